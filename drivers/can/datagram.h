@@ -1,0 +1,27 @@
+/// drivers/can/datagram.h - reading one datagram with the time of its arrival and the kernel's count of lost ones.
+#pragma once
+
+#include <sys/socket.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace narpa {
+
+/// At least 4 MiB of receive buffer (the default holds 278 classic CAN frames: 35 ms of a full 1 Mbit/s bus),
+/// arrival stamps and loss counts.
+void prepare_for_bursts(int fd) noexcept;
+
+struct Datagram {
+    long bytes = -1;  ///< as recvmsg: -1 with errno when there is none
+    bool truncated = false;
+    std::int64_t t_received_ns = 0;  ///< CLOCK_MONOTONIC
+    std::uint32_t lost = 0;          ///< datagrams that the kernel threw away, up to now; 0: not told
+};
+
+/// Does not wait. `source`, where given, gets the sender's address.
+[[nodiscard]] Datagram receive_datagram(int fd, std::span<std::uint8_t> buffer, sockaddr* source = nullptr,
+                                        socklen_t source_bytes = 0) noexcept;
+
+}  // namespace narpa

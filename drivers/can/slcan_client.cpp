@@ -1,0 +1,148 @@
+// The side of slcan that commands: it connects to a hub on loopback, opens the channel, and comes back when the hub
+// does.
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "drivers/can/buses.h"
+#include "drivers/can/slcan_stream.h"
+
+namespace narpa {
+namespace {
+
+enum class Connection : std::uint8_t { made, under_way, refused };
+
+/// Starts to connect; `under_way` when the answer takes a moment even on loopback.
+Connection connect_to(std::uint16_t port, Descriptor& fd) noexcept {
+    fd = Descriptor(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    if (!fd) return Connection::refused;
+    const int on = 1;
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+        return Connection::made;
+    return errno == EINPROGRESS ? Connection::under_way : Connection::refused;
+}
+
+/// How a connection under way has come out; errno says why it was refused.
+Connection outcome(int fd, std::int64_t timeout_ns) noexcept {
+    std::array<pollfd, 1> fds{{{fd, POLLOUT, 0}}};
+    wait_ready(fds, timeout_ns);
+    if (fds[0].revents == 0) return Connection::under_way;
+    int reason = 0;
+    socklen_t bytes = sizeof reason;
+    ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &reason, &bytes);
+    errno = reason;
+    return reason == 0 ? Connection::made : Connection::refused;
+}
+
+class SlcanClient final : public CanBus {
+public:
+    SlcanClient(Descriptor fd, std::uint16_t port) : port_(port) { begin(std::move(fd)); }
+    ~SlcanClient() override {
+        if (stream_ && stream_.write("C\r")) stream_.flush();
+    }
+
+    [[nodiscard]] bool receive(ReceivedFrame& out) noexcept override {
+        for (;;) {
+            std::string_view line;
+            while (stream_.next_line(line)) {
+                count_overlong();
+                if (decode_slcan(line, out.frame)) {
+                    out.t_received_ns = monotonic_ns();
+                    ++counters_.received;
+                    return true;
+                }
+                // The hub's answers to what we sent: z and Z; the rest are lines that no hub sends unasked.
+                if (line != "z" && line != "Z") ++counters_.malformed;
+            }
+            count_overlong();
+            if (!ready()) return false;
+            stream_.flush();
+            if (!stream_.read()) {
+                stream_.close();
+                overlong_ = 0;
+                ++counters_.interface_down;
+                return false;
+            }
+            if (!stream_.unread()) return false;
+        }
+    }
+
+    bool send(const CanFrame& frame) noexcept override {
+        std::array<char, kSlcanMaxLine> line;
+        const std::size_t n = sendable(frame) ? encode_slcan(frame, line) : 0;
+        const bool taken = n > 0 && ready() && stream_.write({line.data(), n});
+        ++(taken ? counters_.sent : counters_.send_drops);
+        return taken;
+    }
+
+    void wait(std::int64_t timeout_ns) noexcept override {
+        if (stream_.unread()) return;
+        const bool write_too = stream_.pending() || connecting_;
+        std::array<pollfd, 1> fds{{{stream_ ? stream_.fd() : connecting_.get(),
+                                    static_cast<short>(write_too ? POLLIN | POLLOUT : POLLIN), 0}}};
+        wait_ready(fds, stream_ ? timeout_ns : retry_.limit(timeout_ns));
+    }
+
+    [[nodiscard]] bool carries_fd() const noexcept override { return false; }
+    [[nodiscard]] std::string description() const override {
+        return "slcan: client of 127.0.0.1:" + std::to_string(port_);
+    }
+
+private:
+    void begin(Descriptor fd) noexcept {
+        stream_.attach(std::move(fd));
+        for (const std::string_view line : {"C\r", "S8\r", "O\r"})
+            if (!stream_.write(line)) ++counters_.send_drops;
+    }
+
+    /// Connected, if need be by a new try.
+    bool ready() noexcept {
+        if (stream_) return true;
+        Connection connection = Connection::refused;
+        if (connecting_)
+            connection = outcome(connecting_.get(), 0);
+        else if (retry_.due())
+            connection = connect_to(port_, connecting_);
+        if (connection == Connection::made) begin(std::move(connecting_));
+        if (connection == Connection::refused) connecting_.reset();
+        return static_cast<bool>(stream_);
+    }
+
+    void count_overlong() noexcept {
+        counters_.malformed += stream_.overlong() - overlong_;
+        overlong_ = stream_.overlong();
+    }
+
+    SlcanStream stream_{};
+    Descriptor connecting_{};
+    std::uint16_t port_;
+    std::uint64_t overlong_ = 0;
+    RetryTimer retry_{};
+};
+
+}  // namespace
+
+CanBusResult open_slcan_client(std::uint16_t port) {
+    Descriptor fd;
+    Connection connection = connect_to(port, fd);
+    if (connection == Connection::under_way) connection = outcome(fd.get(), kSecond_ns);
+    if (connection != Connection::made) {
+        const std::string spec = "slcan:" + std::to_string(port);
+        return Error{
+            .what = spec + ": cannot connect to 127.0.0.1:" + std::to_string(port) + ": " + std::strerror(errno),
+            .kind = ErrorKind::missing,
+            .remedy = "narpa run SCENE --can " + spec + "   (start the hub first)"};
+    }
+    return CanBusResult(std::make_unique<SlcanClient>(std::move(fd), port));
+}
+
+}  // namespace narpa

@@ -1,0 +1,231 @@
+// The slcan bus as narpa offers it: clients come over TCP on loopback or over one pseudo-terminal, and all of them
+// and narpa share the bus. Wire: protocols/can/slcan.h.
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <termios.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "drivers/can/buses.h"
+#include "drivers/can/slcan_stream.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::size_t kTcpClients = 8, kPty = kTcpClients, kClients = kTcpClients + 1;
+
+struct Client {
+    SlcanStream stream{};
+    bool open = false;  ///< it has sent O: it takes part in the bus
+    std::uint64_t overlong = 0;
+};
+
+/// Frames that have come in and not been taken yet; its size is fixed at the start.
+class FrameQueue {
+public:
+    [[nodiscard]] bool empty() const noexcept { return begin_ == end_; }
+    [[nodiscard]] std::size_t free() const noexcept { return frames_.size() - (end_ - begin_); }
+    void push(const ReceivedFrame& f) noexcept { frames_[end_++ % frames_.size()] = f; }
+    [[nodiscard]] const ReceivedFrame& pop() noexcept { return frames_[begin_++ % frames_.size()]; }
+
+private:
+    std::vector<ReceivedFrame> frames_{4096};
+    std::size_t begin_ = 0, end_ = 0;
+};
+
+/// No read brings more frames than this: the shortest line is "t1230" and CR.
+constexpr std::size_t kFramesPerRead = SlcanStream::kReadBytes / 6 + 1;
+
+class SlcanHub final : public CanBus {
+public:
+    SlcanHub(Descriptor listener, std::uint16_t port, Descriptor pty_near, Descriptor pty_far, std::string pty_path)
+        : listener_(std::move(listener)),
+          pty_far_(std::move(pty_far)),
+          port_(port),
+          pty_path_(std::move(pty_path)) {
+        clients_[kPty].stream.attach(std::move(pty_near));
+    }
+
+    [[nodiscard]] bool receive(ReceivedFrame& out) noexcept override {
+        if (queue_.empty()) serve();
+        if (queue_.empty()) return false;
+        out = queue_.pop();
+        ++counters_.received;
+        return true;
+    }
+
+    bool send(const CanFrame& frame) noexcept override {
+        std::array<char, kSlcanMaxLine> line;
+        const std::size_t n = sendable(frame) ? encode_slcan(frame, line) : 0;
+        const Delivery delivery = n > 0 ? deliver({line.data(), n}, nullptr) : Delivery{};
+        if (delivery.taken > 0)
+            ++counters_.sent;
+        else if (delivery.missed == 0)
+            ++counters_.send_drops;
+        return delivery.taken > 0;
+    }
+
+    void wait(std::int64_t timeout_ns) noexcept override {
+        if (!queue_.empty()) return;
+        std::array<pollfd, kClients + 1> fds{};
+        fds[kClients] = {listener_.get(), POLLIN, 0};
+        for (std::size_t i = 0; i < kClients; ++i) {
+            const SlcanStream& s = clients_[i].stream;
+            fds[i] = {s.fd(), static_cast<short>(s.pending() ? POLLIN | POLLOUT : POLLIN), 0};
+        }
+        wait_ready(fds, timeout_ns);
+    }
+
+    [[nodiscard]] bool carries_fd() const noexcept override { return false; }
+    [[nodiscard]] std::string description() const override {
+        return "slcan: 127.0.0.1:" + std::to_string(port_) + " and " + pty_path_;
+    }
+
+private:
+    struct Delivery {
+        std::uint64_t taken = 0, missed = 0;  ///< clients
+    };
+
+    void serve() noexcept {
+        accept_clients();
+        for (Client& client : clients_) {
+            if (!client.stream) continue;
+            client.stream.flush();
+            // A full queue leaves the rest in the client's socket: it is slowed down and loses nothing.
+            if (queue_.free() >= kFramesPerRead) serve(client);
+        }
+    }
+
+    void accept_clients() noexcept {
+        for (;;) {
+            Descriptor fd(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+            if (!fd) return;
+            const int on = 1;
+            ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+            for (std::size_t i = 0; i < kTcpClients; ++i) {
+                if (clients_[i].stream) continue;
+                clients_[i].stream.attach(std::move(fd));
+                clients_[i].open = false;
+                clients_[i].overlong = 0;
+                break;
+            }  // no place left: fd closes, and the client sees it
+        }
+    }
+
+    void serve(Client& client) noexcept {
+        const bool there = client.stream.read();
+        std::string_view line;
+        while (client.stream.next_line(line)) obey(client, line);
+        for (; client.overlong < client.stream.overlong(); ++client.overlong) refuse(client);
+        if (there || &client == &clients_[kPty]) return;
+        client.stream.close();
+        client.open = false;
+        ++counters_.interface_down;
+    }
+
+    void obey(Client& client, std::string_view line) noexcept {
+        const bool bare = line.size() == 1;
+        switch (line[0]) {
+            case 'O':
+            case 'C':
+                if (!bare) return refuse(client);
+                client.open = line[0] == 'O';
+                if (&client == &clients_[kPty] && !client.open) forget_unread(client);
+                return answer(client, "\r");
+            case 'S':
+                return line.size() == 2 && line[1] >= '0' && line[1] <= '9' ? answer(client, "\r") : refuse(client);
+            case 'V': return bare ? answer(client, "V1013\r") : refuse(client);
+            case 'N': return bare ? answer(client, "NNRP1\r") : refuse(client);
+            case 'F': return bare ? answer(client, "F00\r") : refuse(client);
+            default: return take_frame(client, line);
+        }
+    }
+
+    void take_frame(Client& client, std::string_view line) noexcept {
+        ReceivedFrame received;
+        if (!client.open || !decode_slcan(line, received.frame)) return refuse(client);
+        received.t_received_ns = monotonic_ns();
+        queue_.push(received);
+        answer(client, received.frame.extended ? "Z\r" : "z\r");
+        std::array<char, kSlcanMaxLine> text;
+        const std::size_t n = encode_slcan(received.frame, text);
+        deliver({text.data(), n}, &client);
+    }
+
+    /// To every open client but `from`. One that has fallen too far behind misses it: that is counted.
+    Delivery deliver(std::string_view line, const Client* from) noexcept {
+        Delivery delivery;
+        for (Client& client : clients_)
+            if (client.open && &client != from) ++(client.stream.write(line) ? delivery.taken : delivery.missed);
+        counters_.send_drops += delivery.missed;
+        return delivery;
+    }
+
+    void answer(Client& client, std::string_view text) noexcept {
+        if (!client.stream.write(text)) ++counters_.send_drops;
+    }
+    void refuse(Client& client) noexcept {
+        ++counters_.malformed;
+        answer(client, "\a");
+    }
+
+    /// What nobody read on the pty would otherwise wait there for the next program that opens it.
+    void forget_unread(Client& client) noexcept {
+        client.stream.discard();
+        ::tcflush(pty_far_.get(), TCIFLUSH);
+    }
+
+    Descriptor listener_, pty_far_;
+    std::uint16_t port_;
+    std::string pty_path_;
+    std::array<Client, kClients> clients_{};
+    FrameQueue queue_{};
+};
+
+Error failed(const std::string& what) {
+    return {.what = what + ": " + std::strerror(errno), .kind = ErrorKind::missing};
+}
+
+}  // namespace
+
+CanBusResult open_slcan_hub(std::uint16_t port) {
+    const std::string name = "slcan:" + std::to_string(port);
+    Descriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int on = 1;
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t bytes = sizeof address;
+    auto* const raw = reinterpret_cast<sockaddr*>(&address);
+    if (!listener || ::setsockopt(listener.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
+        ::bind(listener.get(), raw, sizeof address) != 0 || ::listen(listener.get(), kTcpClients) != 0 ||
+        ::getsockname(listener.get(), raw, &bytes) != 0) {
+        Error error = failed(name + ": cannot listen on 127.0.0.1:" + std::to_string(port));
+        error.remedy = "another port, such as slcan:" + std::to_string(port < 65535 ? port + 1 : 29537) +
+                       ", or see who has it: ss -ltnp 'sport = :" + std::to_string(port) + "'";
+        return error;
+    }
+
+    Descriptor near(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+    std::array<char, 64> path{};
+    if (!near || ::grantpt(near.get()) != 0 || ::unlockpt(near.get()) != 0 ||
+        ::ptsname_r(near.get(), path.data(), path.size()) != 0)
+        return failed(name + ": cannot make a pseudo-terminal");
+    // The far end stays open here, so that clients may come and go without hanging up the near one.
+    Descriptor far(::open(path.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
+    termios mode{};
+    if (!far || ::tcgetattr(far.get(), &mode) != 0) return failed(name + ": " + path.data());
+    ::cfmakeraw(&mode);
+    if (::tcsetattr(far.get(), TCSANOW, &mode) != 0) return failed(name + ": " + path.data());
+    return CanBusResult(std::make_unique<SlcanHub>(std::move(listener), ntohs(address.sin_port), std::move(near),
+                                                   std::move(far), path.data()));
+}
+
+}  // namespace narpa

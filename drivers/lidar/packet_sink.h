@@ -1,0 +1,39 @@
+/// drivers/lidar/packet_sink.h - where LiDAR packets go: UDP, a capture file, or nowhere.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+
+namespace narpa {
+
+struct PacketCounters {
+    std::uint64_t sent = 0;
+    std::uint64_t dropped = 0;  ///< socket buffer full, nobody listening, disk full
+};
+
+/// Ports by the maker's convention; `udp:HOST:PORT` moves the data port, position packets keep their distance.
+enum class PacketKind : std::uint8_t { data, position };
+
+class PacketSink {
+public:
+    virtual ~PacketSink() = default;
+    /// Sends one datagram. Never blocks. `t_ns` is the simulation time at which the instrument would send it;
+    /// a capture stamps the packet with it.
+    virtual bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept = 0;
+    /// Waits, at most a second, until what was sent is written; then the counters are final.
+    virtual void flush() noexcept = 0;
+    [[nodiscard]] virtual PacketCounters counters() const noexcept = 0;
+    [[nodiscard]] virtual std::string description() const = 0;
+};
+
+/// SINK: `udp:HOST:PORT` | `FILE.pcap` | `none`. `epoch_unix_ns` is the UTC of simulation time 0, for captures.
+/// `wait_when_full`: a lockstep run waits for the disk where a real-time run drops.
+Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, std::int64_t epoch_unix_ns,
+                                                     bool wait_when_full);
+
+}  // namespace narpa

@@ -1,0 +1,191 @@
+#include "drivers/lidar/backends.h"
+
+#ifdef NARPA_WITH_PCAP
+
+#include <pcap/pcap.h>
+#include <stdio_ext.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "drivers/outbox.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::size_t kEthernetBytes = 14, kIpBytes = 20, kUdpBytes = 8;
+constexpr std::size_t kHeaderBytes = kEthernetBytes + kIpBytes + kUdpBytes;  // 42, as the manual counts
+constexpr std::size_t kPayloadMax = 1500 - kIpBytes - kUdpBytes;
+constexpr std::size_t kRecordSlots = 2048;  // 2.7 s of data packets: a disk may pause
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+// A record of the ring: when, then the Ethernet frame.
+constexpr std::size_t kStampBytes = sizeof(std::int64_t);
+using Record = std::array<std::uint8_t, kStampBytes + kHeaderBytes + kPayloadMax>;
+
+void put_be16(std::uint8_t* at, std::size_t value) noexcept {
+    at[0] = static_cast<std::uint8_t>(value >> 8);
+    at[1] = static_cast<std::uint8_t>(value);
+}
+
+// One's complement sum of 16-bit words (RFC 1071), not yet complemented.
+std::uint32_t add_words(const std::uint8_t* at, std::size_t size, std::uint32_t sum) noexcept {
+    for (std::size_t i = 0; i < size; ++i) sum += i % 2 == 0 ? std::uint32_t{at[i]} << 8 : at[i];
+    return sum;
+}
+std::uint16_t checksum(std::uint32_t sum) noexcept {
+    while (sum >> 16) sum = (sum & 0xFFFF) + (sum >> 16);
+    return static_cast<std::uint16_t>(~sum);
+}
+
+// Ethernet, IPv4 and UDP as the instrument sends by default: 192.168.1.201 broadcasts, source port = its port.
+std::size_t put_frame(std::uint8_t* frame, int port, std::span<const std::uint8_t> payload) noexcept {
+    constexpr std::array<std::uint8_t, kEthernetBytes> ethernet{
+        0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,  // to all
+        0x60, 0x76, 0x88, 0,    0,    0,     // Velodyne's prefix
+        0x08, 0x00};                         // IPv4
+    constexpr std::array<std::uint8_t, 8> addresses{192, 168, 1, 201, 255, 255, 255, 255};
+    constexpr std::uint8_t udp_protocol = 17;
+    const std::size_t udp_length = kUdpBytes + payload.size();
+
+    std::memcpy(frame, ethernet.data(), ethernet.size());
+    std::uint8_t* ip = frame + kEthernetBytes;
+    std::memset(ip, 0, kIpBytes);
+    ip[0] = 0x45;  // version 4, five words
+    put_be16(ip + 2, kIpBytes + udp_length);
+    put_be16(ip + 6, 0x4000);  // do not fragment
+    ip[8] = 255;               // time to live
+    ip[9] = udp_protocol;
+    std::memcpy(ip + 12, addresses.data(), addresses.size());
+    put_be16(ip + 10, checksum(add_words(ip, kIpBytes, 0)));
+
+    std::uint8_t* udp = ip + kIpBytes;
+    put_be16(udp, static_cast<std::size_t>(port));
+    put_be16(udp + 2, static_cast<std::size_t>(port));
+    put_be16(udp + 4, udp_length);
+    put_be16(udp + 6, 0);
+    std::memcpy(udp + kUdpBytes, payload.data(), payload.size());
+    const std::uint32_t pseudo_header =
+        add_words(addresses.data(), addresses.size(), static_cast<std::uint32_t>(udp_protocol + udp_length));
+    const std::uint16_t sum = checksum(add_words(udp, udp_length, pseudo_header));
+    put_be16(udp + 6, sum == 0 ? 0xFFFF : sum);  // RFC 768: 0 would mean "no checksum"
+    return kHeaderBytes + payload.size();
+}
+
+// The file always ends with a whole record: what a full disk cut short is taken back.
+class PcapWriter final : public OutboxWriter {
+public:
+    /// The file's header is already written.
+    PcapWriter(pcap_t* pcap, pcap_dumper_t* dumper)
+        : pcap_(pcap), dumper_(dumper), file_(pcap_dump_file(dumper)), end_of_last_record_(::ftello(file_)) {}
+    ~PcapWriter() override {
+        ::pcap_dump_close(dumper_);
+        ::pcap_close(pcap_);
+    }
+
+    void write(std::span<const std::uint8_t> record, const Outbox&) noexcept override {
+        std::int64_t unix_ns = 0;
+        std::memcpy(&unix_ns, record.data(), kStampBytes);
+        const auto length = static_cast<bpf_u_int32>(record.size() - kStampBytes);
+        // With nanosecond precision libpcap keeps nanoseconds in tv_usec.
+        const pcap_pkthdr header{{unix_ns / kSecondNs, unix_ns % kSecondNs}, length, length};
+        ::pcap_dump(reinterpret_cast<u_char*>(dumper_), &header, record.data() + kStampBytes);
+        if (::pcap_dump_flush(dumper_) != 0 || std::ferror(file_) != 0) return take_back();
+        end_of_last_record_ = ::ftello(file_);
+        sent.fetch_add(1, std::memory_order_relaxed);
+    }
+    void abandon(std::span<const std::uint8_t>) noexcept override { lost_.fetch_add(1, std::memory_order_relaxed); }
+    [[nodiscard]] std::uint64_t lost_packets() const noexcept { return lost_.load(std::memory_order_relaxed); }
+
+    std::atomic<std::uint64_t> sent{0};
+
+private:
+    void take_back() noexcept {
+        abandon({});
+        ::__fpurge(file_);
+        std::clearerr(file_);
+        if (::ftruncate(::fileno(file_), end_of_last_record_) == 0) ::fseeko(file_, end_of_last_record_, SEEK_SET);
+    }
+
+    pcap_t* pcap_;
+    pcap_dumper_t* dumper_;
+    std::FILE* file_;
+    off_t end_of_last_record_;
+    std::atomic<std::uint64_t> lost_{0};
+};
+
+class PcapSink final : public PacketSink {
+public:
+    PcapSink(const std::string& path, std::int64_t epoch_unix_ns, bool wait_when_full, pcap_t* pcap,
+             pcap_dumper_t* dumper)
+        : description_("capture " + path),
+          epoch_unix_ns_(epoch_unix_ns),
+          writer_(pcap, dumper),
+          outbox_(writer_, kRecordSlots, sizeof(Record), wait_when_full) {}
+
+    bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept override {
+        if (payload.size() > kPayloadMax) {
+            writer_.abandon(payload);
+            return false;
+        }
+        Record record;
+        const std::int64_t unix_ns = epoch_unix_ns_ + t_ns;
+        std::memcpy(record.data(), &unix_ns, kStampBytes);
+        const int port = kind == PacketKind::data ? kVelodyneDataPort : kVelodynePositionPort;
+        const std::size_t size = kStampBytes + put_frame(record.data() + kStampBytes, port, payload);
+        return outbox_.push(std::span(record).first(size));
+    }
+    void flush() noexcept override { outbox_.flush(); }
+    PacketCounters counters() const noexcept override {
+        return {writer_.sent.load(std::memory_order_relaxed), outbox_.dropped() + writer_.lost_packets()};
+    }
+    std::string description() const override { return description_; }
+
+private:
+    std::string description_;
+    std::int64_t epoch_unix_ns_;
+    PcapWriter writer_;
+    Outbox outbox_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std::int64_t epoch_unix_ns,
+                                                   bool wait_when_full) {
+    constexpr int snapshot_bytes = 65535;
+    pcap_t* pcap = ::pcap_open_dead_with_tstamp_precision(DLT_EN10MB, snapshot_bytes, PCAP_TSTAMP_PRECISION_NANO);
+    if (pcap == nullptr) return Error{"libpcap gave no handle", path, 0, 0, ErrorKind::missing};
+    pcap_dumper_t* dumper = ::pcap_dump_open(pcap, path.c_str());
+    if (dumper == nullptr || ::pcap_dump_flush(dumper) != 0) {
+        Error error{std::string("cannot write the capture: ") + std::strerror(errno), path, 0, 0,
+                    ErrorKind::missing};
+        if (dumper != nullptr) ::pcap_dump_close(dumper);
+        ::pcap_close(pcap);
+        return error;
+    }
+    return std::unique_ptr<PacketSink>(
+        std::make_unique<PcapSink>(path, epoch_unix_ns, wait_when_full, pcap, dumper));
+}
+
+}  // namespace narpa
+
+#else
+
+namespace narpa {
+
+Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std::int64_t, bool) {
+    return Error{"this narpa was built without captures",
+                 path,
+                 0,
+                 0,
+                 ErrorKind::missing,
+                 "cmake -DNARPA_WITH_PCAP=ON ... (needs libpcap-dev), and build again"};
+}
+
+}  // namespace narpa
+
+#endif

@@ -1,0 +1,113 @@
+#include "drivers/outbox.h"
+
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <system_error>
+
+namespace narpa {
+namespace {
+
+constexpr std::int64_t kFlushNs = 1'000'000'000;
+
+std::int64_t now_ns() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+// Signals belong to the thread that started the program; a reader that leaves must not raise SIGPIPE here.
+std::thread start_without_signals(auto body) {
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    std::thread thread(body);
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    return thread;
+}
+
+}  // namespace
+
+Outbox::Outbox(OutboxWriter& writer, std::size_t slots, std::size_t slot_bytes, bool wait_when_full)
+    : writer_(writer),
+      slots_(slots),
+      slot_bytes_(slot_bytes),
+      wait_when_full_(wait_when_full),
+      ring_(slots * slot_bytes),
+      sizes_(slots) {
+    wake_fd_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (wake_fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+    sem_init(&free_slots_, 0, static_cast<unsigned>(slots));
+    thread_ = start_without_signals([this] { run(); });
+}
+
+Outbox::~Outbox() {
+    flush();
+    ending_.store(true, std::memory_order_release);
+    ::eventfd_write(wake_fd_, 1);
+    thread_.join();
+    sem_destroy(&free_slots_);
+    ::close(wake_fd_);
+}
+
+bool Outbox::push(std::span<const std::uint8_t> item) noexcept {
+    const bool fits = item.size() <= slot_bytes_;
+    if (!fits || (wait_when_full_ ? sem_wait(&free_slots_) : sem_trywait(&free_slots_)) != 0) {
+        dropped_.fetch_add(1, std::memory_order_relaxed);
+        return false;
+    }
+    const std::size_t slot = next_push_ % slots_;
+    std::memcpy(ring_.data() + slot * slot_bytes_, item.data(), item.size());
+    sizes_[slot] = item.size();
+    pushed_.store(++next_push_, std::memory_order_release);
+    ::eventfd_write(wake_fd_, 1);
+    return true;
+}
+
+void Outbox::flush() noexcept {
+    flush_deadline_ns_.store(now_ns() + kFlushNs, std::memory_order_release);
+    // Who holds every slot knows that the ring is empty.
+    for (std::size_t held = 0; held < slots_;) held += sem_wait(&free_slots_) == 0 ? 1 : 0;
+    for (std::size_t held = slots_; held > 0; --held) sem_post(&free_slots_);
+    flush_deadline_ns_.store(0, std::memory_order_release);
+}
+
+int Outbox::time_left_ms() const noexcept {
+    const std::int64_t deadline_ns = flush_deadline_ns_.load(std::memory_order_acquire);
+    if (deadline_ns == 0) return -1;
+    return static_cast<int>(std::max<std::int64_t>(0, (deadline_ns - now_ns()) / 1'000'000));
+}
+
+void Outbox::run() noexcept {
+    for (std::uint64_t next = 0;;) {
+        if (next == pushed_.load(std::memory_order_acquire)) {
+            if (ending_.load(std::memory_order_acquire)) return;
+            wait_for_work();
+            continue;
+        }
+        const std::size_t slot = next++ % slots_;
+        const std::span<const std::uint8_t> item{ring_.data() + slot * slot_bytes_, sizes_[slot]};
+        if (time_left_ms() == 0) {
+            writer_.abandon(item);
+        } else {
+            writer_.write(item, *this);
+        }
+        sem_post(&free_slots_);
+    }
+}
+
+void Outbox::wait_for_work() noexcept {
+    pollfd fds[] = {{wake_fd_, POLLIN, 0}, {writer_.watched(), 0, 0}};
+    if (::poll(fds, 2, -1) < 0) return;
+    if (fds[1].revents & (POLLERR | POLLHUP)) writer_.lost();
+    eventfd_t count = 0;
+    if (fds[0].revents & POLLIN) ::eventfd_read(wake_fd_, &count);
+}
+
+}  // namespace narpa

@@ -1,0 +1,248 @@
+#include <fcntl.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <numeric>
+
+#include "drivers/outbox.h"
+#include "drivers/video/backends.h"
+
+// v4l2loopback 0.12.7 (Debian 12) decides the way here: memory-mapped output always returns the same buffer, so
+// frames go by write(); an unknown format is "accepted" as another, so what comes back is compared; without
+// STREAMON before the first write the device is unusable once the writer has closed it, and newer versions (0.13)
+// refuse that same STREAMON with EINVAL, harmlessly. See v4l2loopback issues 191, 442 and 607.
+
+namespace narpa {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+std::int64_t now_ns() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+int xioctl(int fd, unsigned long request, void* argument) noexcept {
+    int result = 0;
+    do result = ::ioctl(fd, request, argument);
+    while (result < 0 && errno == EINTR);
+    return result;
+}
+
+std::uint32_t fourcc(PixelFormat pixel) noexcept {
+    switch (pixel) {
+        case PixelFormat::grey: return V4L2_PIX_FMT_GREY;
+        case PixelFormat::y16: return V4L2_PIX_FMT_Y16;
+        case PixelFormat::yuyv: return V4L2_PIX_FMT_YUYV;
+        case PixelFormat::rgb24: return V4L2_PIX_FMT_RGB24;
+    }
+    return 0;
+}
+
+enum class Step : std::uint8_t { open, query, output, format_call, format_kept, stream, started };
+
+// How far the start of a device came; made into words only when a person is there to read them.
+struct Start {
+    Step step = Step::open;
+    int error = 0;
+    v4l2_pix_format got{};
+    int fd = -1;
+};
+
+v4l2_pix_format wanted_format(const VideoFormat& format) noexcept {
+    v4l2_pix_format pix{};
+    pix.width = static_cast<std::uint32_t>(format.width);
+    pix.height = static_cast<std::uint32_t>(format.height);
+    pix.pixelformat = fourcc(format.pixel);
+    pix.field = V4L2_FIELD_NONE;
+    pix.bytesperline =
+        static_cast<std::uint32_t>(format.width) * static_cast<std::uint32_t>(bytes_per_pixel(format.pixel));
+    pix.sizeimage = static_cast<std::uint32_t>(frame_bytes(format));
+    pix.colorspace = format.pixel == PixelFormat::yuyv ? V4L2_COLORSPACE_SMPTE170M : V4L2_COLORSPACE_SRGB;
+    return pix;
+}
+
+bool is_same(const v4l2_pix_format& a, const v4l2_pix_format& b) noexcept {
+    return a.width == b.width && a.height == b.height && a.pixelformat == b.pixelformat &&
+           a.bytesperline == b.bytesperline;
+}
+
+void tell_frame_rate(int fd, std::int64_t period_ns) noexcept {
+    const std::int64_t common = std::gcd(period_ns, kSecondNs);
+    v4l2_streamparm parameters{};
+    parameters.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    parameters.parm.output.timeperframe = {static_cast<std::uint32_t>(period_ns / common),
+                                           static_cast<std::uint32_t>(kSecondNs / common)};
+    xioctl(fd, VIDIOC_S_PARM, &parameters);  // readers only show it, so a refusal costs nothing
+}
+
+Start start_steps(int fd, const VideoFormat& format) noexcept {
+    v4l2_capability capability{};
+    if (xioctl(fd, VIDIOC_QUERYCAP, &capability) < 0) return {Step::query, errno};
+    const std::uint32_t caps =
+        capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
+    if (!(caps & V4L2_CAP_VIDEO_OUTPUT)) return {Step::output, 0};
+
+    v4l2_format f{};
+    f.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    f.fmt.pix = wanted_format(format);
+    if (xioctl(fd, VIDIOC_S_FMT, &f) < 0) return {Step::format_call, errno};
+    if (!is_same(f.fmt.pix, wanted_format(format))) return {Step::format_kept, 0, f.fmt.pix};
+    tell_frame_rate(fd, format.period_ns);
+    int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    if (xioctl(fd, VIDIOC_STREAMON, &type) < 0 && errno != EINVAL) return {Step::stream, errno};
+    return {Step::started, 0};
+}
+
+Start start_device(const char* path, const VideoFormat& format) noexcept {
+    const int fd = ::open(path, O_RDWR | O_CLOEXEC);
+    if (fd < 0) return {Step::open, errno};
+    Start start = start_steps(fd, format);
+    if (start.step == Step::started) {
+        start.fd = fd;
+    } else {
+        ::close(fd);
+    }
+    return start;
+}
+
+std::string format_text(const v4l2_pix_format& pix) {
+    std::string text;
+    for (int i = 0; i < 4; ++i) text += static_cast<char>(pix.pixelformat >> (8 * i) & 0x7F);
+    return std::to_string(pix.width) + "x" + std::to_string(pix.height) + " " + text + ", " +
+           std::to_string(pix.bytesperline) + " bytes a line";
+}
+
+// The number in /dev/videoN, or 10.
+std::string video_number(const std::string& path) {
+    constexpr std::string_view prefix = "/dev/video";
+    const std::string number = path.starts_with(prefix) ? path.substr(prefix.size()) : "";
+    return number.empty() || !std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; }) ? "10"
+                                                                                                       : number;
+}
+
+Error describe(const std::string& path, const VideoFormat& format, const Start& start) {
+    const std::string load =
+        "sudo modprobe v4l2loopback video_nr=" + video_number(path) + " exclusive_caps=1 max_buffers=8";
+    const std::string reload = "sudo modprobe -r v4l2loopback && " + load;
+    Error error{{}, path, 0, 0, ErrorKind::missing, load};
+    const std::string why = std::strerror(start.error);
+    switch (start.step) {
+        case Step::open:
+            error.what = "cannot open the video device: " + why;
+            if (start.error == EACCES) error.remedy = "sudo usermod -aG video $USER   (then log in again)";
+            if (start.error == EBUSY) error.remedy = "close the other program that writes to it";
+            break;
+        case Step::query:
+            error.what = "not a V4L2 device (" + why + "); expected a video output such as v4l2loopback's";
+            break;
+        case Step::output:
+            error.what =
+                "this V4L2 device takes no frames (a camera, or a v4l2loopback that another program writes to "
+                "or left unusable)";
+            error.remedy = reload;
+            break;
+        case Step::format_call:
+            error.what = "the device refuses " + format_text(wanted_format(format)) + ": " + why;
+            error.remedy = reload;
+            break;
+        case Step::format_kept:
+            error.what = "asked for " + format_text(wanted_format(format)) + ", the device stays at " +
+                         format_text(start.got) + "; a reader may hold it open, or it cannot do this format";
+            error.remedy = "close its readers, or " + reload;
+            break;
+        case Step::stream: error.what = "cannot start output: " + why; break;
+        case Step::started: break;
+    }
+    return error;
+}
+
+class V4l2Writer final : public OutboxWriter {
+public:
+    V4l2Writer(std::string path, const VideoFormat& format, int fd)
+        : path_(std::move(path)), format_(format), fd_(fd) {}
+    ~V4l2Writer() override { close_device(); }
+
+    void write(std::span<const std::uint8_t> frame, const Outbox&) noexcept override {
+        if (fd_ < 0 && !look_for_device()) return abandon(frame);
+        ssize_t n = 0;
+        do n = ::write(fd_, frame.data(), frame.size());
+        while (n < 0 && errno == EINTR);
+        if (n == static_cast<ssize_t>(frame.size())) {
+            written.fetch_add(1, std::memory_order_relaxed);
+            return;
+        }
+        if (n < 0 && errno != EAGAIN) close_device();
+        abandon(frame);
+    }
+    void abandon(std::span<const std::uint8_t>) noexcept override {
+        failed.fetch_add(1, std::memory_order_relaxed);
+    }
+
+    std::atomic<std::uint64_t> written{0}, failed{0}, reconnects{0};
+
+private:
+    bool look_for_device() noexcept {
+        const std::int64_t now = now_ns();
+        if (now < next_look_ns_) return false;
+        next_look_ns_ = now + kSecondNs;
+        fd_ = start_device(path_.c_str(), format_).fd;
+        if (fd_ < 0) return false;
+        reconnects.fetch_add(1, std::memory_order_relaxed);
+        return true;
+    }
+    void close_device() noexcept {
+        if (fd_ >= 0) ::close(fd_);
+        fd_ = -1;
+        next_look_ns_ = now_ns() + kSecondNs;
+    }
+
+    std::string path_;
+    VideoFormat format_;
+    int fd_;
+    std::int64_t next_look_ns_ = 0;
+};
+
+class V4l2Sink final : public VideoSink {
+public:
+    V4l2Sink(const std::string& path, const VideoFormat& format, WhenFull full, int fd)
+        : description_("V4L2 output " + path + ", " + format_text(wanted_format(format))),
+          frame_size_(frame_bytes(format)),
+          writer_(path, format, fd),
+          outbox_(writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
+
+    bool send(std::span<const std::uint8_t> frame) noexcept override {
+        if (frame.size() == frame_size_) return outbox_.push(frame);
+        writer_.abandon(frame);
+        return false;
+    }
+    void flush() noexcept override { outbox_.flush(); }
+    VideoCounters counters() const noexcept override {
+        return {writer_.written.load(std::memory_order_relaxed), outbox_.dropped(), 0,
+                writer_.failed.load(std::memory_order_relaxed), writer_.reconnects.load(std::memory_order_relaxed)};
+    }
+    std::string description() const override { return description_; }
+
+private:
+    std::string description_;
+    std::size_t frame_size_;
+    V4l2Writer writer_;
+    Outbox outbox_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
+                                                  WhenFull full) {
+    const Start start = start_device(path.c_str(), format);
+    if (start.step != Step::started) return describe(path, format, start);
+    return std::unique_ptr<VideoSink>(std::make_unique<V4l2Sink>(path, format, full, start.fd));
+}
+
+}  // namespace narpa

@@ -1,0 +1,44 @@
+/// drivers/video/video_sink.h - where frames go: a V4L2 output device, a Y4M file or FIFO, or nowhere.
+///
+/// A sink owns a thread and a ring of preallocated frames, so that handing a frame over is one copy: no disk, no
+/// reader and no device can hold the loop up.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/pixel_format.h"
+#include "base/result.h"
+
+namespace narpa {
+
+struct VideoCounters {
+    std::uint64_t written = 0;     ///< whole frames that reached the device, file or reader
+    std::uint64_t ring_full = 0;   ///< dropped: the sink could not keep up
+    std::uint64_t no_reader = 0;   ///< dropped: a FIFO that nobody reads
+    std::uint64_t failed = 0;      ///< dropped: the write failed (device gone, disk full)
+    std::uint64_t reconnects = 0;  ///< times that a reader or a device came back
+};
+
+/// What to do when the ring is full: a real-time run drops, a lockstep run waits (and no frame is ever lost).
+enum class WhenFull : std::uint8_t { drop, wait };
+
+class VideoSink {
+public:
+    virtual ~VideoSink() = default;  ///< flushes what is in the ring, within a second
+    /// Copies one whole frame (frame_bytes) into the ring. False: dropped and counted. Never blocks unless
+    /// the sink was opened with WhenFull::wait.
+    virtual bool send(std::span<const std::uint8_t> frame) noexcept = 0;
+    /// Waits, at most a second, until what was sent is written; then the counters are final.
+    virtual void flush() noexcept = 0;
+    [[nodiscard]] virtual VideoCounters counters() const noexcept = 0;
+    [[nodiscard]] virtual std::string description() const = 0;
+};
+
+/// SINK: `/dev/videoN` (V4L2 output) | `FILE.y4m` or an existing FIFO | `none`.
+Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full);
+
+}  // namespace narpa

@@ -1,0 +1,116 @@
+#include "emulator/camera_feed.h"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "emulator/trajectory.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::string_view kLedgerHeader =
+    "frame,pose_counter,t_pose_ns,stale,t_exposure_start_ns,t_exposure_mid_ns,t_exposure_end_ns,t_render_start_ns,"
+    "t_render_end_ns,t_hand_over_ns,t_deadline_ns,deadline_met,samples_per_pixel,expected_error\n";
+
+}  // namespace
+
+CameraFeed::CameraFeed(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
+    : world_(world), unit_(world, camera), sinks_(std::move(sinks)) {
+    const LatePolicy late = unit_.camera().late;
+    if (late == LatePolicy::repeat || late == LatePolicy::blank) spare_.resize(unit_.bytes().size());
+}
+
+Status CameraFeed::log_to(const std::string& folder, bool wait_when_full) {
+    folder_ = folder;
+    const std::string stem = folder + "/" + unit_.camera().name;
+    auto truth = RowLog::create(stem + ".truth.csv", std::string(kTrajectoryHeader) + "\n", wait_when_full);
+    if (!truth) return truth.error();
+    auto ledger = RowLog::create(stem + ".ledger.csv", kLedgerHeader, wait_when_full);
+    if (!ledger) return ledger.error();
+    truth_log_ = *std::move(truth);
+    ledger_log_ = *std::move(ledger);
+    sheet_ = std::make_unique<ContactSheet>(unit_.format());
+    return Ok{};
+}
+
+void CameraFeed::start_at(std::int64_t t_ns) noexcept {
+    const std::int64_t period = unit_.camera().period_ns;
+    next_ = static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period - 1) / period));
+}
+
+void CameraFeed::make_next(const Clock* clock) {
+    const std::uint32_t frame = next_;
+    const std::int64_t due = due_ns();
+    const std::int64_t started = clock ? clock->now_ns() : due;
+    const std::int64_t wall_start = monotonic_ns();
+
+    FrameLedger ledger = unit_.expose(frame, unit_.t_mid_ns(frame));
+    ledger.t_render_start_ns = started;
+    ledger.t_render_end_ns = clock ? clock->now_ns() : due;
+    ledger.t_deadline_ns = unit_.t_mid_ns(frame + 1);
+    stats_.render.add(monotonic_ns() - wall_start);
+    stats_.wake_late.add(started - due);
+
+    hand_over(ledger, clock);
+    account(ledger, clock);
+    log(ledger);
+}
+
+void CameraFeed::hand_over(FrameLedger& ledger, const Clock* clock) noexcept {
+    const std::int64_t now = clock ? clock->now_ns() : ledger.t_render_end_ns;
+    ledger.deadline_met = now <= ledger.t_deadline_ns;
+    unit_.embed(ledger);
+    const LatePolicy late = unit_.camera().late;
+    if (ledger.deadline_met || late == LatePolicy::late) {
+        send(unit_.bytes());
+        if (late == LatePolicy::repeat) std::copy(unit_.bytes().begin(), unit_.bytes().end(), spare_.begin());
+    } else if (late != LatePolicy::drop) {
+        send(spare_);  // the last frame that was in time, or black
+    }
+    ledger.t_hand_over_ns = clock ? clock->now_ns() : now;
+}
+
+void CameraFeed::send(std::span<const std::uint8_t> bytes) noexcept {
+    for (const auto& sink : sinks_) sink->send(bytes);
+    ++stats_.handed_over;
+}
+
+void CameraFeed::account(const FrameLedger& ledger, const Clock* clock) noexcept {
+    ++stats_.frames;
+    stats_.deadline_missed += !ledger.deadline_met;
+    stats_.stale += ledger.pose_stale;
+    stats_.hand_over.add(ledger.t_hand_over_ns - ledger.t_exposure_mid_ns);
+    stats_.ledgers_lost += !ledgers_.push(ledger);
+    ++next_;
+    // A frame whose successor is already due lets it go: the stream stays in step with the clock.
+    for (; clock && due_ns() + unit_.camera().period_ns <= clock->now_ns(); ++next_) ++stats_.skipped;
+}
+
+void CameraFeed::log(const FrameLedger& l) noexcept {
+    if (!truth_log_) return;
+    std::array<char, RowLog::kMaxLine> row;
+    for (std::size_t i = 0; i < world_.scene().bodies.size(); ++i) {
+        const Motion m = world_.motion(i, l.t_exposure_mid_ns);
+        truth_log_->append({row.data(), format_trajectory_row(row, l.t_exposure_mid_ns, world_.scene().bodies[i].name, m)});
+    }
+    const auto end = fmt::format_to_n(row.data(), row.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{}\n", l.frame,
+                                      l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns,
+                                      l.t_exposure_mid_ns, l.t_exposure_end_ns, l.t_render_start_ns, l.t_render_end_ns,
+                                      l.t_hand_over_ns, l.t_deadline_ns, l.deadline_met, l.samples_per_pixel,
+                                      l.expected_error);
+    ledger_log_->append({row.data(), end.size});
+    sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
+}
+
+Status CameraFeed::finish() {
+    for (const auto& sink : sinks_) sink->flush();
+    if (!sheet_) return Ok{};
+    Status truth = truth_log_->close(), ledger = ledger_log_->close();
+    Status sheet = sheet_->write(folder_ + "/" + unit_.camera().name + ".png");
+    for (Status* s : {&truth, &ledger, &sheet})
+        if (!*s) return s->error();
+    return Ok{};
+}
+
+}  // namespace narpa

@@ -1,0 +1,74 @@
+/// emulator/camera_feed.h - a camera on its way out: unit -> sinks, log, ledger, with everything counted.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/video/video_sink.h"
+#include "emulator/camera_unit.h"
+#include "emulator/clock.h"
+#include "emulator/contact_sheet.h"
+#include "emulator/histogram.h"
+#include "emulator/row_log.h"
+#include "emulator/spsc_ring.h"
+
+namespace narpa {
+
+struct CameraStats {
+    std::uint64_t frames = 0;            ///< exposed
+    std::uint64_t handed_over = 0;       ///< given to the sinks
+    std::uint64_t skipped = 0;           ///< never exposed: the one before took too long
+    std::uint64_t deadline_missed = 0;
+    std::uint64_t stale = 0;             ///< frames that show a body without a fresh command
+    std::uint64_t ledgers_lost = 0;      ///< the CAN thread did not keep up
+    Histogram wake_late, render, hand_over;  ///< after it was due; duration; from mid-exposure to hand-over
+};
+
+class CameraFeed {
+public:
+    CameraFeed(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks);
+
+    /// Truth (trajectory CSV), ledger (CSV) and contact sheet in this folder.
+    Status log_to(const std::string& folder, bool wait_when_full);
+
+    /// The first frame at or after this time is next.
+    void start_at(std::int64_t t_ns) noexcept;
+    [[nodiscard]] std::int64_t next_mid_ns() const noexcept { return unit_.t_mid_ns(next_); }
+    /// When the next frame can be made: its exposure is over.
+    [[nodiscard]] std::int64_t due_ns() const noexcept { return next_mid_ns() + unit_.exposure_ns() / 2; }
+
+    /// Exposes the next frame for nobody.
+    void warm_up() { unit_.expose(next_, next_mid_ns()); }
+    /// Exposes the next frame and hands it to every sink. `clock`: null in lockstep, where no wall time enters.
+    void make_next(const Clock* clock);
+
+    [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
+    [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }
+    [[nodiscard]] const std::vector<std::unique_ptr<VideoSink>>& sinks() const noexcept { return sinks_; }
+    /// Ledgers for the CAN thread.
+    SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
+    /// Flushes sinks and logs and writes the contact sheet.
+    Status finish();
+
+private:
+    void hand_over(FrameLedger& ledger, const Clock* clock) noexcept;
+    void send(std::span<const std::uint8_t> bytes) noexcept;
+    void account(const FrameLedger& ledger, const Clock* clock) noexcept;
+    void log(const FrameLedger& ledger) noexcept;
+
+    const World& world_;
+    CameraUnit unit_;
+    std::vector<std::unique_ptr<VideoSink>> sinks_;
+    std::uint32_t next_ = 0;
+    std::vector<std::uint8_t> spare_;  ///< `repeat`: the last frame in time; `blank`: black; else empty
+    SpscRing<FrameLedger, 64> ledgers_;
+    CameraStats stats_;
+
+    std::string folder_;
+    std::unique_ptr<RowLog> truth_log_, ledger_log_;
+    std::unique_ptr<ContactSheet> sheet_;
+};
+
+}  // namespace narpa

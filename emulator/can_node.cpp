@@ -1,0 +1,102 @@
+#include "emulator/can_node.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "protocols/can/candump.h"
+
+namespace narpa {
+
+CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded)
+    : bus_(bus), log_(log), pace_(pace_recorded && bus.recorded()) {
+    for (std::size_t i = 0; i < world.scene().bodies.size(); ++i)
+        if (PoseTrack* track = world.track(i))
+            listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id), -1});
+}
+
+bool CanNode::receive(std::int64_t t_now_ns, bool& moved) noexcept {
+    moved = false;
+    if (!next_frame(t_now_ns)) return false;
+    log_frame(received_.frame, t_now_ns);
+    moved = take(received_.frame, t_now_ns);
+    return true;
+}
+
+bool CanNode::next_frame(std::int64_t t_now_ns) noexcept {
+    if (!waiting_ && !bus_.receive(received_)) return false;
+    waiting_ = pace_ && received_.t_received_ns > t_now_ns;
+    return !waiting_;
+}
+
+bool CanNode::take(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
+    for (Listener& l : listeners_) {
+        PoseCommand command;
+        const PoseStatus status = l.decoder.accept(frame, t_now_ns, command);
+        if (status == PoseStatus::not_mine) continue;
+        if (status != PoseStatus::complete) return false;
+        switch (l.track->push(command, t_now_ns)) {
+            case TrackStatus::past: ++counters_.past; return false;
+            case TrackStatus::overrun: ++counters_.overrun; return false;
+            case TrackStatus::taken: break;
+        }
+        if (l.last_counter >= 0)
+            counters_.missed += static_cast<std::uint8_t>(command.counter - l.last_counter - 1);
+        l.last_counter = command.counter;
+        ++counters_.taken;
+        return true;
+    }
+    ++counters_.foreign;
+    return false;
+}
+
+void CanNode::send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept {
+    if (bus_.carries_fd()) {
+        put(encode_fd(ledger), t_now_ns);
+    } else {
+        for (const CanFrame& frame : encode_classic(ledger)) put(frame, t_now_ns);
+    }
+}
+
+void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
+    heartbeat.counter = heartbeat_counter_++;
+    put(encode(heartbeat), t_now_ns);
+}
+
+void CanNode::put(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
+    if (bus_.send(frame)) log_frame(frame, t_now_ns);
+}
+
+void CanNode::log_frame(const CanFrame& frame, std::int64_t t_ns) noexcept {
+    if (!log_) return;
+    std::array<char, kCandumpMaxLine> line;
+    const std::size_t n = format_candump({t_ns, frame}, "narpa", line);
+    log_->append({line.data(), n});
+}
+
+bool CanNode::commanded() const noexcept {
+    return !listeners_.empty() &&
+           std::all_of(listeners_.begin(), listeners_.end(), [](const Listener& l) { return l.track->commanded(); });
+}
+
+std::int64_t CanNode::granted_ns() const noexcept {
+    std::int64_t t = std::numeric_limits<std::int64_t>::max();
+    for (const Listener& l : listeners_) t = std::min(t, l.track->newest_ns());
+    return t;
+}
+
+std::int64_t CanNode::first_ns() const noexcept {
+    std::int64_t t = std::numeric_limits<std::int64_t>::min();
+    for (const Listener& l : listeners_) t = std::max(t, l.track->first_ns());
+    return t;
+}
+
+CommandCounters CanNode::counters() const noexcept {
+    CommandCounters c = counters_;
+    for (const Listener& l : listeners_)
+        for (std::size_t s = 0; s < kDecodeStatusCount; ++s)
+            c.by_status[s] += l.decoder.count(static_cast<DecodeStatus>(s));
+    c.by_status[static_cast<std::size_t>(DecodeStatus::not_mine)] = 0;  // `foreign` says it once for all bodies
+    return c;
+}
+
+}  // namespace narpa

@@ -1,0 +1,69 @@
+/// emulator/can_node.h - narpa on the CAN bus: commands in, heartbeat and frame ledgers out. One thread uses it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "drivers/can/can_bus.h"
+#include "emulator/row_log.h"
+#include "emulator/world.h"
+#include "protocols/can/messages.h"
+
+namespace narpa {
+
+/// Why commands were not taken, beyond the bus's own counters.
+struct CommandCounters {
+    std::uint64_t taken = 0;    ///< whole commands that moved a body
+    std::uint64_t past = 0;     ///< time of validity not after the newest: late, repeated, out of order
+    std::uint64_t overrun = 0;  ///< further ahead than the track is deep
+    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, as PoseDecoder counts them
+    std::uint64_t foreign = 0;  ///< frames of other identifiers
+    std::uint64_t missed = 0;   ///< commands lost by the gaps in their counters
+};
+
+class CanNode {
+public:
+    /// `log` may be null. All outlive the node. `pace_recorded`: a frame of a recorded bus waits for its time (real
+    /// time); otherwise it is taken at once (lockstep).
+    CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded);
+
+    [[nodiscard]] CanBus& bus() noexcept { return bus_; }
+
+    /// Reads one waiting frame. `moved`: it completed a command that was taken. False: nothing was waiting.
+    bool receive(std::int64_t t_now_ns, bool& moved) noexcept;
+    void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
+    void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
+
+    /// Simulation time up to which every commanded body has commands, and the time of the first frame that has
+    /// them: the clock of a lockstep run. `commanded` is false until every commanded body has a command.
+    [[nodiscard]] bool commanded() const noexcept;
+    [[nodiscard]] std::int64_t granted_ns() const noexcept;
+    [[nodiscard]] std::int64_t first_ns() const noexcept;
+
+    [[nodiscard]] CommandCounters counters() const noexcept;
+
+private:
+    struct Listener {
+        PoseTrack* track;
+        PoseDecoder decoder;
+        int last_counter = -1;
+    };
+    bool next_frame(std::int64_t t_now_ns) noexcept;
+    bool take(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
+    void put(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
+    void log_frame(const CanFrame& frame, std::int64_t t_ns) noexcept;
+
+    CanBus& bus_;
+    RowLog* log_;
+    bool pace_;
+    ReceivedFrame received_{};
+    bool waiting_ = false;  ///< received_ is not due yet
+    std::vector<Listener> listeners_;
+    CommandCounters counters_{};
+    std::uint8_t heartbeat_counter_ = 0;
+};
+
+}  // namespace narpa

@@ -1,0 +1,40 @@
+/// emulator/cli/cli.h - the subcommands of `narpa`, one file each. Words for people go to standard error, the one
+/// JSON document of --json to standard output; exit status: base/result.h.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa::cli {
+
+/// What a subcommand found out, for --json; or why it could not.
+using Outcome = Result<nlohmann::json>;
+using Command = std::function<Outcome()>;
+
+/// Options common to all subcommands.
+struct Console {
+    bool json = false;  ///< standard output carries one JSON document
+};
+
+/// Each adds its subcommand and returns what runs when it is chosen.
+Command add_check(CLI::App& app, const Console& console);
+Command add_run(CLI::App& app, const Console& console);
+Command add_fly(CLI::App& app, const Console& console);
+Command add_render(CLI::App& app, const Console& console);
+Command add_scan(CLI::App& app, const Console& console);
+
+/// Words for people, on standard error.
+void say(std::string_view text);
+/// Reads a scene and tells its warnings.
+Result<Scene> load_scene(const std::string& path);
+/// "NAME=VALUE" -> {NAME, VALUE}; an Error that says what was expected.
+Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);
+
+}  // namespace narpa::cli

@@ -1,0 +1,125 @@
+// narpa render - one frame of one camera, as the run would make it, to an image file.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "emulator/camera_unit.h"
+#include "emulator/cli/cli.h"
+#include "emulator/cli/pose_options.h"
+#include "emulator/clock.h"
+#include "emulator/threads.h"
+#include "renderer/image/image_file.h"
+
+namespace narpa::cli {
+namespace {
+
+struct Options {
+    std::string scene, camera, format, out, aov;
+    PoseOptions pose;
+    std::optional<double> time_s;
+    std::optional<std::uint32_t> frame;
+    std::optional<int> spp;
+    std::optional<std::uint64_t> seed;
+    int threads = 0;
+};
+
+/// What the command line says differently from the scene.
+Status override_scene(const Options& o, Scene& scene, Camera& camera) {
+    if (o.spp) scene.render.spp = *o.spp;
+    if (o.seed) scene.render.seed = *o.seed;
+    if (!o.format.empty()) {
+        const auto format = pixel_format_from(o.format);
+        if (!format) return Error{fmt::format("--format {}, expected GREY, Y16, YUYV or RGB24", o.format)};
+        if (*format == PixelFormat::yuyv && camera.width % 2 != 0)
+            return Error{fmt::format("--format YUYV needs an even width, camera \"{}\" has {}", camera.name, camera.width)};
+        camera.format = *format;
+    }
+    return o.pose.place(scene);
+}
+
+constexpr std::array<std::string_view, 7> kOutputs{"radiance", "depth", "range", "normal", "position", "body", "variance"};
+
+/// The names in "depth,normal"; an Error for one that is not known.
+Result<std::set<std::string>> parse_outputs(const std::string& list) {
+    std::set<std::string> names;
+    for (std::size_t start = 0; start < list.size();) {
+        const std::size_t comma = std::min(list.find(',', start), list.size());
+        const std::string name = list.substr(start, comma - start);
+        start = comma + 1;
+        if (std::find(kOutputs.begin(), kOutputs.end(), name) == kOutputs.end())
+            return Error{fmt::format("--aov \"{}\", expected some of {}", name, fmt::join(kOutputs, ","))};
+        names.insert(name);
+    }
+    return names;
+}
+
+/// The image file holds what is not empty.
+void keep_only(const std::set<std::string>& names, Aovs& a) {
+    if (!names.contains("depth")) a.depth_m.clear();
+    if (!names.contains("range")) a.range_m.clear();
+    if (!names.contains("normal")) a.normal.clear();
+    if (!names.contains("position")) a.position.clear();
+    if (!names.contains("body")) a.body.clear();
+    if (!names.contains("variance")) a.variance.clear();
+}
+
+Outcome render(const Options& o) {
+    auto scene = load_scene(o.scene);
+    if (!scene) return scene.error();
+    auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
+    if (!index) return index.error();
+    Camera& camera = scene->cameras[*index];
+    if (auto good = override_scene(o, *scene, camera); !good) return good.error();
+    auto outputs = parse_outputs(o.aov);
+    if (!outputs) return outputs.error();
+
+    const std::int64_t period_ns = camera.period_ns;
+    const std::int64_t t_ns = o.time_s ? std::llround(*o.time_s * 1e9) : o.frame.value_or(0) * period_ns;
+    const auto frame = o.frame.value_or(static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period_ns / 2) / period_ns)));
+
+    TracingThreads threads(o.threads);
+    auto world = World::create(*std::move(scene));
+    if (!world) return world.error();
+    if (auto loaded = o.pose.load(**world, t_ns, t_ns); !loaded) return loaded.error();
+    CameraUnit unit(**world, *index);
+    Aovs values;
+    Aovs* const aovs = outputs->empty() ? nullptr : &values;
+    const std::int64_t start_ns = monotonic_ns();
+    threads.arena.execute([&] { unit.embed(unit.expose(frame, t_ns, aovs)); });
+    const double seconds = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
+    keep_only(*outputs, values);
+
+    auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
+    if (!written) return written.error();
+    say(fmt::format("{}: {} x {}, {} spp, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out, unit.camera().width,
+                    unit.camera().height, (*world)->scene().render.spp, frame, static_cast<double>(t_ns) * 1e-9,
+                    (*world)->tracer().triangle_count(), 1e3 * seconds));
+    return nlohmann::json{{"file", o.out}, {"camera", unit.camera().name}, {"frame", frame}, {"t_ns", t_ns},
+                          {"width", unit.camera().width}, {"height", unit.camera().height},
+                          {"samples_per_pixel", (*world)->scene().render.spp},
+                          {"triangles", (*world)->tracer().triangle_count()}, {"render_s", seconds}};
+}
+
+}  // namespace
+
+Command add_render(CLI::App& app, const Console&) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c = app.add_subcommand("render", "Render one frame of a camera, byte for byte as `run` would put it out");
+    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
+    c->add_option("--camera", o->camera, "Name of the camera (default: the first)");
+    c->add_option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)");
+    c->add_option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
+    o->pose.add_to(*c);
+    c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
+    c->add_option("--spp", o->spp, "Samples per pixel instead of the scene's")->check(CLI::Range(1, 65535));
+    c->add_option("--seed", o->seed, "Seed instead of the scene's");
+    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")->check(CLI::Range(0, 1024));
+    c->add_option("--aov", o->aov, "With .exr: depth,range,normal,position,body,variance beside radiance");
+    c->add_option("-o,--output", o->out, "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")->required();
+    return [o] { return render(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,117 @@
+#include "emulator/emulator.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "emulator/threads.h"
+
+namespace narpa {
+namespace {
+
+/// The sinks of one sensor, opened in the order in which they were given.
+template <class Sink, class Open>
+Result<std::vector<std::unique_ptr<Sink>>> open_sinks(const std::vector<std::pair<std::string, std::string>>& wanted,
+                                                      std::size_t sensor, const auto& sensors, std::string_view kind,
+                                                      const std::string& file, Open open) {
+    std::vector<std::unique_ptr<Sink>> sinks;
+    for (const auto& [name, spec] : wanted) {
+        auto index = sensor_named(sensors, name, kind, file);
+        if (!index) return index.error();
+        if (*index != sensor) continue;
+        auto sink = open(spec);
+        if (!sink) return sink.error();
+        sinks.push_back(*std::move(sink));
+    }
+    return sinks;
+}
+
+}  // namespace
+
+Emulator::Emulator() = default;
+Emulator::~Emulator() = default;
+
+Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions& options) {
+    if (options.video.empty() && options.lidar.empty())
+        return Error{"nothing to put out, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
+    if (options.lockstep && options.bus.empty())
+        return Error{"--lockstep needs --can BUS: the clock advances only with commands"};
+    auto world = World::create(std::move(scene));
+    if (!world) return world.error();
+    if (options.lockstep && !(*world)->has_commanded_bodies())
+        return Error{"--lockstep needs a body with a can_id", (*world)->scene().file};
+
+    std::unique_ptr<Emulator> emulator(new Emulator);
+    emulator->options_ = options;
+    emulator->world_ = *std::move(world);
+    emulator->end_ns_ = options.duration_s > 0 ? std::llround(options.duration_s * 1e9)
+                                               : std::numeric_limits<std::int64_t>::max();
+    emulator->threads_ = std::make_unique<TracingThreads>(options.threads);
+    if (auto opened = emulator->open_outputs(); !opened) return opened.error();
+    return emulator;
+}
+
+Status Emulator::open_outputs() {
+    const Scene& scene = world_->scene();
+    const bool wait = options_.lockstep;
+    if (!options_.log_folder.empty()) {
+        std::error_code error;
+        std::filesystem::create_directories(options_.log_folder, error);
+        if (error) return Error{"cannot be made a folder: " + error.message(), options_.log_folder};
+    }
+    if (!options_.bus.empty()) {
+        auto bus = open_can_bus(options_.bus, CanRole::hub);
+        if (!bus) return bus.error();
+        bus_ = *std::move(bus);
+        if (!options_.log_folder.empty()) {
+            auto log = RowLog::create(options_.log_folder + "/can.log", "", wait);
+            if (!log) return log.error();
+            can_log_ = *std::move(log);
+        }
+        can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), !options_.lockstep);
+    }
+    for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+        const Camera& c = scene.cameras[i];
+        const VideoFormat format{c.width, c.height, c.format, c.period_ns};
+        auto sinks = open_sinks<VideoSink>(options_.video, i, scene.cameras, "camera", scene.file, [&](const auto& spec) {
+            return open_video_sink(spec, format, wait ? WhenFull::wait : WhenFull::drop);
+        });
+        if (!sinks) return sinks.error();
+        if (sinks->empty()) continue;  // a camera that nobody asked for costs nothing
+        cameras_.push_back(std::make_unique<CameraFeed>(*world_, i, *std::move(sinks)));
+        if (!options_.log_folder.empty())
+            if (auto logs = cameras_.back()->log_to(options_.log_folder, wait); !logs) return logs.error();
+    }
+    for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
+        auto sinks = open_sinks<PacketSink>(options_.lidar, i, scene.lidars, "LiDAR", scene.file, [&](const auto& spec) {
+            return open_packet_sink(spec, scene.epoch_unix_ns, wait);
+        });
+        if (!sinks) return sinks.error();
+        if (!sinks->empty()) lidars_.push_back(std::make_unique<LidarFeed>(*world_, i, *std::move(sinks)));
+    }
+    // A name that fits no sensor is caught above only where there are sensors of its kind.
+    if (!options_.video.empty() && cameras_.empty()) return Error{"the scene has no camera", scene.file};
+    if (!options_.lidar.empty() && lidars_.empty()) return Error{"the scene has no LiDAR", scene.file};
+    return Ok{};
+}
+
+Status Emulator::run(const StopFlag& stop) {
+    if (options_.lockstep) {
+        run_lockstep(stop);
+    } else {
+        run_real_time(stop);
+        t_ns_.store(std::min(clock_->now_ns(), end_ns_.load()), std::memory_order_relaxed);
+    }
+    if (no_priority_) notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
+    Status status = Ok{};
+    for (const auto& feed : cameras_)
+        if (auto done = feed->finish(); !done && status) status = done.error();
+    for (const auto& feed : lidars_) feed->finish();
+    if (can_log_)
+        if (auto done = can_log_->close(); !done && status) status = done.error();
+    return status;
+}
+
+}  // namespace narpa

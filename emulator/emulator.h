@@ -1,0 +1,83 @@
+/// emulator/emulator.h - the running instrument: bus, cameras and LiDARs of one scene, in real time or in lockstep.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.h"
+#include "emulator/camera_feed.h"
+#include "emulator/can_node.h"
+#include "emulator/lidar_feed.h"
+#include "emulator/stop.h"
+
+namespace narpa {
+
+struct TracingThreads;
+
+struct RunOptions {
+    std::string bus;  ///< BUS; empty: nothing is commanded
+    std::vector<std::pair<std::string, std::string>> video, lidar;  ///< sensor name and SINK, one sensor many times
+    bool lockstep = false;
+    double duration_s = 0;  ///< of simulation time; 0: until stopped, or the end of a log
+    std::string log_folder; ///< empty: no log
+    int threads = 0;        ///< that trace rays; 0: all cores
+};
+
+class Emulator {
+public:
+    /// Opens everything; nothing moves yet. All memory that the loop needs is taken here.
+    static Result<std::unique_ptr<Emulator>> create(Scene scene, const RunOptions& options);
+    ~Emulator();
+
+    /// Runs until the duration is over, the bus has ended, or the flag is set; then flushes everything.
+    /// Returns the first error of a file that could not be written at the end.
+    Status run(const StopFlag& stop);
+
+    [[nodiscard]] const World& world() const noexcept { return *world_; }
+    [[nodiscard]] CanNode* can() noexcept { return can_.get(); }
+    [[nodiscard]] const std::vector<std::unique_ptr<CameraFeed>>& cameras() const noexcept { return cameras_; }
+    [[nodiscard]] const std::vector<std::unique_ptr<LidarFeed>>& lidars() const noexcept { return lidars_; }
+    [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
+    /// Simulation time reached.
+    [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
+    /// What the kernel did not grant, in plain words; filled by `run`.
+    [[nodiscard]] const std::vector<std::string>& notices() const noexcept { return notices_; }
+
+private:
+    Emulator();
+    Status open_outputs();
+
+    void run_real_time(const StopFlag& stop);
+    void warm_up();
+    void run_camera(CameraFeed& feed, const StopFlag& stop);
+    void run_lidar(LidarFeed& feed, const StopFlag& stop);
+    void run_bus(const StopFlag& stop);
+
+    void run_lockstep(const StopFlag& stop);
+    void advance_to(std::int64_t t_ns, const StopFlag& stop);
+
+    void send_ledgers(std::int64_t t_ns) noexcept;
+    void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
+    [[nodiscard]] std::uint64_t output_drops() const noexcept;
+
+    RunOptions options_;
+    std::atomic<std::int64_t> end_ns_{0};  ///< of the simulation clock
+    std::unique_ptr<World> world_;
+    std::unique_ptr<CanBus> bus_;
+    std::unique_ptr<RowLog> can_log_;
+    std::unique_ptr<CanNode> can_;
+    std::vector<std::unique_ptr<CameraFeed>> cameras_;
+    std::vector<std::unique_ptr<LidarFeed>> lidars_;
+    std::unique_ptr<TracingThreads> threads_;
+    std::unique_ptr<Clock> clock_;
+    std::atomic<std::int64_t> t_ns_{0};
+    std::atomic<bool> no_priority_{false};
+    Heartbeat faults_{};           ///< since the last heartbeat
+    std::uint64_t drops_told_ = 0;
+    std::vector<std::string> notices_;
+};
+
+}  // namespace narpa

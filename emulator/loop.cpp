@@ -1,0 +1,168 @@
+// emulator/loop.cpp - the loops. In real time every sensor has a thread that waits for its absolute deadline,
+// renders and publishes, and one thread serves the CAN bus. In lockstep one thread does it all, and the clock is
+// the bus: it stands still until every commanded body has a command for the time to come.
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <limits>
+#include <thread>
+
+#include "emulator/emulator.h"
+#include "emulator/realtime.h"
+#include "emulator/threads.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;
+constexpr std::int64_t kStartLeadNs = 200'000'000;  // for threads whose stacks are locked into memory
+constexpr std::int64_t kBusWaitNs = 2'000'000;  // how long a ledger may wait for the bus thread
+constexpr int kFramesPerTurn = 4096;            // bounds a turn of the bus thread on a saturated bus
+constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50;
+
+}  // namespace
+
+// --- Real time ----------------------------------------------------------------------------------------------------
+
+void Emulator::run_real_time(const StopFlag& stop) {
+    if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
+    warm_up();
+    clock_ = std::make_unique<Clock>(kStartLeadNs);
+    StopFlag sensors_done{false};
+    std::thread bus;
+    if (can_) bus = std::thread([&] { run_bus(sensors_done); });
+    std::vector<std::thread> sensors;
+    for (const auto& feed : lidars_) sensors.emplace_back([&, f = feed.get()] { run_lidar(*f, stop); });
+    for (const auto& feed : cameras_) sensors.emplace_back([&, f = feed.get()] { run_camera(*f, stop); });
+    for (std::thread& t : sensors) t.join();
+    sensors_done = true;
+    if (bus.joinable()) bus.join();
+}
+
+/// The first frame and packet pay for everything that is only needed once: here, before the clock runs.
+void Emulator::warm_up() {
+    for (const auto& feed : cameras_) threads_->arena.execute([&] { feed->warm_up(); });
+    for (const auto& feed : lidars_) feed->warm_up();
+}
+
+void Emulator::run_camera(CameraFeed& feed, const StopFlag& stop) {
+    name_thread("narpa-camera");
+    if (!take_fifo_priority(kCameraPriority)) no_priority_ = true;
+    while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop))
+        threads_->arena.execute([&] { feed.make_next(clock_.get()); });
+}
+
+void Emulator::run_lidar(LidarFeed& feed, const StopFlag& stop) {
+    name_thread("narpa-lidar");
+    if (!take_fifo_priority(kLidarPriority)) no_priority_ = true;
+    while (feed.due_ns() <= end_ns_ && clock_->wait_until(feed.due_ns(), stop)) feed.make_next(clock_.get());
+}
+
+void Emulator::run_bus(const StopFlag& stop) {
+    name_thread("narpa-can");
+    if (!take_fifo_priority(kBusPriority)) no_priority_ = true;
+    std::int64_t next_heartbeat = 0;
+    while (!stop.load(std::memory_order_relaxed)) {
+        can_->bus().wait(kBusWaitNs);
+        const std::int64_t now = clock_->now_ns();
+        t_ns_.store(now, std::memory_order_relaxed);
+        bool moved = false;
+        for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {}
+        send_ledgers(now);
+        if (can_->bus().ended() && options_.duration_s == 0) end_ns_ = now;  // nothing more will be commanded
+        if (now >= next_heartbeat) {
+            send_heartbeat(now, RunState::running);
+            next_heartbeat += kHeartbeatPeriodNs;
+        }
+    }
+    send_ledgers(clock_->now_ns());
+    send_heartbeat(clock_->now_ns(), RunState::stopping);
+}
+
+// --- Lockstep -----------------------------------------------------------------------------------------------------
+
+void Emulator::run_lockstep(const StopFlag& stop) {
+    bool started = false;
+    bool moved = false;
+    send_heartbeat(0, RunState::starting);
+    while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
+        if (!can_->receive(t_ns(), moved)) {
+            if (can_->bus().ended()) break;
+            can_->bus().wait(100'000'000);
+            continue;
+        }
+        if (!moved || !can_->commanded()) continue;
+        if (!started) {
+            for (const auto& feed : cameras_) feed->start_at(can_->first_ns());
+            for (const auto& feed : lidars_) feed->start_at(can_->first_ns());
+            started = true;
+        }
+        advance_to(std::min(can_->granted_ns(), end_ns_.load()), stop);
+        send_heartbeat(t_ns(), RunState::lockstep);
+    }
+    send_heartbeat(t_ns(), RunState::stopping);
+}
+
+/// Makes every frame and packet that falls due up to t, in the order of time.
+void Emulator::advance_to(std::int64_t t_ns, const StopFlag& stop) {
+    while (!stop.load(std::memory_order_relaxed)) {
+        const auto earlier_frame = [](const auto& a, const auto& b) { return a->next_mid_ns() < b->next_mid_ns(); };
+        const auto earlier_packet = [](const auto& a, const auto& b) { return a->due_ns() < b->due_ns(); };
+        const auto camera = std::min_element(cameras_.begin(), cameras_.end(), earlier_frame);
+        const auto lidar = std::min_element(lidars_.begin(), lidars_.end(), earlier_packet);
+        constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+        const std::int64_t t_camera = camera == cameras_.end() ? kNever : (*camera)->next_mid_ns();
+        const std::int64_t t_lidar = lidar == lidars_.end() ? kNever : (*lidar)->due_ns();
+        // The run ends before the frame at `end` and after the packet that is complete by then.
+        if (std::min(t_camera, t_lidar) > t_ns || (t_camera >= end_ns_ && t_lidar > end_ns_)) break;
+        if (t_lidar <= t_camera) {
+            (*lidar)->make_next(nullptr);
+        } else if (t_camera < end_ns_) {
+            threads_->arena.execute([&] { (*camera)->make_next(nullptr); });
+            send_ledgers(t_camera);
+        } else {
+            break;
+        }
+    }
+    t_ns_.store(std::max(this->t_ns(), t_ns), std::memory_order_relaxed);
+}
+
+// --- Telemetry ----------------------------------------------------------------------------------------------------
+
+void Emulator::send_ledgers(std::int64_t t_ns) noexcept {
+    FrameLedger ledger;
+    for (const auto& feed : cameras_) {
+        while (feed->ledgers().pop(ledger)) {
+            faults_.stale |= ledger.pose_stale;
+            faults_.deadline_missed |= !ledger.deadline_met;
+            can_->send(ledger, t_ns);
+        }
+    }
+}
+
+/// Faults are those since the last heartbeat.
+void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
+    Heartbeat heartbeat = faults_;
+    heartbeat.t_ns = t_ns;
+    heartbeat.state = state;
+    heartbeat.no_command = !can_->commanded();
+    const std::uint64_t drops = output_drops();
+    heartbeat.output_dropped = drops != drops_told_;
+    drops_told_ = drops;
+    faults_ = {};
+    can_->send(heartbeat, t_ns);
+}
+
+std::uint64_t Emulator::output_drops() const noexcept {
+    std::uint64_t n = 0;
+    for (const auto& feed : cameras_)
+        for (const auto& sink : feed->sinks()) {
+            const VideoCounters c = sink->counters();
+            n += c.ring_full + c.no_reader + c.failed;
+        }
+    for (const auto& feed : lidars_)
+        for (const auto& sink : feed->sinks()) n += sink->counters().dropped;
+    return n;
+}
+
+}  // namespace narpa

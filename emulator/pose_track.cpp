@@ -1,0 +1,111 @@
+#include "emulator/pose_track.h"
+
+#include <cstring>
+
+namespace narpa {
+namespace {
+
+constexpr double kSecondsPerNs = 1e-9;
+constexpr std::int64_t kHistoryNs = 1'000'000'000;  // sensors look back by an exposure or a packet, never more
+
+bool at_rest(const Motion& m) { return m.velocity_m_s == Vec3{}; }
+
+}  // namespace
+
+Motion extrapolate(const Motion& from, double dt_s) {
+    if (dt_s == 0) return from;  // bit for bit what was commanded
+    Motion m = from;
+    m.T_world_body.t += from.velocity_m_s * dt_s;
+    m.T_world_body.q = normalized(from.T_world_body.q * exp_rotation(from.rate_rad_s * dt_s));
+    return m;
+}
+
+PoseTrack::PoseTrack(const Motion& initial, double stale_after_s)
+    : initial_(initial), stale_after_ns_(std::llround(stale_after_s * 1e9)) {}
+
+void PoseTrack::Slot::store(const Sample& s) noexcept {
+    std::array<std::uint64_t, sizeof(Sample) / 8> raw;
+    std::memcpy(raw.data(), &s, sizeof s);
+    version.fetch_add(1, std::memory_order_acq_rel);
+    for (std::size_t i = 0; i < raw.size(); ++i) words[i].store(raw[i], std::memory_order_release);
+    version.fetch_add(1, std::memory_order_release);
+}
+
+bool PoseTrack::Slot::load(Sample& s) const noexcept {
+    std::array<std::uint64_t, sizeof(Sample) / 8> raw;
+    const std::uint64_t before = version.load(std::memory_order_acquire);
+    for (std::size_t i = 0; i < raw.size(); ++i) raw[i] = words[i].load(std::memory_order_acquire);
+    if ((before & 1) != 0 || version.load(std::memory_order_acquire) != before) return false;
+    std::memcpy(static_cast<void*>(&s), raw.data(), sizeof s);
+    return true;
+}
+
+TrackStatus PoseTrack::push(const PoseCommand& command, std::int64_t t_now_ns) noexcept {
+    const std::uint64_t count = count_.load(std::memory_order_relaxed);
+    if (count > 0 && command.t_valid_ns <= newest_ns_.load(std::memory_order_relaxed)) return TrackStatus::past;
+    Slot& slot = slots_[count % kDepth];
+    if (count >= kDepth - 1) {  // the oldest that must stay is the one after the slot that is given up
+        Sample next_oldest;
+        if (slots_[(count + 1) % kDepth].load(next_oldest) && next_oldest.t_ns > t_now_ns - kHistoryNs)
+            return TrackStatus::overrun;
+    }
+    slot.store({command.t_valid_ns, command.counter, command.motion});
+    if (count == 0) first_ns_.store(command.t_valid_ns, std::memory_order_release);
+    newest_ns_.store(command.t_valid_ns, std::memory_order_release);
+    count_.store(count + 1, std::memory_order_release);
+    return TrackStatus::taken;
+}
+
+/// `before`: the newest sample at or before t. `after`: the one that follows it, or the oldest of all.
+PoseTrack::Found PoseTrack::bracket(std::int64_t t_ns, Sample& before, Sample& after) const noexcept {
+    const std::uint64_t count = count_.load(std::memory_order_acquire);
+    const std::uint64_t kept = std::min<std::uint64_t>(count, kDepth - 1);
+    for (std::uint64_t i = 1; i <= kept; ++i) {
+        if (!slots_[(count - i) % kDepth].load(before)) return Found::torn;
+        if (before.t_ns <= t_ns) return i == 1 ? Found::after_newest : Found::between;
+        after = before;
+    }
+    return kept == 0 ? Found::nothing : Found::before_oldest;
+}
+
+Motion PoseTrack::interpolate(const Sample& a, const Sample& b, std::int64_t t_ns) const noexcept {
+    const double h = static_cast<double>(b.t_ns - a.t_ns) * kSecondsPerNs;
+    const double u = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns), u2 = u * u;
+    const Rigid3 &Ta = a.motion.T_world_body, &Tb = b.motion.T_world_body;
+    const Vec3 chord = Tb.t - Ta.t, va = a.motion.velocity_m_s, vb = b.motion.velocity_m_s;
+    Motion m;
+    if (at_rest(a.motion) && at_rest(b.motion)) {
+        m.T_world_body.t = Ta.t + u * chord;
+        m.velocity_m_s = chord / h;
+    } else {
+        m.T_world_body.t = Ta.t + (u2 * (3 - 2 * u)) * chord + (h * u * (1 - u) * (1 - u)) * va - (h * u2 * (1 - u)) * vb;
+        m.velocity_m_s = (6 * u * (1 - u) / h) * chord + ((1 - u) * (1 - 3 * u)) * va + (u * (3 * u - 2)) * vb;
+    }
+    m.T_world_body.q = slerp(Ta.q, Tb.q, u);
+    m.rate_rad_s = rotation_vector(conjugate(Ta.q) * Tb.q) / h;
+    return m;
+}
+
+TrackedPose PoseTrack::at(std::int64_t t_ns) const noexcept {
+    Sample a, b;
+    Found found = bracket(t_ns, a, b);
+    while (found == Found::torn) found = bracket(t_ns, a, b);
+
+    // Beyond the newest command, or before the oldest one kept: its own motion up to the limit, then at rest.
+    const auto run_on = [&](const Sample& s) {
+        const std::int64_t asked = t_ns - s.t_ns, dt = std::clamp(asked, -stale_after_ns_, stale_after_ns_);
+        Motion m = extrapolate(s.motion, static_cast<double>(dt) * kSecondsPerNs);
+        if (dt != asked) m.velocity_m_s = m.rate_rad_s = {};
+        return TrackedPose{m, static_cast<std::uint8_t>(s.counter), s.t_ns, true, dt != asked};
+    };
+    switch (found) {
+        case Found::between:
+            return {t_ns == a.t_ns ? a.motion : interpolate(a, b, t_ns), static_cast<std::uint8_t>(a.counter), a.t_ns,
+                    true, false};
+        case Found::after_newest: return run_on(a);
+        case Found::before_oldest: return run_on(b);
+        default: return {extrapolate(initial_, static_cast<double>(t_ns) * kSecondsPerNs), 0, 0, false, true};
+    }
+}
+
+}  // namespace narpa

@@ -1,0 +1,77 @@
+/// emulator/pose_track.h - the pose of one commanded body at any time, from the commands that came in on CAN.
+///
+/// Between two commands: cubic Hermite in position through the commanded velocities (straight when both commands
+/// carry none), shortest-arc slerp in attitude. After the newest: constant velocity and body rate, up to
+/// `stale_after_s`; from there the body holds and is reported stale. One thread writes, any number read: neither
+/// locks nor allocates.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "base/pose.h"
+#include "protocols/can/messages.h"
+
+namespace narpa {
+
+/// Moves on at constant velocity (world) and rate (body axes).
+[[nodiscard]] Motion extrapolate(const Motion& from, double dt_s);
+
+struct TrackedPose {
+    Motion motion{};            ///< velocity and rate are the derivatives of the pose as it is shown
+    std::uint8_t counter = 0;   ///< of the newest command at or before the time asked for
+    std::int64_t t_pose_ns = 0; ///< its time of validity
+    bool commanded = false;     ///< false: no command yet, the scene's own motion
+    bool stale = true;
+};
+
+enum class TrackStatus : std::uint8_t {
+    taken,
+    past,     ///< time of validity not after the newest: late, repeated or out of order
+    overrun,  ///< so far ahead of the clock that it would push out commands still in use
+};
+
+class PoseTrack {
+public:
+    /// `initial` is the scene's own motion, used until the first command.
+    PoseTrack(const Motion& initial, double stale_after_s);
+
+    /// `t_now_ns`: commands older than a second before this may be forgotten.
+    TrackStatus push(const PoseCommand& command, std::int64_t t_now_ns) noexcept;
+    [[nodiscard]] TrackedPose at(std::int64_t t_ns) const noexcept;
+
+    /// Times of validity of the first and newest command; meaningful when `commanded`.
+    [[nodiscard]] bool commanded() const noexcept { return count_.load(std::memory_order_acquire) > 0; }
+    [[nodiscard]] std::int64_t first_ns() const noexcept { return first_ns_.load(std::memory_order_acquire); }
+    [[nodiscard]] std::int64_t newest_ns() const noexcept { return newest_ns_.load(std::memory_order_acquire); }
+
+    static constexpr std::size_t kDepth = 256;  ///< commands kept
+
+private:
+    struct Sample {
+        std::int64_t t_ns = 0;
+        std::uint64_t counter = 0;
+        Motion motion{};
+    };
+    /// A sample that is rewritten only after kDepth - 1 others; a reader that meets a rewrite reads again.
+    struct Slot {
+        std::atomic<std::uint64_t> version{0};  ///< odd while it is written
+        std::array<std::atomic<std::uint64_t>, sizeof(Sample) / 8> words{};
+        void store(const Sample&) noexcept;
+        [[nodiscard]] bool load(Sample&) const noexcept;
+    };
+    static_assert(sizeof(Sample) % 8 == 0);
+
+    enum class Found : std::uint8_t { between, after_newest, before_oldest, nothing, torn };
+    [[nodiscard]] Found bracket(std::int64_t t_ns, Sample& before, Sample& after) const noexcept;
+    [[nodiscard]] Motion interpolate(const Sample& a, const Sample& b, std::int64_t t_ns) const noexcept;
+
+    Motion initial_;
+    std::int64_t stale_after_ns_;
+    std::array<Slot, kDepth> slots_{};
+    std::atomic<std::uint64_t> count_{0};
+    std::atomic<std::int64_t> first_ns_{0}, newest_ns_{0};
+};
+
+}  // namespace narpa

@@ -1,0 +1,128 @@
+#include "emulator/report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace narpa {
+namespace {
+
+using nlohmann::json;
+
+json percentiles_ms(const Histogram& h) {
+    return {{"p50", h.percentile_ns(0.5) * 1e-6}, {"p99", h.percentile_ns(0.99) * 1e-6}, {"max", h.max_ns() * 1e-6}};
+}
+
+json of_camera(const CameraFeed& feed) {
+    const CameraStats& s = feed.stats();
+    json sinks = json::array();
+    for (const auto& sink : feed.sinks()) {
+        const VideoCounters c = sink->counters();
+        sinks.push_back({{"sink", sink->description()}, {"written", c.written}, {"dropped_ring_full", c.ring_full},
+                         {"dropped_no_reader", c.no_reader}, {"dropped_failed", c.failed}, {"reconnects", c.reconnects}});
+    }
+    return {{"name", feed.unit().camera().name}, {"frames", s.frames}, {"handed_over", s.handed_over},
+            {"skipped", s.skipped}, {"deadlines_missed", s.deadline_missed}, {"stale", s.stale},
+            {"ledgers_lost", s.ledgers_lost}, {"wake_late_ms", percentiles_ms(s.wake_late)},
+            {"render_ms", percentiles_ms(s.render)}, {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
+            {"sinks", sinks}};
+}
+
+json of_lidar(const LidarFeed& feed) {
+    const LidarStats& s = feed.stats();
+    json sinks = json::array();
+    for (const auto& sink : feed.sinks()) {
+        const PacketCounters c = sink->counters();
+        sinks.push_back({{"sink", sink->description()}, {"sent", c.sent}, {"dropped", c.dropped}});
+    }
+    return {{"name", feed.unit().lidar().name}, {"packets", s.packets}, {"sweeps", s.sweeps(feed.unit().lidar().rate_hz)},
+            {"skipped", s.skipped}, {"shots", s.shots}, {"returns", s.returns},
+            {"wake_late_ms", percentiles_ms(s.wake_late)}, {"fire_ms", percentiles_ms(s.fire)},
+            {"due_to_sent_ms", percentiles_ms(s.hand_over)}, {"sinks", sinks}};
+}
+
+json of_bus(CanNode& node) {
+    const CommandCounters c = node.counters();
+    const CanCounters& b = node.bus().counters();
+    json rejected = {{"past", c.past}, {"overrun", c.overrun}};
+    for (std::size_t i = 0; i < kDecodeStatusCount; ++i) {
+        const auto status = static_cast<DecodeStatus>(i);
+        const bool good = status == DecodeStatus::not_mine || status == DecodeStatus::partial ||
+                          status == DecodeStatus::complete;
+        if (!good) rejected[std::string(name(status))] = c.by_status[i];
+    }
+    return {{"bus", node.bus().description()}, {"frames_received", b.received}, {"frames_sent", b.sent},
+            {"send_drops", b.send_drops}, {"receive_overflow", b.receive_overflow}, {"malformed", b.malformed},
+            {"error_frames", b.error_frames}, {"bus_off", b.bus_off}, {"interface_down", b.interface_down},
+            {"foreign_frames", c.foreign}, {"commands_taken", c.taken}, {"commands_missed", c.missed},
+            {"rejected", rejected}};
+}
+
+std::string latency(const json& p) {
+    return fmt::format("{:.2f} / {:.2f} / {:.2f} ms", p["p50"].get<double>(), p["p99"].get<double>(),
+                       p["max"].get<double>());
+}
+
+/// "3 bad_checksum, 1 past", or "none".
+std::string non_zero(const json& counts) {
+    std::string text;
+    for (const auto& [key, n] : counts.items())
+        if (n.get<std::uint64_t>() > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n.get<std::uint64_t>(), key);
+    return text.empty() ? "none" : text;
+}
+
+std::uint64_t number(const json& j, const char* key) { return j[key].get<std::uint64_t>(); }
+
+}  // namespace
+
+json report(Emulator& emulator) {
+    json cameras = json::array(), lidars = json::array();
+    for (const auto& feed : emulator.cameras()) cameras.push_back(of_camera(*feed));
+    for (const auto& feed : emulator.lidars()) lidars.push_back(of_lidar(*feed));
+    return {{"scene", emulator.world().scene().name},
+            {"mode", emulator.options().lockstep ? "lockstep" : "real time"},
+            {"simulated_s", static_cast<double>(emulator.t_ns()) * 1e-9},
+            {"cameras", cameras},
+            {"lidars", lidars},
+            {"can", emulator.can() ? of_bus(*emulator.can()) : json(nullptr)},
+            {"notices", emulator.notices()},
+            {"log", emulator.options().log_folder}};
+}
+
+std::string in_words(const json& r) {
+    std::string out = fmt::format("{}: {:.3f} s in {}\n", r["scene"].get<std::string>(), r["simulated_s"].get<double>(),
+                                  r["mode"].get<std::string>());
+    for (const json& c : r["cameras"]) {
+        out += fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {} deadlines missed, {} stale\n",
+                           c["name"].get<std::string>(), number(c, "frames"), number(c, "handed_over"),
+                           number(c, "skipped"), number(c, "deadlines_missed"), number(c, "stale"));
+        out += fmt::format("    p50 / p99 / max: render {}; mid-exposure to hand-over {}; woken late {}\n",
+                           latency(c["render_ms"]), latency(c["mid_exposure_to_hand_over_ms"]), latency(c["wake_late_ms"]));
+        for (const json& s : c["sinks"]) {
+            const json drops = {{"ring full", s["dropped_ring_full"]}, {"no reader", s["dropped_no_reader"]}, {"failed", s["dropped_failed"]}};
+            out += fmt::format("    -> {}: {} written, dropped: {}\n", s["sink"].get<std::string>(), number(s, "written"), non_zero(drops));
+        }
+    }
+    for (const json& l : r["lidars"]) {
+        out += fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
+                           l["name"].get<std::string>(), number(l, "packets"), l["sweeps"].get<double>(),
+                           number(l, "skipped"), number(l, "returns"), number(l, "shots"));
+        out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(l["fire_ms"]), latency(l["due_to_sent_ms"]));
+        for (const json& s : l["sinks"])
+            out += fmt::format("    -> {}: {} sent, {} dropped\n", s["sink"].get<std::string>(), number(s, "sent"), number(s, "dropped"));
+    }
+    if (const json& b = r["can"]; !b.is_null()) {
+        out += fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", b["bus"].get<std::string>(),
+                           number(b, "commands_taken"), number(b, "commands_missed"), non_zero(b["rejected"]));
+        const json trouble = {{"receive overflow", b["receive_overflow"]}, {"malformed", b["malformed"]},
+                              {"error frames", b["error_frames"]}, {"bus-off", b["bus_off"]},
+                              {"interface down", b["interface_down"]}, {"send drops", b["send_drops"]}};
+        out += fmt::format("    {} frames received ({} foreign), {} sent, trouble: {}\n", number(b, "frames_received"),
+                           number(b, "foreign_frames"), number(b, "frames_sent"), non_zero(trouble));
+    }
+    for (const json& n : r["notices"]) out += "  note: " + n.get<std::string>() + "\n";
+    if (!r["log"].get<std::string>().empty()) out += "  log: " + r["log"].get<std::string>() + "\n";
+    return out;
+}
+
+}  // namespace narpa

@@ -1,0 +1,114 @@
+#include "emulator/trajectory.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <map>
+
+namespace narpa {
+namespace {
+
+constexpr int kColumns = 15;
+
+/// One line's cells, each with the column (from 1) at which it starts.
+struct Cell {
+    std::string_view text;
+    int column = 1;
+};
+
+std::vector<Cell> split(std::string_view line) {
+    std::vector<Cell> cells;
+    std::size_t start = 0;
+    for (;;) {
+        const std::size_t comma = std::min(line.find(',', start), line.size());
+        std::string_view text = line.substr(start, comma - start);
+        const std::size_t blank = std::min(text.find_first_not_of(" \t"), text.size());
+        text.remove_prefix(blank);
+        while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+        cells.push_back({text, static_cast<int>(start + blank) + 1});
+        if (comma == line.size()) return cells;
+        start = comma + 1;
+    }
+}
+
+bool read_number(std::string_view text, double& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
+}
+
+Result<TrajectoryRow> read_row(std::string_view line, const std::string& path, int number) {
+    const auto bad = [&](int column, std::string what) { return Error{std::move(what), path, number, column}; };
+    const std::vector<Cell> cells = split(line);
+    if (cells.size() != kColumns)
+        return bad(1, fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kTrajectoryHeader));
+    std::array<double, kColumns> v{};
+    for (std::size_t i = 0; i < kColumns; ++i) {
+        if (i != 1 && !read_number(cells[i].text, v[i]))
+            return bad(cells[i].column, fmt::format("\"{}\" where a finite number was expected", cells[i].text));
+    }
+    if (std::abs(v[0]) > 9e9) return bad(1, fmt::format("time {} s, expected less than 9e9 s", v[0]));
+    if (cells[1].text.empty()) return bad(cells[1].column, "empty body name");
+
+    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1].text), {}};
+    row.motion = {{{v[5], v[6], v[7], v[8]}, {v[2], v[3], v[4]}}, {v[9], v[10], v[11]}, {v[12], v[13], v[14]}};
+    if (!accept_attitude(row.motion.T_world_body.q))
+        return bad(cells[5].column, fmt::format("attitude of norm {:.6g}, expected a unit quaternion (w, x, y, z)",
+                                                norm(Quat{v[5], v[6], v[7], v[8]})));
+    return row;
+}
+
+}  // namespace
+
+bool accept_attitude(Quat& q) noexcept {
+    const double n = norm(q);
+    if (!(std::abs(n - 1) <= 1e-3)) return false;
+    if (std::abs(n - 1) > 1e-15) q = normalized(q);
+    return true;
+}
+
+Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path) {
+    std::ifstream in(path);
+    if (!in) return Error{"cannot be opened, expected a trajectory (CSV)", path};
+    std::vector<TrajectoryRow> rows;
+    std::map<std::string, std::int64_t> last;
+    std::string line;
+    bool header = false;
+    for (int number = 1; std::getline(in, line); ++number) {
+        if (!line.empty() && line.back() == '\r') line.pop_back();
+        if (line.empty() || line.front() == '#') continue;
+        if (!header) {
+            if (line != kTrajectoryHeader)
+                return Error{fmt::format("expected the header line \"{}\"", kTrajectoryHeader), path, number, 1};
+            header = true;
+            continue;
+        }
+        auto row = read_row(line, path, number);
+        if (!row) return row.error();
+        const auto [at, first] = last.try_emplace(row->body, row->t_ns);
+        if (!first && row->t_ns <= at->second)
+            return Error{fmt::format("time {} s of body \"{}\" does not come after its last row ({} s)",
+                                     static_cast<double>(row->t_ns) * 1e-9, row->body,
+                                     static_cast<double>(at->second) * 1e-9),
+                         path, number, 1};
+        at->second = row->t_ns;
+        rows.push_back(*std::move(row));
+    }
+    if (rows.empty()) return Error{"no rows, expected a header line and at least one row", path};
+    return rows;
+}
+
+std::size_t format_trajectory_row(std::span<char> out, std::int64_t t_ns, std::string_view body,
+                                  const Motion& m) noexcept {
+    const Quat& q = m.T_world_body.q;
+    const Vec3 &p = m.T_world_body.t, &v = m.velocity_m_s, &w = m.rate_rad_s;
+    const std::uint64_t abs_ns = t_ns < 0 ? 0 - static_cast<std::uint64_t>(t_ns) : static_cast<std::uint64_t>(t_ns);
+    const auto end = fmt::format_to_n(out.data(), out.size(), "{}{}.{:09},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                                      t_ns < 0 ? "-" : "", abs_ns / 1'000'000'000, abs_ns % 1'000'000'000, body, p.x,
+                                      p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z);
+    return end.size <= out.size() ? end.size : 0;
+}
+
+}  // namespace narpa

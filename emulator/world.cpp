@@ -1,0 +1,110 @@
+#include "emulator/world.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "protocols/video/embedded_line.h"
+
+namespace narpa {
+
+namespace {
+
+/// What a scene may ask but this camera cannot give.
+Status check_camera(const Camera& c, const std::string& file) {
+    const std::size_t row = static_cast<std::size_t>(c.width) * bytes_per_pixel(c.format);
+    if (c.embedded_line && row < kEmbeddedLineBytes)
+        return Error{fmt::format("camera \"{}\": rows of {} bytes, expected at least {} for embedded_line", c.name, row,
+                                 kEmbeddedLineBytes),
+                     file};
+    return Ok{};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<World>> World::create(Scene scene) {
+    for (const Camera& c : scene.cameras)
+        if (auto good = check_camera(c, scene.file); !good) return good.error();
+    std::unique_ptr<World> world(new World);
+    world->scene_ = std::move(scene);
+    auto tracer = Tracer::create(world->scene_);
+    if (!tracer) return tracer.error();
+    world->tracer_.emplace(*std::move(tracer));
+
+    const std::vector<Body>& bodies = world->scene_.bodies;
+    world->tracks_.resize(bodies.size());
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!bodies[i].can_id) continue;
+        world->tracks_[i] = std::make_unique<PoseTrack>(bodies[i].initial, world->scene_.render.stale_after_s);
+        ++world->commanded_;
+    }
+    world->find_moving();
+    return world;
+}
+
+void World::find_moving() {
+    moving_.clear();
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
+        const Motion& m = scene_.bodies[i].initial;
+        if (tracks_[i] || m.velocity_m_s != Vec3{} || m.rate_rad_s != Vec3{}) moving_.push_back(i);
+    }
+}
+
+Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns) {
+    std::vector<const TrajectoryRow*> before(scene_.bodies.size(), nullptr);
+    std::vector<bool> past_end(scene_.bodies.size(), false);
+    const auto take = [&](std::size_t body, const TrajectoryRow& row) {
+        if (!tracks_[body])
+            tracks_[body] = std::make_unique<PoseTrack>(scene_.bodies[body].initial, scene_.render.stale_after_s);
+        return tracks_[body]->push({0, row.t_ns, row.motion}, t_from_ns) == TrackStatus::taken;
+    };
+    for (const TrajectoryRow& row : rows) {
+        const auto body = body_named(row.body);
+        if (!body) return Error{"the trajectory names a body \"" + row.body + "\" that the scene does not have", scene_.file};
+        const std::size_t i = *body;
+        if (row.t_ns <= t_from_ns) {
+            before[i] = &row;
+        } else if (!past_end[i]) {
+            if (before[i]) take(i, *std::exchange(before[i], nullptr));
+            if (!take(i, row)) return Error{"the trajectory has too many rows for this span", scene_.file};
+            past_end[i] = row.t_ns >= t_to_ns;
+        }
+    }
+    for (std::size_t i = 0; i < before.size(); ++i)
+        if (before[i]) take(i, *before[i]);
+    find_moving();
+    return Ok{};
+}
+
+TrackedPose World::pose(std::size_t body, std::int64_t t_ns) const noexcept {
+    if (tracks_[body]) return tracks_[body]->at(t_ns);
+    return {extrapolate(scene_.bodies[body].initial, static_cast<double>(t_ns) * 1e-9), 0, 0, false, false};
+}
+
+PlacementSource World::place(std::int64_t t_ns, int rider, Placement& out) const noexcept {
+    PlacementSource source;
+    bool named = false;
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
+        const TrackedPose p = pose(i, t_ns);
+        out.set(i, p.motion.T_world_body);
+        source.stale |= p.stale;
+        if (p.commanded && (!named || static_cast<int>(i) == rider)) {
+            source.counter = p.counter;
+            source.t_pose_ns = p.t_pose_ns;
+            named = true;
+        }
+    }
+    return source;
+}
+
+void World::place_moving(std::int64_t t_ns, Placement& out) const noexcept {
+    for (const std::size_t i : moving_) out.set(i, pose(i, t_ns).motion.T_world_body);
+}
+
+std::optional<std::size_t> World::body_named(std::string_view name) const noexcept {
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
+        if (scene_.bodies[i].name == name) return i;
+    return std::nullopt;
+}
+
+}  // namespace narpa

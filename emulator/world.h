@@ -1,0 +1,78 @@
+/// emulator/world.h - a scene with its tracer and the tracks of its commanded bodies: where everything is, when.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "emulator/pose_track.h"
+#include "emulator/trajectory.h"
+#include "renderer/scene/scene.h"
+#include "renderer/trace/tracer.h"
+
+namespace narpa {
+
+/// Which command a placement rests on, for the ledger.
+struct PlacementSource {
+    std::uint8_t counter = 0;
+    std::int64_t t_pose_ns = 0;  ///< 0: no command
+    bool stale = false;          ///< a commanded body had no command, or none for longer than stale_after_s
+};
+
+class World {
+public:
+    /// Builds the tracer and the tracks.
+    static Result<std::unique_ptr<World>> create(Scene scene);
+
+    [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
+    [[nodiscard]] const Tracer& tracer() const noexcept { return *tracer_; }
+    /// The track of body i; null when the scene gives it no can_id.
+    [[nodiscard]] PoseTrack* track(std::size_t body) noexcept { return tracks_[body].get(); }
+    [[nodiscard]] bool has_commanded_bodies() const noexcept { return commanded_ > 0; }
+
+    /// For a single picture or scan: the rows of a trajectory that matter between two times, taken as commands.
+    /// Bodies that it does not name keep the scene's own motion.
+    Status load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns);
+
+    /// Puts every body where it is at t. `rider`: the body whose command the source names first (a sensor's
+    /// mount); -1 for none. Allocates nothing.
+    PlacementSource place(std::int64_t t_ns, int rider, Placement& out) const noexcept;
+    /// Puts only the bodies that move (all but those at rest without a can_id): after a first `place`.
+    void place_moving(std::int64_t t_ns, Placement& out) const noexcept;
+
+    [[nodiscard]] Motion motion(std::size_t body, std::int64_t t_ns) const noexcept { return pose(body, t_ns).motion; }
+
+    [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const Placement& at) const noexcept {
+        return mount < 0 ? T_mount_sensor : at.T_world_body[static_cast<std::size_t>(mount)] * T_mount_sensor;
+    }
+    [[nodiscard]] std::optional<std::size_t> body_named(std::string_view name) const noexcept;
+
+private:
+    World() = default;
+    void find_moving();
+    [[nodiscard]] TrackedPose pose(std::size_t body, std::int64_t t_ns) const noexcept;
+
+    Scene scene_;
+    std::optional<Tracer> tracer_;
+    std::vector<std::unique_ptr<PoseTrack>> tracks_;
+    std::vector<std::size_t> moving_;
+    std::size_t commanded_ = 0;
+};
+
+/// The index of a camera or LiDAR by name ("" is the first); an Error that lists the names there are.
+template <class Sensor>
+Result<std::size_t> sensor_named(const std::vector<Sensor>& sensors, std::string_view name, std::string_view kind,
+                                 const std::string& file) {
+    if (sensors.empty()) return Error{"the scene has no " + std::string(kind), file};
+    if (name.empty()) return std::size_t{0};
+    std::string names;
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+        if (sensors[i].name == name) return i;
+        names += (i ? ", " : "") + sensors[i].name;
+    }
+    return Error{"no " + std::string(kind) + " named \"" + std::string(name) + "\", expected one of: " + names, file};
+}
+
+}  // namespace narpa

@@ -1,0 +1,32 @@
+/// protocols/can/candump.h - one line of a candump log <-> a frame and its stamp.
+///
+/// (1700000000.250000) vcan0 123#DEADBEEF     data        (..) vcan0 18FF50E5#R4   remote, length 4
+/// (1700000000.250000) vcan0 123##1DEADBEEF   CAN FD, the digit holds the flags (1 bit rate switch, 2 error state)
+/// A trailing " R" or " T" (direction, as python-can writes it) is allowed. Source: can-utils, lib.h and candump.c.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "protocols/can/frame.h"
+
+namespace narpa {
+
+struct CandumpLine {
+    std::int64_t t_ns = 0;  ///< stamp as in the line: usually Unix time
+    CanFrame frame{};
+};
+
+inline constexpr std::size_t kCandumpMaxLine = 224;
+
+/// Returns nullptr when the line (without its line end) is good, else what was expected; `out` is then as it was.
+[[nodiscard]] const char* parse_candump(std::string_view line, CandumpLine& out) noexcept;
+
+/// Writes the line with its LF, microseconds as candump does; `interface` at most 15 characters. Returns its
+/// length.
+[[nodiscard]] std::size_t format_candump(const CandumpLine& line, std::string_view interface,
+                                         std::span<char, kCandumpMaxLine> out) noexcept;
+
+}  // namespace narpa

@@ -1,0 +1,109 @@
+#include "protocols/can/dbc.h"
+
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cstddef>
+#include <string_view>
+
+#include "protocols/can/messages.h"
+
+namespace narpa {
+namespace {
+
+std::string symbol(std::string_view text) {
+    std::string s(text);
+    for (char& c : s)
+        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+    if (s.empty() || std::isdigit(static_cast<unsigned char>(s[0]))) s.insert(0, "_");
+    return s;
+}
+
+/// Shortest decimal text that reads back as the same double.
+std::string number(double value) {
+    std::array<char, 32> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+    return {text.data(), end};
+}
+
+/// The DBC is written in sections; each message adds to all of them.
+struct Sections {
+    std::string messages{}, comments{}, attributes{}, values{};
+
+    void begin_message(std::uint32_t id, std::string_view name, std::size_t bytes, std::string_view sender,
+                       std::string_view comment, bool fd) {
+        id_ = std::to_string(id);
+        messages +=
+            "BO_ " + id_ + " " + symbol(name) + ": " + std::to_string(bytes) + " " + std::string(sender) + "\n";
+        comments += "CM_ BO_ " + id_ + " \"" + std::string(comment) + "\";\n";
+        attributes += "BA_ \"VFrameFormat\" BO_ " + id_ + (fd ? " 14" : " 0") + ";\n";
+    }
+    void signal(const Signal& s, const BitPlace& at, std::string_view receiver) {
+        messages += " SG_ " + std::string(s.name) + " : " + std::to_string(at.start_bit) + "|" +
+                    std::to_string(at.length) + "@1" + (s.is_signed ? "-" : "+") + " (" +
+                    number(1.0 / s.steps_per_unit) + ",0) [" +
+                    number(static_cast<double>(raw_min(s.is_signed, at.length)) / s.steps_per_unit) + "|" +
+                    number(static_cast<double>(raw_max(s.is_signed, at.length)) / s.steps_per_unit) + "] \"" +
+                    std::string(s.unit) + "\" " + std::string(receiver) + "\n";
+        comments += "CM_ SG_ " + id_ + " " + std::string(s.name) + " \"" + std::string(s.comment) + "\";\n";
+        if (s.choices.empty()) return;
+        values += "VAL_ " + id_ + " " + std::string(s.name);
+        for (const Choice& c : s.choices)
+            values += " " + std::to_string(c.raw) + " \"" + std::string(c.name) + "\"";
+        values += " ;\n";
+    }
+    void end_message() { messages += "\n"; }
+
+private:
+    std::string id_{};
+};
+
+struct Route {
+    std::string_view sender, receiver;
+};
+
+void write_set(Sections& out, const SetLayout& layout, const std::string& prefix, std::uint32_t base_id,
+               Route route) {
+    for (std::size_t frame = 0; frame < layout.frames.size(); ++frame) {
+        out.begin_message(base_id + static_cast<std::uint32_t>(frame), prefix + std::string(layout.frames[frame]),
+                          kClassicBytes, route.sender, layout.comment, false);
+        for (const Signal& s : layout.signals)
+            if (s.classic.frame == frame) out.signal(s, s.classic, route.receiver);
+        out.signal({"Counter", "", "Same in all frames of a set, +1 with every set, wraps"},
+                   {0, 8 * kClassicCounterByte, 8}, route.receiver);
+        out.signal({"Crc", "", "CRC-8/SAE-J1850 over identifier (2 bytes, low first) and bytes 0..6"},
+                   {0, 8 * kClassicCrcByte, 8}, route.receiver);
+        out.end_message();
+    }
+    if (layout.fd_counter_bit == 0) return;
+    out.begin_message(base_id + kFdOffset, prefix + std::string(layout.name), kFdBytes, route.sender,
+                      layout.comment, true);
+    for (const Signal& s : layout.signals) out.signal(s, s.fd, route.receiver);
+    out.signal({"Counter", "", "+1 with every set, wraps"}, {0, layout.fd_counter_bit, 8}, route.receiver);
+    out.signal({"Crc", "", "CRC-16/IBM-3740 over identifier (2 bytes, low first) and bytes 0..61"},
+               {0, 8 * kFdCrcByte, 16}, route.receiver);
+    out.end_message();
+}
+
+}  // namespace
+
+std::string write_dbc(std::span<const DbcBody> bodies, int cameras) {
+    Sections out;
+    const Route command{"Commander", "narpa"}, telemetry{"narpa", "Commander"};
+    for (const DbcBody& body : bodies) write_set(out, kPoseLayout, symbol(body.name) + "_", body.base_id, command);
+    for (int i = 0; i < cameras; ++i)
+        write_set(out, kLedgerLayout, "Camera" + std::to_string(i) + "_",
+                  ledger_base_id(static_cast<std::uint8_t>(i)), telemetry);
+    write_set(out, kHeartbeatLayout, "", kHeartbeatId, telemetry);
+    return "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: Commander narpa\n\n" + out.messages +
+           "CM_ \"narpa on CAN. The most negative raw value of a signed signal means: not available.\";\n" +
+           out.comments +
+           "BA_DEF_ BO_ \"VFrameFormat\" ENUM "
+           "\"StandardCAN\",\"ExtendedCAN\",\"reserved\",\"J1939PG\",\"reserved\",\"reserved\",\"reserved\","
+           "\"reserved\","
+           "\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"StandardCAN_FD\","
+           "\"ExtendedCAN_FD\";\nBA_DEF_DEF_ \"VFrameFormat\" \"StandardCAN\";\n" +
+           out.attributes + out.values;
+}
+
+}  // namespace narpa

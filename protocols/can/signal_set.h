@@ -1,0 +1,102 @@
+/// protocols/can/signal_set.h - any set of signals.h, to frames and back. No allocation, no sockets.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+
+#include "protocols/can/frame.h"
+#include "protocols/can/signals.h"
+
+namespace narpa {
+
+/// What became of one frame.
+enum class DecodeStatus : std::uint8_t {
+    not_mine,        ///< another identifier, or a controller's error report
+    partial,         ///< a valid part of a set that still misses others
+    complete,        ///< with this frame the set is whole
+    too_short,       ///< fewer bytes than the message has
+    too_long,        ///< more bytes than the message has
+    wrong_kind,      ///< right identifier, but remote, 29-bit, or classic where FD belongs and the other way round
+    bad_checksum,    ///< CRC-8 or CRC-16 differs
+    duplicate,       ///< same counter and content as a part already seen or the last whole set
+    incomplete_set,  ///< counted only: an earlier set was dropped because this frame belongs to another one
+    not_a_number,    ///< the set is whole, but a signal says "not available"
+    not_unit,        ///< the set is whole, but its quaternion's norm is more than 1e-3 from 1
+};
+inline constexpr std::size_t kDecodeStatusCount = 11;
+
+/// "bad_checksum" and so on.
+[[nodiscard]] std::string_view name(DecodeStatus status) noexcept;
+
+inline constexpr std::size_t kMaxSignals = 16;
+/// "Not available" among raw values, whatever the length of the field that it came from.
+inline constexpr std::int64_t kNotAvailable = std::numeric_limits<std::int64_t>::min();
+/// Raw values in the order of the layout's signals.
+using RawSignals = std::array<std::int64_t, kMaxSignals>;
+
+/// Frame `index` of the classic form. Raw values are within the signal's range for classic CAN (or "not
+/// available").
+[[nodiscard]] CanFrame encode_classic(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
+                                      std::uint32_t base_id, std::size_t index) noexcept;
+/// The one frame of the FD form.
+[[nodiscard]] CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
+                                 std::uint32_t base_id) noexcept;
+
+/// Gathers the frames of one set. A set takes effect when all its classic frames of one counter have arrived, in
+/// any order, or with its one FD frame. A frame with another counter (or other content under the same counter)
+/// drops what was gathered: that is counted as `incomplete_set`, and the frame itself is accepted as the first of
+/// its own set.
+class SetDecoder {
+public:
+    /// Judges a whole set: `complete`, `not_a_number` or `not_unit`.
+    using Verdict = DecodeStatus (*)(const RawSignals&) noexcept;
+
+    SetDecoder(const SetLayout& layout, std::uint32_t base_id, Verdict verdict) noexcept
+        : layout_(&layout), base_id_(base_id), verdict_(verdict) {}
+
+    [[nodiscard]] DecodeStatus accept(const CanFrame& frame) noexcept;
+
+    /// The newest whole set; meaningful once `accept` has returned complete.
+    [[nodiscard]] const RawSignals& raw() const noexcept { return whole_.raw; }
+    [[nodiscard]] std::uint8_t counter() const noexcept { return whole_.counter; }
+    [[nodiscard]] std::uint32_t base_id() const noexcept { return base_id_; }
+    /// How often each status was met (for incomplete_set: how many sets were dropped).
+    [[nodiscard]] std::uint64_t count(DecodeStatus status) const noexcept {
+        return counts_[static_cast<std::size_t>(status)];
+    }
+
+private:
+    struct Set {
+        RawSignals raw{};
+        std::uint32_t seen = 0;  ///< bit i: classic frame i has arrived
+        std::uint8_t counter = 0;
+    };
+
+    [[nodiscard]] DecodeStatus judge(const CanFrame& frame) noexcept;
+    [[nodiscard]] DecodeStatus take_classic(const CanFrame& frame, std::size_t index) noexcept;
+    [[nodiscard]] DecodeStatus take_fd(const CanFrame& frame) noexcept;
+    [[nodiscard]] DecodeStatus conclude(const Set& set) noexcept;
+    void drop_partial() noexcept;
+
+    const SetLayout* layout_;
+    std::uint32_t base_id_;
+    Verdict verdict_;
+    Set partial_{}, whole_{};
+    bool has_whole_ = false;
+    std::array<std::uint64_t, kDecodeStatusCount> counts_{};
+};
+
+/// The 64-bit time nearest to `t_reference` whose low `bits` bits are `wrapped` (serial number arithmetic as in
+/// RFC 1982: the result is less than half a period ahead of the reference, or at most half a period behind).
+[[nodiscard]] constexpr std::int64_t unwrap_time(std::uint64_t wrapped, int bits,
+                                                 std::int64_t t_reference) noexcept {
+    const std::uint64_t difference = (wrapped - static_cast<std::uint64_t>(t_reference)) << (64 - bits);
+    return static_cast<std::int64_t>(
+        static_cast<std::uint64_t>(t_reference) +
+        static_cast<std::uint64_t>(static_cast<std::int64_t>(difference) >> (64 - bits)));
+}
+
+}  // namespace narpa

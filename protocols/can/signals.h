@@ -1,0 +1,195 @@
+/// protocols/can/signals.h - where every quantity lies on the wire: the tables that encode, decode and the DBC
+/// share.
+///
+/// A set is a group of quantities that take effect together. On classic CAN it travels as several 8-byte frames at
+/// base identifier + 0, + 1, ...: 48 bits of payload, the set's counter (byte 6), CRC-8 (byte 7). On CAN FD it is
+/// one 64-byte frame at base identifier + 15: payload, counter, zeros, CRC-16 (last two bytes). Little-endian
+/// (Intel) bit order throughout. README.md in this folder shows it with a worked example.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace narpa {
+
+/// A field of `length` bits whose least significant bit is bit `start_bit` of the payload (bit b is bit b % 8 of
+/// byte b / 8). `frame` is the index within a classic set; 0 for CAN FD. length 0: not carried.
+struct BitPlace {
+    std::uint8_t frame = 0;
+    std::uint16_t start_bit = 0;
+    std::uint8_t length = 0;
+};
+
+/// A value's name. A signal with choices is an enumeration on the wire.
+struct Choice {
+    std::int64_t raw = 0;
+    std::string_view name{};
+};
+
+/// physical value = raw / steps_per_unit, where the steps are whole numbers, so that the division rounds only once
+/// and decimal values come out as written. The most negative raw value of a signed signal means "not available".
+struct Signal {
+    std::string_view name{}, unit{}, comment{};
+    double steps_per_unit = 1;  ///< 1 / the factor of the DBC
+    bool is_signed = false;
+    BitPlace classic{}, fd{};
+    std::span<const Choice> choices{};
+};
+
+[[nodiscard]] constexpr std::int64_t raw_max(bool is_signed, int length) {
+    return (std::int64_t{1} << (is_signed ? length - 1 : length)) - 1;
+}
+[[nodiscard]] constexpr std::int64_t raw_min(bool is_signed, int length) {
+    return is_signed ? -raw_max(is_signed, length) : 0;
+}
+/// "Not available" on the wire; only for signed signals.
+[[nodiscard]] constexpr std::int64_t raw_not_available(int length) {
+    return -(std::int64_t{1} << (length - 1));
+}
+
+struct SetLayout {
+    std::string_view name{};  ///< name of the CAN FD message
+    std::string_view comment{};
+    std::span<const std::string_view> frames{};  ///< names of the classic messages, at base + index
+    std::span<const Signal> signals{};
+    std::uint16_t fd_counter_bit = 0;  ///< where the counter lies in the FD frame; 0: no FD form
+};
+
+inline constexpr std::uint32_t kFdOffset = 15;    ///< identifier of the FD form: base + 15
+inline constexpr std::uint32_t kBaseIdStep = 16;  ///< base identifiers are multiples of this
+inline constexpr std::size_t kClassicBytes = 8, kFdBytes = 64;
+inline constexpr int kClassicPayloadBits = 48;
+inline constexpr int kClassicCounterByte = 6, kClassicCrcByte = 7, kFdCrcByte = 62;
+
+// --- Pose command: base identifier = the body's can_id ----------------------------------------------------------
+
+inline constexpr double kPositionSteps_per_m = 1e6;
+inline constexpr double kAttitudeSteps = 4194304.0;  ///< 2^22: 1 and -1 fit exactly
+inline constexpr double kVelocitySteps_per_m_s = 5e4;
+inline constexpr double kRateSteps_per_rad_s = 5e4;
+
+/// Index of each quantity in `kPoseSignals`; the three or four components follow each other.
+enum PoseSignal : std::size_t {
+    kPoseTime = 0,
+    kPosePosition = 1,
+    kPoseAttitude = 4,
+    kPoseVelocity = 8,
+    kPoseRate = 11,
+    kPoseSignalCount = 14
+};
+
+inline constexpr std::array<std::string_view, 9> kPoseFrames{
+    "Time", "PositionX", "PositionY", "PositionZ", "AttitudeWX", "AttitudeYZ", "MotionX", "MotionY", "MotionZ"};
+
+inline constexpr std::array<Signal, kPoseSignalCount> kPoseSignals{{
+    {"Time", "ns", "Time of validity: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}, {0, 0, 48}},
+    {"PositionX", "m", "Body origin in world axes", kPositionSteps_per_m, true, {1, 0, 48}, {0, 48, 48}},
+    {"PositionY", "m", "Body origin in world axes", kPositionSteps_per_m, true, {2, 0, 48}, {0, 96, 48}},
+    {"PositionZ", "m", "Body origin in world axes", kPositionSteps_per_m, true, {3, 0, 48}, {0, 144, 48}},
+    {"AttitudeW", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 0, 24}, {0, 192, 24}},
+    {"AttitudeX", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 24, 24}, {0, 216, 24}},
+    {"AttitudeY", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 0, 24}, {0, 240, 24}},
+    {"AttitudeZ", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 24, 24}, {0, 264, 24}},
+    {"VelocityX", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {6, 0, 30}, {0, 288, 32}},
+    {"VelocityY", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {7, 0, 30}, {0, 320, 32}},
+    {"VelocityZ", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {8, 0, 30}, {0, 352, 32}},
+    {"RateX", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {6, 30, 18}, {0, 384, 24}},
+    {"RateY", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {7, 30, 18}, {0, 408, 24}},
+    {"RateZ", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {8, 30, 18}, {0, 432, 24}},
+}};
+
+inline constexpr SetLayout kPoseLayout{
+    "Pose", "Commanded pose: on classic CAN the nine frames of one counter take effect together", kPoseFrames,
+    kPoseSignals, 456};
+
+// --- Telemetry: one ledger set for each camera, and the heartbeat -----------------------------------------------
+
+enum LedgerSignal : std::size_t {
+    kLedgerFrame,
+    kLedgerCamera,
+    kLedgerPoseCounter,
+    kLedgerExposureMid,
+    kLedgerPoseTime,
+    kLedgerExposureStart,
+    kLedgerExposureEnd,
+    kLedgerRenderStart,
+    kLedgerRenderEnd,
+    kLedgerHandOver,
+    kLedgerDeadline,
+    kLedgerSamples,
+    kLedgerExpectedError,
+    kLedgerPoseStale,
+    kLedgerDeadlineMet,
+    kLedgerPoseKnown,
+    kLedgerSignalCount
+};
+
+inline constexpr double kExpectedErrorSteps = 1e7;  ///< of full scale
+
+inline constexpr std::array<std::string_view, 7> kLedgerFrames{
+    "LedgerFrame",  "LedgerExposureMid", "LedgerPoseTime", "LedgerExposure",
+    "LedgerRender", "LedgerHandOver",    "LedgerQuality"};
+
+inline constexpr std::array<Signal, kLedgerSignalCount> kLedgerSignals{{
+    {"Frame", "", "Frame number", 1, false, {0, 0, 32}, {0, 0, 32}},
+    {"Camera", "", "Index of the camera in the scene", 1, false, {0, 32, 8}, {0, 32, 8}},
+    {"PoseCounter", "", "Counter of the newest pose command in the frame", 1, false, {0, 40, 8}, {0, 40, 8}},
+    {"ExposureMid",
+     "ns",
+     "Middle of the exposure: simulation clock modulo 2^48 ns",
+     1,
+     false,
+     {1, 0, 48},
+     {0, 48, 48}},
+    {"PoseTime", "ns", "Time of validity of that command, modulo 2^48 ns", 1, false, {2, 0, 48}, {0, 96, 48}},
+    {"ExposureStart", "us", "After ExposureMid", 1, true, {3, 0, 24}, {0, 144, 24}},
+    {"ExposureEnd", "us", "After ExposureMid", 1, true, {3, 24, 24}, {0, 168, 24}},
+    {"RenderStart", "us", "After ExposureMid", 1, true, {4, 0, 24}, {0, 192, 24}},
+    {"RenderEnd", "us", "After ExposureMid", 1, true, {4, 24, 24}, {0, 216, 24}},
+    {"HandOver", "us", "After ExposureMid; not available: not handed over", 1, true, {5, 0, 24}, {0, 240, 24}},
+    {"Deadline", "us", "After ExposureMid", 1, true, {5, 24, 24}, {0, 264, 24}},
+    {"SamplesPerPixel", "", "Samples per pixel", 1, false, {6, 0, 16}, {0, 288, 16}},
+    {"ExpectedError",
+     "",
+     "Standard error of the mean, fraction of full scale; 0: not estimated",
+     kExpectedErrorSteps,
+     false,
+     {6, 16, 24},
+     {0, 304, 24}},
+    {"PoseStale", "", "A commanded body had no command or an old one", 1, false, {6, 40, 1}, {0, 328, 1}},
+    {"DeadlineMet", "", "Handed over in time", 1, false, {6, 41, 1}, {0, 329, 1}},
+    {"PoseKnown", "", "PoseCounter and PoseTime hold a command", 1, false, {6, 42, 1}, {0, 330, 1}},
+}};
+
+inline constexpr SetLayout kLedgerLayout{"Ledger", "Time ledger of one camera frame", kLedgerFrames, kLedgerSignals,
+                                         336};
+
+enum HeartbeatSignal : std::size_t {
+    kHeartbeatTime,
+    kHeartbeatState,
+    kHeartbeatNoCommand,
+    kHeartbeatStale,
+    kHeartbeatDeadlineMissed,
+    kHeartbeatOutputDropped,
+    kHeartbeatSignalCount
+};
+
+inline constexpr std::array<Choice, 4> kRunStates{
+    {{0, "starting"}, {1, "running"}, {2, "lockstep"}, {3, "stopping"}}};
+inline constexpr std::array<std::string_view, 1> kHeartbeatFrames{"Heartbeat"};
+
+inline constexpr std::array<Signal, kHeartbeatSignalCount> kHeartbeatSignals{{
+    {"Time", "us", "Simulation clock modulo 2^40 us", 1, false, {0, 0, 40}, {}},
+    {"State", "", "What the emulator is doing", 1, false, {0, 40, 4}, {}, kRunStates},
+    {"NoCommand", "", "A commanded body never had a command", 1, false, {0, 44, 1}, {}},
+    {"Stale", "", "A commanded body's last command is too old", 1, false, {0, 45, 1}, {}},
+    {"DeadlineMissed", "", "A frame was late since the last heartbeat", 1, false, {0, 46, 1}, {}},
+    {"OutputDropped", "", "An output dropped data since the last heartbeat", 1, false, {0, 47, 1}, {}},
+}};
+
+inline constexpr SetLayout kHeartbeatLayout{"Heartbeat", "narpa is alive", kHeartbeatFrames, kHeartbeatSignals, 0};
+
+}  // namespace narpa

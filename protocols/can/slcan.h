@@ -1,0 +1,45 @@
+/// protocols/can/slcan.h - LAWICEL text (slcan): lines that end in CR <-> classic CAN frames. No sockets.
+///
+/// t iii n dd..  data frame, 11-bit id (hex)     r iii n  remote frame
+/// T iiiiiiii n dd..  the same with 29-bit id    R iiiiiiii n
+/// C close, O open, Sn bit rate, V version, N serial number, F status. Source: LAWICEL CANUSB manual, "ASCII
+/// commands".
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "protocols/can/frame.h"
+
+namespace narpa {
+
+/// "T1FFFFFFF8" + 16 digits + CR.
+inline constexpr std::size_t kSlcanMaxLine = 27;
+
+/// Writes the line with its CR and returns its length; 0 when slcan cannot carry the frame (FD, error, bad id).
+[[nodiscard]] std::size_t encode_slcan(const CanFrame& frame, std::span<char, kSlcanMaxLine> out) noexcept;
+
+/// One line without its CR. A time stamp of four digits after the data is allowed and ignored (LAWICEL Z1).
+[[nodiscard]] bool decode_slcan(std::string_view line, CanFrame& out) noexcept;
+
+/// Cuts a stream of bytes into lines. Lines longer than any valid one are thrown away whole, and counted.
+class SlcanLines {
+public:
+    /// Takes bytes from the front of `bytes` up to and with the next line end (CR; LF and BEL end a line too) and
+    /// returns true when `line()` now holds a line that is not empty; false when all bytes are used up.
+    [[nodiscard]] bool next(std::span<const char>& bytes) noexcept;
+    [[nodiscard]] std::string_view line() const noexcept { return {buffer_.data(), size_}; }
+    /// Lines thrown away because they were too long.
+    [[nodiscard]] std::uint64_t overlong() const noexcept { return overlong_; }
+
+private:
+    std::array<char, 64> buffer_{};
+    std::size_t size_ = 0;
+    bool done_ = false, skipping_ = false;
+    std::uint64_t overlong_ = 0;
+};
+
+}  // namespace narpa

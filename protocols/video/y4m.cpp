@@ -1,0 +1,76 @@
+#include "protocols/video/y4m.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+
+namespace narpa {
+namespace {
+
+std::string_view colour_space(PixelFormat pixel) {
+    switch (pixel) {
+        case PixelFormat::grey: return "mono";
+        case PixelFormat::y16: return "mono16";
+        case PixelFormat::yuyv: return "422";
+        case PixelFormat::rgb24: break;
+    }
+    return {};
+}
+
+// Y0 U Y1 V in the frame; all Y, all U, all V in the samples.
+struct Planes {
+    explicit Planes(const VideoFormat& f)
+        : pairs(static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) / 2),
+          u(2 * pairs),
+          v(3 * pairs) {}
+    std::size_t pairs, u, v;
+};
+
+}  // namespace
+
+Result<std::string> y4m_stream_header(const VideoFormat& format) {
+    const std::string_view colour = colour_space(format.pixel);
+    if (colour.empty())
+        return Error{"Y4M cannot hold " + std::string(name(format.pixel)) + " frames; it holds GREY, Y16 and YUYV"};
+    if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
+        return Error{"Y4M needs a positive width, height and frame period"};
+    if (format.pixel == PixelFormat::yuyv && format.width % 2 != 0)
+        return Error{"YUYV needs an even width, not " + std::to_string(format.width)};
+    constexpr std::int64_t second = 1'000'000'000;
+    const std::int64_t common = std::gcd(second, format.period_ns);
+    return "YUV4MPEG2 W" + std::to_string(format.width) + " H" + std::to_string(format.height) + " F" +
+           std::to_string(second / common) + ":" + std::to_string(format.period_ns / common) + " Ip A1:1 C" +
+           std::string(colour) + "\n";
+}
+
+void y4m_samples(const VideoFormat& format, std::span<const std::uint8_t> frame,
+                 std::span<std::uint8_t> out) noexcept {
+    if (y4m_is_verbatim(format.pixel)) {
+        std::ranges::copy(frame, out.data());
+        return;
+    }
+    const Planes plane(format);
+    for (std::size_t i = 0; i < plane.pairs; ++i) {
+        out[2 * i] = frame[4 * i];
+        out[plane.u + i] = frame[4 * i + 1];
+        out[2 * i + 1] = frame[4 * i + 2];
+        out[plane.v + i] = frame[4 * i + 3];
+    }
+}
+
+void frame_from_y4m(const VideoFormat& format, std::span<const std::uint8_t> samples,
+                    std::span<std::uint8_t> out) noexcept {
+    if (y4m_is_verbatim(format.pixel)) {
+        std::ranges::copy(samples, out.data());
+        return;
+    }
+    const Planes plane(format);
+    for (std::size_t i = 0; i < plane.pairs; ++i) {
+        out[4 * i] = samples[2 * i];
+        out[4 * i + 1] = samples[plane.u + i];
+        out[4 * i + 2] = samples[2 * i + 1];
+        out[4 * i + 3] = samples[plane.v + i];
+    }
+}
+
+}  // namespace narpa

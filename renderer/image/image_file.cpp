@@ -1,0 +1,164 @@
+#include "renderer/image/image_file.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+
+#include <algorithm>
+#include <bit>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace narpa {
+namespace {
+
+Error cannot_write(const std::string& path, const std::string& why) {
+    const bool forbidden = errno == EACCES || errno == EPERM || errno == EROFS;
+    return Error{"cannot write: " + why, path, 0, 0, forbidden ? ErrorKind::missing : ErrorKind::bad_input};
+}
+
+Status write_bytes(const std::string& path, const std::string& head, const void* data, std::size_t size) {
+    errno = 0;
+    std::ofstream file(path, std::ios::binary);
+    file.write(head.data(), static_cast<std::streamsize>(head.size()));
+    file.write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
+    file.close();
+    if (!file) return cannot_write(path, errno != 0 ? std::strerror(errno) : "the disk did not take it all");
+    return Ok{};
+}
+
+Status write_pfm(const std::string& path, const RadianceImage& image) {
+    static_assert(std::endian::native == std::endian::little && sizeof(Rgb) == 12);
+    const std::size_t width = static_cast<std::size_t>(image.width),
+                      height = static_cast<std::size_t>(image.height);
+    std::vector<Rgb> from_bottom(image.pixels.size());
+    for (std::size_t y = 0; y < height; ++y)
+        std::copy_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(y * width), width,
+                    from_bottom.begin() + static_cast<std::ptrdiff_t>((height - 1 - y) * width));
+    return write_bytes(path, "PF\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n",
+                       from_bottom.data(), from_bottom.size() * sizeof(Rgb));
+}
+
+/// Named 32-bit float planes of one size.
+class Planes {
+public:
+    explicit Planes(std::size_t pixels) : pixels_(pixels) {}
+
+    void add(const std::string& name, const std::function<double(std::size_t)>& value) {
+        std::vector<float> plane(pixels_);
+        for (std::size_t i = 0; i < pixels_; ++i) plane[i] = static_cast<float>(value(i));
+        planes_.emplace_back(name, std::move(plane));
+    }
+    /// The value, and what rounding it to 32 bits took away.
+    void add_exact(const std::string& name, const std::function<double(std::size_t)>& value) {
+        add(name, value);
+        add(name + ".rest", [&](std::size_t i) {
+            const double v = value(i);
+            return std::isfinite(v) ? v - static_cast<double>(static_cast<float>(v)) : 0.0;
+        });
+    }
+    std::vector<std::pair<std::string, std::vector<float>>>& all() { return planes_; }
+
+private:
+    std::size_t pixels_;
+    std::vector<std::pair<std::string, std::vector<float>>> planes_;
+};
+
+constexpr std::array<const char*, 3> kAxis{"X", "Y", "Z"}, kBand{"R", "G", "B"};
+
+Planes planes_of(const RenderedFrame& frame) {
+    const auto& pixels = frame.radiance.pixels;
+    Planes planes(pixels.size());
+    for (int b = 0; b < 3; ++b)
+        planes.add(kBand[static_cast<std::size_t>(b)], [&, b](std::size_t i) { return pixels[i][b]; });
+    if (frame.aovs == nullptr) return planes;
+    const Aovs& a = *frame.aovs;
+    if (!a.depth_m.empty()) planes.add_exact("depth.Z", [&](std::size_t i) { return a.depth_m[i]; });
+    if (!a.range_m.empty()) planes.add_exact("range", [&](std::size_t i) { return a.range_m[i]; });
+    for (int k = 0; k < 3; ++k) {
+        const std::string axis = kAxis[static_cast<std::size_t>(k)];
+        if (!a.normal.empty()) planes.add("normal." + axis, [&, k](std::size_t i) { return a.normal[i][k]; });
+        if (!a.position.empty())
+            planes.add_exact("position." + axis, [&, k](std::size_t i) { return a.position[i][k]; });
+    }
+    if (!a.body.empty()) planes.add("body", [&](std::size_t i) { return a.body[i]; });
+    if (!a.variance.empty()) planes.add("variance", [&](std::size_t i) { return a.variance[i]; });
+    return planes;
+}
+
+Status write_exr(const std::string& path, const RenderedFrame& frame) {
+    // OpenEXR's own messages do not say why a file could not be opened; this one does.
+    if (const Status writable = write_bytes(path, "", nullptr, 0); !writable) return writable.error();
+    try {
+        Planes planes = planes_of(frame);
+        const int width = frame.radiance.width, height = frame.radiance.height;
+        Imf::Header header(width, height);
+        header.compression() = Imf::ZIP_COMPRESSION;
+        header.insert("comments", Imf::StringAttribute("linear radiance in W m^-2 sr^-1 a band; lengths in m; "
+                                                       "NAME + NAME.rest is NAME in double precision"));
+        Imf::FrameBuffer buffer;
+        for (auto& [name, plane] : planes.all()) {
+            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+            buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(plane.data()), sizeof(float),
+                                           sizeof(float) * static_cast<std::size_t>(width)));
+        }
+        Imf::OutputFile file(path.c_str(), header, 1);
+        file.setFrameBuffer(buffer);
+        file.writePixels(height);
+    } catch (const std::exception& e) {
+        return cannot_write(path, e.what());
+    }
+    return Ok{};
+}
+
+Status write_png(const std::string& path, const RenderedFrame& frame) {
+    try {
+        const int width = frame.radiance.width, height = frame.radiance.height;
+        // OpenCV takes no const data; it only reads here.
+        const auto view = [&](int type) {
+            return cv::Mat(height, width, type, const_cast<std::uint8_t*>(frame.bytes.data()));
+        };
+        cv::Mat image;
+        switch (frame.camera.format) {
+            case PixelFormat::grey: image = view(CV_8UC1); break;
+            case PixelFormat::y16: image = view(CV_16UC1); break;
+            case PixelFormat::rgb24: cv::cvtColor(view(CV_8UC3), image, cv::COLOR_RGB2BGR); break;
+            case PixelFormat::yuyv: cv::cvtColor(view(CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV); break;
+        }
+        std::vector<std::uint8_t> encoded;
+        if (!cv::imencode(".png", image, encoded)) return Error{"OpenCV could not encode the PNG", path};
+        return write_bytes(path, "", encoded.data(), encoded.size());
+    } catch (const std::exception& e) {
+        return Error{std::string("OpenCV could not encode the PNG: ") + e.what(), path};
+    }
+}
+
+}  // namespace
+
+Status write_image(const std::string& path, const RenderedFrame& frame) {
+    std::string extension = std::filesystem::path(path).extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (extension == ".exr") return write_exr(path, frame);
+    if (extension == ".pfm") return write_pfm(path, frame.radiance);
+    if (extension != ".png" && extension != ".raw")
+        return Error{"unknown image format \"" + extension + "\": expected .exr, .pfm, .png or .raw", path};
+    const std::size_t expected = frame_bytes({frame.radiance.width, frame.radiance.height, frame.camera.format, 0});
+    if (frame.bytes.size() != expected)
+        return Error{"the frame has " + std::to_string(frame.bytes.size()) + " bytes where its format has " +
+                         std::to_string(expected),
+                     path};
+    return extension == ".png" ? write_png(path, frame)
+                               : write_bytes(path, "", frame.bytes.data(), frame.bytes.size());
+}
+
+}  // namespace narpa

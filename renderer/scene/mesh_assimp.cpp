@@ -1,0 +1,211 @@
+#include <assimp/GltfMaterial.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <stdexcept>
+
+#include "renderer/scene/file_bytes.h"
+#include "renderer/scene/triangle_soup.h"
+#include "renderer/scene/triangulate.h"
+
+namespace Assimp {
+
+/// Debian builds Assimp with its assertions on, which abort the program on some damaged files. This definition
+/// stands before the library's own (the linker exports it, as the library refers to it), and makes them exceptions.
+[[noreturn]] void aiAssertViolation(const char* failed_expression, const char* file, int line) {
+    throw std::runtime_error(fmt::format("{}:{}: {} does not hold", file, line, failed_expression));
+}
+
+}  // namespace Assimp
+
+namespace narpa {
+
+namespace {
+
+Rgb rgb(const aiColor3D& c) {
+    return {c.r, c.g, c.b};
+}
+
+Rgb colour(const aiMaterial& m, const char* key, unsigned type, unsigned index, const Rgb& otherwise) {
+    aiColor3D c;
+    return m.Get(key, type, index, c) == AI_SUCCESS ? rgb(c) : otherwise;
+}
+
+/// Phong from what MTL, 3DS, PLY and DAE give.
+Material classic_material(const aiMaterial& m) {
+    float exponent = 0;
+    m.Get(AI_MATKEY_SHININESS, exponent);
+    return make_material(m.GetName().C_Str(), colour(m, AI_MATKEY_COLOR_DIFFUSE, {0.5f, 0.5f, 0.5f}),
+                         colour(m, AI_MATKEY_COLOR_SPECULAR, {}), exponent,
+                         colour(m, AI_MATKEY_COLOR_EMISSIVE, {}));
+}
+
+/// glTF's metallic-roughness, told with the two lobes that there are: Lambert of (1 - metallic) base colour, Phong
+/// of metallic base colour and 0.04 of the rest. GGX with roughness r is as wide as Blinn's lobe with 2 / r^4 - 2,
+/// and Phong's lobe, about the mirror direction, is as wide as Blinn's with a quarter of the exponent.
+Material metallic_material(const aiMaterial& m) {
+    aiColor4D base(1, 1, 1, 1);
+    float metallic = 1, roughness = 1;
+    m.Get(AI_MATKEY_BASE_COLOR, base);
+    m.Get(AI_MATKEY_METALLIC_FACTOR, metallic);
+    m.Get(AI_MATKEY_ROUGHNESS_FACTOR, roughness);
+    metallic = std::clamp(metallic, 0.0f, 1.0f);
+    roughness = std::clamp(roughness, 0.05f, 1.0f);
+    const Rgb albedo{base.r, base.g, base.b}, dielectric{0.04f, 0.04f, 0.04f};
+    return make_material(m.GetName().C_Str(), albedo * (1 - metallic),
+                         albedo * metallic + dielectric * (1 - metallic), (2 / std::pow(roughness, 4.0f) - 2) / 4,
+                         colour(m, AI_MATKEY_COLOR_EMISSIVE, {}));
+}
+
+bool is_gltf(const std::string& path) {
+    const std::string extension = extension_of(path);
+    return extension == ".gltf" || extension == ".glb";
+}
+
+/// The image of the diffuse (or base) colour, as a file or as the bytes that the mesh file holds.
+void find_texture(const aiScene& scene, const aiMaterial& m, const std::string& path, MeshMaterial& out) {
+    aiString name;
+    if (m.GetTexture(aiTextureType_BASE_COLOR, 0, &name) != AI_SUCCESS &&
+        m.GetTexture(aiTextureType_DIFFUSE, 0, &name) != AI_SUCCESS)
+        return;
+    if (const aiTexture* inside = scene.GetEmbeddedTexture(name.C_Str())) {
+        const auto* bytes = reinterpret_cast<const std::uint8_t*>(inside->pcData);
+        if (inside->mHeight == 0)
+            out.texture_file = path + name.C_Str(), out.texture_bytes.assign(bytes, bytes + inside->mWidth);
+        return;
+    }
+    out.texture_file = texture_path(path, name.C_Str());
+}
+
+/// Assimp 5.2 looks for the end of a PLY header for ever where there is none.
+Status check_ply_header(const std::string& path) {
+    if (extension_of(path) != ".ply") return Ok{};
+    const Result<std::string> bytes = read_file(path);
+    if (!bytes) return bytes.error();
+    if (bytes->find("\nend_header\n") == bytes->npos && bytes->find("\nend_header\r") == bytes->npos)
+        return Error{.what = "no \"end_header\" line, expected a PLY header", .file = path};
+    return Ok{};
+}
+
+class Walk {
+public:
+    Walk(const aiScene& scene, const std::string& path) : scene_(scene), path_(path) {}
+
+    Result<TriangleSoup> read() {
+        if (scene_.mNumMaterials > kMaxMaterials)
+            return Error{
+                .what = fmt::format("{} materials, at most {} can be used", scene_.mNumMaterials, kMaxMaterials),
+                .file = path_};
+        const bool gltf = is_gltf(path_);
+        for (unsigned i = 0; i < scene_.mNumMaterials; ++i) {
+            const aiMaterial& m = *scene_.mMaterials[i];
+            MeshMaterial& out = soup_.materials.emplace_back();
+            out.material = gltf ? metallic_material(m) : classic_material(m);
+            find_texture(scene_, m, path_, out);
+        }
+        if (gltf) warn_of_lost_textures();
+        if (scene_.mRootNode) read_node(*scene_.mRootNode, aiMatrix4x4t<double>());
+        if (too_many_corners_ > 0)
+            return Error{
+                .what = fmt::format("a face of {} corners, expected at most {}", too_many_corners_, kMostCorners),
+                .file = path_};
+        return std::move(soup_);
+    }
+
+private:
+    /// Assimp 5.2 passes over this extension and the textures with it, in silence.
+    void warn_of_lost_textures() {
+        const Result<std::string> bytes = read_file(path_);
+        if (bytes && bytes->find("\"EXT_texture_webp\"") != std::string::npos)
+            soup_.warnings.push_back(path_ + ": its textures (EXT_texture_webp) cannot be read and are not used");
+    }
+
+    void read_node(const aiNode& node, const aiMatrix4x4t<double>& parent) {
+        const aiMatrix4x4& t = node.mTransformation;
+        const aiMatrix4x4t<double> here =
+            parent * aiMatrix4x4t<double>(t.a1, t.a2, t.a3, t.a4, t.b1, t.b2, t.b3, t.b4, t.c1, t.c2, t.c3, t.c4,
+                                          t.d1, t.d2, t.d3, t.d4);
+        for (unsigned i = 0; i < node.mNumMeshes; ++i) read_part(*scene_.mMeshes[node.mMeshes[i]], here);
+        for (unsigned i = 0; i < node.mNumChildren; ++i) read_node(*node.mChildren[i], here);
+    }
+
+    void read_part(const aiMesh& part, const aiMatrix4x4t<double>& T) {
+        const auto first_position = static_cast<std::uint32_t>(soup_.positions.size());
+        const auto first_normal = static_cast<std::uint32_t>(soup_.normals.size());
+        const auto first_uv = static_cast<std::uint32_t>(soup_.uvs.size());
+        const bool has_uv = part.HasTextureCoords(0);
+        for (unsigned i = 0; i < part.mNumVertices; ++i) {
+            const aiVector3D& p = part.mVertices[i];
+            const aiVector3t<double> w = T * aiVector3t<double>(p.x, p.y, p.z);
+            soup_.positions.push_back({w.x, w.y, w.z});
+            if (has_uv) soup_.uvs.push_back({part.mTextureCoords[0][i].x, part.mTextureCoords[0][i].y});
+        }
+        if (part.HasNormals()) read_normals(part, T);
+        const bool mirrored = aiMatrix3x3t<double>(T).Determinant() < 0;
+        for (unsigned f = 0; f < part.mNumFaces; ++f) {
+            const aiFace& face = part.mFaces[f];
+            if (face.mNumIndices != 3) continue;  // a point or a line
+            TriangleSoup::Triangle triangle{.corners = {},
+                                            .material = static_cast<std::uint16_t>(part.mMaterialIndex)};
+            for (unsigned k = 0; k < 3; ++k) {
+                const unsigned v = face.mIndices[k];
+                TriangleSoup::Corner& c = triangle.corners[mirrored ? 2 - k : k];
+                c.position = first_position + v;
+                if (has_uv) c.uv = first_uv + v;
+                if (part.HasNormals()) c.normal = first_normal + v;
+            }
+            soup_.triangles.push_back(triangle);
+        }
+    }
+
+    /// A polygon of three corners or more; points and lines are left out.
+    template <class CornerOf>
+    void read_face(const aiFace& face, CornerOf corner, std::uint16_t material) {
+        if (face.mNumIndices == 3) soup_.triangles.push_back({{corner(0), corner(1), corner(2)}, material});
+        if (face.mNumIndices <= 3) return;
+        if (face.mNumIndices > kMostCorners) {
+            too_many_corners_ = std::max(too_many_corners_, face.mNumIndices);
+            return;
+        }
+        std::vector<Vec3> points;
+        for (unsigned k = 0; k < face.mNumIndices; ++k) points.push_back(soup_.positions[corner(k).position]);
+        for (const auto& t : triangulate(points))
+            soup_.triangles.push_back({{corner(t[0]), corner(t[1]), corner(t[2])}, material});
+    }
+
+    void read_normals(const aiMesh& part, const aiMatrix4x4t<double>& T) {
+        const aiMatrix3x3t<double> R = aiMatrix3x3t<double>(T).Inverse().Transpose();
+        for (unsigned i = 0; i < part.mNumVertices; ++i) {
+            const aiVector3D& n = part.mNormals[i];
+            const aiVector3t<double> w = R * aiVector3t<double>(n.x, n.y, n.z);
+            soup_.normals.push_back({static_cast<float>(w.x), static_cast<float>(w.y), static_cast<float>(w.z)});
+        }
+    }
+
+    const aiScene& scene_;
+    const std::string& path_;
+    TriangleSoup soup_;
+    unsigned too_many_corners_ = 0;
+};
+
+}  // namespace
+
+Result<TriangleSoup> read_soup_with_assimp(const std::string& path) {
+    try {
+        if (const Status header = check_ply_header(path); !header) return header.error();
+        Assimp::Importer importer;
+        const aiScene* scene = importer.ReadFile(path, 0);
+        if (!scene)
+            return Error{.what = fmt::format("not a mesh that can be read: {}", importer.GetErrorString()),
+                         .file = path};
+        return Walk(*scene, path).read();
+    } catch (const std::exception& e) {
+        return Error{.what = fmt::format("not a mesh that can be read: {}", e.what()), .file = path};
+    }
+}
+
+}  // namespace narpa

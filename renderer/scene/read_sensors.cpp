@@ -1,0 +1,214 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "renderer/scene/scene_parts.h"
+
+namespace narpa {
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Where a sensor sits: on a body or in the world.
+struct Mounting {
+    int mount = -1;
+    Rigid3 T_mount_sensor{};
+};
+
+int read_mount(TableReader& table, const std::vector<Body>& bodies) {
+    const auto name = table.text("mount");
+    if (!name) return -1;
+    std::string all;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (bodies[i].name == *name) return static_cast<int>(i);
+        all += (all.empty() ? "\"" : ", \"") + bodies[i].name + "\"";
+    }
+    table.fail("mount",
+               fmt::format("there is no body \"{}\", expected one of {}", *name, all.empty() ? "none" : all));
+    return -1;
+}
+
+/// The sensor's attitude that looks along `forward`, its picture upright with respect to `up`.
+Quat camera_attitude(const Vec3& forward, const Vec3& right) {
+    return quat_from_columns(right, cross(forward, right), forward);  // x right, y down, z forward
+}
+Quat lidar_attitude(const Vec3& forward, const Vec3& right) {
+    return quat_from_columns(right, forward, cross(right, forward));  // x right, y forward, z up
+}
+
+template <class AttitudeOf>
+void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
+    const auto target = table.vec3("look_at");
+    const Vec3 up = table.vec3("up").value_or(Vec3{0, 0, 1});
+    if (!table.has("look_at")) {
+        if (table.has("up")) table.fail("up", "belongs to look_at, which is not here");
+        return;
+    }
+    if (table.has("attitude_wxyz")) table.fail("look_at", "there is an attitude_wxyz too, expected one of the two");
+    if (!target) return;
+    const Vec3 line = *target - T.t;
+    if (!(norm(line) > 1e-9) || !std::isfinite(norm(line)))
+        return table.fail("look_at", "is where the sensor is, expected another point");
+    const Vec3 right = cross(normalized(line), up);
+    if (!(norm(right) > 1e-6 * norm(up)) || !std::isfinite(norm(right)))
+        return table.fail("look_at",
+                          fmt::format("lies along up = [{}, {}, {}], expected another \"up\"", up.x, up.y, up.z));
+    T.q = attitude_of(normalized(line), normalized(right));
+}
+
+template <class AttitudeOf>
+Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of) {
+    Mounting m;
+    m.mount = read_mount(table, bodies);
+    m.T_mount_sensor.t = table.vec3("position_m").value_or(Vec3{});
+    m.T_mount_sensor.q = table.attitude("attitude_wxyz").value_or(Quat{});
+    read_look_at(table, m.T_mount_sensor, attitude_of);
+    return m;
+}
+
+void read_resolution(TableReader& table, Camera& camera) {
+    constexpr int kMostPixels = 16384;
+    table.require("resolution", "[width, height] in pixels");
+    if (const auto size = table.size("resolution", kMostPixels))
+        camera.width = (*size)[0], camera.height = (*size)[1];
+}
+
+void read_intrinsics(TableReader& table, Camera& camera) {
+    for (const char* key : {"fx", "fy"}) table.require(key, "a focal length in pixels");
+    camera.fx = table.number("fx", kPositive).value_or(1);
+    camera.fy = table.number("fy", kPositive).value_or(1);
+    camera.cx = table.number("cx").value_or(camera.cx);
+    camera.cy = table.number("cy").value_or(camera.cy);
+    table.finish();
+}
+
+/// Field of view edge to edge of the picture: the diagonal is hypot(width, height) pixels long.
+void read_projection(TableReader& table, Camera& camera) {
+    const Range angle{.low = 0, .high = 180, .low_open = true, .high_open = true};
+    camera.cx = 0.5 * (camera.width - 1), camera.cy = 0.5 * (camera.height - 1);
+    auto intrinsics = table.table("intrinsics");
+    const auto diagonal = table.number("fov_diagonal_deg", angle),
+               horizontal = table.number("fov_horizontal_deg", angle);
+    const char* const keys[] = {"intrinsics", "fov_diagonal_deg", "fov_horizontal_deg"};
+    const auto given = std::count_if(std::begin(keys), std::end(keys), [&](const char* k) { return table.has(k); });
+    if (given == 0) table.require("fov_diagonal_deg", "one of intrinsics, fov_diagonal_deg, fov_horizontal_deg");
+    if (given > 1)
+        for (const char* key : keys)
+            if (table.has(key))
+                table.fail(key, "expected exactly one of intrinsics, fov_diagonal_deg, fov_horizontal_deg");
+    if (intrinsics) read_intrinsics(*intrinsics, camera);
+    if (diagonal)
+        camera.fx = camera.fy = 0.5 * std::hypot(camera.width, camera.height) / std::tan(*diagonal * kPi / 360.0);
+    if (horizontal) camera.fx = camera.fy = 0.5 * camera.width / std::tan(*horizontal * kPi / 360.0);
+    table.not_in_this_version("distortion", "the projection is a pinhole so far");
+    table.not_in_this_version("lens", "the projection is a pinhole so far");
+}
+
+std::int64_t read_period_ns(TableReader& table, std::int64_t otherwise) {
+    const auto rate_hz = table.number("rate_hz", {.low = 1e-3, .high = 10000});
+    return rate_hz ? std::llround(1e9 / *rate_hz) : otherwise;
+}
+
+PixelFormat read_format(TableReader& table, int width) {
+    using enum PixelFormat;
+    static constexpr std::array<std::pair<std::string_view, PixelFormat>, 4> kFormats{
+        {{name(grey), grey}, {name(y16), y16}, {name(yuyv), yuyv}, {name(rgb24), rgb24}}};
+    const PixelFormat format = table.choice<PixelFormat>("format", kFormats).value_or(grey);
+    if (format == yuyv && width % 2 != 0)
+        table.fail("format",
+                   fmt::format("YUYV holds pixels in pairs and the width is {}, expected an even one", width));
+    return format;
+}
+
+LatePolicy read_late_policy(TableReader& table) {
+    using enum LatePolicy;
+    static constexpr std::array<std::pair<std::string_view, LatePolicy>, 4> kPolicies{
+        {{"drop", drop}, {"repeat", repeat}, {"late", late}, {"blank", blank}}};
+    return table.choice<LatePolicy>("late_policy", kPolicies).value_or(late);
+}
+
+std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_ns) {
+    auto table = camera.table("detector");
+    if (!table) return std::nullopt;
+    Detector d;
+    d.exposure_s = table->number("exposure_s", kPositive).value_or(d.exposure_s);
+    d.pixel_pitch_m = table->number("pixel_pitch_m", kPositive).value_or(d.pixel_pitch_m);
+    d.f_number = table->number("f_number", kPositive).value_or(d.f_number);
+    d.quantum_efficiency =
+        table->number("quantum_efficiency", {.low = 0, .high = 1, .low_open = true}).value_or(d.quantum_efficiency);
+    d.full_well_e = table->number("full_well_e", {.low = 1}).value_or(d.full_well_e);
+    d.gain_e_per_dn = table->number("gain_e_per_dn", kNotNegative).value_or(d.gain_e_per_dn);
+    d.read_noise_e = table->number("read_noise_e", kNotNegative).value_or(d.read_noise_e);
+    d.shot_noise = table->boolean("shot_noise").value_or(d.shot_noise);
+    d.bits = static_cast<int>(table->integer("bits", 8, 12).value_or(d.bits));
+    d.black_level_dn = static_cast<int>(table->integer("black_level_dn", 0, (1 << d.bits) - 2).value_or(0));
+    const double period_s = 1e-9 * static_cast<double>(period_ns);
+    if (d.exposure_s > period_s) {
+        const std::string what = fmt::format("{} s is longer than a frame, expected at most 1 / rate_hz = {:g} s",
+                                             d.exposure_s, period_s);
+        table->fail("exposure_s", what);
+    }
+    table->finish();
+    return d;
+}
+
+/// What an ideal sensor maps to full scale: a white Lambert surface that faces the Sun, or the brightest band of
+/// the ambient light where there is no Sun. 0: neither is there.
+double white_radiance(const Scene& scene) {
+    if (scene.sun) return scene.sun->irradiance_w_m2 / kPi;
+    return std::max({scene.ambient.x, scene.ambient.y, scene.ambient.z});
+}
+
+Camera read_camera(TableReader& table, std::vector<std::string>& names, const Scene& scene) {
+    Camera camera;
+    camera.name = read_name(table, names);
+    const Mounting mounting = read_mounting(table, scene.bodies, camera_attitude);
+    camera.mount = mounting.mount;
+    camera.T_mount_camera = mounting.T_mount_sensor;
+    read_resolution(table, camera);
+    read_projection(table, camera);
+    camera.period_ns = read_period_ns(table, camera.period_ns);
+    camera.format = read_format(table, camera.width);
+    camera.embedded_line = table.boolean("embedded_line").value_or(camera.embedded_line);
+    if (camera.embedded_line && camera.height < 2)
+        table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");
+    camera.late = read_late_policy(table);
+    camera.detector = read_detector(table, camera.period_ns);
+    camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
+    if (!camera.detector && !(camera.white_radiance > 0))
+        table.require("white_radiance", "a number > 0, as there is neither [sun] nor [ambient] to take it from");
+    table.finish();
+    return camera;
+}
+
+Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene) {
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kModels{{{"VLP-16", "VLP-16"}}};
+    constexpr double kFarthestM = 65535 * 0.002;  // what the VLP-16's packets can say: 16 bits of 2 mm
+    Lidar lidar;
+    lidar.name = read_name(table, names);
+    const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
+    lidar.mount = mounting.mount;
+    lidar.T_mount_lidar = mounting.T_mount_sensor;
+    table.require("model", "\"VLP-16\"");
+    lidar.model = table.choice<std::string_view>("model", kModels).value_or("VLP-16");
+    lidar.rate_hz = table.number("rate_hz", {.low = 5, .high = 20}).value_or(lidar.rate_hz);
+    lidar.range_max_m =
+        table.number("range_max_m", {.low = 0, .high = kFarthestM, .low_open = true}).value_or(lidar.range_max_m);
+    table.finish();
+    return lidar;
+}
+
+}  // namespace
+
+void read_sensors(TableReader& root, SceneReading& reading) {
+    Scene& scene = reading.scene;
+    std::vector<std::string> cameras, lidars;
+    for (TableReader& table : root.tables("camera")) scene.cameras.push_back(read_camera(table, cameras, scene));
+    for (TableReader& table : root.tables("lidar")) scene.lidars.push_back(read_lidar(table, lidars, scene));
+    if (!root.has("camera") && !root.has("lidar")) root.require("camera", "at least one [[camera]] or [[lidar]]");
+}
+
+}  // namespace narpa

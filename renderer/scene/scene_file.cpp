@@ -1,0 +1,71 @@
+#include "renderer/scene/scene_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "renderer/scene/file_bytes.h"
+#include "renderer/scene/scene_parts.h"
+
+namespace narpa {
+
+namespace {
+
+bool allowed_in_name(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+           c == '.';
+}
+
+void read_root(TableReader& root, SceneReading& reading) {
+    read_surroundings(root, reading);
+    read_bodies(root, reading);
+    read_sensors(root, reading);
+    root.not_in_this_version("atmosphere", "leave [atmosphere] out: scenes are in vacuum so far");
+    root.not_in_this_version("light", "leave [[light]] out: light comes from [sun], [ambient] and emission so far");
+    root.finish();
+    if (reading.problems.none()) load_named_files(reading);
+}
+
+Result<Scene> read_text(const std::string& path, const std::string& text) {
+    SceneReading reading{
+        .scene = {}, .problems = Problems(path), .folder = std::filesystem::path(path).parent_path()};
+    reading.scene.file = path;
+    try {
+        const toml::table table = toml::parse(std::string_view(text), std::string_view(path));
+        TableReader root(table, "the scene", reading.problems);
+        read_root(root, reading);
+    } catch (const toml::parse_error& e) {
+        reading.problems.add(e.source(), std::string(e.description()));
+    }
+    if (!reading.problems.none()) return reading.problems.first();
+    return std::move(reading.scene);
+}
+
+}  // namespace
+
+std::string read_name(TableReader& table, std::vector<std::string>& taken) {
+    constexpr std::size_t kLongest = 64;
+    table.require("name", "a text");
+    std::string name = table.text("name").value_or("");
+    const bool good =
+        !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed_in_name);
+    if (table.has("name") && !good)
+        table.fail("name", fmt::format("expected 1 to {} letters, digits, '_', '-' or '.'", kLongest));
+    if (good && std::find(taken.begin(), taken.end(), name) != taken.end())
+        table.fail("name",
+                   fmt::format("\"{}\" is the name of another {}, expected a name of its own", name, table.name()));
+    taken.push_back(name);
+    return name;
+}
+
+Result<Scene> read_scene(const std::string& path) {
+    try {
+        Result<std::string> text = read_file(path);
+        if (!text) return text.error();
+        return read_text(path, *text);
+    } catch (const std::exception& e) {
+        return Error{.what = fmt::format("cannot be read: {}", e.what()), .file = path};
+    }
+}
+
+}  // namespace narpa

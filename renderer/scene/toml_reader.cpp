@@ -1,0 +1,267 @@
+#include "renderer/scene/toml_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace narpa {
+
+namespace {
+
+std::string_view type_words(const toml::node& node) {
+    switch (node.type()) {
+        case toml::node_type::table: return "a table";
+        case toml::node_type::array: return "an array";
+        case toml::node_type::string: return "a text";
+        case toml::node_type::integer: return "an integer";
+        case toml::node_type::floating_point: return "a number";
+        case toml::node_type::boolean: return "a boolean";
+        case toml::node_type::date:
+        case toml::node_type::time:
+        case toml::node_type::date_time: return "a date or time";
+        case toml::node_type::none: break;
+    }
+    return "nothing";
+}
+
+std::optional<double> as_number(const toml::node& node) {
+    if (const auto* f = node.as_floating_point()) return f->get();
+    if (const auto* i = node.as_integer()) return static_cast<double>(i->get());
+    return std::nullopt;
+}
+
+std::string shown(const toml::node& node) {
+    if (const std::optional<double> x = as_number(node)) return fmt::format("{}", *x);
+    return std::string(type_words(node));
+}
+
+/// Levenshtein's distance.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        std::size_t diagonal = row[0];
+        row[0] = i + 1;
+        for (std::size_t j = 0; j < b.size(); ++j) {
+            const std::size_t replace = diagonal + (a[i] != b[j]);
+            diagonal = row[j + 1];
+            row[j + 1] = std::min({replace, row[j] + 1, diagonal + 1});
+        }
+    }
+    return row.back();
+}
+
+std::string suggestion(std::string_view key, const std::vector<std::string>& known) {
+    constexpr std::size_t kFarthest = 2;
+    std::size_t best = std::min(kFarthest + 1, key.size());
+    const std::string* nearest = nullptr;
+    for (const std::string& k : known) {
+        const std::size_t d = edit_distance(key, k);
+        if (d < best) best = d, nearest = &k;
+    }
+    return nearest ? fmt::format("; did you mean \"{}\"?", *nearest) : std::string();
+}
+
+}  // namespace
+
+Error Problems::located(const toml::source_region& at, std::string what) const {
+    return {.what = std::move(what),
+            .file = file_,
+            .line = static_cast<int>(at.begin.line),
+            .column = static_cast<int>(at.begin.column)};
+}
+
+void Problems::add(const toml::source_region& at, std::string what) {
+    add(at, located(at, std::move(what)));
+}
+
+void Problems::add(const toml::source_region& at, Error error) {
+    problems_.push_back({false, at.begin, std::move(error)});
+}
+
+void Problems::add_missing(const toml::source_region& at, std::string what) {
+    problems_.push_back({true, at.begin, located(at, std::move(what))});
+}
+
+Error Problems::first() const {
+    const auto earlier = [](const Problem& a, const Problem& b) {
+        return a.is_missing_key != b.is_missing_key ? b.is_missing_key : a.at < b.at;
+    };
+    return std::min_element(problems_.begin(), problems_.end(), earlier)->error;
+}
+
+bool Range::holds(double x) const {
+    return std::isfinite(x) && (low_open ? x > low : x >= low) && (high_open ? x < high : x <= high);
+}
+
+std::string Range::words() const {
+    const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
+    if (has_low && has_high)
+        return fmt::format("a number in {}{}, {}{}", low_open ? '(' : '[', low, high, high_open ? ')' : ']');
+    if (has_low) return fmt::format("a number {} {}", low_open ? ">" : ">=", low);
+    if (has_high) return fmt::format("a number {} {}", high_open ? "<" : "<=", high);
+    return "a finite number";
+}
+
+const toml::node* TableReader::find(std::string_view key) {
+    if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) asked_.emplace_back(key);
+    return table_->get(key);
+}
+
+const toml::source_region& TableReader::place(std::string_view key) const {
+    const toml::node* node = table_->get(key);
+    return node ? node->source() : table_->source();
+}
+
+void TableReader::fail(std::string_view key, const std::string& what) {
+    problems_->add(place(key), fmt::format("{}: {}", key, what));
+}
+
+void TableReader::require(std::string_view key, std::string_view expected) {
+    if (!has(key))
+        problems_->add_missing(table_->source(),
+                               fmt::format("{} has no \"{}\", expected {}", name_, key, expected));
+}
+
+std::optional<double> TableReader::number(std::string_view key, const Range& range) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const std::optional<double> x = as_number(*node);
+    if (x && range.holds(*x)) return x;
+    fail(key, fmt::format("got {}, expected {}", shown(*node), range.words()));
+    return std::nullopt;
+}
+
+std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int64_t low, std::int64_t high) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const auto* i = node->as_integer();
+    if (i && i->get() >= low && i->get() <= high) return i->get();
+    const std::string got = i ? fmt::format("{}", i->get()) : shown(*node);
+    fail(key, fmt::format("got {}, expected an integer in [{}, {}]", got, low, high));
+    return std::nullopt;
+}
+
+std::optional<bool> TableReader::boolean(std::string_view key) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    if (const auto* b = node->as_boolean()) return b->get();
+    fail(key, fmt::format("got {}, expected true or false", shown(*node)));
+    return std::nullopt;
+}
+
+std::optional<std::string> TableReader::text(std::string_view key) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    if (const auto* s = node->as_string()) return s->get();
+    fail(key, fmt::format("got {}, expected a text in quotes", shown(*node)));
+    return std::nullopt;
+}
+
+std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::size_t count,
+                                                        const Range& range) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const toml::array* array = node->as_array();
+    if (!array || array->size() != count) {
+        const std::string got = array ? fmt::format("an array of {}", array->size()) : shown(*node);
+        fail(key, fmt::format("got {}, expected an array of {} numbers", got, count));
+        return std::nullopt;
+    }
+    std::vector<double> out;
+    for (const toml::node& element : *array) {
+        const std::optional<double> x = as_number(element);
+        if (!x || !range.holds(*x)) {
+            problems_->add(element.source(), fmt::format("{}[{}]: got {}, expected {}", key, out.size(),
+                                                         shown(element), range.words()));
+            return std::nullopt;
+        }
+        out.push_back(*x);
+    }
+    return out;
+}
+
+std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) {
+    const auto v = numbers(key, 3, range);
+    if (!v) return std::nullopt;
+    return Vec3{(*v)[0], (*v)[1], (*v)[2]};
+}
+
+std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
+    const toml::node* node = find(key);
+    if (node && node->is_array()) {
+        const auto v = vec3(key, range);
+        return v ? std::optional(vec_cast<float>(*v)) : std::nullopt;
+    }
+    if (const auto x = number(key, range)) {
+        const auto grey = static_cast<float>(*x);
+        return Rgb{grey, grey, grey};
+    }
+    return std::nullopt;
+}
+
+std::optional<Quat> TableReader::attitude(std::string_view key) {
+    const auto v = numbers(key, 4, kAnyNumber);
+    if (!v) return std::nullopt;
+    const Quat q{(*v)[0], (*v)[1], (*v)[2], (*v)[3]};
+    if (const double n = norm(q); !(std::abs(n - 1.0) < 1e-3)) {
+        fail(key,
+             fmt::format("the quaternion's norm is {:.6g}, expected 1 (within 0.001), in the order w, x, y, z", n));
+        return std::nullopt;
+    }
+    return normalized(q);
+}
+
+std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int high) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const toml::array* array = node->as_array();
+    if (array && array->size() == 2) {
+        const auto* w = array->get(0)->as_integer();
+        const auto* h = array->get(1)->as_integer();
+        const auto good = [high](const auto* i) { return i && i->get() >= 1 && i->get() <= high; };
+        if (good(w) && good(h)) return std::array{static_cast<int>(w->get()), static_cast<int>(h->get())};
+    }
+    fail(key, fmt::format("expected [width, height] in pixels, two integers in [1, {}]", high));
+    return std::nullopt;
+}
+
+std::optional<TableReader> TableReader::table(std::string_view key) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    if (const toml::table* t = node->as_table())
+        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_);
+    fail(key, fmt::format("got {}, expected a table", shown(*node)));
+    return std::nullopt;
+}
+
+std::vector<TableReader> TableReader::tables(std::string_view key) {
+    const toml::node* node = find(key);
+    if (!node) return {};
+    const toml::array* array = node->as_array();
+    if (!array || !array->is_homogeneous(toml::node_type::table)) {
+        fail(key, fmt::format("expected an array of tables, each headed [[{}]]", key));
+        return {};
+    }
+    std::vector<TableReader> out;
+    for (const toml::node& element : *array)
+        out.emplace_back(*element.as_table(), fmt::format("[[{}]]", key), *problems_);
+    return out;
+}
+
+void TableReader::not_in_this_version(std::string_view key, std::string_view instead) {
+    if (table_->get(key) == nullptr) return;  // and it stays unknown to the suggestions
+    find(key);
+    fail(key, fmt::format("not in this version of narpa; {}", instead));
+}
+
+void TableReader::finish() {
+    for (const auto& [key, value] : *table_)
+        if (std::find(asked_.begin(), asked_.end(), key.str()) == asked_.end())
+            problems_->add(key.source(), fmt::format("unknown key \"{}\" in {}{}", key.str(), name_,
+                                                     suggestion(key.str(), asked_)));
+}
+
+}  // namespace narpa

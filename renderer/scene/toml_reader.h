@@ -1,0 +1,122 @@
+/// renderer/scene/toml_reader.h - reads TOML tables key by key, and remembers which keys were asked for.
+///
+/// A value that is absent or wrong comes back as nullopt, and what is wrong is noted with its place; so a reader is
+/// a flat list of `x = table.number("x").value_or(1)`, and the problem that stands first in the file is told at the
+/// end.
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/pose.h"
+#include "base/result.h"
+
+namespace narpa {
+
+/// Everything that is wrong with a file so far.
+class Problems {
+public:
+    explicit Problems(std::string file) : file_(std::move(file)) {}
+    void add(const toml::source_region& at, std::string what);
+    /// A key that is not there. Told when nothing else is wrong: it may be there under a misspelt name.
+    void add_missing(const toml::source_region& at, std::string what);
+    /// An error of another file (a mesh, a texture) that was named at this place.
+    void add(const toml::source_region& at, Error error);
+    [[nodiscard]] bool none() const { return problems_.empty(); }
+    /// The one that stands first in the file; keys that are missing come last.
+    [[nodiscard]] Error first() const;
+    [[nodiscard]] const std::string& file() const { return file_; }
+
+private:
+    struct Problem {
+        bool is_missing_key;
+        toml::source_position at;
+        Error error;
+    };
+    [[nodiscard]] Error located(const toml::source_region& at, std::string what) const;
+
+    std::string file_;
+    std::vector<Problem> problems_;
+};
+
+/// The interval that a number has to lie in.
+struct Range {
+    double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+    bool low_open = false, high_open = false;
+
+    [[nodiscard]] bool holds(double x) const;
+    [[nodiscard]] std::string words() const;  ///< "a number > 0"
+};
+inline constexpr Range kAnyNumber{};
+inline constexpr Range kPositive{.low = 0, .low_open = true};
+inline constexpr Range kNotNegative{.low = 0};
+inline constexpr Range kUnit{.low = 0, .high = 1};
+
+/// One table of the file.
+class TableReader {
+public:
+    /// `name` as a person would write it: "[sun]", "[[camera]]", "sphere".
+    TableReader(const toml::table& table, std::string name, Problems& problems)
+        : table_(&table), name_(std::move(name)), problems_(&problems) {}
+
+    [[nodiscard]] const std::string& name() const { return name_; }
+    [[nodiscard]] bool has(std::string_view key) { return find(key) != nullptr; }
+    /// Notes a problem when the key is absent; `expected` completes "expected ...".
+    void require(std::string_view key, std::string_view expected);
+
+    std::optional<double> number(std::string_view key, const Range& range = kAnyNumber);
+    std::optional<std::int64_t> integer(std::string_view key, std::int64_t low, std::int64_t high);
+    std::optional<bool> boolean(std::string_view key);
+    std::optional<std::string> text(std::string_view key);
+    std::optional<Vec3> vec3(std::string_view key, const Range& range = kAnyNumber);
+    /// One number for the three bands, or [r, g, b].
+    std::optional<Rgb> rgb(std::string_view key, const Range& range);
+    /// [w, x, y, z]; made exactly unit when | |q| - 1 | < 1e-3, else a problem.
+    std::optional<Quat> attitude(std::string_view key);
+    /// [width, height], each in [1, high].
+    std::optional<std::array<int, 2>> size(std::string_view key, int high);
+    /// One of a few words.
+    template <class T>
+    std::optional<T> choice(std::string_view key, std::span<const std::pair<std::string_view, T>> words) {
+        const std::optional<std::string> word = text(key);
+        if (!word) return std::nullopt;
+        std::string all;
+        for (const auto& [name, value] : words) {
+            if (name == *word) return value;
+            all += (all.empty() ? "\"" : ", \"") + std::string(name) + "\"";
+        }
+        fail(key, "\"" + *word + "\" is not known here, expected one of " + all);
+        return std::nullopt;
+    }
+    std::optional<TableReader> table(std::string_view key);
+    /// The tables of `[[key]]`, in the file's order.
+    std::vector<TableReader> tables(std::string_view key);
+
+    /// The node of a key, counted as read; null when absent.
+    const toml::node* find(std::string_view key);
+    /// A key that the design names and this version does not know.
+    void not_in_this_version(std::string_view key, std::string_view instead);
+    /// Notes a problem at the value of a key (at the table when absent).
+    void fail(std::string_view key, const std::string& what);
+    [[nodiscard]] const toml::source_region& place(std::string_view key) const;
+    /// Every key that nobody asked for is a problem. Call it last.
+    void finish();
+
+private:
+    std::optional<std::vector<double>> numbers(std::string_view key, std::size_t count, const Range& range);
+
+    const toml::table* table_;
+    std::string name_;
+    Problems* problems_;
+    std::vector<std::string> asked_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,1 @@
+target_sources(narpa_renderer PRIVATE sensor/detector.cpp)

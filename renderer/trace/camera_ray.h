@@ -1,0 +1,14 @@
+/// renderer/trace/camera_ray.h - from a pixel to a ray.
+#pragma once
+
+#include "renderer/trace/tracer.h"
+
+namespace narpa {
+
+/// The ray through image point (x, y), in pixels; the centre of the top-left pixel is (0, 0). Camera axes: x right,
+/// y down, z forward.
+[[nodiscard]] inline Ray camera_ray(const Camera& c, const Rigid3& T_world_camera, double x, double y) {
+    return {T_world_camera.t, T_world_camera.q * normalized(Vec3{(x - c.cx) / c.fx, (y - c.cy) / c.fy, 1.0})};
+}
+
+}  // namespace narpa

@@ -1,0 +1,74 @@
+/// renderer/trace/tracer.h - rays into a scene.
+///
+/// Each body's triangles stand in an Embree scene of their own, in the body's frame, in robust mode, built once.
+/// A ray enters that frame in double, its origin advanced to the body's bounding sphere, and its range stays
+/// double: 0.3 um at any distance, where Embree's own instances (float) lose 0.2 m at 6778 km. Spheres are solved
+/// in double. Bodies move by handing other poses to `place`; nothing is ever rebuilt.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/pose.h"
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+struct Ray {
+    Vec3 origin{};
+    Vec3 direction{};  ///< unit
+};
+
+/// The nearest surface along a ray. `body` < 0: nothing was hit and the rest is undefined.
+struct Hit {
+    int body = -1;
+    std::uint32_t face = 0;   ///< triangle of the mesh; 0 on a sphere
+    double range_m = 0;       ///< from the ray's origin
+    Vec3 position{};          ///< world, metres
+    Vec3 geometric_normal{};  ///< world, unit, towards the ray's origin
+    Vec3 shading_normal{};    ///< world, unit, same side
+    float u = 0, v = 0;       ///< texture coordinates; 0 where the material has no texture
+    int material = 0;         ///< index into Scene::materials
+    Vec3 departure_body{};    ///< body frame: where rays that leave start, before the offset for rounding: the
+                              ///< position, or above it on the smooth surface that vertex normals describe
+};
+
+/// Where every body is at one instant. Reused from frame to frame: no allocation after the first `place`.
+class Placement {
+public:
+    explicit Placement(std::size_t bodies) : T_world_body(bodies), T_body_world(bodies) {}
+    void set(std::size_t body, const Rigid3& T) { T_world_body[body] = T, T_body_world[body] = inverse(T); }
+
+    std::vector<Rigid3> T_world_body;
+    std::vector<Rigid3> T_body_world;
+};
+
+class Tracer {
+public:
+    /// `scene` must outlive the tracer. `threads` bounds the threads that build; 0 is all.
+    static Result<Tracer> create(const Scene& scene, int threads = 0);
+    Tracer(Tracer&&) noexcept;
+    Tracer& operator=(Tracer&&) noexcept;
+    ~Tracer();
+
+    /// Nearest hit with 0 <= range < t_max. Thread-safe, allocates nothing.
+    [[nodiscard]] Hit intersect(const Placement& at, const Ray& ray, double t_max) const noexcept;
+    /// Is anything between the surface point and the distance t_max in this direction? `from` is the hit that
+    /// the ray leaves on the side of its geometric normal; the start is lifted by the bound of the rounding error
+    /// in that body's own frame, so that a surface never shadows itself and nothing further off is skipped.
+    [[nodiscard]] bool occluded(const Placement& at, const Hit& from, const Vec3& direction,
+                                double t_max) const noexcept;
+    /// Radius of the body's bounding sphere about its own origin, metres.
+    [[nodiscard]] double bounding_radius_m(std::size_t body) const noexcept;
+    [[nodiscard]] std::size_t triangle_count() const noexcept;
+    [[nodiscard]] const Scene& scene() const noexcept;
+
+private:
+    struct Impl;
+    explicit Tracer(std::unique_ptr<Impl>);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace narpa

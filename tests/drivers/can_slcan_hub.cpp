@@ -1,0 +1,298 @@
+// The slcan hub against clients of every manner: the text on the wire is spelled out here.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <random>
+
+#include "drivers/can/descriptor.h"
+#include "tests/drivers/can_support.h"
+
+namespace narpa {
+namespace {
+
+/// A bare socket or terminal that says what the test tells it.
+class Wire {
+public:
+    explicit Wire(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+        sockaddr_in address{};
+        address.sin_family = AF_INET;
+        address.sin_port = htons(port);
+        address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        EXPECT_EQ(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+        ::fcntl(fd_.get(), F_SETFL, O_NONBLOCK);
+    }
+    explicit Wire(const std::string& pty) : fd_(::open(pty.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+        EXPECT_TRUE(fd_);
+    }
+    void say(std::string_view text) {
+        ASSERT_EQ(::write(fd_.get(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
+    }
+    /// Everything that has come by the time the hub has answered with `end`.
+    std::string hear(CanBus& hub, std::string_view end) {
+        std::string text;
+        turn_until(hub, [&] {
+            for (bool more = true; more;) {  // as long as reading makes room for what the hub has queued
+                ReceivedFrame out;
+                while (hub.receive(out)) frames.push_back(out.frame);
+                std::array<char, 4096> part;
+                more = false;
+                for (ssize_t n = 0; (n = ::read(fd_.get(), part.data(), part.size())) > 0; more = true)
+                    text.append(part.data(), static_cast<std::size_t>(n));
+            }
+            return text.ends_with(end);
+        });
+        return text;
+    }
+    /// The hub has hung up.
+    bool hung_up(CanBus& hub) {
+        return turn_until(hub, [&] {
+            ReceivedFrame out;
+            (void)hub.receive(out);
+            char c = 0;
+            return ::read(fd_.get(), &c, 1) == 0;
+        });
+    }
+    int fd() const { return fd_.get(); }
+    std::vector<CanFrame> frames{};  ///< what the hub has received meanwhile
+
+private:
+    Descriptor fd_;
+};
+
+class SlcanHub : public testing::Test {
+protected:
+    std::unique_ptr<CanBus> hub_ = open_or_fail("slcan:0", CanRole::hub);
+    std::uint16_t port_ = hub_port(*hub_);
+};
+
+TEST_F(SlcanHub, AnswersAsLawicelDoes) {
+    for (const bool pty : {false, true}) {
+        Wire w = pty ? Wire(hub_pty(*hub_)) : Wire(port_);
+        w.say("C\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "\r");
+        w.say("S6\rO\r");
+        EXPECT_EQ(w.hear(*hub_, "\r\r"), "\r\r");
+        w.say("V\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "V1013\r");
+        w.say("N\r");
+        EXPECT_EQ(w.hear(*hub_, "\r").size(), 6u);
+        w.say("F\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "F00\r");
+        w.say("t1232AABB\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "z\r");
+        w.say("T000001232AABB\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "Z\r");
+        w.say("r1232\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "z\r");
+        w.say("R000001232\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "Z\r");
+        w.say("nonsense\r");
+        EXPECT_EQ(w.hear(*hub_, "\a"), "\a");
+        w.say("C\r");
+        EXPECT_EQ(w.hear(*hub_, "\r"), "\r");
+        w.say("t1232AABB\r");
+        EXPECT_EQ(w.hear(*hub_, "\a"), "\a") << "the channel is closed";
+        EXPECT_EQ(w.frames.size(), 4u);
+    }
+    EXPECT_EQ(hub_->counters().malformed, 4u);
+}
+
+TEST_F(SlcanHub, PythonCansOpeningSequence) {
+    Wire w(port_);
+    w.say("C\rS6\rO\rO\r");
+    EXPECT_EQ(w.hear(*hub_, "\r\r\r\r"), "\r\r\r\r");
+    EXPECT_TRUE(hub_->send(can_frame(0x123, {0xAA})));
+    EXPECT_EQ(w.hear(*hub_, "\r"), "t1231AA\r");
+}
+
+TEST_F(SlcanHub, IsABusForAllOpenClients) {
+    Wire a(port_), b(port_), closed(port_), terminal(hub_pty(*hub_));
+    for (Wire* w : {&a, &b, &terminal}) {
+        w->say("O\r");
+        EXPECT_EQ(w->hear(*hub_, "\r"), "\r");
+    }
+    closed.say("V\r");
+    EXPECT_EQ(closed.hear(*hub_, "\r"), "V1013\r");
+    a.say("t1231AA\r");
+    EXPECT_EQ(a.hear(*hub_, "\r"), "z\r");
+    EXPECT_EQ(b.hear(*hub_, "\r"), "t1231AA\r");
+    EXPECT_EQ(terminal.hear(*hub_, "\r"), "t1231AA\r");
+    terminal.say("T000001231BB\r");
+    EXPECT_EQ(terminal.hear(*hub_, "\r"), "Z\r");
+    EXPECT_EQ(a.hear(*hub_, "\r"), "T000001231BB\r");
+    EXPECT_TRUE(hub_->send(can_frame(0x7, {})));
+    for (Wire* w : {&a, &b, &terminal}) EXPECT_TRUE(w->hear(*hub_, "t0070\r").ends_with("t0070\r"));
+    closed.say("V\r");
+    EXPECT_EQ(closed.hear(*hub_, "\r"), "V1013\r") << "nothing of the bus came here";
+    EXPECT_EQ(a.frames.size() + b.frames.size() + terminal.frames.size(), 2u) << "the hub itself received both";
+}
+
+TEST_F(SlcanHub, NobodyListeningIsADrop) {
+    EXPECT_FALSE(hub_->send(can_frame(0x123, {1})));
+    EXPECT_EQ(hub_->counters().send_drops, 1u);
+    EXPECT_EQ(hub_->counters().sent, 0u);
+}
+
+TEST_F(SlcanHub, EightClientsAndNotNine) {
+    std::vector<Wire> clients;
+    for (int i = 0; i < 8; ++i) {
+        clients.emplace_back(port_).say("O\r");
+        EXPECT_EQ(clients.back().hear(*hub_, "\r"), "\r");
+    }
+    Wire ninth(port_);
+    EXPECT_TRUE(ninth.hung_up(*hub_));
+    clients.erase(clients.begin() + 3);
+    EXPECT_TRUE(turn_until(*hub_, [&] {
+        ReceivedFrame out;
+        (void)hub_->receive(out);
+        return hub_->counters().interface_down == 1;
+    }));
+    Wire late(port_);
+    late.say("V\r");
+    EXPECT_EQ(late.hear(*hub_, "\r"), "V1013\r") << "a place was free again";
+}
+
+TEST_F(SlcanHub, HalfLinesAndLongLinesAndJunk) {
+    Wire w(port_);
+    w.say("O\r");
+    EXPECT_EQ(w.hear(*hub_, "\r"), "\r");
+    for (const char c : std::string("t12341122")) {
+        w.say({&c, 1});
+        ReceivedFrame out;
+        hub_->wait(1'000'000);
+        EXPECT_FALSE(hub_->receive(out));
+    }
+    w.say("3344\r");
+    EXPECT_EQ(w.hear(*hub_, "\r"), "z\r");
+    w.say(std::string(20'000, 't') + "\r");
+    EXPECT_EQ(w.hear(*hub_, "\a"), "\a");
+    w.say(std::string("\0\xff\x80\r", 4));
+    EXPECT_EQ(w.hear(*hub_, "\a"), "\a");
+    w.say("S\rS66\rSx\rO1\rC2\rV1\rt\r");
+    EXPECT_EQ(w.hear(*hub_, "\a\a\a\a\a\a\a"), "\a\a\a\a\a\a\a");
+    EXPECT_EQ(hub_->counters().malformed, 9u);
+    w.say("t1230\r");
+    EXPECT_EQ(w.hear(*hub_, "\r"), "z\r");
+    EXPECT_EQ(w.frames.size(), 2u);
+}
+
+TEST_F(SlcanHub, ClientThatStopsReadingIsLeftBehind) {
+    Wire reads(port_), stuck(port_);
+    const int small = 4096;
+    ::setsockopt(stuck.fd(), SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
+    for (Wire* w : {&reads, &stuck}) {
+        w->say("O\r");
+        EXPECT_EQ(w->hear(*hub_, "\r"), "\r");
+    }
+    const std::vector<std::uint8_t> data{0x00, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77};
+    const std::string line = "t12380011223344556677\r";
+    // In the end the lines do not fit the buffers of the one that does not read. The other one loses nothing by it.
+    std::size_t sent = 0, heard = 0;
+    while (hub_->counters().send_drops == 0 && sent < 1'000'000) {
+        for (int k = 0; k < 4000; ++k, ++sent) ASSERT_TRUE(hub_->send(can_frame(0x123, data)));
+        while (heard < sent) heard += reads.hear(*hub_, line).size() / line.size();
+    }
+    EXPECT_GT(hub_->counters().send_drops, 0u);
+    EXPECT_EQ(heard, sent);
+    // When it reads again it finds whole lines, and then takes part again.
+    std::string text;
+    while (!hub_->counters().interface_down) {
+        const std::string part = stuck.hear(*hub_, line);
+        text += part;
+        if (part.size() <= line.size()) break;
+        (void)hub_->send(can_frame(0x123, data));
+    }
+    ASSERT_EQ(text.size() % line.size(), 0u);
+    for (std::size_t i = 0; i < text.size(); i += line.size())
+        ASSERT_EQ(text.compare(i, line.size(), line), 0) << i;
+}
+
+TEST_F(SlcanHub, FloodBeyondItsQueueLosesNothing) {
+    Wire w(port_);
+    w.say("O\r");
+    EXPECT_EQ(w.hear(*hub_, "\r"), "\r");
+    std::string lines;
+    for (int i = 0; i < 200; ++i) lines += "t1230\r";
+    constexpr std::size_t n = 20'000;
+    std::size_t said = 0, got = 0;
+    ReceivedFrame out;
+    // The client speaks whenever it can; the hub listens now and then.
+    EXPECT_TRUE(turn_until(*hub_, [&] {
+        while (said < n * 6) {
+            const std::size_t at = said % lines.size();
+            const ssize_t k = ::write(w.fd(), lines.data() + at, std::min(lines.size() - at, n * 6 - said));
+            if (k <= 0) break;
+            said += static_cast<std::size_t>(k);
+        }
+        for (int i = 0; i < 5000 && hub_->receive(out); ++i) ++got;
+        return got == n;
+    })) << got;
+}
+
+TEST_F(SlcanHub, PtyKeepsNothingForTheNextProgram) {
+    {
+        Wire first(hub_pty(*hub_));
+        first.say("O\r");
+        EXPECT_EQ(first.hear(*hub_, "\r"), "\r");
+        for (int i = 0; i < 100; ++i) EXPECT_TRUE(hub_->send(can_frame(0x123, {1})));
+    }  // it ends without reading and without C
+    Wire second(hub_pty(*hub_));
+    second.say("C\r");
+    ReceivedFrame out;
+    EXPECT_TRUE(turn_until(*hub_, [&] {
+        (void)hub_->receive(out);
+        return !hub_->send(can_frame(0x123, {1}));  // the channel is closed
+    }));
+    EXPECT_EQ(second.hear(*hub_, "\r"), "\r");
+}
+
+TEST_F(SlcanHub, SurvivesRandomTalk) {
+    std::mt19937_64 rng(41);
+    const std::string words = "OCSVNFtTrR0123456789ABCDEF\r\r\r\a\n \xff";
+    for (int round = 0; round < 30; ++round) {
+        Wire w(port_), terminal(hub_pty(*hub_));
+        for (int i = 0; i < 20; ++i) {
+            std::string text;
+            for (std::uint64_t k = rng() % 200; k > 0; --k) text += words[rng() % words.size()];
+            w.say(text);
+            terminal.say(text);
+            ReceivedFrame out;
+            while (hub_->receive(out)) EXPECT_LE(out.frame.size, 8);
+            (void)hub_->send(can_frame(0x1, {1}));
+        }
+        terminal.say("\rC\r");
+        (void)terminal.hear(*hub_, "\r");
+    }
+    Wire w(port_);
+    w.say("V\r");
+    EXPECT_EQ(w.hear(*hub_, "\r"), "V1013\r");
+}
+
+TEST(SlcanClient, ComesBackWhenTheHubDoes) {
+    auto hub = open_or_fail("slcan:0", CanRole::hub);
+    const std::string spec = "slcan:" + std::to_string(hub_port(*hub));
+    auto client = open_or_fail(spec, CanRole::client);
+    ASSERT_TRUE(client);
+    ReceivedFrame out;
+    ASSERT_TRUE(client->send(can_frame(0x1, {1})));
+    ASSERT_TRUE(next_frame(*hub, out));
+    hub.reset();
+    EXPECT_TRUE(turn_until(*client, [&] {
+        (void)client->receive(out);
+        return client->counters().interface_down == 1;
+    }));
+    while (client->send(can_frame(0x1, {1}))) {
+    }
+    EXPECT_GT(client->counters().send_drops, 0u);
+    hub = open_or_fail(spec, CanRole::hub);
+    ASSERT_TRUE(hub);
+    EXPECT_TRUE(turn_until(*client, [&] { return client->send(can_frame(0x2, {1})); }));
+    ASSERT_TRUE(next_frame(*hub, out));
+    EXPECT_EQ(out.frame.id, 0x2u);
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,81 @@
+/// tests/drivers/can_support.h - frames and waiting for the tests of drivers/can.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_bus.h"
+
+namespace narpa {
+
+inline CanFrame can_frame(std::uint32_t id, std::vector<std::uint8_t> data, bool extended = false) {
+    CanFrame f;
+    f.id = id;
+    f.extended = extended;
+    f.size = static_cast<std::uint8_t>(data.size());
+    std::copy(data.begin(), data.end(), f.data.begin());
+    return f;
+}
+inline CanFrame remote_frame(std::uint32_t id, std::uint8_t size, bool extended = false) {
+    CanFrame f = can_frame(id, {}, extended);
+    f.remote = true;
+    f.size = size;
+    return f;
+}
+inline CanFrame fd_frame(std::uint32_t id, std::vector<std::uint8_t> data, bool bit_rate_switch) {
+    CanFrame f = can_frame(id, std::move(data));
+    f.fd = true;
+    f.bit_rate_switch = bit_rate_switch;
+    return f;
+}
+
+inline bool same(const CanFrame& a, const CanFrame& b) {
+    return a.id == b.id && a.extended == b.extended && a.remote == b.remote && a.fd == b.fd &&
+           a.bit_rate_switch == b.bit_rate_switch && a.size == b.size && a.data == b.data;
+}
+
+/// Turns `step` until it returns true. The number of turns is bounded only so that a broken bus fails its test
+/// instead of hanging it: 2000 waits of 10 ms with nothing happening.
+inline bool turn_until(CanBus& bus, const std::function<bool()>& step) {
+    for (int i = 0; i < 2000; ++i) {
+        if (step()) return true;
+        bus.wait(10'000'000);
+    }
+    return false;
+}
+
+/// Waits for one frame.
+inline bool next_frame(CanBus& bus, ReceivedFrame& out) {
+    return turn_until(bus, [&] { return bus.receive(out); });
+}
+
+inline std::unique_ptr<CanBus> open_or_fail(const std::string& spec, CanRole role) {
+    auto bus = open_can_bus(spec, role);
+    if (!bus) {
+        ADD_FAILURE() << bus.error().text();
+        return nullptr;
+    }
+    return std::move(*bus);
+}
+
+/// The port and the pty of a hub's description: "slcan: 127.0.0.1:29537 and /dev/pts/3".
+inline std::uint16_t hub_port(const CanBus& hub) {
+    const std::string text = hub.description();
+    return static_cast<std::uint16_t>(std::stoi(text.substr(text.find(':', 6) + 1)));
+}
+inline std::string hub_pty(const CanBus& hub) {
+    const std::string text = hub.description();
+    return text.substr(text.rfind(' ') + 1);
+}
+
+/// A group of this process alone, so that tests may run side by side.
+inline std::string own_group() {
+    const int n = ::getpid();
+    return "239.74." + std::to_string(164 + n / 250 % 80) + "." + std::to_string(1 + n % 250);
+}
+
+}  // namespace narpa

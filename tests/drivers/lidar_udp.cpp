@@ -1,0 +1,130 @@
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <numeric>
+
+#include "drivers/lidar/packet_sink.h"
+#include "tests/drivers/video_support.h"
+#include "tests/support/allocation_counter.h"
+
+namespace narpa {
+namespace {
+
+using test::Bytes;
+
+constexpr int kPositionPortOffset = 8308 - 2368;  // the instrument's two ports
+
+// A UDP socket on loopback; -1 when the port is taken.
+class Receiver {
+public:
+    explicit Receiver(int port) : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
+        sockaddr_in address{};
+        address.sin_family = AF_INET;
+        address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        address.sin_port = htons(static_cast<std::uint16_t>(port));
+        bound_ = ::bind(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+        const timeval patience{30, 0};
+        ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    }
+    ~Receiver() { ::close(fd_); }
+    Receiver(const Receiver&) = delete;
+    Receiver& operator=(const Receiver&) = delete;
+
+    [[nodiscard]] bool bound() const { return bound_; }
+    [[nodiscard]] Bytes receive() const {
+        Bytes bytes(2000);
+        const ssize_t n = ::recv(fd_, bytes.data(), bytes.size(), 0);
+        bytes.resize(n < 0 ? 0 : static_cast<std::size_t>(n));
+        return bytes;
+    }
+
+private:
+    int fd_;
+    bool bound_ = false;
+};
+
+Bytes counted_bytes(std::size_t size, int first) {
+    Bytes bytes(size);
+    std::iota(bytes.begin(), bytes.end(), static_cast<std::uint8_t>(first));
+    return bytes;
+}
+
+std::unique_ptr<PacketSink> opened(const std::string& spec) {
+    auto sink = open_packet_sink(spec, 0, false);
+    EXPECT_TRUE(sink) << sink.error().text();
+    return sink ? std::move(*sink) : nullptr;
+}
+
+TEST(UdpSink, DataAndPositionPacketsReachTheirPorts) {
+    for (int port = 23'680; port < 23'980; ++port) {
+        const Receiver data(port), position(port + kPositionPortOffset);
+        if (!data.bound() || !position.bound()) continue;
+        const auto sink = opened("udp:127.0.0.1:" + std::to_string(port));
+        for (int i = 0; i < 20; ++i) {
+            EXPECT_TRUE(sink->send(PacketKind::data, counted_bytes(1206, i), i));
+            EXPECT_TRUE(sink->send(PacketKind::position, counted_bytes(512, i + 1), i));
+            EXPECT_EQ(data.receive(), counted_bytes(1206, i));
+            EXPECT_EQ(position.receive(), counted_bytes(512, i + 1));
+        }
+        EXPECT_EQ(sink->counters().sent, 40U);
+        EXPECT_EQ(sink->counters().dropped, 0U);
+        return;
+    }
+    GTEST_SKIP() << "no pair of free ports on loopback";
+}
+
+TEST(UdpSink, NobodyListeningIsNoError) {
+    for (const std::string host : {"127.0.0.1", "localhost", "[::1]"}) {
+        auto sink = open_packet_sink("udp:" + host + ":24999", 0, false);
+        if (!sink) continue;  // no such address family here
+        const Bytes packet = counted_bytes(1206, 0);
+        for (int i = 0; i < 500; ++i) (*sink)->send(PacketKind::data, packet, 0);
+        const PacketCounters c = (*sink)->counters();
+        EXPECT_EQ(c.sent + c.dropped, 500U) << host;
+        if (host == "127.0.0.1") {
+            EXPECT_EQ(c.sent, 500U);
+        }
+    }
+}
+
+TEST(UdpSink, SendingAllocatesNothing) {
+    if (!test::kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer has its own heap";
+    const auto sink = opened("udp:127.0.0.1:24999");
+    const Bytes packet = counted_bytes(1206, 0);
+    const test::AllocationCounter counter;
+    for (int i = 0; i < 1000; ++i) sink->send(PacketKind::data, packet, 0);
+    EXPECT_EQ(counter.on_all_threads(), 0U);
+}
+
+TEST(PacketSink, NoneCounts) {
+    const auto sink = opened("none");
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(sink->send(PacketKind::data, counted_bytes(1206, 0), 0));
+    EXPECT_EQ(sink->counters().sent, 3U);
+}
+
+TEST(PacketSink, BadSinksSayWhatIsWrong) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"", "expected udp:HOST:PORT, FILE.pcap, or none"},
+        {"tcp:127.0.0.1:2368", "expected udp:HOST:PORT, FILE.pcap, or none"},
+        {"udp:127.0.0.1", "expected udp:HOST:PORT, as in udp:127.0.0.1:2368"},
+        {"udp::2368", "expected udp:HOST:PORT, as in udp:127.0.0.1:2368"},
+        {"udp:127.0.0.1:", "expected a data port from 1 to 59595"},
+        {"udp:127.0.0.1:0", "expected a data port from 1 to 59595"},
+        {"udp:127.0.0.1:59596", "expected a data port from 1 to 59595"},
+        {"udp:127.0.0.1:23x", "expected a data port from 1 to 59595"},
+        {"udp:127.0.0.1:99999999999", "expected a data port from 1 to 59595"},
+        {"udp:256.1.1.1:2368", "unknown host \"256.1.1.1\""},
+    };
+    for (const auto& [spec, says] : cases) {
+        const auto sink = open_packet_sink(spec, 0, false);
+        ASSERT_FALSE(sink) << spec;
+        EXPECT_EQ(sink.error().kind, ErrorKind::bad_input) << spec;
+        EXPECT_NE(sink.error().text().find(says), std::string::npos) << sink.error().text();
+    }
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,41 @@
+#include "emulator/histogram.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+namespace narpa {
+namespace {
+
+TEST(Histogram, PercentilesAreWithinThreePercentOfTheSamples) {
+    std::mt19937_64 rng(3);
+    std::lognormal_distribution<double> latency(13, 2);  // around 0.4 ms, with a long tail
+    Histogram h;
+    std::vector<std::int64_t> all;
+    for (int i = 0; i < 100'000; ++i) {
+        all.push_back(static_cast<std::int64_t>(latency(rng)));
+        h.add(all.back());
+    }
+    std::sort(all.begin(), all.end());
+    for (const double p : {0.01, 0.5, 0.9, 0.99, 0.999}) {
+        const auto truth = static_cast<double>(all[static_cast<std::size_t>(p * static_cast<double>(all.size())) - 1]);
+        EXPECT_NEAR(h.percentile_ns(p) / truth, 1.0, 0.032) << p;
+    }
+    EXPECT_EQ(h.max_ns(), static_cast<double>(all.back()));
+    EXPECT_EQ(h.percentile_ns(1), h.max_ns());
+}
+
+TEST(Histogram, ExtremesHaveAPlace) {
+    Histogram h;
+    EXPECT_EQ(h.percentile_ns(0.5), 0);
+    h.add(-5);
+    h.add(0);
+    h.add(INT64_MAX);
+    EXPECT_EQ(h.count(), 3U);
+    EXPECT_EQ(h.percentile_ns(0.5), 0);
+    EXPECT_EQ(h.max_ns(), static_cast<double>(INT64_MAX));
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,73 @@
+/// tests/emulator/loop_support.h - a small scene, commands for it on a recorded bus, and the files of a run.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_bus.h"
+#include "emulator/emulator.h"
+#include "protocols/can/messages.h"
+#include "renderer/scene/scene_file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace narpa::test {
+
+/// A sphere to look at and a chaser with a camera and a LiDAR.
+inline std::string small_scene(const std::string& camera_keys = "rate_hz = 10") {
+    return "[scene]\nname = \"small\"\nepoch = 2026-11-21T12:00:00Z\n"
+           "[sun]\ndirection = [-1, 0.5, 0.7]\n"
+           "[[body]]\nname = \"target\"\nsphere = {radius_m = 2}\nmaterial = {kind = \"lambert\", albedo = 0.6}\n"
+           "[[body]]\nname = \"chaser\"\nsphere = {radius_m = 0.01}\nposition_m = [-10, 0, 0]\ncan_id = 0x100\n"
+           "[[camera]]\nname = \"nav\"\nmount = \"chaser\"\nposition_m = [0.1, 0, 0]\n"
+           "attitude_wxyz = [0.5, -0.5, 0.5, -0.5]\nresolution = [64, 48]\nfov_horizontal_deg = 40\n" + camera_keys +
+           "\n[[lidar]]\nname = \"top\"\nmount = \"chaser\"\nposition_m = [0.1, 0, 0]\n"
+           "attitude_wxyz = [0.7071067811865476, 0, 0, -0.7071067811865476]\nmodel = \"VLP-16\"\nrate_hz = 10\n"
+           "[render]\nspp = 2\nseed = 42\n";
+}
+
+class LoopTest : public ::testing::Test {
+protected:
+    Scene scene(const std::string& text) {
+        const std::string path = folder_ / "scene.toml";
+        std::ofstream(path) << text;
+        auto read = read_scene(path);
+        if (!read) ADD_FAILURE() << read.error().text();
+        return *std::move(read);
+    }
+
+    /// The chaser closes in and turns slowly: pose k is for time k * 100 ms.
+    static PoseCommand command(int k) {
+        const double t = 0.1 * k;
+        Motion m{{exp_rotation({0, 0, 0.02 * t}), {-10 + 0.5 * t, 0.1 * t, 0}}, {0.5, 0.1, 0}, {0, 0, 0.02}};
+        return {static_cast<std::uint8_t>(k), k * 100'000'000LL, m};
+    }
+
+    /// Records `count` commands as a candump log; returns its BUS.
+    std::string record(int count) {
+        const std::string spec = "log:" + (folder_ / "commands.log");
+        auto bus = open_can_bus(spec, CanRole::client);
+        if (!bus) {
+            ADD_FAILURE() << bus.error().text();
+            return spec;
+        }
+        for (int k = 0; k < count; ++k) {
+            CanFrame frame;
+            EXPECT_TRUE(encode_fd(command(k), 0x100, frame));
+            EXPECT_TRUE((*bus)->send(frame));
+        }
+        return spec;
+    }
+
+    static std::string slurp(const std::string& path) {
+        std::ifstream in(path, std::ios::binary);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+
+    TemporaryFolder folder_;
+};
+
+}  // namespace narpa::test

@@ -1,0 +1,109 @@
+// The real-time loop: it keeps step, takes no memory after its start, and does with late frames what it was told.
+#include <thread>
+
+#include "tests/emulator/loop_support.h"
+#include "tests/support/allocation_counter.h"
+
+namespace narpa::test {
+namespace {
+
+class RealTime : public LoopTest {
+protected:
+    std::unique_ptr<Emulator> start(const std::string& scene_text, const RunOptions& o) {
+        auto emulator = Emulator::create(scene(scene_text), o);
+        if (!emulator) ADD_FAILURE() << emulator.error().text();
+        return emulator ? *std::move(emulator) : nullptr;
+    }
+    StopFlag stop_{false};
+};
+
+TEST_F(RealTime, MakesOrCountsEveryFrameAndPacketOfItsDuration) {
+    RunOptions o;
+    o.bus = record(10);
+    o.duration_s = 1;
+    o.video = {{"nav", folder_ / "a.y4m"}};
+    o.lidar = {{"top", "udp:127.0.0.1:23680"}, {"top", folder_ / "a.pcap"}};
+    const auto emulator = start(small_scene(), o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    const CameraStats& c = emulator->cameras().front()->stats();
+    const LidarStats& l = emulator->lidars().front()->stats();
+    EXPECT_EQ(c.frames + c.skipped, 10U);
+    EXPECT_GE(c.frames, 1U);
+    EXPECT_EQ(l.packets + l.skipped, 1'000'000'000U / 1'327'104);
+    EXPECT_GT(l.returns, 0U);
+    EXPECT_EQ(emulator->can()->counters().taken, 10U);
+    EXPECT_EQ(emulator->cameras().front()->sinks().front()->counters().written, c.handed_over);
+}
+
+TEST_F(RealTime, AllocatesNothingAfterItsStart) {
+    if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer brings its own heap";
+    RunOptions o;
+    o.bus = record(15);
+    o.duration_s = 1.6;
+    o.video = {{"nav", folder_ / "a.y4m"}};
+    o.lidar = {{"top", "udp:127.0.0.1:23680"}, {"top", folder_ / "a.pcap"}};
+    o.log_folder = folder_ / "log";
+    const auto emulator = start(small_scene("rate_hz = 50\ndetector = {exposure_s = 0.002, shot_noise = true}"), o);
+    ASSERT_TRUE(emulator);
+    std::thread loop([&] { EXPECT_TRUE(emulator->run(stop_)); });
+    while (emulator->t_ns() < 400'000'000) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::uint64_t calls = 0;
+    {
+        const AllocationCounter counter;
+        while (emulator->t_ns() < 1'200'000'000) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        calls = counter.on_all_threads();
+    }
+    loop.join();
+    EXPECT_EQ(calls, 0U);
+    EXPECT_GT(emulator->cameras().front()->stats().frames, 10U);
+    EXPECT_GT(emulator->lidars().front()->stats().packets, 100U);
+}
+
+TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
+    RunOptions o;
+    o.video = {{"nav", folder_ / "a.y4m"}};
+    const auto emulator = start(small_scene(), o);
+    ASSERT_TRUE(emulator);
+    std::thread loop([&] { EXPECT_TRUE(emulator->run(stop_)); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(350));
+    stop_ = true;
+    loop.join();
+    const std::string video = slurp(folder_ / "a.y4m");
+    const std::uint64_t frames = emulator->cameras().front()->stats().handed_over;
+    EXPECT_GE(frames, 1U);
+    EXPECT_EQ((video.size() - video.find('\n') - 1) % (64 * 48 + 6), 0U);
+    EXPECT_EQ((video.size() - video.find('\n') - 1) / (64 * 48 + 6), frames);
+    // Nobody commands: every frame says so.
+    EXPECT_EQ(emulator->cameras().front()->stats().stale, emulator->cameras().front()->stats().frames);
+}
+
+/// At 10 kHz no frame can be ready before the next is due: every frame is late.
+class LateFrames : public RealTime, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(LateFrames, AreTreatedAsTheSceneSays) {
+    const std::string policy = GetParam();
+    RunOptions o;
+    o.duration_s = 0.2;
+    o.video = {{"nav", folder_ / "late.y4m"}};
+    const auto emulator = start(small_scene("rate_hz = 10000\nlate_policy = \"" + policy + "\""), o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    const CameraStats& c = emulator->cameras().front()->stats();
+    EXPECT_GT(c.frames, 0U);
+    EXPECT_EQ(c.deadline_missed, c.frames);
+    EXPECT_EQ(c.frames + c.skipped, 2'000U);
+    EXPECT_EQ(c.handed_over, policy == "drop" ? 0U : c.frames);
+    const std::string video = slurp(folder_ / "late.y4m");
+    const bool has_light = video.find_first_of("\xff\xfe\xfd\xfc\xfb\xfa\xf0\xe0\x80\x60\x50", video.find('\n')) != std::string::npos;
+    if (policy == "late") {
+        EXPECT_TRUE(has_light);
+    } else {
+        EXPECT_FALSE(has_light);  // black, or the last good frame, of which there was none
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, LateFrames, ::testing::Values("late", "drop", "repeat", "blank"));
+
+}  // namespace
+}  // namespace narpa::test

@@ -1,0 +1,74 @@
+#!/usr/bin/python3
+"""An unmodified python-can commands poses over slcan (classic frames) and over udp_multicast (CAN FD); the frames that
+come out are byte-identical to `narpa render` at those poses.
+
+Usage: commands.py slcan|udp_multicast
+"""
+import os
+import subprocess
+import sys
+
+import support
+from support import expect
+
+POSES = support.flight(10)
+FIRST_FRAME = 3  # lockstep begins with the first command, not with frame 0
+
+
+def command_and_compare(bus_spec, bus_settings, fd):
+    name = f"{bus_settings['interface']}, {'CAN FD' if fd else 'classic'}"
+    folder = support.work_folder()
+    wire = support.Wire()
+    video = folder / "nav.y4m"
+    with support.Run(support.SCENE, "--can", bus_spec, "--video", f"{support.CAMERA}={video}", "--lockstep") as run:
+        bus = support.open_bus(run, **bus_settings)
+        for i, pose in enumerate(POSES):
+            frame = FIRST_FRAME + i
+            t_ns = frame * support.PERIOD_NS
+            for message in wire.command(pose, t_ns, counter=250 + i, fd=fd):
+                bus.send(message)
+            ledger = support.await_ledger(bus, wire, frame)
+            expect(ledger["PoseCounter"] == (250 + i) % 256, f"{name}: ledger of frame {frame} names its command")
+        summary = run.stop()
+        bus.shutdown()
+    told = summary["can"]
+    print(f"{name}: {told}")
+    expect(told["commands_taken"] == len(POSES) and told["commands_missed"] == 0, f"{name}: all commands taken, none missed")
+    expect(not any(told["rejected"].values()), f"{name}: nothing rejected")
+    _, frames = support.read_y4m(video, support.WIDTH * support.HEIGHT)
+    wanted = [support.render(support.SCENE, FIRST_FRAME + i, pose, folder) for i, pose in enumerate(POSES)]
+    support.expect_frames(frames, wanted, name)
+    elsewhere = support.render(support.SCENE, FIRST_FRAME, POSES[-1], folder)  # the same frame's noise, another pose
+    expect(elsewhere != wanted[0], f"{name}: and a frame at another pose differs")
+
+
+def slcan():
+    port = support.free_port()
+    settings = {"interface": "slcan", "channel": f"socket://127.0.0.1:{port}", "sleep_after_open": 0.1}
+    command_and_compare(f"slcan:{port}", settings, fd=False)
+
+
+def udp_multicast():
+    # python-can joins the group by the routing table: a namespace of our own leaves this machine's alone.
+    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+    subprocess.run(["ip", "route", "add", "239.74.163.2/32", "dev", "lo", "src", "127.0.0.1"], check=True)
+    command_and_compare("udp:239.74.163.2", {"interface": "udp_multicast", "channel": "239.74.163.2"}, fd=True)
+
+
+def enter_own_network():
+    """Runs this script again in a network namespace of its own, where only loopback exists."""
+    unshare = ["unshare", "--net"] + ([] if os.geteuid() == 0 else ["--map-root-user"])
+    if subprocess.run([*unshare, "ip", "link", "set", "lo", "up"], capture_output=True).returncode != 0:
+        support.skip("this user may not make a network namespace (unshare --net)")
+    os.execvp(unshare[0], [*unshare, sys.executable, __file__, "udp_multicast", "inside"])
+
+
+match sys.argv[1:]:
+    case ["slcan"]:
+        slcan()
+    case ["udp_multicast"]:
+        enter_own_network()
+    case ["udp_multicast", "inside"]:
+        udp_multicast()
+    case _:
+        sys.exit(f"usage: {sys.argv[0]} slcan|udp_multicast")

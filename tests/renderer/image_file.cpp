@@ -1,0 +1,188 @@
+// Image files, read back by libraries that others wrote.
+#include "renderer/image/image_file.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "renderer/sensor/detector.h"
+#include "tests/support/shapes.h"
+
+namespace narpa {
+namespace {
+
+using namespace test;
+
+std::string scratch(const std::string& name) {
+    const auto folder = std::filesystem::path(NARPA_BUILD_DIR) / "image_file_test";
+    std::filesystem::create_directories(folder);
+    return (folder / name).string();
+}
+std::string contents(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+/// A frame of a globe at the distance of the Moon from the world's origin.
+struct Shot {
+    Camera c = camera(12, 8, 12);
+    RadianceImage image{12, 8};
+    Aovs aovs;
+    std::vector<std::uint8_t> bytes;
+
+    explicit Shot(PixelFormat format) {
+        c.format = format;
+        const Vec3 far{3.844e8, 0.25, -1.5};
+        Scene s;
+        Material m = lambert(0.5f);
+        m.diffuse = {0.9f, 0.5f, 0.1f};
+        s.materials.push_back(m);
+        add_sphere(s, 1, far);
+        add_sun(s, {1, 0.2, 0.1});
+        const auto tracer = Tracer::create(s, 1);
+        EXPECT_TRUE(tracer);
+        FrameSettings settings;
+        settings.spp = 2;
+        render_radiance(*tracer, placed(s), c, looking(far + Vec3{4, 1, 1}, far), settings, image, &aovs);
+        bytes.resize(frame_bytes({12, 8, format, 0}));
+        expose(c, image, 0, 0, bytes);
+    }
+    [[nodiscard]] RenderedFrame frame() const { return {c, image, &aovs, bytes}; }
+};
+
+TEST(ImageFile, ExrHoldsEveryChannelExactly) {
+    const Shot shot(PixelFormat::rgb24);
+    const std::string path = scratch("all.exr");
+    const auto written = write_image(path, shot.frame());
+    ASSERT_TRUE(written) << written.error().text();
+
+    Imf::InputFile file(path.c_str());
+    const auto plane = [&](const std::string& name) {
+        std::vector<float> values(12 * 8, -77);
+        EXPECT_NE(file.header().channels().findChannel(name), nullptr) << name;
+        Imf::FrameBuffer buffer;
+        buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), 4, 4 * 12));
+        file.setFrameBuffer(buffer);
+        file.readPixels(0, 7);
+        return values;
+    };
+    const auto red = plane("R"), blue = plane("B"), body = plane("body"), variance = plane("variance");
+    const auto range = plane("range"), range_rest = plane("range.rest"), depth = plane("depth.Z");
+    const auto x = plane("position.X"), x_rest = plane("position.X.rest"), nz = plane("normal.Z");
+    int seen = 0;
+    for (std::size_t i = 0; i < red.size(); ++i) {
+        EXPECT_EQ(red[i], shot.image.pixels[i].x);
+        EXPECT_EQ(blue[i], shot.image.pixels[i].z);
+        EXPECT_EQ(body[i], static_cast<float>(shot.aovs.body[i]));
+        EXPECT_EQ(variance[i], shot.aovs.variance[i]);
+        EXPECT_EQ(nz[i], static_cast<float>(shot.aovs.normal[i].z));
+        EXPECT_EQ(depth[i], static_cast<float>(shot.aovs.depth_m[i]));
+        if (shot.aovs.body[i] < 0) {
+            EXPECT_TRUE(std::isinf(range[i]));
+            EXPECT_EQ(range_rest[i], 0);
+            continue;
+        }
+        ++seen;
+        EXPECT_NEAR(static_cast<double>(range[i]) + static_cast<double>(range_rest[i]), shot.aovs.range_m[i],
+                    1e-12);
+        EXPECT_NEAR(static_cast<double>(x[i]) + static_cast<double>(x_rest[i]), shot.aovs.position[i].x, 1e-6);
+    }
+    EXPECT_GT(seen, 10);
+}
+
+TEST(ImageFile, ExrWithoutAovsHasTheRadianceAlone) {
+    const Shot shot(PixelFormat::grey);
+    const std::string path = scratch("radiance.EXR");
+    ASSERT_TRUE(write_image(path, {shot.c, shot.image, nullptr, {}}));
+    Imf::InputFile file(path.c_str());
+    int channels = 0;
+    for (auto i = file.header().channels().begin(); i != file.header().channels().end(); ++i) ++channels;
+    EXPECT_EQ(channels, 3);
+}
+
+TEST(ImageFile, PfmIsReadByOpenCv) {
+    const Shot shot(PixelFormat::grey);
+    const std::string path = scratch("radiance.pfm");
+    ASSERT_TRUE(write_image(path, {shot.c, shot.image, nullptr, {}}));
+    EXPECT_EQ(contents(path).substr(0, 13), "PF\n12 8\n-1.0\n");
+    const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(image.type(), CV_32FC3);
+    for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 12; ++x) {
+            const auto bgr = image.at<cv::Vec3f>(y, x);
+            const Rgb& p = shot.image.pixels[static_cast<std::size_t>(y * 12 + x)];
+            EXPECT_EQ((Rgb{bgr[2], bgr[1], bgr[0]}), p);
+        }
+}
+
+TEST(ImageFile, PngIsTheCamerasOwnOutput) {
+    for (const PixelFormat format : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::yuyv}) {
+        const Shot shot(format);
+        const std::string path = scratch(std::string(name(format)) + ".png");
+        const auto written = write_image(path, shot.frame());
+        ASSERT_TRUE(written) << written.error().text();
+        const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+        ASSERT_EQ(image.rows, 8);
+        ASSERT_EQ(image.cols, 12);
+        int lit = 0;
+        for (int i = 0; i < 96; ++i) {
+            const std::size_t at = static_cast<std::size_t>(i);
+            if (format == PixelFormat::grey) {
+                ASSERT_EQ(image.type(), CV_8UC1);
+                EXPECT_EQ(image.at<std::uint8_t>(i), shot.bytes[at]);
+            } else if (format == PixelFormat::y16) {
+                ASSERT_EQ(image.type(), CV_16UC1);
+                EXPECT_EQ(image.at<std::uint16_t>(i), shot.bytes[2 * at] | shot.bytes[2 * at + 1] << 8);
+            } else {
+                ASSERT_EQ(image.type(), CV_8UC3);
+                const auto bgr = image.at<cv::Vec3b>(i / 12, i % 12);
+                lit += bgr[2] > bgr[0];  // the globe is more red than blue
+                for (int k = 0; k < 3 && format == PixelFormat::rgb24; ++k)
+                    EXPECT_EQ(bgr[2 - k], shot.bytes[3 * at + static_cast<std::size_t>(k)]);
+            }
+        }
+        EXPECT_EQ(lit > 10, image.channels() == 3);
+    }
+}
+
+TEST(ImageFile, RawIsTheBytesAsTheyAre) {
+    const Shot shot(PixelFormat::yuyv);
+    const std::string path = scratch("frame.raw");
+    ASSERT_TRUE(write_image(path, shot.frame()));
+    const std::string read = contents(path);
+    EXPECT_TRUE(std::equal(read.begin(), read.end(), shot.bytes.begin(), shot.bytes.end(),
+                           [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }));
+}
+
+TEST(ImageFile, ErrorsNameTheFileAndTheReason) {
+    const Shot shot(PixelFormat::grey);
+    const auto jpeg = write_image(scratch("frame.jpeg"), shot.frame());
+    ASSERT_FALSE(jpeg);
+    EXPECT_NE(jpeg.error().text().find(".jpeg"), std::string::npos);
+    EXPECT_NE(jpeg.error().text().find(".exr"), std::string::npos);
+    for (const char* extension : {".exr", ".pfm", ".png", ".raw"}) {
+        const auto nowhere = write_image("/nonexistent-folder/frame" + std::string(extension), shot.frame());
+        ASSERT_FALSE(nowhere) << extension;
+        EXPECT_NE(nowhere.error().text().find("/nonexistent-folder"), std::string::npos);
+        EXPECT_NE(nowhere.error().what.find("No such file"), std::string::npos) << nowhere.error().what;
+    }
+    const auto no_bytes = write_image(scratch("frame.png"), {shot.c, shot.image, nullptr, {}});
+    EXPECT_FALSE(no_bytes);
+    if (std::filesystem::exists("/dev/full")) {
+        std::filesystem::remove(scratch("full.raw"));
+        std::filesystem::create_symlink("/dev/full", scratch("full.raw"));
+        EXPECT_FALSE(write_image(scratch("full.raw"), shot.frame()));
+    }
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,194 @@
+/// Bad scene files: each says where and what. The place is that of the value, or of the unknown key.
+#include <gtest/gtest.h>
+
+#include "renderer/scene/scene_file.h"
+#include "tests/renderer/scene_support.h"
+
+namespace narpa {
+namespace {
+
+using test::TemporaryFolder;
+
+struct BadScene {
+    const char* name;
+    const char* text;
+    int line, column;
+    const char* words;  ///< that the message holds
+};
+
+void PrintTo(const BadScene& bad, std::ostream* out) {
+    *out << bad.text;
+}
+
+// What a case does not bring itself comes after it, so that places stay.
+std::string completed(std::string text) {
+    if (text.find("[sun]") == text.npos && text.find("[ambient]") == text.npos)
+        text += "\n[ambient]\nradiance = 1\n";
+    if (text.find("body") == text.npos) text += "\n[[body]]\nname = \"b\"\nsphere = {radius_m = 1}\n";
+    if (text.find("camera") == text.npos && text.find("lidar") == text.npos)
+        text += "\n[[camera]]\nname = \"c\"\nresolution = [64, 48]\nfov_diagonal_deg = 30\n";
+    return text;
+}
+
+#define CAMERA "[[camera]]\nname = \"c\"\nresolution = [64, 48]\n"
+#define BODY "[[body]]\nname = \"x\"\n"
+#define BALL BODY "sphere = {radius_m = 1}\n"
+#define LIDAR "[[lidar]]\nname = \"l\"\n"
+
+const BadScene kBad[] = {
+    {"TomlSyntax", "[scene\nname = 1\n", 1, 7, "table header"},
+    {"TomlUnclosedText", "[scene]\nname = \"abc\n", 2, 12, "string"},
+    {"DuplicateKey", "[render]\nspp = 1\nspp = 2\n", 3, 7, "spp"},
+    {"UnknownTable", "[snu]\ndirection = [1, 0, 0]\n", 1, 2,
+     "unknown key \"snu\" in the scene; did you mean \"sun\"?"},
+    {"UnknownKey", "[sun]\ndirectoin = [1, 0, 0]\n", 2, 1, "unknown key \"directoin\" in [sun]"},
+    {"UnknownKeyInBody", BALL "albdeo = 1\n", 4, 1, "unknown key \"albdeo\" in [[body]]"},
+    {"UnknownKeyInMaterial", BALL "material = {albdeo = 0.5}\n", 4, 13, "did you mean \"albedo\"?"},
+    {"UnknownKeyInDetector", CAMERA "fov_diagonal_deg = 9\n[camera.detector]\nbitz = 8\n", 6, 1,
+     "did you mean \"bits\"?"},
+    {"UnknownFarFromAll", "[render]\nphotons = 3\n", 2, 1, "unknown key \"photons\" in [render]"},
+    {"WrongType", "[render]\nspp = \"four\"\n", 2, 7, "spp: got a text, expected an integer in [1, 65536]"},
+    {"FloatForInteger", "[render]\nspp = 4.0\n", 2, 7, "spp: got 4, expected an integer"},
+    {"NegativeSeed", "[render]\nseed = -1\n", 2, 8, "seed: got -1"},
+    {"PathTracing", "[render]\nmethod = \"path\"\n", 2, 10, "only direct light exists"},
+    {"Budget", "[render]\nbudget_ms = 10\n", 2, 13, "not in this version"},
+    {"TableExpected", "sun = 3\n", 1, 7, "sun: got 3, expected a table"},
+    {"ArrayOfTablesExpected", "[body]\nname = \"b\"\n", 1, 1, "headed [[body]]"},
+    {"Atmosphere", "[atmosphere]\nheight_m = 1\n", 1, 1, "atmosphere: not in this version"},
+    {"Light", "[[light]]\npower_w = 1\n", 1, 1, "light: not in this version"},
+    {"SunWithoutDirection", "[sun]\nirradiance_w_m2 = 1\n", 1, 1, "[sun] has no \"direction\""},
+    {"SunDirectionZero", "[sun]\ndirection = [0, 0, 0]\n", 2, 13, "of any length but 0"},
+    {"SunDirectionOfTwo", "[sun]\ndirection = [1, 0]\n", 2, 13,
+     "got an array of 2, expected an array of 3 numbers"},
+    {"SunDirectionNaN", "[sun]\ndirection = [1, nan, 0]\n", 2, 17,
+     "direction[1]: got nan, expected a finite number"},
+    {"NegativeIrradiance", "[sun]\ndirection = [1, 0, 0]\nirradiance_w_m2 = -3\n", 3, 19,
+     "got -3, expected a number > 0"},
+    {"EpochNotADate", "[scene]\nepoch = \"yesterday\"\n", 2, 9, "expected a UTC date and time"},
+    {"EpochFarFuture", "[scene]\nepoch = 2500-01-01T00:00:00Z\n", 2, 9, "1900 to 2099"},
+    {"AmbientNegative", "[ambient]\nradiance = [1, 2, -1]\n", 2, 19, "radiance[2]: got -1"},
+    {"AmbientEmpty", "[ambient]\n", 1, 1, "has no \"radiance\""},
+
+    {"NoBody", "[scene]\nname = \"no b0dies\"\n" LIDAR "model = \"VLP-16\"\n#body\n", 1, 1, "has no \"body\""},
+    {"BodyWithoutName", "[[body]]\nsphere = {radius_m = 1}\n", 1, 1, "[[body]] has no \"name\""},
+    {"BodyNameWithSpace", "[[body]]\nname = \"a b\"\nsphere = {radius_m = 1}\n", 2, 8, "letters, digits"},
+    {"BodyNameTwice", BALL BALL, 5, 8, "\"x\" is the name of another [[body]]"},
+    {"BodyWithoutShape", BODY, 1, 1, "expected mesh = \"FILE\" or sphere"},
+    {"BodyOfTwoShapes", BALL "mesh = \"a.obj\"\n", 3, 10, "has a mesh already"},
+    {"Ellipsoid", BODY "ellipsoid = [1, 2, 3]\n", 3, 13, "ellipsoid: not in this version"},
+    {"Dem", BODY "dem = \"a.tif\"\n", 3, 7, "dem: not in this version"},
+    {"SphereWithoutRadius", BODY "sphere = {}\n", 3, 10, "has no \"radius_m\""},
+    {"SphereRadiusZero", BODY "sphere = {radius_m = 0}\n", 3, 22, "got 0, expected a number in (0"},
+    {"SphereRadiusInfinite", BODY "sphere = {radius_m = inf}\n", 3, 22, "radius_m: got inf"},
+    {"SphereScaled", BALL "scale = 2\n", 4, 9, "belongs to a mesh"},
+    {"ScaleZero", BODY "mesh = \"a.obj\"\nscale = 0\n", 4, 9, "scale: got 0"},
+    {"MeshMissing", BODY "mesh = \"nowhere.obj\"\n", 3, 8, "nowhere.obj: no such file"},
+    {"MeshIsAFolder", BODY "mesh = \".\"\n", 3, 8, "not a plain file"},
+    {"TextureMissing", BALL "material = {texture = \"no.png\"}\n", 4, 23, "no.png: no such file"},
+    {"PositionOfTexts", BALL "position_m = [\"a\", 0, 0]\n", 4, 15, "position_m[0]: got a text"},
+    {"AttitudeNotUnit", BALL "attitude_wxyz = [1, 1, 0, 0]\n", 4, 17, "norm is 1.41421, expected 1"},
+    {"AttitudeZero", BALL "attitude_wxyz = [0, 0, 0, 0]\n", 4, 17, "norm is 0"},
+    {"AttitudeOfThree", BALL "attitude_wxyz = [1, 0, 0]\n", 4, 17, "expected an array of 4 numbers"},
+    {"CanIdOdd", BALL "can_id = 0x105\n", 4, 10, "0x105 is not a base identifier, expected a multiple of 16"},
+    {"CanIdTooHigh", BALL "can_id = 0x600\n", 4, 10, "got 1536, expected an integer in [0, 1520]"},
+    {"CanIdTwice", BALL "can_id = 0x20\n[[body]]\nname = \"y\"\nsphere = {radius_m = 1}\ncan_id = 32\n", 8, 10,
+     "0x020 is taken by body \"x\""},
+    {"MaterialKind", BALL "material = {kind = \"mirror\"}\n", 4, 20, "expected one of \"lambert\", \"phong\""},
+    {"AlbedoOverOne", BALL "material = {albedo = 1.2}\n", 4, 22, "albedo: got 1.2, expected a number in [0, 1]"},
+    {"PhongGainsEnergy", BALL "material = {kind = \"phong\", albedo = 0.7, specular = 0.4, exponent = 9}\n", 4, 54,
+     "at most 1"},
+    {"PhongWithoutExponent", BALL "material = {kind = \"phong\", specular = 0.4}\n", 4, 12, "has no \"exponent\""},
+    {"LambertWithSpecular", BALL "material = {specular = 0.4}\n", 4, 24, "belongs to kind = \"phong\""},
+
+    {"NoSensor", BALL "# no c4mera, no l1dar: camera\n", 1, 1, "at least one [[camera]] or [[lidar]]"},
+    {"CameraNameTwice", CAMERA "fov_diagonal_deg = 9\n" CAMERA "fov_diagonal_deg = 9\n", 6, 8,
+     "another [[camera]]"},
+    {"CameraWithoutProjection", CAMERA, 1, 1, "one of intrinsics, fov_diagonal_deg, fov_horizontal_deg"},
+    {"CameraOfTwoProjections", CAMERA "fov_diagonal_deg = 9\nfov_horizontal_deg = 9\n", 4, 20,
+     "expected exactly one of"},
+    {"CameraWithoutResolution", "[[camera]]\nname = \"c\"\nfov_diagonal_deg = 9\n", 1, 1, "has no \"resolution\""},
+    {"ResolutionOfOne", "[[camera]]\nname = \"c\"\nresolution = [64]\nfov_diagonal_deg = 9\n", 3, 14,
+     "[width, height]"},
+    {"ResolutionNegative", "[[camera]]\nname = \"c\"\nresolution = [64, -2]\nfov_diagonal_deg = 9\n", 3, 14,
+     "[1, 16384]"},
+    {"FieldOfViewHalfTurn", CAMERA "fov_diagonal_deg = 180\n", 4, 20, "expected a number in (0, 180)"},
+    {"IntrinsicsWithoutFy", CAMERA "intrinsics = {fx = 100}\n", 4, 14, "has no \"fy\""},
+    {"Distortion", CAMERA "fov_diagonal_deg = 9\ndistortion = [0.1]\n", 5, 14, "distortion: not in this version"},
+    {"YuyvOddWidth", "[[camera]]\nname = \"c\"\nresolution = [63, 48]\nfov_diagonal_deg = 9\nformat = \"YUYV\"\n",
+     5, 10, "the width is 63, expected an even one"},
+    {"FormatUnknown", CAMERA "fov_diagonal_deg = 9\nformat = \"BGR3\"\n", 5, 10,
+     "expected one of \"GREY\", \"Y16\""},
+    {"LatePolicyUnknown", CAMERA "fov_diagonal_deg = 9\nlate_policy = \"wait\"\n", 5, 15, "\"drop\", \"repeat\""},
+    {"RateZero", CAMERA "fov_diagonal_deg = 9\nrate_hz = 0\n", 5, 11, "rate_hz: got 0"},
+    {"ExposureLongerThanFrame", CAMERA "fov_diagonal_deg = 9\ndetector = {exposure_s = 0.2}\n", 5, 26,
+     "longer than a frame"},
+    {"DetectorBits", CAMERA "fov_diagonal_deg = 9\ndetector = {bits = 16}\n", 5, 20,
+     "expected an integer in [8, 12]"},
+    {"BlackLevelAboveFullScale", CAMERA "fov_diagonal_deg = 9\ndetector = {bits = 8, black_level_dn = 255}\n", 5,
+     40, "expected an integer in [0, 254]"},
+    {"ShotNoiseNumber", CAMERA "fov_diagonal_deg = 9\ndetector = {shot_noise = 1}\n", 5, 26,
+     "expected true or false"},
+    {"MountUnknown", CAMERA "fov_diagonal_deg = 9\nmount = \"ship\"\n", 5, 9,
+     "there is no body \"ship\", expected one of \"b\""},
+    {"LookAtItself", CAMERA "fov_diagonal_deg = 9\nposition_m = [1, 2, 3]\nlook_at = [1, 2, 3]\n", 6, 11,
+     "another point"},
+    {"LookAtAlongUp", CAMERA "fov_diagonal_deg = 9\nlook_at = [0, 0, 4]\n", 5, 11, "lies along up"},
+    {"LookAtAndAttitude", CAMERA "fov_diagonal_deg = 9\nlook_at = [4, 0, 0]\nattitude_wxyz = [1, 0, 0, 0]\n", 5, 11,
+     "one of the two"},
+    {"UpAlone", CAMERA "fov_diagonal_deg = 9\nup = [4, 0, 0]\n", 5, 6, "belongs to look_at"},
+    {"NoWhite", BALL CAMERA "fov_diagonal_deg = 9\n[ambient]\nradiance = 0\n", 4, 1, "has no \"white_radiance\""},
+    {"LidarModel", LIDAR "model = \"HDL-64\"\n", 3, 9, "expected one of \"VLP-16\""},
+    {"LidarWithoutModel", LIDAR, 1, 1, "[[lidar]] has no \"model\""},
+    {"LidarTooFast", LIDAR "model = \"VLP-16\"\nrate_hz = 25\n", 4, 11, "got 25, expected a number in [5, 20]"},
+    {"LidarTooFar", LIDAR "model = \"VLP-16\"\nrange_max_m = 200\n", 4, 15, "expected a number in (0, 131.07]"},
+    {"FirstInTheFileIsTold", "[render]\nspp = 0\n[sun]\ndirection = [0, 0, 0]\n", 2, 7, "spp: got 0"},
+};
+
+class BadSceneFile : public testing::TestWithParam<BadScene> {};
+
+TEST_P(BadSceneFile, SaysWhereAndWhat) {
+    const BadScene& bad = GetParam();
+    const TemporaryFolder folder;
+    const std::string path = folder.write("bad.toml", completed(bad.text));
+    const Result<Scene> scene = read_scene(path);
+    ASSERT_FALSE(scene) << completed(bad.text);
+    const Error& e = scene.error();
+    EXPECT_EQ(e.kind, ErrorKind::bad_input);
+    EXPECT_EQ(e.file, path);
+    EXPECT_EQ(e.line, bad.line) << e.text();
+    EXPECT_EQ(e.column, bad.column) << e.text();
+    EXPECT_NE(e.what.find(bad.words), e.what.npos) << e.what;
+}
+
+INSTANTIATE_TEST_SUITE_P(Scene, BadSceneFile, testing::ValuesIn(kBad),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+TEST(SceneFile, MissingFileIsBadInput) {
+    const Result<Scene> scene = read_scene("/nowhere/at/all.toml");
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().text(), "/nowhere/at/all.toml: no such file");
+    EXPECT_EQ(exit_status(scene.error().kind), 2);
+}
+
+TEST(SceneFile, MeshErrorNamesTheMeshsLineAndTheBody) {
+    const TemporaryFolder folder;
+    const std::string mesh = folder.write("bad.obj", "v 0 0 0\nv 1 0 zero\n");
+    const std::string path = folder.write("s.toml", completed(BODY "mesh = \"bad.obj\"\n"));
+    const Result<Scene> scene = read_scene(path);
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().text(), mesh + ":2:7: \"zero\" is not a number (mesh of body \"x\", " + path + ":3)");
+}
+
+TEST(SceneFile, TextureNeedsCoordinatesOfTheMesh) {
+    const TemporaryFolder folder;
+    folder.write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.write("t.ppm", "P3 1 1 255\n9 9 9\n");
+    const Result<Scene> scene =
+        read_scene(folder.write("s.toml", completed(BODY "mesh = \"t.obj\"\nmaterial = {texture = \"t.ppm\"}\n")));
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().line, 4);
+    EXPECT_NE(scene.error().what.find("no texture coordinates"), std::string::npos) << scene.error().what;
+}
+
+}  // namespace
+}  // namespace narpa

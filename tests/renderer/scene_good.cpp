@@ -1,0 +1,200 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "renderer/scene/scene_file.h"
+#include "tests/renderer/scene_support.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+using test::data_file;
+using test::TemporaryFolder;
+
+Scene read_good(const std::string& path) {
+    Result<Scene> scene = read_scene(path);
+    if (!scene) {
+        ADD_FAILURE() << scene.error().text();
+        return {};
+    }
+    return std::move(*scene);
+}
+
+Scene read_good_text(const std::string& text) {
+    const TemporaryFolder folder;
+    return read_good(folder.write("s.toml", text));
+}
+
+void expect_near(const Vec3& a, const Vec3& b, double tolerance) {
+    EXPECT_LE(norm(a - b), tolerance) << a.x << " " << a.y << " " << a.z << " against " << b.x << " " << b.y << " "
+                                      << b.z;
+}
+
+constexpr const char* kSphere = "[[body]]\nname = \"ball\"\nsphere = {radius_m = 2}\n";
+constexpr const char* kCamera = "[[camera]]\nname = \"c\"\nresolution = [640, 480]\nfov_horizontal_deg = 90\n";
+
+TEST(SceneFile, ManualShowsTheSceneWithEveryKey) {
+    const std::string manual = test::read_text(NARPA_SOURCE_DIR "/docs/scene.md");
+    const std::size_t from = manual.find("```toml\n") + 8;
+    ASSERT_LT(from, manual.size());
+    EXPECT_EQ(manual.substr(from, manual.find("```", from) - from), test::read_text(data_file("complete.toml")));
+}
+
+TEST(SceneFile, ReadsSurroundings) {
+    const Scene s = read_good(data_file("complete.toml"));
+    EXPECT_EQ(s.name, "every key");
+    EXPECT_EQ(s.epoch_unix_ns, 1772366400'000'000'000);  // date -u -d 2026-03-01T12:00:00Z +%s
+    ASSERT_TRUE(s.sun);
+    EXPECT_NEAR(norm(s.sun->direction), 1, 1e-15);
+    expect_near(s.sun->direction, normalized(Vec3{1, -0.5, 0.2}), 1e-15);
+    EXPECT_DOUBLE_EQ(s.sun->angular_diameter_rad, 0.533 * kPi / 180);
+    EXPECT_EQ(s.ambient, (Rgb{0.1f, 0.1f, 0.2f}));
+    EXPECT_EQ(s.render.spp, 4);
+    EXPECT_EQ(s.render.seed, 7u);
+    EXPECT_EQ(s.render.stale_after_s, 0.5);
+    EXPECT_TRUE(s.warnings.empty());
+}
+
+TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
+    const Scene s = read_good(data_file("complete.toml"));
+    ASSERT_EQ(s.bodies.size(), 3u);
+    const Body& target = s.bodies[0];
+    EXPECT_EQ(target.name, "target");
+    EXPECT_EQ(target.initial.T_world_body.t, (Vec3{10, 0, 0}));
+    EXPECT_NEAR(norm(target.initial.T_world_body.q), 1, 1e-15);
+    EXPECT_EQ(target.initial.velocity_m_s, (Vec3{0, 0.01, 0}));
+    EXPECT_EQ(target.initial.rate_rad_s, (Vec3{0, 0, 0.001}));
+    EXPECT_EQ(target.can_id, 0x100u);
+    EXPECT_EQ(s.bodies[1].can_id, 0x110u);
+    EXPECT_FALSE(s.bodies[2].can_id);
+    const Sphere& moon = std::get<Sphere>(s.bodies[2].shape);
+    EXPECT_EQ(moon.radius_m, 1737400.0);
+    EXPECT_FLOAT_EQ(s.materials[static_cast<std::size_t>(moon.material)].diffuse.x, 0.12f);
+
+    const Mesh& overridden = s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[1].shape))];
+    const Material& phong = s.materials[overridden.face_material.front()];
+    EXPECT_EQ(phong.kind, Material::Kind::phong);
+    EXPECT_EQ(phong.specular, (Rgb{0.3f, 0.3f, 0.3f}));
+    EXPECT_EQ(phong.exponent, 40);
+    ASSERT_GE(phong.texture, 0);
+    EXPECT_EQ(s.textures.size(), 1u) << "the mesh and the material name the same file";
+}
+
+TEST(SceneFile, ReadsCamerasAndLidars) {
+    const Scene s = read_good(data_file("complete.toml"));
+    ASSERT_EQ(s.cameras.size(), 2u);
+    const Camera& c = s.cameras[0];
+    EXPECT_EQ(c.mount, 1);
+    EXPECT_EQ(c.width, 640);
+    EXPECT_EQ(c.height, 480);
+    EXPECT_EQ(c.fx, 800);
+    EXPECT_EQ(c.cy, 239.5);
+    EXPECT_EQ(c.format, PixelFormat::y16);
+    EXPECT_EQ(c.period_ns, 33'333'333);
+    EXPECT_TRUE(c.embedded_line);
+    EXPECT_EQ(c.late, LatePolicy::repeat);
+    EXPECT_DOUBLE_EQ(c.white_radiance, 1361.0 / kPi);
+    ASSERT_TRUE(c.detector);
+    EXPECT_EQ(c.detector->exposure_s, 0.002);
+    EXPECT_EQ(c.detector->full_well_e, 13500);
+    EXPECT_EQ(c.detector->bits, 10);
+    EXPECT_EQ(c.detector->black_level_dn, 16);
+    EXPECT_TRUE(c.detector->shot_noise);
+
+    const Camera& overview = s.cameras[1];
+    EXPECT_EQ(overview.mount, -1);
+    // 30 degrees over the diagonal of 500 x 500: f = hypot(250, 250) / tan(15 deg) = 1319.479 px
+    EXPECT_NEAR(overview.fx, 1319.479, 5e-4);
+    EXPECT_EQ(overview.fx, overview.fy);
+    EXPECT_EQ(overview.cx, 249.5);
+    EXPECT_EQ(overview.period_ns, 400'000'000);
+    EXPECT_EQ(overview.white_radiance, 300);
+    EXPECT_FALSE(overview.detector);
+
+    ASSERT_EQ(s.lidars.size(), 1u);
+    EXPECT_EQ(s.lidars[0].mount, 1);
+    EXPECT_EQ(s.lidars[0].model, "VLP-16");
+    expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 2, 0}, {2.5, 0, 0.5},
+                1e-15);  // y is forward: along +x of the body
+    expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 0, 1}, {0.5, 0, 1.5}, 1e-15);  // z is up
+}
+
+TEST(SceneFile, LookAtPutsTheTargetAheadAndUpUpward) {
+    const Scene s = read_good(data_file("complete.toml"));
+    const Rigid3& T = s.cameras[0].T_mount_camera;
+    expect_near(inverse(T) * Vec3{10, 0, 0}, {0, 0, 9.5}, 1e-14);  // along z
+    expect_near(T.q * Vec3{0, 1, 0}, {0, 0, -1}, 1e-15);           // y is down
+    expect_near(T.q * Vec3{1, 0, 0}, {0, -1, 0}, 1e-15);           // x is right: looking along +x, right is -y
+}
+
+TEST(SceneFile, DefaultsAreTheManuals) {
+    const Scene s = read_good_text(std::string("[sun]\ndirection = [0, 0, 5]\n") + kSphere + kCamera);
+    EXPECT_EQ(s.name, "s");
+    EXPECT_EQ(s.epoch_unix_ns, 0);
+    EXPECT_EQ(s.sun->direction, (Vec3{0, 0, 1}));
+    EXPECT_EQ(s.sun->irradiance_w_m2, 1361.0);
+    EXPECT_EQ(s.ambient, Rgb{});
+    EXPECT_EQ(s.materials.at(0).diffuse, (Rgb{0.5f, 0.5f, 0.5f}));
+    EXPECT_EQ(s.bodies[0].initial.T_world_body, Rigid3{});
+    const Camera& c = s.cameras.at(0);
+    EXPECT_NEAR(c.fx, 320, 1e-12);  // 90 degrees over 640 px
+    EXPECT_EQ(c.cx, 319.5);
+    EXPECT_EQ(c.cy, 239.5);
+    EXPECT_EQ(c.format, PixelFormat::grey);
+    EXPECT_EQ(c.period_ns, 100'000'000);
+    EXPECT_FALSE(c.embedded_line);
+    EXPECT_EQ(c.late, LatePolicy::late);
+    EXPECT_FALSE(c.detector);
+    EXPECT_TRUE(s.lidars.empty());
+    EXPECT_EQ(s.render.spp, 1);
+    EXPECT_EQ(s.render.stale_after_s, 0.5);
+}
+
+TEST(SceneFile, WhiteIsTheAmbientWhereThereIsNoSun) {
+    const Scene s = read_good_text(std::string("[ambient]\nradiance = [1, 3, 2]\n") + kSphere + kCamera);
+    EXPECT_FALSE(s.sun);
+    EXPECT_EQ(s.cameras.at(0).white_radiance, 3);
+}
+
+TEST(SceneFile, QuaternionNearlyUnitIsMadeUnit) {
+    const Scene s = read_good_text(std::string("[ambient]\nradiance = 1\n") + kSphere +
+                                   "attitude_wxyz = [0.7071, 0, 0.7071, 0]\n" + kCamera);
+    EXPECT_NEAR(norm(s.bodies[0].initial.T_world_body.q), 1, 1e-15);
+}
+
+TEST(SceneFile, EpochIsUtcInEveryWriting) {
+    const char* const writings[] = {"2026-03-01T12:00:00Z", "2026-03-01T14:00:00+02:00", "2026-03-01T12:00:00",
+                                    "2026-03-01 12:00:00",  "\"2026-03-01T12:00:00Z\"",  "\"2026-03-01T12:00:00\"",
+                                    "2026-03-01T11:59:60Z"};
+    for (const char* writing : writings) {
+        const TemporaryFolder folder;
+        const auto path =
+            folder.write("s.toml", std::string("[scene]\nepoch = ") + writing + "\n[sun]\n" + kSphere + kCamera);
+        const Result<Scene> s = read_scene(path);
+        if (std::string_view(writing).find(":60") != std::string_view::npos) {
+            EXPECT_FALSE(s) << "TOML has no leap second";
+            continue;
+        }
+        ASSERT_TRUE(s) << writing << ": " << s.error().text();
+        EXPECT_EQ(s->epoch_unix_ns, 1772366400'000'000'000) << writing;
+    }
+    const Scene early =
+        read_good_text(std::string("[scene]\nepoch = 1969-12-31T23:59:59.25Z\n[sun]\n") + kSphere + kCamera);
+    EXPECT_EQ(early.epoch_unix_ns, -750'000'000);
+}
+
+TEST(SceneFile, OneMeshFileOfTwoBodiesIsReadOnce) {
+    const TemporaryFolder folder;
+    folder.write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const std::string body = "[[body]]\nmesh = \"t.obj\"\n";
+    const Scene s =
+        read_good(folder.write("s.toml", "[ambient]\nradiance = 1\n" + body + "name = \"a\"\n" + body +
+                                             "name = \"b\"\n" + body + "name = \"c\"\nscale = 3\n" + kCamera));
+    EXPECT_EQ(s.meshes.size(), 2u);
+    EXPECT_EQ(std::get<int>(s.bodies[0].shape), std::get<int>(s.bodies[1].shape));
+    EXPECT_EQ(s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[2].shape))].positions[1].x, 3);
+}
+
+}  // namespace
+}  // namespace narpa

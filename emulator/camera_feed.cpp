@@ -39,7 +39,7 @@ void CameraFeed::start_at(std::int64_t t_ns) noexcept {
     next_ = static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period - 1) / period));
 }
 
-void CameraFeed::make_next(const Clock* clock) {
+void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
     const std::uint32_t frame = next_;
     const std::int64_t due = due_ns();
     const std::int64_t started = clock ? clock->now_ns() : due;
@@ -53,8 +53,10 @@ void CameraFeed::make_next(const Clock* clock) {
     stats_.wake_late.add(started - due);
 
     hand_over(ledger, clock);
-    account(ledger, clock);
+    account(ledger);
     log(ledger);
+    ++next_;
+    if (clock) let_go_of_missed(*clock, end_ns);
 }
 
 void CameraFeed::hand_over(FrameLedger& ledger, const Clock* clock) noexcept {
@@ -76,15 +78,17 @@ void CameraFeed::send(std::span<const std::uint8_t> bytes) noexcept {
     ++stats_.handed_over;
 }
 
-void CameraFeed::account(const FrameLedger& ledger, const Clock* clock) noexcept {
+void CameraFeed::account(const FrameLedger& ledger) noexcept {
     ++stats_.frames;
     stats_.deadline_missed += !ledger.deadline_met;
     stats_.stale += ledger.pose_stale;
     stats_.hand_over.add(ledger.t_hand_over_ns - ledger.t_exposure_mid_ns);
     stats_.ledgers_lost += !ledgers_.push(ledger);
-    ++next_;
-    // A frame whose successor is already due lets it go: the stream stays in step with the clock.
-    for (; clock && due_ns() + unit_.camera().period_ns <= clock->now_ns(); ++next_) ++stats_.skipped;
+}
+
+/// A frame whose successor is already due is not made any more: the stream stays in step with the clock.
+void CameraFeed::let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept {
+    for (; next_mid_ns() < end_ns && due_ns() + unit_.camera().period_ns <= clock.now_ns(); ++next_) ++stats_.skipped;
 }
 
 void CameraFeed::log(const FrameLedger& l) noexcept {

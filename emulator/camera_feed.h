@@ -42,7 +42,8 @@ public:
     /// Exposes the next frame for nobody.
     void warm_up() { unit_.expose(next_, next_mid_ns()); }
     /// Exposes the next frame and hands it to every sink. `clock`: null in lockstep, where no wall time enters.
-    void make_next(const Clock* clock);
+    /// `end_ns`: frames from there on are not part of the run, so they cannot be skipped.
+    void make_next(const Clock* clock, std::int64_t end_ns);
 
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }
@@ -55,7 +56,8 @@ public:
 private:
     void hand_over(FrameLedger& ledger, const Clock* clock) noexcept;
     void send(std::span<const std::uint8_t> bytes) noexcept;
-    void account(const FrameLedger& ledger, const Clock* clock) noexcept;
+    void account(const FrameLedger& ledger) noexcept;
+    void let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept;
     void log(const FrameLedger& ledger) noexcept;
 
     const World& world_;

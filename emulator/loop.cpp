@@ -49,7 +49,7 @@ void Emulator::run_camera(CameraFeed& feed, const StopFlag& stop) {
     name_thread("narpa-camera");
     if (!take_fifo_priority(kCameraPriority)) no_priority_ = true;
     while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop))
-        threads_->arena.execute([&] { feed.make_next(clock_.get()); });
+        threads_->arena.execute([&] { feed.make_next(clock_.get(), end_ns_); });
 }
 
 void Emulator::run_lidar(LidarFeed& feed, const StopFlag& stop) {
@@ -118,7 +118,7 @@ void Emulator::advance_to(std::int64_t t_ns, const StopFlag& stop) {
         if (t_lidar <= t_camera) {
             (*lidar)->make_next(nullptr);
         } else if (t_camera < end_ns_) {
-            threads_->arena.execute([&] { (*camera)->make_next(nullptr); });
+            threads_->arena.execute([&] { (*camera)->make_next(nullptr, end_ns_); });
             send_ledgers(t_camera);
         } else {
             break;

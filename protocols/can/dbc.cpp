@@ -98,11 +98,12 @@ std::string write_dbc(std::span<const DbcBody> bodies, int cameras) {
     return "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: Commander narpa\n\n" + out.messages +
            "CM_ \"narpa on CAN. The most negative raw value of a signed signal means: not available.\";\n" +
            out.comments +
-           "BA_DEF_ BO_ \"VFrameFormat\" ENUM "
+           "BA_DEF_ \"BusType\" STRING;\nBA_DEF_ BO_ \"VFrameFormat\" ENUM "
            "\"StandardCAN\",\"ExtendedCAN\",\"reserved\",\"J1939PG\",\"reserved\",\"reserved\",\"reserved\","
            "\"reserved\","
            "\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"StandardCAN_FD\","
-           "\"ExtendedCAN_FD\";\nBA_DEF_DEF_ \"VFrameFormat\" \"StandardCAN\";\n" +
+           "\"ExtendedCAN_FD\";\nBA_DEF_DEF_ \"BusType\" \"CAN\";\nBA_DEF_DEF_ \"VFrameFormat\" \"StandardCAN\";\n"
+           "BA_ \"BusType\" \"CAN FD\";\n" +
            out.attributes + out.values;
 }
 

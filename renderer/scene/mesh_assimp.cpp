@@ -107,12 +107,10 @@ public:
             out.material = gltf ? metallic_material(m) : classic_material(m);
             find_texture(scene_, m, path_, out);
         }
+        if (soup_.materials.empty()) soup_.materials.emplace_back();  // grey 0.5
         if (gltf) warn_of_lost_textures();
         if (scene_.mRootNode) read_node(*scene_.mRootNode, aiMatrix4x4t<double>());
-        if (too_many_corners_ > 0)
-            return Error{
-                .what = fmt::format("a face of {} corners, expected at most {}", too_many_corners_, kMostCorners),
-                .file = path_};
+        if (!problem_.empty()) return Error{.what = problem_, .file = path_};
         return std::move(soup_);
     }
 
@@ -134,6 +132,11 @@ private:
     }
 
     void read_part(const aiMesh& part, const aiMatrix4x4t<double>& T) {
+        if (part.mMaterialIndex >= soup_.materials.size()) {
+            problem_ = fmt::format("a part has material {}, counted from 0, of {}", part.mMaterialIndex,
+                                   soup_.materials.size());
+            return;
+        }
         const auto first_position = static_cast<std::uint32_t>(soup_.positions.size());
         const auto first_normal = static_cast<std::uint32_t>(soup_.normals.size());
         const auto first_uv = static_cast<std::uint32_t>(soup_.uvs.size());
@@ -146,35 +149,38 @@ private:
         }
         if (part.HasNormals()) read_normals(part, T);
         const bool mirrored = aiMatrix3x3t<double>(T).Determinant() < 0;
-        for (unsigned f = 0; f < part.mNumFaces; ++f) {
-            const aiFace& face = part.mFaces[f];
-            if (face.mNumIndices != 3) continue;  // a point or a line
-            TriangleSoup::Triangle triangle{.corners = {},
-                                            .material = static_cast<std::uint16_t>(part.mMaterialIndex)};
-            for (unsigned k = 0; k < 3; ++k) {
-                const unsigned v = face.mIndices[k];
-                TriangleSoup::Corner& c = triangle.corners[mirrored ? 2 - k : k];
-                c.position = first_position + v;
-                if (has_uv) c.uv = first_uv + v;
-                if (part.HasNormals()) c.normal = first_normal + v;
-            }
-            soup_.triangles.push_back(triangle);
-        }
+        const auto corner = [&](const aiFace& face, unsigned k) {
+            const unsigned v = face.mIndices[mirrored ? face.mNumIndices - 1 - k : k];
+            TriangleSoup::Corner c{.position = first_position + v};
+            if (has_uv) c.uv = first_uv + v;
+            if (part.HasNormals()) c.normal = first_normal + v;
+            return c;
+        };
+        for (unsigned f = 0; f < part.mNumFaces; ++f)
+            if (is_sound(part.mFaces[f], part.mNumVertices)) read_face(part.mFaces[f], corner, part.mMaterialIndex);
     }
 
-    /// A polygon of three corners or more; points and lines are left out.
+    /// Assimp hands on what some formats' files say, unchecked.
+    bool is_sound(const aiFace& face, unsigned vertices) {
+        if (face.mNumIndices > kMostCorners)
+            problem_ = fmt::format("a face of {} corners, expected at most {}", face.mNumIndices, kMostCorners);
+        for (unsigned k = 0; k < face.mNumIndices; ++k)
+            if (face.mIndices[k] >= vertices)
+                problem_ = fmt::format("a face has vertex {}, counted from 0, of {}", face.mIndices[k], vertices);
+        return problem_.empty();
+    }
+
+    /// Points and lines are left out.
     template <class CornerOf>
-    void read_face(const aiFace& face, CornerOf corner, std::uint16_t material) {
-        if (face.mNumIndices == 3) soup_.triangles.push_back({{corner(0), corner(1), corner(2)}, material});
+    void read_face(const aiFace& face, CornerOf corner, unsigned material_index) {
+        const auto material = static_cast<std::uint16_t>(material_index);
+        if (face.mNumIndices == 3)
+            soup_.triangles.push_back({{corner(face, 0), corner(face, 1), corner(face, 2)}, material});
         if (face.mNumIndices <= 3) return;
-        if (face.mNumIndices > kMostCorners) {
-            too_many_corners_ = std::max(too_many_corners_, face.mNumIndices);
-            return;
-        }
         std::vector<Vec3> points;
-        for (unsigned k = 0; k < face.mNumIndices; ++k) points.push_back(soup_.positions[corner(k).position]);
+        for (unsigned k = 0; k < face.mNumIndices; ++k) points.push_back(soup_.positions[corner(face, k).position]);
         for (const auto& t : triangulate(points))
-            soup_.triangles.push_back({{corner(t[0]), corner(t[1]), corner(t[2])}, material});
+            soup_.triangles.push_back({{corner(face, t[0]), corner(face, t[1]), corner(face, t[2])}, material});
     }
 
     void read_normals(const aiMesh& part, const aiMatrix4x4t<double>& T) {
@@ -189,7 +195,7 @@ private:
     const aiScene& scene_;
     const std::string& path_;
     TriangleSoup soup_;
-    unsigned too_many_corners_ = 0;
+    std::string problem_;
 };
 
 }  // namespace

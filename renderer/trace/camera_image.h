@@ -14,7 +14,7 @@ struct Aovs {
     std::vector<double> range_m, depth_m;  ///< along the ray; along the camera's z axis
     std::vector<Vec3> position, normal;    ///< world
     std::vector<std::int32_t> body;
-    std::vector<float> variance;  ///< of the pixel's mean luminance, from its samples (0 for spp < 2)
+    std::vector<float> variance;  ///< of the pixel's mean over the bands, from its samples (0 for spp < 2)
 };
 
 /// Row-major, height x width, linear radiance in W m^-2 sr^-1 a band.
@@ -32,6 +32,10 @@ struct FrameSettings {
     std::uint32_t frame = 0;
 };
 
+/// Light that reaches the camera over one surface: sunlight with its shadow, ambient (never shadowed), emission;
+/// black where nothing is hit. With spp = 1 the Sun is the centre of its disc, with more each sample takes a point
+/// of the disc, so shadows have their penumbra. No light goes from surface to surface yet.
+///
 /// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. After a first call with the
 /// same sizes it allocates nothing. `aovs` may be null.
 void render_radiance(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,

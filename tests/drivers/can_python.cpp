@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "drivers/can/descriptor.h"
+#include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
 
 namespace narpa {
@@ -66,6 +68,37 @@ TEST(PythonCan, SlcanOverTcp) {
     EXPECT_EQ(hub->counters().send_drops, 0u);
 }
 
+// The program that protocols/can/README.md offers, as it stands there but for the port.
+TEST(PythonCan, ReadmeProgramCommandsAPose) {
+    if (std::system("/usr/bin/python3 -c 'import can, serial' 2>/dev/null") != 0) GTEST_SKIP() << "no python-can";
+    std::ifstream file(NARPA_SOURCE_DIR "/protocols/can/README.md");
+    std::string text((std::istreambuf_iterator<char>(file)), {});
+    const std::string fence = "```python\n", port = "29537";
+    const std::size_t begin = text.find(fence) + fence.size();
+    text = text.substr(begin, text.find("```", begin) - begin);
+    auto hub = open_or_fail("slcan:0", CanRole::hub);
+    text.replace(text.find(port), port.size(), std::to_string(hub_port(*hub)));
+    const std::string path = testing::TempDir() + "narpa_readme_" + std::to_string(::getpid()) + ".py";
+    std::ofstream(path) << text;
+
+    FILE* pipe = ::popen(("/usr/bin/python3 " + path + " 2>&1").c_str(), "r");
+    ASSERT_NE(pipe, nullptr);
+    PoseDecoder decoder(0x100);
+    PoseCommand command;
+    EXPECT_TRUE(turn_until(*hub, [&] {
+        for (ReceivedFrame received; hub->receive(received);) (void)decoder.accept(received.frame, 0, command);
+        return hub->counters().interface_down == 1;  // it has ended
+    }));
+    const Outcome run = finish(pipe, "");
+    EXPECT_EQ(run.status, 0) << run.out;
+    EXPECT_EQ(decoder.count(PoseStatus::complete), 100u);
+    EXPECT_EQ(decoder.count(PoseStatus::partial), 800u);
+    EXPECT_EQ(command.t_valid_ns, 990'000'000);
+    EXPECT_EQ(command.motion.T_world_body.t, (Vec3{0, 0, -9.01}));
+    EXPECT_EQ(command.motion.velocity_m_s, (Vec3{0, 0, 1}));
+    std::filesystem::remove(path);
+}
+
 TEST(PythonCan, SlcanOverPty) {
     auto hub = open_or_fail("slcan:0", CanRole::hub);
     const Outcome run = serve_python(*hub, "slcan " + hub_pty(*hub));
@@ -81,7 +114,8 @@ TEST(PythonCan, UdpMulticast) {
     if (std::getenv("NARPA_TEST_OWN_NETWORK") == nullptr) {
         const std::string self = std::filesystem::read_symlink("/proc/self/exe");
         const std::string command =
-            "unshare -rn sh -c 'ip link set lo up && ip route add 239.74.163.2/32 dev lo src 127.0.0.1 || exit 77; "
+            std::string(::geteuid() == 0 ? "unshare -n" : "unshare -rn") +
+            " sh -c 'ip link set lo up && ip route add 239.74.163.2/32 dev lo src 127.0.0.1 || exit 77; "
             "NARPA_TEST_OWN_NETWORK=1 exec \"$0\" --gtest_filter=PythonCan.UdpMulticast' '" +
             self + "' 2>&1";
         FILE* pipe = ::popen(command.c_str(), "r");

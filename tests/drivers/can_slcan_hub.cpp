@@ -181,8 +181,6 @@ TEST_F(SlcanHub, HalfLinesAndLongLinesAndJunk) {
 
 TEST_F(SlcanHub, ClientThatStopsReadingIsLeftBehind) {
     Wire reads(port_), stuck(port_);
-    const int small = 4096;
-    ::setsockopt(stuck.fd(), SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
     for (Wire* w : {&reads, &stuck}) {
         w->say("O\r");
         EXPECT_EQ(w->hear(*hub_, "\r"), "\r");
@@ -192,7 +190,7 @@ TEST_F(SlcanHub, ClientThatStopsReadingIsLeftBehind) {
     // In the end the lines do not fit the buffers of the one that does not read. The other one loses nothing by it.
     std::size_t sent = 0, heard = 0;
     while (hub_->counters().send_drops == 0 && sent < 1'000'000) {
-        for (int k = 0; k < 4000; ++k, ++sent) ASSERT_TRUE(hub_->send(can_frame(0x123, data)));
+        for (int k = 0; k < 100; ++k, ++sent) ASSERT_TRUE(hub_->send(can_frame(0x123, data)));
         while (heard < sent) heard += reads.hear(*hub_, line).size() / line.size();
     }
     EXPECT_GT(hub_->counters().send_drops, 0u);

@@ -114,7 +114,8 @@ TEST(PoseTrack, RefusesToForgetWhatIsStillInUse) {
 }
 
 TEST(PoseTrack, ReadersNeverSeeHalfACommand) {
-    // Position and velocity of every command are equal, so a torn sample would show.
+    // Position and velocity of every command are equal whole numbers, so a torn sample would show. A command may be
+    // announced a moment before it can be read: then the one before it is carried on, by a nanosecond's worth.
     PoseTrack track({}, 1e9);
     ASSERT_EQ(track.push(command(1, {{{}, {1, 1, 1}}, {1, 1, 1}, {}}), 1), TrackStatus::taken);
     std::atomic<bool> done{false};
@@ -125,15 +126,15 @@ TEST(PoseTrack, ReadersNeverSeeHalfACommand) {
         }
         done = true;
     });
-    std::uint64_t reads = 0;
+    std::uint64_t reads = 0, torn = 0;
     while (!done || reads == 0) {
         const std::int64_t t = track.newest_ns();
         const Motion m = track.at(t).motion;
-        ASSERT_EQ(m.T_world_body.t, m.velocity_m_s);
-        ASSERT_EQ(m.T_world_body.t.x, m.T_world_body.t.y);
+        torn += std::abs(m.T_world_body.t.x - m.velocity_m_s.x) > 0.1 || m.T_world_body.t.x != m.T_world_body.t.z;
         ++reads;
     }
     writer.join();
+    EXPECT_EQ(torn, 0U);
 }
 
 }  // namespace

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
-#include <numbers>
 
+#include "protocols/can/candump.h"
 #include "protocols/can/crc.h"
 #include "tests/protocols/can_support.h"
 
@@ -453,6 +454,27 @@ TEST(CanPose, UnwrapsToTheNearestTurn) {
     }
     constexpr std::int64_t last = std::numeric_limits<std::int64_t>::max();
     EXPECT_EQ(unwrap(last, last), last);
+}
+
+// The frames that the README shows are the ones that we send, and say what it says they do.
+TEST(CanPose, WorkedExampleOfTheReadme) {
+    std::ifstream readme(NARPA_SOURCE_DIR "/protocols/can/README.md");
+    std::vector<CanFrame> frames;
+    for (std::string text; std::getline(readme, text);)
+        if (CandumpLine line; parse_candump(text, line) == nullptr) frames.push_back(line.frame);
+    ASSERT_EQ(frames.size(), 10u);
+    PoseCommand sent{7, 1'250'000'000, {}};
+    sent.motion = {{{0.6, 0, 0.8, 0}, {1, -2, 10.5}}, {0, 0, -0.1}, {0, 0.01, 0}};
+    const PoseFrames expected = classic(sent);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_EQ(frames[i].id, expected[i].id);
+        EXPECT_EQ(frames[i].data, expected[i].data);
+    }
+    EXPECT_EQ(frames[9].data, fd(sent).data);
+    PoseCommand out;
+    ASSERT_EQ(decode_all(std::span(frames).first(9), kBase, 0, out), PoseStatus::complete);
+    EXPECT_EQ(out.motion.T_world_body.t, (Vec3{1, -2, 10.5}));
+    EXPECT_EQ(out.motion.rate_rad_s, (Vec3{0, 0.01, 0}));
 }
 
 TEST(CanPose, BodyBaseIdentifiers) {

@@ -120,7 +120,7 @@ TEST(Detector, MeanOfNoisyPixelsIsTheTruthFromOneDnUp) {
         const Rgb radiance = radiance_for(*c.detector, signal_dn * gain);
         std::vector<int> dn = dn_of(c, radiance);
         const Moments all = moments(dn);
-        // A million pixels tell the signal alone from the truth to 5 standard errors, at most 0.5 % at 1 DN ...
+        // A million pixels tell the signal alone from the truth to 5 standard errors, under 1 % at 1 DN ...
         const double standard_error = std::sqrt(all.variance / 1e6);
         EXPECT_NEAR(all.mean - 64, signal_dn, 5 * standard_error) << signal_dn;
         EXPECT_LT(standard_error, 1.1e-2 * signal_dn);

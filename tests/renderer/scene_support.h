@@ -2,6 +2,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -12,11 +13,15 @@
 
 namespace narpa::test {
 
-/// A new folder that goes when the test ends.
+/// A new folder that goes when the test ends; in memory where there is such a place, as some tests write thousands
+/// of files.
 class TemporaryFolder {
 public:
     TemporaryFolder() {
-        std::string pattern = (std::filesystem::temp_directory_path() / "narpa-test-XXXXXX").string();
+        const std::filesystem::path memory = "/dev/shm";
+        const bool in_memory = access(memory.c_str(), W_OK) == 0;
+        std::string pattern =
+            ((in_memory ? memory : std::filesystem::temp_directory_path()) / "narpa-test-XXXXXX").string();
         path_ = mkdtemp(pattern.data());
     }
     TemporaryFolder(const TemporaryFolder&) = delete;

@@ -46,7 +46,7 @@ using PoseFrames = std::array<CanFrame, kPoseFrames.size()>;
 /// The nine classic frames at base_id + 0 .. 8. Leaves `out` as it was unless the status is good.
 [[nodiscard]] EncodeStatus encode_classic(const PoseCommand& command, std::uint32_t base_id,
                                           PoseFrames& out) noexcept;
-/// The one CAN FD frame at base_id + 15, with the same factors.
+/// The one CAN FD frame at base_id + 15, in the same steps.
 [[nodiscard]] EncodeStatus encode_fd(const PoseCommand& command, std::uint32_t base_id, CanFrame& out) noexcept;
 
 using PoseStatus = DecodeStatus;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "renderer/trace/mesh_topology.h"
 #include "renderer/trace/sphere_roots.h"
 
 namespace narpa {
@@ -65,6 +66,7 @@ Result<MeshScene> MeshScene::build(RTCDevice device, const Mesh& mesh) {
     s.radius_m_ *= 1 + 1e-5;
     s.reach_m_ *= 1 + 1e-5;
     s.off_centre_ = s.reach_m_ > 1.25 * s.radius_m_;
+    s.closed_ = is_closed(mesh);
     // A mesh modelled far from its own origin is held relative to its centre, where single precision is finer.
     // Near the origin the vertices stay bit for bit as they were read.
     if (norm(s.centre_) > 4 * s.radius_m_) s.vertex_origin_ = vec_cast<double>(vec_cast<float>(s.centre_));
@@ -136,16 +138,17 @@ bool MeshScene::intersect(const Vec3& origin, const Vec3& direction, double entr
     const Vec3 start = origin + *skipped * direction;
 
     RTCRayHit query = query_embree(start, direction, t_max - *skipped);
-    if (!is_hit(query) || shows_back(query)) {
-        // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass
-        // through, out of the body or to the inner side of its far wall. They are common where a camera's pixels
-        // line up with a model's grid. One more try, turned by a few roundings, finds what they lost.
+    // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass through,
+    // to the inner side of the far wall where the mesh is closed, out of it where it is not. They are common where a
+    // camera's pixels line up with a model's grid. One more try, turned by a few roundings, finds what they lost.
+    const bool suspicious = is_hit(query) ? shows_back(query) : !closed_;
+    if (suspicious) {
         const Vec3 turn{direction.y - direction.z, direction.z - direction.x, direction.x - direction.y + 0.5};
         const RTCRayHit again = query_embree(start, direction + 4e-7 * turn, t_max - *skipped);
-        if (!is_hit(again) && !is_hit(query)) return false;
         if (is_hit(again) && (!is_hit(query) || (!shows_back(again) && again.ray.tfar < query.ray.tfar)))
             query = again;
     }
+    if (!is_hit(query)) return false;
 
     // Embree found the triangle; where the ray meets it is solved again in double (Moller and Trumbore 1997), kept
     // inside the triangle so that a hit on an edge stays on the surface.

@@ -53,6 +53,7 @@ private:
     Vec3 vertex_origin_{};
     Vec3 centre_{};
     double radius_m_ = 0, reach_m_ = 0;
+    bool closed_ = false;      ///< a ray that misses the mesh cannot have slipped through it unseen
     bool off_centre_ = false;  ///< the sphere about the centre is clearly smaller than the one about the origin
 };
 

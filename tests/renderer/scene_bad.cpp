@@ -17,7 +17,7 @@ struct BadScene {
 };
 
 void PrintTo(const BadScene& bad, std::ostream* out) {
-    *out << bad.text;
+    *out << bad.name;
 }
 
 // What a case does not bring itself comes after it, so that places stay.

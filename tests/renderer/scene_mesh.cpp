@@ -20,7 +20,7 @@ struct BadMesh {
     const char* words;
 };
 void PrintTo(const BadMesh& bad, std::ostream* out) {
-    *out << bad.text;
+    *out << bad.name;
 }
 
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\n"

@@ -10,7 +10,9 @@
 #include "tests/renderer/scene_support.h"
 
 /// Assimp forgets memory when it gives up on a file; that is not ours to mend.
-extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp"; }
+extern "C" const char* __lsan_default_suppressions() {
+    return "leak:libassimp";
+}
 
 namespace narpa {
 namespace {

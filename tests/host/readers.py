@@ -5,8 +5,11 @@ import os
 import shutil
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import support
+from support import expect
 
 if not shutil.which("ffmpeg") or not importlib.util.find_spec("cv2"):
     support.skip("no ffmpeg or no OpenCV for Python; try: apt-get install ffmpeg python3-opencv")
@@ -15,7 +18,19 @@ POSES = support.flight(4)
 FFMPEG_RAW = {"GREY": "gray", "Y16": "gray16le", "YUYV": "yuyv422"}
 
 
-def fly(scene, sinks):
+def await_open(process, path):
+    """Returns when the process has opened the path; a reader of a FIFO gets there when its writer has as well."""
+    files = Path(f"/proc/{process.pid}/fd")
+    for _ in range(600):
+        if any(os.path.realpath(file) == str(path) for file in files.iterdir()):
+            return
+        if process.poll() is not None:
+            break
+        time.sleep(0.05)
+    expect(False, f"{process.args[0]} opens {path}")
+
+
+def fly(scene, sinks, await_reader):
     """Commands the poses in lockstep; frame i shows POSES[i]."""
     wire, port = support.Wire(), support.free_port()
     video = [word for sink in sinks for word in ("--video", f"{support.CAMERA}={sink}")]
@@ -26,6 +41,7 @@ def fly(scene, sinks):
                 bus.send(message)
             support.await_ledger(bus, wire, frame)
         bus.shutdown()
+        await_reader()  # narpa waits only a second for it at the end
         return run.stop()
 
 
@@ -37,50 +53,47 @@ def split(data, size):
     return [data[i : i + size] for i in range(0, len(data), size)]
 
 
-def start_ffmpeg(path, pixel_format):
+def start_ffmpeg(path, pixel_format, out):
     """ffmpeg, told nothing but the file's name, repacking to the layout of narpa's raw frames."""
     command = ["ffmpeg", "-v", "error", "-nostdin", "-i", path, "-f", "rawvideo", "-fps_mode", "passthrough"]
-    return subprocess.Popen([*command, "-pix_fmt", FFMPEG_RAW[pixel_format], "-"], stdout=subprocess.PIPE)
+    return subprocess.Popen([*command, "-pix_fmt", FFMPEG_RAW[pixel_format], out])
 
 
 OPENCV_READER = """
 import cv2, sys
 video = cv2.VideoCapture(sys.argv[1], cv2.CAP_FFMPEG)
+out = open(sys.argv[2], "wb")
 while True:
     good, picture = video.read()
     if not good: break
     blue, green, red = cv2.split(picture)
     assert (blue == green).all() and (green == red).all(), "grey came out coloured"
-    sys.stdout.buffer.write(blue.tobytes())
+    out.write(blue.tobytes())
 """
 
 
-def start_opencv(path):
-    return subprocess.Popen([sys.executable, "-c", OPENCV_READER, path], stdout=subprocess.PIPE)
+def start_opencv(path, _, out):
+    return subprocess.Popen([sys.executable, "-c", OPENCV_READER, path, out])
 
 
-def check_format(pixel_format):
+def check(tool, start_reader, pixel_format):
+    """The tool reads a FIFO while frames are made, and the file that they went to as well."""
     folder = support.work_folder()
     scene = support.scene_with(folder, pixel_format)
     size = support.WIDTH * support.HEIGHT * support.PIXEL_BYTES[pixel_format]
     file, fifo = folder / "nav.y4m", folder / "nav.fifo"
     os.mkfifo(fifo)
-    at_fifo = start_ffmpeg(fifo, pixel_format)
-    summary = fly(scene, [file, fifo])
-    from_fifo = at_fifo.communicate(timeout=30)[0]
-    from_file = start_ffmpeg(file, pixel_format).communicate(timeout=30)[0]
+    at_fifo = start_reader(fifo, pixel_format, folder / "from_fifo")
+    summary = fly(scene, [file, fifo], lambda: await_open(at_fifo, fifo))
+    print(f"{tool}, {pixel_format}: {summary['cameras'][0]['sinks']}")
+    at_file = start_reader(file, pixel_format, folder / "from_file")
     wanted = rendered(scene, folder)
-    print(f"{pixel_format}: {summary['cameras'][0]['sinks']}")
-    support.expect_frames(split(from_file, size), wanted, f"ffmpeg, {pixel_format}, file")
-    support.expect_frames(split(from_fifo, size), wanted, f"ffmpeg, {pixel_format}, FIFO")
-    if pixel_format != "GREY":
-        return
-    from_file = start_opencv(file).communicate(timeout=30)[0]
-    support.expect_frames(split(from_file, size), wanted, "OpenCV, GREY, file")
-    at_fifo = start_opencv(fifo)
-    fly(scene, [fifo])
-    support.expect_frames(split(at_fifo.communicate(timeout=30)[0], size), wanted, "OpenCV, GREY, FIFO")
+    for source, reader in ("fifo", at_fifo), ("file", at_file):
+        expect(reader.wait(timeout=60) == 0, f"{tool} ends well")
+        got = (folder / f"from_{source}").read_bytes()
+        support.expect_frames(split(got, size), wanted, f"{tool}, {pixel_format}, {source}")
 
 
 for pixel_format in FFMPEG_RAW:
-    check_format(pixel_format)
+    check("ffmpeg", start_ffmpeg, pixel_format)
+check("OpenCV", start_opencv, "GREY")

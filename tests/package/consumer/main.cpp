@@ -1,0 +1,19 @@
+// A project of somebody else's: finds the installed package and uses it, from the scene file to a range.
+#include <cstdio>
+
+#include "emulator/world.h"
+#include "renderer/scene/scene_file.h"
+
+int main(int argc, char** argv) {
+    if (argc < 2) return 2;
+    auto scene = narpa::read_scene(argv[1]);
+    if (!scene) return std::puts(scene.error().text().c_str()), 2;
+    auto world = narpa::World::create(*std::move(scene));
+    if (!world) return std::puts(world.error().text().c_str()), 2;
+    narpa::Placement at((*world)->scene().bodies.size());
+    (*world)->place(0, -1, at);
+    const narpa::Hit hit = (*world)->tracer().intersect(at, {{50, 0, 0}, {-1, 0, 0}}, 1e3);
+    std::printf("%zu triangles; along the port's axis from 50 m: %.3f m\n", (*world)->tracer().triangle_count(),
+                hit.range_m);
+    return hit.body >= 0 ? 0 : 1;
+}

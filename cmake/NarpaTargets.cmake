@@ -20,8 +20,9 @@ endif()
 function(narpa_compile_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
                                            -Woverloaded-virtual $<$<BOOL:${NARPA_WERROR}>:-Werror>)
-  # Same bytes on every machine with the same instruction set: no fused multiply-add behind our back.
-  target_compile_options(${target} PRIVATE -ffp-contract=off)
+  # Same bytes on every machine with the same instruction set: no fused multiply-add behind our back. Nobody reads errno
+  # after sqrt.
+  target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno)
   if(NARPA_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${NARPA_SANITIZE} -fno-omit-frame-pointer
                                              -fno-sanitize-recover=undefined)

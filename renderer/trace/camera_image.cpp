@@ -3,6 +3,8 @@
 #include <tbb/blocked_range2d.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -16,7 +18,9 @@
 namespace narpa {
 namespace {
 
-constexpr int kTile = 16;
+constexpr int kBlock = 4;  // pixels a side: kPacket in all
+constexpr int kTile = 4;   // blocks a side of what a thread takes at a time
+static_assert(kBlock * kBlock == kPacket);
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// What stays the same over a frame.
@@ -29,49 +33,54 @@ struct Frame {
     std::optional<SunDisc> sun;
 };
 
-/// Radiance that leaves the hit along the ray, back to its origin. The only light is direct.
-Rgb outgoing_radiance(const Frame& f, const Hit& hit, const Vec3& to_viewer, const Vec3& to_sun) {
-    const Surface surface = surface_at(f.tracer.scene(), hit);
-    Rgb radiance = surface.emission + f.tracer.scene().ambient * ambient_reflectance(surface);
-    if (!f.sun) return radiance;
-    const double cosine = dot(hit.shading_normal, to_sun);
-    if (cosine <= 0) return radiance;
-    const Rgb reflected = brdf(surface, hit.shading_normal, to_sun, to_viewer);
-    if (reflected == Rgb{} || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) return radiance;
-    return radiance + reflected * (f.sun->irradiance() * static_cast<float>(cosine));
+/// Pixels that are traced together: a square of the image, cut off at its edges.
+struct Block {
+    std::size_t n = 0;
+    std::array<int, kPacket> x, y;
+    [[nodiscard]] std::size_t index(std::size_t i, int width) const {
+        return static_cast<std::size_t>(y[i]) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x[i]);
+    }
+};
+
+Block block_at(int bx, int by, int width, int height) {
+    Block b;
+    for (int y = by * kBlock; y < std::min(height, (by + 1) * kBlock); ++y)
+        for (int x = bx * kBlock; x < std::min(width, (bx + 1) * kBlock); ++x) b.x[b.n] = x, b.y[b.n] = y, ++b.n;
+    return b;
+}
+
+template <class T>
+using Lanes = std::array<T, kPacket>;
+
+/// Radiance that comes back along each ray, with the light of a point of the Sun for each. Only light that comes
+/// straight from its source counts.
+void direct_radiance(const Frame& f, std::size_t n, const Lanes<Ray>& rays, const Lanes<Hit>& hits,
+                     const Lanes<Vec3>& to_sun, Lanes<Rgb>& radiance) {
+    const Scene& scene = f.tracer.scene();
+    Lanes<Rgb> sunlit;
+    std::uint32_t towards_sun = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        radiance[i] = {};
+        if (hits[i].body < 0) continue;
+        const Surface surface = surface_at(scene, hits[i]);
+        radiance[i] = surface.emission + scene.ambient * ambient_reflectance(surface);
+        if (!f.sun) continue;
+        const double cosine = dot(hits[i].shading_normal, to_sun[i]);
+        if (cosine <= 0) continue;
+        const Rgb reflected = brdf(surface, hits[i].shading_normal, to_sun[i], -rays[i].direction);
+        if (reflected == Rgb{}) continue;
+        sunlit[i] = reflected * (f.sun->irradiance() * static_cast<float>(cosine));
+        towards_sun |= 1u << i;
+    }
+    if (towards_sun == 0) return;
+    const std::uint32_t lit = towards_sun & ~f.tracer.occluded(f.at, std::span(hits).first(n), to_sun, towards_sun);
+    for (std::size_t i = 0; i < n; ++i)
+        if ((lit >> i & 1u) != 0) radiance[i] += sunlit[i];
 }
 
 /// Mean of the three bands: what a monochrome sensor would weigh.
 double mean_band(const Vec3& radiance) {
     return (radiance.x + radiance.y + radiance.z) / 3;
-}
-
-struct PixelMean {
-    Vec3 radiance{};
-    double variance = 0;  ///< of the mean of the bands
-};
-
-PixelMean sample_pixel(const Frame& f, int x, int y) {
-    const PixelSampler sampler(
-        f.settings.seed, f.settings.frame,
-        static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(f.camera.width) + static_cast<std::uint32_t>(x));
-    Vec3 sum{};
-    double mean = 0, deviations = 0;  // Welford's running variance
-    for (int s = 0; s < f.settings.spp; ++s) {
-        const SamplePoint p = sampler.point(static_cast<std::uint32_t>(s));
-        const Ray ray = camera_ray(f.camera, f.T_world_camera, x + p[0] - 0.5, y + p[1] - 0.5);
-        const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-        Vec3 radiance{};
-        if (hit.body >= 0)
-            radiance = vec_cast<double>(
-                outgoing_radiance(f, hit, -ray.direction, f.sun ? f.sun->sample(p[2], p[3]) : Vec3{}));
-        sum += radiance;
-        const double delta = mean_band(radiance) - mean;
-        mean += delta / (s + 1);
-        deviations += delta * (mean_band(radiance) - mean);
-    }
-    const double n = f.settings.spp;
-    return {sum / n, deviations / (n * (n - 1))};
 }
 
 void store_aovs(const Frame& f, const Ray& ray, const Hit& hit, std::size_t i, Aovs& aovs) {
@@ -85,22 +94,55 @@ void store_aovs(const Frame& f, const Ray& ray, const Hit& hit, std::size_t i, A
     aovs.variance[i] = 0;
 }
 
-void render_pixel(const Frame& f, int x, int y, RadianceImage& out, Aovs* aovs) {
-    const std::size_t i =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width) + static_cast<std::size_t>(x);
-    const bool many = f.settings.spp > 1;
-    if (!many || aovs != nullptr) {
-        const Ray ray = camera_ray(f.camera, f.T_world_camera, x, y);
-        const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-        if (!many)
-            out.pixels[i] =
-                hit.body < 0 ? Rgb{} : outgoing_radiance(f, hit, -ray.direction, f.sun ? f.sun->centre() : Vec3{});
-        if (aovs != nullptr) store_aovs(f, ray, hit, i, *aovs);
+/// The ray through each pixel's centre: the whole picture for one sample a pixel, and what the other outputs show.
+void render_centres(const Frame& f, const Block& block, bool radiance_wanted, RadianceImage& out, Aovs* aovs) {
+    Lanes<Ray> rays;
+    Lanes<Hit> hits;
+    for (std::size_t i = 0; i < block.n; ++i)
+        rays[i] = camera_ray(f.camera, f.T_world_camera, block.x[i], block.y[i]);
+    f.tracer.intersect(f.at, std::span(rays).first(block.n), hits);
+    if (radiance_wanted) {
+        Lanes<Vec3> to_sun;
+        to_sun.fill(f.sun ? f.sun->centre() : Vec3{});
+        Lanes<Rgb> radiance;
+        direct_radiance(f, block.n, rays, hits, to_sun, radiance);
+        for (std::size_t i = 0; i < block.n; ++i) out.pixels[block.index(i, out.width)] = radiance[i];
     }
-    if (many) {
-        const PixelMean pixel = sample_pixel(f, x, y);
-        out.pixels[i] = vec_cast<float>(pixel.radiance);
-        if (aovs != nullptr) aovs->variance[i] = static_cast<float>(pixel.variance);
+    if (aovs != nullptr)
+        for (std::size_t i = 0; i < block.n; ++i) store_aovs(f, rays[i], hits[i], block.index(i, out.width), *aovs);
+}
+
+/// Mean of several samples a pixel, and the variance of that mean.
+void render_samples(const Frame& f, const Block& block, RadianceImage& out, Aovs* aovs) {
+    Lanes<Vec3> sum{};
+    Lanes<double> mean{}, deviations{};  // Welford's running variance of the mean of the bands
+    Lanes<Ray> rays;
+    Lanes<Hit> hits;
+    Lanes<Vec3> to_sun{};
+    Lanes<Rgb> radiance;
+    for (int s = 0; s < f.settings.spp; ++s) {
+        for (std::size_t i = 0; i < block.n; ++i) {
+            const auto pixel = static_cast<std::uint32_t>(block.index(i, out.width));
+            const SamplePoint p =
+                PixelSampler(f.settings.seed, f.settings.frame, pixel).point(static_cast<std::uint32_t>(s));
+            rays[i] = camera_ray(f.camera, f.T_world_camera, block.x[i] + p[0] - 0.5, block.y[i] + p[1] - 0.5);
+            if (f.sun) to_sun[i] = f.sun->sample(p[2], p[3]);
+        }
+        f.tracer.intersect(f.at, std::span(rays).first(block.n), hits);
+        direct_radiance(f, block.n, rays, hits, to_sun, radiance);
+        for (std::size_t i = 0; i < block.n; ++i) {
+            const Vec3 sample = vec_cast<double>(radiance[i]);
+            sum[i] += sample;
+            const double delta = mean_band(sample) - mean[i];
+            mean[i] += delta / (s + 1);
+            deviations[i] += delta * (mean_band(sample) - mean[i]);
+        }
+    }
+    const double n = f.settings.spp;
+    for (std::size_t i = 0; i < block.n; ++i) {
+        const std::size_t at = block.index(i, out.width);
+        out.pixels[at] = vec_cast<float>(sum[i] / n);
+        if (aovs != nullptr) aovs->variance[at] = static_cast<float>(deviations[i] / (n * (n - 1)));
     }
 }
 
@@ -121,12 +163,19 @@ void render_radiance(const Tracer& tracer, const Placement& at, const Camera& ca
                       camera,   T_world_camera,
                       settings, tracer.scene().sun ? std::optional<SunDisc>(*tracer.scene().sun) : std::nullopt};
     if (aovs != nullptr) resize(*aovs, out.pixels.size());
+    const bool one_sample = settings.spp == 1;
+    // Blocks lie on a grid of their own, so that which rays travel together does not depend on the threads.
+    const auto blocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock; };
     tbb::parallel_for(
-        tbb::blocked_range2d<int>(0, out.height, kTile, 0, out.width, kTile),
+        tbb::blocked_range2d<int>(0, blocks(out.height), kTile, 0, blocks(out.width), kTile),
         [&](const tbb::blocked_range2d<int>& tile) {
             const FlushDenormals flush;
-            for (int y = tile.rows().begin(); y != tile.rows().end(); ++y)
-                for (int x = tile.cols().begin(); x != tile.cols().end(); ++x) render_pixel(frame, x, y, out, aovs);
+            for (int by = tile.rows().begin(); by != tile.rows().end(); ++by)
+                for (int bx = tile.cols().begin(); bx != tile.cols().end(); ++bx) {
+                    const Block block = block_at(bx, by, out.width, out.height);
+                    if (one_sample || aovs != nullptr) render_centres(frame, block, one_sample, out, aovs);
+                    if (!one_sample) render_samples(frame, block, out, aovs);
+                }
         },
         tbb::simple_partitioner());
 }

@@ -20,6 +20,8 @@ struct Release {
 template <class Handle>
 using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
+// The calls differ in where the context goes; the context's only use here is the coherent flag.
+
 inline void intersect(RTCScene scene, RTCRayHit& ray) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
     rtcIntersect1(scene, &ray);
@@ -27,6 +29,21 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) noexcept {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcIntersect1(scene, &context, &ray);
+#endif
+}
+
+/// Sixteen rays that run close together; lanes whose `valid` is 0 are left alone, others have -1.
+inline void intersect_coherent(RTCScene scene, const int* valid, RTCRayHit16& rays) noexcept {
+#if NARPA_EMBREE_MAJOR >= 4
+    RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, &rays, &arguments);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, &context, &rays);
 #endif
 }
 
@@ -38,6 +55,18 @@ inline void occluded(RTCScene scene, RTCRay& ray) noexcept {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcOccluded1(scene, &context, &ray);
+#endif
+}
+
+/// Sixteen shadow rays. Without the coherent flag: with it, Embree 3.13 has been seen to loop for ever here (AVX-512,
+/// instances), and it gains little.
+inline void occluded(RTCScene scene, const int* valid, RTCRay16& rays) noexcept {
+#if NARPA_EMBREE_MAJOR >= 4
+    rtcOccluded16(valid, scene, &rays);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded16(valid, scene, &context, &rays);
 #endif
 }
 

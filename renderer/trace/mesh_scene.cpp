@@ -16,11 +16,16 @@ double largest(const Vec3& a) {
     return std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)});
 }
 
-bool is_hit(const RTCRayHit& q) {
-    return q.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+/// Puts one ray into a lane of sixteen.
+void put_lane(const RTCRay& ray, std::size_t i, auto& lanes) {
+    lanes.org_x[i] = ray.org_x, lanes.org_y[i] = ray.org_y, lanes.org_z[i] = ray.org_z;
+    lanes.dir_x[i] = ray.dir_x, lanes.dir_y[i] = ray.dir_y, lanes.dir_z[i] = ray.dir_z;
+    lanes.tnear[i] = ray.tnear, lanes.tfar[i] = ray.tfar;
+    lanes.time[i] = ray.time, lanes.mask[i] = ray.mask, lanes.id[i] = ray.id, lanes.flags[i] = ray.flags;
 }
-bool shows_back(const RTCRayHit& q) {
-    return q.hit.Ng_x * q.ray.dir_x + q.hit.Ng_y * q.ray.dir_y + q.hit.Ng_z * q.ray.dir_z > 0;
+
+bool is_set(std::uint32_t bits, std::size_t i) {
+    return (bits >> i & 1u) != 0;
 }
 
 Status check_mesh(const Mesh& mesh) {
@@ -136,46 +141,87 @@ bool MeshScene::intersect(const Vec3& origin, const Vec3& direction, double entr
     const auto skipped = advance(origin, direction, entry_m, t_max);
     if (!skipped) return false;
     const Vec3 start = origin + *skipped * direction;
+    return settle(ask(start, direction, t_max - *skipped), start, direction, *skipped, t_max, hit);
+}
 
-    RTCRayHit query = query_embree(start, direction, t_max - *skipped);
+std::uint32_t MeshScene::intersect(const MeshRays& rays, std::uint32_t wanted,
+                                   std::span<MeshHit, kPacket> hits) const noexcept {
+    alignas(64) RTCRayHit16 query;
+    alignas(64) std::array<int, kPacket> valid{};
+    std::array<Vec3, kPacket> start;
+    std::array<double, kPacket> skipped;
+    std::uint32_t asked = 0;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        if (!is_set(wanted, i)) continue;
+        const auto to_entry = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
+        if (!to_entry) continue;
+        skipped[i] = *to_entry;
+        start[i] = rays.origin[i] + skipped[i] * rays.direction[i];
+        put_lane(embree_ray(start[i], rays.direction[i], rays.t_max[i] - skipped[i]), i, query.ray);
+        query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        valid[i] = -1;
+        asked |= 1u << i;
+    }
+    if (asked == 0) return 0;
+    embree::intersect_coherent(scene_.get(), valid.data(), query);
+
+    std::uint32_t hit = 0;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        if (!is_set(asked, i)) continue;
+        Answer answer;
+        if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
+            const float facing = query.hit.Ng_x[i] * query.ray.dir_x[i] + query.hit.Ng_y[i] * query.ray.dir_y[i] +
+                                 query.hit.Ng_z[i] * query.ray.dir_z[i];
+            answer = {query.hit.primID[i], query.ray.tfar[i], query.hit.u[i], query.hit.v[i], true, facing > 0};
+        }
+        if (settle(answer, start[i], rays.direction[i], skipped[i], rays.t_max[i], hits[i])) hit |= 1u << i;
+    }
+    return hit;
+}
+
+bool MeshScene::settle(Answer answer, const Vec3& start, const Vec3& direction, double skipped_m, double t_max,
+                       MeshHit& hit) const noexcept {
     // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass through,
     // to the inner side of the far wall where the mesh is closed, out of it where it is not. They are common where a
     // camera's pixels line up with a model's grid. One more try, turned by a few roundings, finds what they lost.
-    const bool suspicious = is_hit(query) ? shows_back(query) : !closed_;
+    const bool suspicious = answer.hit ? answer.back : !closed_;
     if (suspicious) {
         const Vec3 turn{direction.y - direction.z, direction.z - direction.x, direction.x - direction.y + 0.5};
-        const RTCRayHit again = query_embree(start, direction + 4e-7 * turn, t_max - *skipped);
-        if (is_hit(again) && (!is_hit(query) || (!shows_back(again) && again.ray.tfar < query.ray.tfar)))
-            query = again;
+        const Answer again = ask(start, direction + 4e-7 * turn, t_max - skipped_m);
+        if (again.hit && (!answer.hit || (!again.back && again.t < answer.t))) answer = again;
     }
-    if (!is_hit(query)) return false;
+    if (!answer.hit) return false;
 
     // Embree found the triangle; where the ray meets it is solved again in double (Moller and Trumbore 1997), kept
     // inside the triangle so that a hit on an edge stays on the surface.
-    const auto [v0, v1, v2] = corners(query.hit.primID);
+    const auto [v0, v1, v2] = corners(answer.face);
     const Vec3 e1 = v1 - v0, e2 = v2 - v0;
     const Vec3 p = cross(direction, e2), s = start - v0, q = cross(s, e1);
     const double inverse_det = 1 / dot(e1, p);
     double b1 = dot(s, p) * inverse_det, b2 = dot(direction, q) * inverse_det;
-    if (!std::isfinite(b1) || !std::isfinite(b2)) b1 = query.hit.u, b2 = query.hit.v;
+    if (!std::isfinite(b1) || !std::isfinite(b2)) b1 = answer.u, b2 = answer.v;
     b1 = std::clamp(b1, 0.0, 1.0);
     b2 = std::clamp(b2, 0.0, 1.0);
     if (const double sum = b1 + b2; sum > 1) b1 /= sum, b2 /= sum;
 
     const Vec3 position = v0 + b1 * e1 + b2 * e2;
-    const double range = *skipped + std::max(0.0, dot(position - start, direction));
+    const double range = skipped_m + std::max(0.0, dot(position - start, direction));
     if (!(range < t_max)) return false;
-    hit = {query.hit.primID, range, position, b1, b2};
+    hit = {answer.face, range, position, b1, b2};
     return true;
 }
 
-RTCRayHit MeshScene::query_embree(const Vec3& start, const Vec3& direction, double length) const noexcept {
+MeshScene::Answer MeshScene::ask(const Vec3& start, const Vec3& direction, double length) const noexcept {
     RTCRayHit query;
     query.ray = embree_ray(start, direction, length);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     embree::intersect(scene_.get(), query);
-    return query;
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+    const float facing = query.hit.Ng_x * query.ray.dir_x + query.hit.Ng_y * query.ray.dir_y +
+                         query.hit.Ng_z * query.ray.dir_z;
+    return {query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v, true, facing > 0};
 }
 
 bool MeshScene::occluded(const Vec3& origin, const Vec3& direction, double entry_m, double t_max) const noexcept {
@@ -184,6 +230,27 @@ bool MeshScene::occluded(const Vec3& origin, const Vec3& direction, double entry
     RTCRay ray = embree_ray(origin + *skipped * direction, direction, t_max - *skipped);
     embree::occluded(scene_.get(), ray);
     return ray.tfar < 0;
+}
+
+std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept {
+    alignas(64) RTCRay16 query;
+    alignas(64) std::array<int, kPacket> valid{};
+    std::uint32_t asked = 0;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        if (!is_set(wanted, i)) continue;
+        const auto skipped = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
+        if (!skipped) continue;
+        put_lane(embree_ray(rays.origin[i] + *skipped * rays.direction[i], rays.direction[i], rays.t_max[i] - *skipped),
+                 i, query);
+        valid[i] = -1;
+        asked |= 1u << i;
+    }
+    if (asked == 0) return 0;
+    embree::occluded(scene_.get(), valid.data(), query);
+    std::uint32_t dark = 0;
+    for (std::size_t i = 0; i < kPacket; ++i)
+        if (is_set(asked, i) && query.tfar[i] < 0) dark |= 1u << i;
+    return dark;
 }
 
 double MeshScene::departure_offset_m(std::uint32_t face, const Vec3& position) const noexcept {

@@ -6,6 +6,7 @@
 #include "base/result.h"
 #include "renderer/scene/scene.h"
 #include "renderer/trace/embree.h"
+#include "renderer/trace/tracer.h"
 
 namespace narpa {
 
@@ -15,6 +16,12 @@ struct MeshHit {
     double range_m = 0;     ///< from the ray's origin
     Vec3 position{};        ///< body frame, on the triangle to rounding in double
     double b1 = 0, b2 = 0;  ///< barycentric weights of the face's second and third vertex
+};
+
+/// Rays in the body's frame, as `MeshScene::intersect` takes one.
+struct MeshRays {
+    std::array<Vec3, kPacket> origin, direction;
+    std::array<double, kPacket> entry_m, t_max;
 };
 
 class MeshScene {
@@ -28,6 +35,11 @@ public:
     bool intersect(const Vec3& origin, const Vec3& direction, double entry_m, double t_max,
                    MeshHit& hit) const noexcept;
     bool occluded(const Vec3& origin, const Vec3& direction, double entry_m, double t_max) const noexcept;
+
+    /// The same for those of sixteen rays whose bit is set in `wanted`; returns the bits of those that hit. Rays of
+    /// `intersect` run close together, those of `occluded` need not.
+    std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted, std::span<MeshHit, kPacket> hits) const noexcept;
+    [[nodiscard]] std::uint32_t occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept;
 
     /// How far above a point of this face a ray must start so that rounding in single precision cannot put it
     /// below.
@@ -44,8 +56,17 @@ private:
     /// where that is worth while. 0 from inside; none if the ray misses, or meets the sphere beyond t_max.
     [[nodiscard]] std::optional<double> advance(const Vec3& origin, const Vec3& direction, double entry_m,
                                                 double t_max) const noexcept;
-    [[nodiscard]] RTCRayHit query_embree(const Vec3& start, const Vec3& direction, double length) const noexcept;
+    /// What Embree says of a ray: which triangle, roughly where, from which side.
+    struct Answer {
+        std::uint32_t face = 0;
+        float t = 0, u = 0, v = 0;
+        bool hit = false, back = false;
+    };
+    [[nodiscard]] Answer ask(const Vec3& start, const Vec3& direction, double length) const noexcept;
     [[nodiscard]] RTCRay embree_ray(const Vec3& origin, const Vec3& direction, double length) const noexcept;
+    /// Asks once more where the answer is suspicious, and solves the hit in double.
+    bool settle(Answer answer, const Vec3& start, const Vec3& direction, double skipped_m, double t_max,
+                MeshHit& hit) const noexcept;
 
     const Mesh* mesh_ = nullptr;
     embree::Owned<RTCScene> scene_;

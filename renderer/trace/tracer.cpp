@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <optional>
 
 #include "renderer/trace/mesh_scene.h"
 #include "renderer/trace/sphere_roots.h"
@@ -19,6 +21,19 @@ struct Candidate {
     std::uint32_t body;
     double entry_m;
 };
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool is_set(std::uint32_t bits, std::size_t i) {
+    return (bits >> i & 1u) != 0;
+}
+
+/// The nearest crossing of a sphere about the origin that is not behind the ray.
+std::optional<double> nearest_root(const Vec3& o, const Vec3& d, double radius_m) {
+    const auto roots = sphere_roots(o, d, radius_m);
+    if (!roots || roots->far < 0) return std::nullopt;
+    return roots->near >= 0 ? roots->near : roots->far;
+}
 
 Vec3 to_body(const Quat& q_world_body, const Vec3& v) {
     return conjugate(q_world_body) * v;
@@ -48,8 +63,15 @@ struct Tracer::Impl {
     std::vector<bool> textured;  ///< per material
 
     Status build(const Scene& s, int threads);
+    /// Fills in what follows from where the ray, in the body's frame, met which body at which range.
+    void finish(const Placement& at, const Vec3& o_body, const Vec3& d_body, const MeshHit& mesh_hit,
+                Hit& hit) const noexcept;
     void finish_mesh(const Rigid3& T_world_body, const Vec3& d_body, const MeshHit& at, Hit& hit) const noexcept;
     void finish_sphere(const Rigid3& T_world_body, const Vec3& o_body, const Vec3& d_body, Hit& hit) const noexcept;
+    /// Where a ray starts that leaves the hit, in the frame of its body.
+    [[nodiscard]] Vec3 departure(const Placement& at, const Hit& from) const noexcept;
+    [[nodiscard]] bool sphere_hides(const Placement& at, std::size_t sphere, const Hit& from, const Vec3& start_turned,
+                                    const Vec3& direction, double t_max) const noexcept;
 };
 
 Status Tracer::Impl::build(const Scene& s, int threads) {
@@ -158,6 +180,39 @@ void Tracer::Impl::finish_sphere(const Rigid3& T_world_body, const Vec3& o_body,
     }
 }
 
+void Tracer::Impl::finish(const Placement& at, const Vec3& o_body, const Vec3& d_body, const MeshHit& mesh_hit,
+                          Hit& hit) const noexcept {
+    const std::size_t body = static_cast<std::size_t>(hit.body);
+    if (shapes[body].mesh != nullptr)
+        finish_mesh(at.T_world_body[body], d_body, mesh_hit, hit);
+    else
+        finish_sphere(at.T_world_body[body], o_body, d_body, hit);
+}
+
+Vec3 Tracer::Impl::departure(const Placement& at, const Hit& from) const noexcept {
+    const std::size_t own = static_cast<std::size_t>(from.body);
+    const MeshScene* mesh = shapes[own].mesh;
+    if (mesh == nullptr) return from.departure_body;
+    const double lift_m = mesh->departure_offset_m(from.face, from.departure_body);
+    return from.departure_body + lift_m * to_body(at.T_world_body[own].q, from.geometric_normal);
+}
+
+bool Tracer::Impl::sphere_hides(const Placement& at, std::size_t sphere, const Hit& from, const Vec3& start_turned,
+                                const Vec3& direction, double t_max) const noexcept {
+    const std::size_t own = static_cast<std::size_t>(from.body);
+    const double radius_m = shapes[sphere].radius_m;
+    if (sphere == own) {  // convex: from outside it hides what is below its horizon, from inside everything
+        const double up = dot(from.geometric_normal, direction);
+        const bool outside = dot(start_turned, from.geometric_normal) > 0;
+        return outside ? up < 0 : 2 * radius_m * up < t_max;
+    }
+    const Vec3 o = start_turned + (at.T_world_body[own].t - at.T_world_body[sphere].t);
+    const auto roots = sphere_roots(o, direction, radius_m);
+    if (!roots) return false;
+    const double t = roots->near > 0 ? roots->near : roots->far;
+    return t > 0 && t < t_max;
+}
+
 Result<Tracer> Tracer::create(const Scene& scene, int threads) {
     auto impl = std::make_unique<Impl>();
     if (const Status good = impl->build(scene, threads); !good) return good.error();
@@ -194,54 +249,154 @@ Hit Tracer::intersect(const Placement& at, const Ray& ray, double t_max) const n
                 if (!mesh->intersect(o, d, batch[k].entry_m, nearest, mesh_hit)) continue;
                 hit.range_m = nearest = mesh_hit.range_m;
             } else {
-                const auto roots = sphere_roots(o, d, impl_->shapes[body].radius_m);
-                const double t = !roots ? -1 : roots->near >= 0 ? roots->near : roots->far;
-                if (t < 0 || t >= nearest) continue;
-                hit.range_m = nearest = t;
+                const auto t = nearest_root(o, d, impl_->shapes[body].radius_m);
+                if (!t || *t >= nearest) continue;
+                hit.range_m = nearest = *t;
             }
             hit.body = static_cast<int>(body);
             o_hit = o, d_hit = d;
         }
     }
-    if (hit.body < 0) return hit;
-    const std::size_t body = static_cast<std::size_t>(hit.body);
-    if (impl_->shapes[body].mesh != nullptr)
-        impl_->finish_mesh(at.T_world_body[body], d_hit, mesh_hit, hit);
-    else
-        impl_->finish_sphere(at.T_world_body[body], o_hit, d_hit, hit);
+    if (hit.body >= 0) impl_->finish(at, o_hit, d_hit, mesh_hit, hit);
     return hit;
+}
+
+void Tracer::intersect(const Placement& at, std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
+    struct Entries {
+        std::uint32_t body = 0;
+        double nearest_m = 0;  ///< of the packet
+        std::array<double, kPacket> entry_m;
+    };
+    const std::size_t n = std::min({rays.size(), hits.size(), kPacket});
+    std::array<double, kPacket> nearest;
+    nearest.fill(kInfinity);
+    std::array<MeshHit, kPacket> mesh_hits;
+    std::array<Vec3, kPacket> o_hit, d_hit;
+    for (std::size_t i = 0; i < n; ++i) hits[i] = Hit{};
+
+    std::array<Entries, kBatch> batch;
+    std::array<std::size_t, kBatch> order;
+    for (std::size_t next = 0; next < impl_->shapes.size();) {
+        // As for one ray: bounds about the bodies' origins first, nearest body first.
+        std::size_t m = 0;
+        for (; next < impl_->shapes.size() && m < kBatch; ++next) {
+            Entries& e = batch[m];
+            e = {static_cast<std::uint32_t>(next), kInfinity, {}};
+            for (std::size_t i = 0; i < n; ++i) {
+                const Vec3 o = rays[i].origin - at.T_world_body[next].t;
+                const SphereSpan span = bounding_span(o, rays[i].direction, impl_->shapes[next].bound_m);
+                e.entry_m[i] = span.exit < 0 || span.entry >= nearest[i] ? kInfinity : span.entry;
+                e.nearest_m = std::min(e.nearest_m, e.entry_m[i]);
+            }
+            if (e.nearest_m == kInfinity) continue;
+            std::size_t k = m;
+            for (; k > 0 && batch[order[k - 1]].nearest_m > e.nearest_m; --k) order[k] = order[k - 1];
+            order[k] = m++;
+        }
+        for (std::size_t k = 0; k < m; ++k) {
+            const Entries& e = batch[order[k]];
+            const Rigid3& T = at.T_world_body[e.body];
+            MeshRays local;
+            std::uint32_t wanted = 0;
+            for (std::size_t i = 0; i < n; ++i) {
+                if (e.entry_m[i] >= nearest[i]) continue;
+                local.origin[i] = to_body(T.q, rays[i].origin - T.t);
+                local.direction[i] = to_body(T.q, rays[i].direction);
+                local.entry_m[i] = e.entry_m[i];
+                local.t_max[i] = nearest[i];
+                wanted |= 1u << i;
+            }
+            if (wanted == 0) continue;
+            std::uint32_t met = 0;
+            if (const MeshScene* mesh = impl_->shapes[e.body].mesh) {
+                met = mesh->intersect(local, wanted, mesh_hits);
+                for (std::size_t i = 0; i < n; ++i)
+                    if (is_set(met, i)) nearest[i] = mesh_hits[i].range_m;
+            } else {
+                for (std::size_t i = 0; i < n; ++i) {
+                    if (!is_set(wanted, i)) continue;
+                    const auto t = nearest_root(local.origin[i], local.direction[i], impl_->shapes[e.body].radius_m);
+                    if (!t || *t >= nearest[i]) continue;
+                    nearest[i] = *t;
+                    met |= 1u << i;
+                }
+            }
+            for (std::size_t i = 0; i < n; ++i) {
+                if (!is_set(met, i)) continue;
+                hits[i].body = static_cast<int>(e.body);
+                o_hit[i] = local.origin[i], d_hit[i] = local.direction[i];
+            }
+        }
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        if (hits[i].body < 0) continue;
+        hits[i].range_m = nearest[i];
+        impl_->finish(at, o_hit[i], d_hit[i], mesh_hits[i], hits[i]);
+    }
 }
 
 bool Tracer::occluded(const Placement& at, const Hit& from, const Vec3& direction, double t_max) const noexcept {
     const std::size_t own = static_cast<std::size_t>(from.body);
     const Rigid3& T_own = at.T_world_body[own];
-    const MeshScene* own_mesh = impl_->shapes[own].mesh;
-    Vec3 start = from.departure_body;
-    if (own_mesh != nullptr) {
-        start += own_mesh->departure_offset_m(from.face, start) * to_body(T_own.q, from.geometric_normal);
-        // The start is on the body, so inside its bounds.
-        if (own_mesh->occluded(start, to_body(T_own.q, direction), 0, t_max)) return true;
-    } else {
-        // A sphere is convex: from outside it hides what is below its horizon, from inside everything.
-        const double up = dot(from.geometric_normal, direction);
-        const bool outside = dot(T_own.q * from.departure_body, from.geometric_normal) > 0;
-        if (outside ? up < 0 : 2 * impl_->shapes[own].radius_m * up < t_max) return true;
-    }
-    const Vec3 start_turned = T_own.q * start;
+    const Vec3 start = impl_->departure(at, from), start_turned = T_own.q * start;
+    // The body that the ray leaves is the likeliest to hide the light. The start is on it, so inside its bounds.
+    if (const MeshScene* mesh = impl_->shapes[own].mesh)
+        if (mesh->occluded(start, to_body(T_own.q, direction), 0, t_max)) return true;
     for (std::size_t body = 0; body < impl_->shapes.size(); ++body) {
+        const MeshScene* mesh = impl_->shapes[body].mesh;
+        if (mesh == nullptr) {
+            if (impl_->sphere_hides(at, body, from, start_turned, direction, t_max)) return true;
+            continue;
+        }
         if (body == own) continue;
         const Rigid3& T = at.T_world_body[body];
         const Vec3 o = start_turned + (T_own.t - T.t);
         const SphereSpan span = bounding_span(o, direction, impl_->shapes[body].bound_m);
         if (span.exit < 0 || span.entry >= t_max) continue;
-        if (const MeshScene* mesh = impl_->shapes[body].mesh) {
-            if (mesh->occluded(to_body(T.q, o), to_body(T.q, direction), span.entry, t_max)) return true;
-        } else if (const auto roots = sphere_roots(o, direction, impl_->shapes[body].radius_m)) {
-            const double t = roots->near > 0 ? roots->near : roots->far;
-            if (t > 0 && t < t_max) return true;
-        }
+        if (mesh->occluded(to_body(T.q, o), to_body(T.q, direction), span.entry, t_max)) return true;
     }
     return false;
+}
+
+std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                               std::uint32_t wanted) const noexcept {
+    const std::size_t n = std::min({from.size(), directions.size(), kPacket});
+    std::array<Vec3, kPacket> start, start_turned;  // in the frame of the body it leaves, and turned into the world's
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!is_set(wanted, i)) continue;
+        start[i] = impl_->departure(at, from[i]);
+        start_turned[i] = at.T_world_body[static_cast<std::size_t>(from[i].body)].q * start[i];
+    }
+    std::uint32_t dark = 0;
+    for (std::size_t body = 0; body < impl_->shapes.size(); ++body) {
+        const Rigid3& T = at.T_world_body[body];
+        const MeshScene* mesh = impl_->shapes[body].mesh;
+        MeshRays local;
+        std::uint32_t asked = 0;
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!is_set(wanted & ~dark, i)) continue;
+            const std::size_t own = static_cast<std::size_t>(from[i].body);
+            if (mesh == nullptr) {
+                if (impl_->sphere_hides(at, body, from[i], start_turned[i], directions[i], kInfinity)) dark |= 1u << i;
+                continue;
+            }
+            if (own == body) {  // the start is on the body, so inside its bounds
+                local.origin[i] = start[i];
+                local.entry_m[i] = 0;
+            } else {
+                const Vec3 o = start_turned[i] + (at.T_world_body[own].t - T.t);
+                const SphereSpan span = bounding_span(o, directions[i], impl_->shapes[body].bound_m);
+                if (span.exit < 0) continue;
+                local.origin[i] = to_body(T.q, o);
+                local.entry_m[i] = span.entry;
+            }
+            local.direction[i] = to_body(T.q, directions[i]);
+            local.t_max[i] = kInfinity;
+            asked |= 1u << i;
+        }
+        if (asked != 0) dark |= mesh->occluded(local, asked);
+    }
+    return dark;
 }
 
 double Tracer::bounding_radius_m(std::size_t body) const noexcept {

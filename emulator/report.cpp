@@ -116,9 +116,10 @@ std::string in_words(const json& r) {
                            number(b, "commands_taken"), number(b, "commands_missed"), non_zero(b["rejected"]));
         const json trouble = {{"receive overflow", b["receive_overflow"]}, {"malformed", b["malformed"]},
                               {"error frames", b["error_frames"]}, {"bus-off", b["bus_off"]},
-                              {"interface down", b["interface_down"]}, {"send drops", b["send_drops"]}};
-        out += fmt::format("    {} frames received ({} foreign), {} sent, trouble: {}\n", number(b, "frames_received"),
-                           number(b, "foreign_frames"), number(b, "frames_sent"), non_zero(trouble));
+                              {"connection or interface lost", b["interface_down"]}};
+        out += fmt::format("    {} frames received ({} foreign), {} sent, {} that nobody took; trouble: {}\n",
+                           number(b, "frames_received"), number(b, "foreign_frames"), number(b, "frames_sent"),
+                           number(b, "send_drops"), non_zero(trouble));
     }
     for (const json& n : r["notices"]) out += "  note: " + n.get<std::string>() + "\n";
     if (!r["log"].get<std::string>().empty()) out += "  log: " + r["log"].get<std::string>() + "\n";

@@ -109,7 +109,7 @@ void read_render(TableReader& root, Scene& scene) {
     table->not_in_this_version("max_depth", "only direct light exists so far, which has no bounces");
     table->not_in_this_version("budget_ms", "give spp");
     table->not_in_this_version("budget_rays", "give spp");
-    render.spp = static_cast<int>(table->integer("spp", 1, 65536).value_or(render.spp));
+    render.spp = static_cast<int>(table->integer("spp", 1, 65535).value_or(render.spp));
     render.seed = static_cast<std::uint64_t>(table->integer("seed", 0, INT64_MAX).value_or(0));
     render.stale_after_s = table->number("stale_after_s", kPositive).value_or(render.stale_after_s);
     table->finish();

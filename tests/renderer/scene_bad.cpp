@@ -47,7 +47,7 @@ const BadScene kBad[] = {
     {"UnknownKeyInDetector", CAMERA "fov_diagonal_deg = 9\n[camera.detector]\nbitz = 8\n", 6, 1,
      "did you mean \"bits\"?"},
     {"UnknownFarFromAll", "[render]\nphotons = 3\n", 2, 1, "unknown key \"photons\" in [render]"},
-    {"WrongType", "[render]\nspp = \"four\"\n", 2, 7, "spp: got a text, expected an integer in [1, 65536]"},
+    {"WrongType", "[render]\nspp = \"four\"\n", 2, 7, "spp: got a text, expected an integer in [1, 65535]"},
     {"FloatForInteger", "[render]\nspp = 4.0\n", 2, 7, "spp: got 4, expected an integer"},
     {"NegativeSeed", "[render]\nseed = -1\n", 2, 8, "seed: got -1"},
     {"PathTracing", "[render]\nmethod = \"path\"\n", 2, 10, "only direct light exists"},

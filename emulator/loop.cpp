@@ -48,8 +48,10 @@ void Emulator::warm_up() {
 void Emulator::run_camera(CameraFeed& feed, const StopFlag& stop) {
     name_thread("narpa-camera");
     if (!take_fifo_priority(kCameraPriority)) no_priority_ = true;
-    while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop))
+    while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop)) {
         threads_->arena.execute([&] { feed.make_next(clock_.get(), end_ns_); });
+        t_ns_.store(clock_->now_ns(), std::memory_order_relaxed);
+    }
 }
 
 void Emulator::run_lidar(LidarFeed& feed, const StopFlag& stop) {

@@ -66,7 +66,7 @@ TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
     const auto emulator = start(small_scene(), o);
     ASSERT_TRUE(emulator);
     std::thread loop([&] { EXPECT_TRUE(emulator->run(stop_)); });
-    std::this_thread::sleep_for(std::chrono::milliseconds(350));
+    while (emulator->t_ns() < 250'000'000) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     stop_ = true;
     loop.join();
     const std::string video = slurp(folder_ / "a.y4m");

@@ -24,6 +24,15 @@ void put_lane(const RTCRay& ray, std::size_t i, auto& lanes) {
     lanes.time[i] = ray.time, lanes.mask[i] = ray.mask, lanes.id[i] = ray.id, lanes.flags[i] = ray.flags;
 }
 
+/// A ray of no length: what a lane that asks nothing holds. Where the processor has no sixteen lanes, Embree 3.13
+/// looks into these too.
+constexpr RTCRay kNoRay = [] {
+    RTCRay ray{};
+    ray.dir_z = 1;
+    ray.tfar = -1;
+    return ray;
+}();
+
 bool is_set(std::uint32_t bits, std::size_t i) {
     return (bits >> i & 1u) != 0;
 }
@@ -152,14 +161,15 @@ std::uint32_t MeshScene::intersect(const MeshRays& rays, std::uint32_t wanted,
     std::array<double, kPacket> skipped;
     std::uint32_t asked = 0;
     for (std::size_t i = 0; i < kPacket; ++i) {
+        put_lane(kNoRay, i, query.ray);
+        query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
         if (!is_set(wanted, i)) continue;
         const auto to_entry = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
         if (!to_entry) continue;
         skipped[i] = *to_entry;
         start[i] = rays.origin[i] + skipped[i] * rays.direction[i];
         put_lane(embree_ray(start[i], rays.direction[i], rays.t_max[i] - skipped[i]), i, query.ray);
-        query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
         valid[i] = -1;
         asked |= 1u << i;
     }
@@ -237,6 +247,7 @@ std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted) co
     alignas(64) std::array<int, kPacket> valid{};
     std::uint32_t asked = 0;
     for (std::size_t i = 0; i < kPacket; ++i) {
+        put_lane(kNoRay, i, query);
         if (!is_set(wanted, i)) continue;
         const auto skipped = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
         if (!skipped) continue;

@@ -21,6 +21,7 @@ def command_and_compare(bus_spec, bus_settings, fd):
     wire = support.Wire()
     video = folder / "nav.y4m"
     with support.Run(support.SCENE, "--can", bus_spec, "--video", f"{support.CAMERA}={video}", "--lockstep") as run:
+        run.wait_for("commands: ")  # from now on it hears
         bus = support.open_bus(run, **bus_settings)
         for i, pose in enumerate(POSES):
             frame = FIRST_FRAME + i

@@ -78,22 +78,24 @@ class Run:
     """`narpa run` in the background. `stop` ends it as Ctrl-C does and returns its JSON summary."""
 
     def __init__(self, *arguments):
-        self.log = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(
-            [NARPA, "run", *map(str, arguments), "--json"], stdout=subprocess.PIPE, stderr=self.log
-        )
+        self.log = work_folder() / "stderr"
+        with open(self.log, "wb") as log:
+            command = [NARPA, "run", *map(str, arguments), "--json"]
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
 
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
-        if self.process.poll() is None:
+    def __exit__(self, trouble, *_):
+        status = self.process.poll()
+        if status is None:
             self.process.kill()
-            print("--- narpa run said:\n" + self.said())
+            self.process.wait()
+        if trouble:
+            print(f"--- narpa run ({'still there' if status is None else f'ended with {status}'}) said:\n{self.said()}")
 
     def said(self):
-        self.log.seek(0)
-        return self.log.read().decode(errors="replace")
+        return self.log.read_text(errors="replace")
 
     def expect_alive(self):
         if self.process.poll() is not None:
@@ -243,9 +245,10 @@ def await_ledger(bus, wire, frame, seconds=30):
 
 
 def open_bus(run, seconds=30, **settings):
-    """A python-can bus, as soon as narpa offers it."""
+    """A python-can bus, as soon as narpa listens: on a bus without a server, nobody would notice a command too early."""
     import can
 
+    run.wait_for("commands: ")
     until = time.monotonic() + seconds
     while True:
         run.expect_alive()

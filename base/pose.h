@@ -29,10 +29,18 @@ struct Quat {
     friend constexpr bool operator==(const Quat&, const Quat&) = default;
 };
 
-constexpr double dot(const Quat& a, const Quat& b) { return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z; }
-constexpr Quat conjugate(const Quat& q) { return {q.w, -q.x, -q.y, -q.z}; }
-constexpr Quat operator-(const Quat& q) { return {-q.w, -q.x, -q.y, -q.z}; }
-inline double norm(const Quat& q) { return std::sqrt(dot(q, q)); }
+constexpr double dot(const Quat& a, const Quat& b) {
+    return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z;
+}
+constexpr Quat conjugate(const Quat& q) {
+    return {q.w, -q.x, -q.y, -q.z};
+}
+constexpr Quat operator-(const Quat& q) {
+    return {-q.w, -q.x, -q.y, -q.z};
+}
+inline double norm(const Quat& q) {
+    return std::sqrt(dot(q, q));
+}
 inline Quat normalized(const Quat& q) {
     const double s = 1.0 / norm(q);
     return {q.w * s, q.x * s, q.y * s, q.z * s};

@@ -88,7 +88,8 @@ void CameraFeed::account(const FrameLedger& ledger) noexcept {
 
 /// A frame whose successor is already due is not made any more: the stream stays in step with the clock.
 void CameraFeed::let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept {
-    for (; next_mid_ns() < end_ns && due_ns() + unit_.camera().period_ns <= clock.now_ns(); ++next_) ++stats_.skipped;
+    for (; next_mid_ns() < end_ns && due_ns() + unit_.camera().period_ns <= clock.now_ns(); ++next_)
+        ++stats_.skipped;
 }
 
 void CameraFeed::log(const FrameLedger& l) noexcept {
@@ -96,13 +97,14 @@ void CameraFeed::log(const FrameLedger& l) noexcept {
     std::array<char, RowLog::kMaxLine> row;
     for (std::size_t i = 0; i < world_.scene().bodies.size(); ++i) {
         const Motion m = world_.motion(i, l.t_exposure_mid_ns);
-        truth_log_->append({row.data(), format_trajectory_row(row, l.t_exposure_mid_ns, world_.scene().bodies[i].name, m)});
+        truth_log_->append(
+            {row.data(), format_trajectory_row(row, l.t_exposure_mid_ns, world_.scene().bodies[i].name, m)});
     }
-    const auto end = fmt::format_to_n(row.data(), row.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{}\n", l.frame,
-                                      l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns,
-                                      l.t_exposure_mid_ns, l.t_exposure_end_ns, l.t_render_start_ns, l.t_render_end_ns,
-                                      l.t_hand_over_ns, l.t_deadline_ns, l.deadline_met, l.samples_per_pixel,
-                                      l.expected_error);
+    const auto end =
+        fmt::format_to_n(row.data(), row.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{}\n", l.frame,
+                         l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns, l.t_exposure_mid_ns,
+                         l.t_exposure_end_ns, l.t_render_start_ns, l.t_render_end_ns, l.t_hand_over_ns,
+                         l.t_deadline_ns, l.deadline_met, l.samples_per_pixel, l.expected_error);
     ledger_log_->append({row.data(), end.size});
     sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
 }

@@ -17,12 +17,12 @@
 namespace narpa {
 
 struct CameraStats {
-    std::uint64_t frames = 0;            ///< exposed
-    std::uint64_t handed_over = 0;       ///< given to the sinks
-    std::uint64_t skipped = 0;           ///< never exposed: the one before took too long
+    std::uint64_t frames = 0;       ///< exposed
+    std::uint64_t handed_over = 0;  ///< given to the sinks
+    std::uint64_t skipped = 0;      ///< never exposed: the one before took too long
     std::uint64_t deadline_missed = 0;
-    std::uint64_t stale = 0;             ///< frames that show a body without a fresh command
-    std::uint64_t ledgers_lost = 0;      ///< the CAN thread did not keep up
+    std::uint64_t stale = 0;                 ///< frames that show a body without a fresh command
+    std::uint64_t ledgers_lost = 0;          ///< the CAN thread did not keep up
     Histogram wake_late, render, hand_over;  ///< after it was due; duration; from mid-exposure to hand-over
 };
 

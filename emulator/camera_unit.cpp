@@ -25,8 +25,8 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs*
     const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_);
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
-    render_radiance(world_.tracer(), placement_, camera_, T_world_camera, {render.spp, render.seed, frame}, radiance_,
-                    aovs);
+    render_radiance(world_.tracer(), placement_, camera_, T_world_camera, {render.spp, render.seed, frame},
+                    radiance_, aovs);
     narpa::expose(camera_, radiance_, render.seed, frame, bytes_);
 
     FrameLedger ledger;

@@ -74,8 +74,8 @@ void CanNode::log_frame(const CanFrame& frame, std::int64_t t_ns) noexcept {
 }
 
 bool CanNode::commanded() const noexcept {
-    return !listeners_.empty() &&
-           std::all_of(listeners_.begin(), listeners_.end(), [](const Listener& l) { return l.track->commanded(); });
+    return !listeners_.empty() && std::all_of(listeners_.begin(), listeners_.end(),
+                                              [](const Listener& l) { return l.track->commanded(); });
 }
 
 std::int64_t CanNode::granted_ns() const noexcept {

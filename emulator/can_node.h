@@ -20,8 +20,8 @@ struct CommandCounters {
     std::uint64_t past = 0;     ///< time of validity not after the newest: late, repeated, out of order
     std::uint64_t overrun = 0;  ///< further ahead than the track is deep
     std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, as PoseDecoder counts them
-    std::uint64_t foreign = 0;  ///< frames of other identifiers
-    std::uint64_t missed = 0;   ///< commands lost by the gaps in their counters
+    std::uint64_t foreign = 0;                                  ///< frames of other identifiers
+    std::uint64_t missed = 0;                                   ///< commands lost by the gaps in their counters
 };
 
 class CanNode {

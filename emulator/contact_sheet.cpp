@@ -14,8 +14,9 @@ constexpr int kThumbnailWidth = 320;
 
 /// Blue, green, red of one pixel, 0..255, as the format carries them.
 std::array<int, 3> pixel(const VideoFormat& f, std::span<const std::uint8_t> bytes, int x, int y) {
-    const std::size_t i = (static_cast<std::size_t>(y) * static_cast<std::size_t>(f.width) +
-                           static_cast<std::size_t>(x)) * bytes_per_pixel(f.pixel);
+    const std::size_t i =
+        (static_cast<std::size_t>(y) * static_cast<std::size_t>(f.width) + static_cast<std::size_t>(x)) *
+        bytes_per_pixel(f.pixel);
     switch (f.pixel) {
         case PixelFormat::grey: return {bytes[i], bytes[i], bytes[i]};
         case PixelFormat::y16: return {bytes[i + 1], bytes[i + 1], bytes[i + 1]};
@@ -89,8 +90,8 @@ Status ContactSheet::write(const std::string& path) const {
         const int y = gap + static_cast<int>(i / kColumns) * (height_ + gap);
         cv::Mat tile(height_, width_, CV_8UC3, const_cast<std::uint8_t*>(tiles_[i].bgr.data())), shown;
         cv::LUT(tile, srgb_curve(), shown);
-        cv::putText(shown, fmt::format("t = {:.1f} s", static_cast<double>(tiles_[i].t_ns) * 1e-9), {6, height_ - 8},
-                    cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar(80, 220, 255), 1, cv::LINE_AA);
+        cv::putText(shown, fmt::format("t = {:.1f} s", static_cast<double>(tiles_[i].t_ns) * 1e-9),
+                    {6, height_ - 8}, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar(80, 220, 255), 1, cv::LINE_AA);
         shown.copyTo(sheet(cv::Rect(x, y, width_, height_)));
     }
     try {

@@ -13,9 +13,9 @@ namespace {
 
 /// The sinks of one sensor, opened in the order in which they were given.
 template <class Sink, class Open>
-Result<std::vector<std::unique_ptr<Sink>>> open_sinks(const std::vector<std::pair<std::string, std::string>>& wanted,
-                                                      std::size_t sensor, const auto& sensors, std::string_view kind,
-                                                      const std::string& file, Open open) {
+Result<std::vector<std::unique_ptr<Sink>>> open_sinks(
+    const std::vector<std::pair<std::string, std::string>>& wanted, std::size_t sensor, const auto& sensors,
+    std::string_view kind, const std::string& file, Open open) {
     std::vector<std::unique_ptr<Sink>> sinks;
     for (const auto& [name, spec] : wanted) {
         auto index = sensor_named(sensors, name, kind, file);
@@ -46,8 +46,8 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
     std::unique_ptr<Emulator> emulator(new Emulator);
     emulator->options_ = options;
     emulator->world_ = *std::move(world);
-    emulator->end_ns_ = options.duration_s > 0 ? std::llround(options.duration_s * 1e9)
-                                               : std::numeric_limits<std::int64_t>::max();
+    emulator->end_ns_ =
+        options.duration_s > 0 ? std::llround(options.duration_s * 1e9) : std::numeric_limits<std::int64_t>::max();
     emulator->threads_ = std::make_unique<TracingThreads>(options.threads);
     if (auto opened = emulator->open_outputs(); !opened) return opened.error();
     return emulator;
@@ -75,9 +75,10 @@ Status Emulator::open_outputs() {
     for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
         const Camera& c = scene.cameras[i];
         const VideoFormat format{c.width, c.height, c.format, c.period_ns};
-        auto sinks = open_sinks<VideoSink>(options_.video, i, scene.cameras, "camera", scene.file, [&](const auto& spec) {
-            return open_video_sink(spec, format, wait ? WhenFull::wait : WhenFull::drop);
-        });
+        auto sinks =
+            open_sinks<VideoSink>(options_.video, i, scene.cameras, "camera", scene.file, [&](const auto& spec) {
+                return open_video_sink(spec, format, wait ? WhenFull::wait : WhenFull::drop);
+            });
         if (!sinks) return sinks.error();
         if (sinks->empty()) continue;  // a camera that nobody asked for costs nothing
         cameras_.push_back(std::make_unique<CameraFeed>(*world_, i, *std::move(sinks)));
@@ -85,9 +86,9 @@ Status Emulator::open_outputs() {
             if (auto logs = cameras_.back()->log_to(options_.log_folder, wait); !logs) return logs.error();
     }
     for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
-        auto sinks = open_sinks<PacketSink>(options_.lidar, i, scene.lidars, "LiDAR", scene.file, [&](const auto& spec) {
-            return open_packet_sink(spec, scene.epoch_unix_ns, wait);
-        });
+        auto sinks = open_sinks<PacketSink>(
+            options_.lidar, i, scene.lidars, "LiDAR", scene.file,
+            [&](const auto& spec) { return open_packet_sink(spec, scene.epoch_unix_ns, wait); });
         if (!sinks) return sinks.error();
         if (!sinks->empty()) lidars_.push_back(std::make_unique<LidarFeed>(*world_, i, *std::move(sinks)));
     }

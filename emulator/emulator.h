@@ -18,12 +18,12 @@ namespace narpa {
 struct TracingThreads;
 
 struct RunOptions {
-    std::string bus;  ///< BUS; empty: nothing is commanded
+    std::string bus;                                                ///< BUS; empty: nothing is commanded
     std::vector<std::pair<std::string, std::string>> video, lidar;  ///< sensor name and SINK, one sensor many times
     bool lockstep = false;
-    double duration_s = 0;  ///< of simulation time; 0: until stopped, or the end of a log
-    std::string log_folder; ///< empty: no log
-    int threads = 0;        ///< that trace rays; 0: all cores
+    double duration_s = 0;   ///< of simulation time; 0: until stopped, or the end of a log
+    std::string log_folder;  ///< empty: no log
+    int threads = 0;         ///< that trace rays; 0: all cores
 };
 
 class Emulator {
@@ -75,7 +75,7 @@ private:
     std::unique_ptr<Clock> clock_;
     std::atomic<std::int64_t> t_ns_{0};
     std::atomic<bool> no_priority_{false};
-    Heartbeat faults_{};           ///< since the last heartbeat
+    Heartbeat faults_{};  ///< since the last heartbeat
     std::uint64_t drops_told_ = 0;
     std::vector<std::string> notices_;
 };

@@ -14,7 +14,7 @@ namespace narpa {
 
 struct LidarStats {
     std::uint64_t packets = 0;
-    std::uint64_t skipped = 0;     ///< never fired: the run was more than kMaxLagNs behind
+    std::uint64_t skipped = 0;  ///< never fired: the run was more than kMaxLagNs behind
     std::uint64_t shots = 0, returns = 0;
     Histogram wake_late, fire, hand_over;  ///< after it was due; duration; from due to sent
     [[nodiscard]] double sweeps(double rate_hz) const noexcept {

@@ -16,13 +16,13 @@ namespace {
 
 constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;
 constexpr std::int64_t kStartLeadNs = 200'000'000;  // for threads whose stacks are locked into memory
-constexpr std::int64_t kBusWaitNs = 2'000'000;  // how long a ledger may wait for the bus thread
-constexpr int kFramesPerTurn = 4096;            // bounds a turn of the bus thread on a saturated bus
+constexpr std::int64_t kBusWaitNs = 2'000'000;      // how long a ledger may wait for the bus thread
+constexpr int kFramesPerTurn = 4096;                // bounds a turn of the bus thread on a saturated bus
 constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50;
 
 }  // namespace
 
-// --- Real time ----------------------------------------------------------------------------------------------------
+// --- Real time ------------------------------------------------------------
 
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
@@ -69,7 +69,8 @@ void Emulator::run_bus(const StopFlag& stop) {
         const std::int64_t now = clock_->now_ns();
         t_ns_.store(now, std::memory_order_relaxed);
         bool moved = false;
-        for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {}
+        for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
+        }
         send_ledgers(now);
         if (can_->bus().ended() && options_.duration_s == 0) end_ns_ = now;  // nothing more will be commanded
         if (now >= next_heartbeat) {
@@ -81,7 +82,7 @@ void Emulator::run_bus(const StopFlag& stop) {
     send_heartbeat(clock_->now_ns(), RunState::stopping);
 }
 
-// --- Lockstep -----------------------------------------------------------------------------------------------------
+// --- Lockstep ------------------------------------------------------------
 
 void Emulator::run_lockstep(const StopFlag& stop) {
     bool started = false;
@@ -129,7 +130,7 @@ void Emulator::advance_to(std::int64_t t_ns, const StopFlag& stop) {
     t_ns_.store(std::max(this->t_ns(), t_ns), std::memory_order_relaxed);
 }
 
-// --- Telemetry ----------------------------------------------------------------------------------------------------
+// --- Telemetry ------------------------------------------------------------
 
 void Emulator::send_ledgers(std::int64_t t_ns) noexcept {
     FrameLedger ledger;

@@ -8,7 +8,9 @@ namespace {
 constexpr double kSecondsPerNs = 1e-9;
 constexpr std::int64_t kHistoryNs = 1'000'000'000;  // sensors look back by an exposure or a packet, never more
 
-bool at_rest(const Motion& m) { return m.velocity_m_s == Vec3{}; }
+bool at_rest(const Motion& m) {
+    return m.velocity_m_s == Vec3{};
+}
 
 }  // namespace
 
@@ -78,7 +80,8 @@ Motion PoseTrack::interpolate(const Sample& a, const Sample& b, std::int64_t t_n
         m.T_world_body.t = Ta.t + u * chord;
         m.velocity_m_s = chord / h;
     } else {
-        m.T_world_body.t = Ta.t + (u2 * (3 - 2 * u)) * chord + (h * u * (1 - u) * (1 - u)) * va - (h * u2 * (1 - u)) * vb;
+        m.T_world_body.t =
+            Ta.t + (u2 * (3 - 2 * u)) * chord + (h * u * (1 - u) * (1 - u)) * va - (h * u2 * (1 - u)) * vb;
         m.velocity_m_s = (6 * u * (1 - u) / h) * chord + ((1 - u) * (1 - 3 * u)) * va + (u * (3 * u - 2)) * vb;
     }
     m.T_world_body.q = slerp(Ta.q, Tb.q, u);
@@ -100,8 +103,8 @@ TrackedPose PoseTrack::at(std::int64_t t_ns) const noexcept {
     };
     switch (found) {
         case Found::between:
-            return {t_ns == a.t_ns ? a.motion : interpolate(a, b, t_ns), static_cast<std::uint8_t>(a.counter), a.t_ns,
-                    true, false};
+            return {t_ns == a.t_ns ? a.motion : interpolate(a, b, t_ns), static_cast<std::uint8_t>(a.counter),
+                    a.t_ns, true, false};
         case Found::after_newest: return run_on(a);
         case Found::before_oldest: return run_on(b);
         default: return {extrapolate(initial_, static_cast<double>(t_ns) * kSecondsPerNs), 0, 0, false, true};

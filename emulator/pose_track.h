@@ -19,10 +19,10 @@ namespace narpa {
 [[nodiscard]] Motion extrapolate(const Motion& from, double dt_s);
 
 struct TrackedPose {
-    Motion motion{};            ///< velocity and rate are the derivatives of the pose as it is shown
-    std::uint8_t counter = 0;   ///< of the newest command at or before the time asked for
-    std::int64_t t_pose_ns = 0; ///< its time of validity
-    bool commanded = false;     ///< false: no command yet, the scene's own motion
+    Motion motion{};             ///< velocity and rate are the derivatives of the pose as it is shown
+    std::uint8_t counter = 0;    ///< of the newest command at or before the time asked for
+    std::int64_t t_pose_ns = 0;  ///< its time of validity
+    bool commanded = false;      ///< false: no command yet, the scene's own motion
     bool stale = true;
 };
 

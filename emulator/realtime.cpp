@@ -10,7 +10,9 @@
 
 namespace narpa {
 
-bool lock_memory() noexcept { return ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0; }
+bool lock_memory() noexcept {
+    return ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+}
 
 bool take_fifo_priority(int priority) noexcept {
     sched_param parameters{};
@@ -18,7 +20,9 @@ bool take_fifo_priority(int priority) noexcept {
     return ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
 }
 
-void name_thread(const char* name) noexcept { ::pthread_setname_np(::pthread_self(), name); }
+void name_thread(const char* name) noexcept {
+    ::pthread_setname_np(::pthread_self(), name);
+}
 
 void stop_on_signals() noexcept {
     struct sigaction action {};

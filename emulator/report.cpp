@@ -10,7 +10,8 @@ namespace {
 using nlohmann::json;
 
 json percentiles_ms(const Histogram& h) {
-    return {{"p50", h.percentile_ns(0.5) * 1e-6}, {"p99", h.percentile_ns(0.99) * 1e-6}, {"max", h.max_ns() * 1e-6}};
+    return {
+        {"p50", h.percentile_ns(0.5) * 1e-6}, {"p99", h.percentile_ns(0.99) * 1e-6}, {"max", h.max_ns() * 1e-6}};
 }
 
 json of_camera(const CameraFeed& feed) {
@@ -18,13 +19,23 @@ json of_camera(const CameraFeed& feed) {
     json sinks = json::array();
     for (const auto& sink : feed.sinks()) {
         const VideoCounters c = sink->counters();
-        sinks.push_back({{"sink", sink->description()}, {"written", c.written}, {"dropped_ring_full", c.ring_full},
-                         {"dropped_no_reader", c.no_reader}, {"dropped_failed", c.failed}, {"reconnects", c.reconnects}});
+        sinks.push_back({{"sink", sink->description()},
+                         {"written", c.written},
+                         {"dropped_ring_full", c.ring_full},
+                         {"dropped_no_reader", c.no_reader},
+                         {"dropped_failed", c.failed},
+                         {"reconnects", c.reconnects}});
     }
-    return {{"name", feed.unit().camera().name}, {"frames", s.frames}, {"handed_over", s.handed_over},
-            {"skipped", s.skipped}, {"deadlines_missed", s.deadline_missed}, {"stale", s.stale},
-            {"ledgers_lost", s.ledgers_lost}, {"wake_late_ms", percentiles_ms(s.wake_late)},
-            {"render_ms", percentiles_ms(s.render)}, {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
+    return {{"name", feed.unit().camera().name},
+            {"frames", s.frames},
+            {"handed_over", s.handed_over},
+            {"skipped", s.skipped},
+            {"deadlines_missed", s.deadline_missed},
+            {"stale", s.stale},
+            {"ledgers_lost", s.ledgers_lost},
+            {"wake_late_ms", percentiles_ms(s.wake_late)},
+            {"render_ms", percentiles_ms(s.render)},
+            {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
             {"sinks", sinks}};
 }
 
@@ -35,10 +46,16 @@ json of_lidar(const LidarFeed& feed) {
         const PacketCounters c = sink->counters();
         sinks.push_back({{"sink", sink->description()}, {"sent", c.sent}, {"dropped", c.dropped}});
     }
-    return {{"name", feed.unit().lidar().name}, {"packets", s.packets}, {"sweeps", s.sweeps(feed.unit().lidar().rate_hz)},
-            {"skipped", s.skipped}, {"shots", s.shots}, {"returns", s.returns},
-            {"wake_late_ms", percentiles_ms(s.wake_late)}, {"fire_ms", percentiles_ms(s.fire)},
-            {"due_to_sent_ms", percentiles_ms(s.hand_over)}, {"sinks", sinks}};
+    return {{"name", feed.unit().lidar().name},
+            {"packets", s.packets},
+            {"sweeps", s.sweeps(feed.unit().lidar().rate_hz)},
+            {"skipped", s.skipped},
+            {"shots", s.shots},
+            {"returns", s.returns},
+            {"wake_late_ms", percentiles_ms(s.wake_late)},
+            {"fire_ms", percentiles_ms(s.fire)},
+            {"due_to_sent_ms", percentiles_ms(s.hand_over)},
+            {"sinks", sinks}};
 }
 
 json of_bus(CanNode& node) {
@@ -47,14 +64,22 @@ json of_bus(CanNode& node) {
     json rejected = {{"past", c.past}, {"overrun", c.overrun}};
     for (std::size_t i = 0; i < kDecodeStatusCount; ++i) {
         const auto status = static_cast<DecodeStatus>(i);
-        const bool good = status == DecodeStatus::not_mine || status == DecodeStatus::partial ||
-                          status == DecodeStatus::complete;
+        const bool good =
+            status == DecodeStatus::not_mine || status == DecodeStatus::partial || status == DecodeStatus::complete;
         if (!good) rejected[std::string(name(status))] = c.by_status[i];
     }
-    return {{"bus", node.bus().description()}, {"frames_received", b.received}, {"frames_sent", b.sent},
-            {"send_drops", b.send_drops}, {"receive_overflow", b.receive_overflow}, {"malformed", b.malformed},
-            {"error_frames", b.error_frames}, {"bus_off", b.bus_off}, {"interface_down", b.interface_down},
-            {"foreign_frames", c.foreign}, {"commands_taken", c.taken}, {"commands_missed", c.missed},
+    return {{"bus", node.bus().description()},
+            {"frames_received", b.received},
+            {"frames_sent", b.sent},
+            {"send_drops", b.send_drops},
+            {"receive_overflow", b.receive_overflow},
+            {"malformed", b.malformed},
+            {"error_frames", b.error_frames},
+            {"bus_off", b.bus_off},
+            {"interface_down", b.interface_down},
+            {"foreign_frames", c.foreign},
+            {"commands_taken", c.taken},
+            {"commands_missed", c.missed},
             {"rejected", rejected}};
 }
 
@@ -67,11 +92,14 @@ std::string latency(const json& p) {
 std::string non_zero(const json& counts) {
     std::string text;
     for (const auto& [key, n] : counts.items())
-        if (n.get<std::uint64_t>() > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n.get<std::uint64_t>(), key);
+        if (n.get<std::uint64_t>() > 0)
+            text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n.get<std::uint64_t>(), key);
     return text.empty() ? "none" : text;
 }
 
-std::uint64_t number(const json& j, const char* key) { return j[key].get<std::uint64_t>(); }
+std::uint64_t number(const json& j, const char* key) {
+    return j[key].get<std::uint64_t>();
+}
 
 }  // namespace
 
@@ -90,32 +118,40 @@ json report(Emulator& emulator) {
 }
 
 std::string in_words(const json& r) {
-    std::string out = fmt::format("{}: {:.3f} s in {}\n", r["scene"].get<std::string>(), r["simulated_s"].get<double>(),
-                                  r["mode"].get<std::string>());
+    std::string out = fmt::format("{}: {:.3f} s in {}\n", r["scene"].get<std::string>(),
+                                  r["simulated_s"].get<double>(), r["mode"].get<std::string>());
     for (const json& c : r["cameras"]) {
         out += fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {} deadlines missed, {} stale\n",
                            c["name"].get<std::string>(), number(c, "frames"), number(c, "handed_over"),
                            number(c, "skipped"), number(c, "deadlines_missed"), number(c, "stale"));
         out += fmt::format("    p50 / p99 / max: render {}; mid-exposure to hand-over {}; woken late {}\n",
-                           latency(c["render_ms"]), latency(c["mid_exposure_to_hand_over_ms"]), latency(c["wake_late_ms"]));
+                           latency(c["render_ms"]), latency(c["mid_exposure_to_hand_over_ms"]),
+                           latency(c["wake_late_ms"]));
         for (const json& s : c["sinks"]) {
-            const json drops = {{"ring full", s["dropped_ring_full"]}, {"no reader", s["dropped_no_reader"]}, {"failed", s["dropped_failed"]}};
-            out += fmt::format("    -> {}: {} written, dropped: {}\n", s["sink"].get<std::string>(), number(s, "written"), non_zero(drops));
+            const json drops = {{"ring full", s["dropped_ring_full"]},
+                                {"no reader", s["dropped_no_reader"]},
+                                {"failed", s["dropped_failed"]}};
+            out += fmt::format("    -> {}: {} written, dropped: {}\n", s["sink"].get<std::string>(),
+                               number(s, "written"), non_zero(drops));
         }
     }
     for (const json& l : r["lidars"]) {
         out += fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
                            l["name"].get<std::string>(), number(l, "packets"), l["sweeps"].get<double>(),
                            number(l, "skipped"), number(l, "returns"), number(l, "shots"));
-        out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(l["fire_ms"]), latency(l["due_to_sent_ms"]));
+        out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(l["fire_ms"]),
+                           latency(l["due_to_sent_ms"]));
         for (const json& s : l["sinks"])
-            out += fmt::format("    -> {}: {} sent, {} dropped\n", s["sink"].get<std::string>(), number(s, "sent"), number(s, "dropped"));
+            out += fmt::format("    -> {}: {} sent, {} dropped\n", s["sink"].get<std::string>(), number(s, "sent"),
+                               number(s, "dropped"));
     }
     if (const json& b = r["can"]; !b.is_null()) {
         out += fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", b["bus"].get<std::string>(),
                            number(b, "commands_taken"), number(b, "commands_missed"), non_zero(b["rejected"]));
-        const json trouble = {{"receive overflow", b["receive_overflow"]}, {"malformed", b["malformed"]},
-                              {"error frames", b["error_frames"]}, {"bus-off", b["bus_off"]},
+        const json trouble = {{"receive overflow", b["receive_overflow"]},
+                              {"malformed", b["malformed"]},
+                              {"error frames", b["error_frames"]},
+                              {"bus-off", b["bus_off"]},
                               {"connection or interface lost", b["interface_down"]}};
         out += fmt::format("    {} frames received ({} foreign), {} sent, {} that nobody took; trouble: {}\n",
                            number(b, "frames_received"), number(b, "foreign_frames"), number(b, "frames_sent"),

@@ -21,9 +21,13 @@ Result<std::unique_ptr<RowLog>> RowLog::create(const std::string& path, std::str
 }
 
 RowLog::RowLog(std::string path, std::FILE* file, bool wait_when_full)
-    : path_(std::move(path)), file_(file), outbox_(std::make_unique<Outbox>(*this, kLines, kMaxLine, wait_when_full)) {}
+    : path_(std::move(path)),
+      file_(file),
+      outbox_(std::make_unique<Outbox>(*this, kLines, kMaxLine, wait_when_full)) {}
 
-RowLog::~RowLog() { (void)close(); }
+RowLog::~RowLog() {
+    (void)close();
+}
 
 void RowLog::append(std::string_view line) noexcept {
     outbox_->push({reinterpret_cast<const std::uint8_t*>(line.data()), line.size()});
@@ -40,8 +44,10 @@ Status RowLog::close() {
     dropped += lost_;
     const bool closed = std::fclose(file_) == 0;
     file_ = nullptr;
-    if (dropped > 0) return Error{fmt::format("{} lines could not be written", dropped), path_, 0, 0, ErrorKind::failed};
-    if (!closed) return Error{fmt::format("cannot be written: {}", std::strerror(errno)), path_, 0, 0, ErrorKind::failed};
+    if (dropped > 0)
+        return Error{fmt::format("{} lines could not be written", dropped), path_, 0, 0, ErrorKind::failed};
+    if (!closed)
+        return Error{fmt::format("cannot be written: {}", std::strerror(errno)), path_, 0, 0, ErrorKind::failed};
     return Ok{};
 }
 

@@ -105,9 +105,10 @@ std::size_t format_trajectory_row(std::span<char> out, std::int64_t t_ns, std::s
     const Quat& q = m.T_world_body.q;
     const Vec3 &p = m.T_world_body.t, &v = m.velocity_m_s, &w = m.rate_rad_s;
     const std::uint64_t abs_ns = t_ns < 0 ? 0 - static_cast<std::uint64_t>(t_ns) : static_cast<std::uint64_t>(t_ns);
-    const auto end = fmt::format_to_n(out.data(), out.size(), "{}{}.{:09},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                                      t_ns < 0 ? "-" : "", abs_ns / 1'000'000'000, abs_ns % 1'000'000'000, body, p.x,
-                                      p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z);
+    const auto end =
+        fmt::format_to_n(out.data(), out.size(), "{}{}.{:09},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                         t_ns < 0 ? "-" : "", abs_ns / 1'000'000'000, abs_ns % 1'000'000'000, body, p.x, p.y, p.z,
+                         q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z);
     return end.size <= out.size() ? end.size : 0;
 }
 

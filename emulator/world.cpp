@@ -14,8 +14,8 @@ namespace {
 Status check_camera(const Camera& c, const std::string& file) {
     const std::size_t row = static_cast<std::size_t>(c.width) * bytes_per_pixel(c.format);
     if (c.embedded_line && row < kEmbeddedLineBytes)
-        return Error{fmt::format("camera \"{}\": rows of {} bytes, expected at least {} for embedded_line", c.name, row,
-                                 kEmbeddedLineBytes),
+        return Error{fmt::format("camera \"{}\": rows of {} bytes, expected at least {} for embedded_line", c.name,
+                                 row, kEmbeddedLineBytes),
                      file};
     return Ok{};
 }
@@ -60,7 +60,9 @@ Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_n
     };
     for (const TrajectoryRow& row : rows) {
         const auto body = body_named(row.body);
-        if (!body) return Error{"the trajectory names a body \"" + row.body + "\" that the scene does not have", scene_.file};
+        if (!body)
+            return Error{"the trajectory names a body \"" + row.body + "\" that the scene does not have",
+                         scene_.file};
         const std::size_t i = *body;
         if (row.t_ns <= t_from_ns) {
             before[i] = &row;

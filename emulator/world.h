@@ -42,7 +42,9 @@ public:
     /// Puts only the bodies that move (all but those at rest without a can_id): after a first `place`.
     void place_moving(std::int64_t t_ns, Placement& out) const noexcept;
 
-    [[nodiscard]] Motion motion(std::size_t body, std::int64_t t_ns) const noexcept { return pose(body, t_ns).motion; }
+    [[nodiscard]] Motion motion(std::size_t body, std::int64_t t_ns) const noexcept {
+        return pose(body, t_ns).motion;
+    }
 
     [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const Placement& at) const noexcept {
         return mount < 0 ? T_mount_sensor : at.T_world_body[static_cast<std::size_t>(mount)] * T_mount_sensor;
@@ -72,7 +74,8 @@ Result<std::size_t> sensor_named(const std::vector<Sensor>& sensors, std::string
         if (sensors[i].name == name) return i;
         names += (i ? ", " : "") + sensors[i].name;
     }
-    return Error{"no " + std::string(kind) + " named \"" + std::string(name) + "\", expected one of: " + names, file};
+    return Error{"no " + std::string(kind) + " named \"" + std::string(name) + "\", expected one of: " + names,
+                 file};
 }
 
 }  // namespace narpa

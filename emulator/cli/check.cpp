@@ -34,7 +34,8 @@ struct Finding {
 Finding socketcan() {
     const int fd = ::socket(PF_CAN, SOCK_RAW, 1);  // CAN_RAW
     if (fd < 0)
-        return {"SocketCAN", false, std::strerror(errno), "sudo modprobe can-raw (or use --can slcan:29537, which needs no kernel support)"};
+        return {"SocketCAN", false, std::strerror(errno),
+                "sudo modprobe can-raw (or use --can slcan:29537, which needs no kernel support)"};
     ::close(fd);
     return {"SocketCAN", true, "the kernel has it", ""};
 }
@@ -47,42 +48,65 @@ Finding video_devices() {
         if (name.starts_with("video")) found += (found.empty() ? "/dev/" : " /dev/") + name;
     }
     if (found.empty())
-        return {"V4L2 devices", false, "no /dev/video*", "sudo modprobe v4l2loopback video_nr=10 exclusive_caps=1 max_buffers=8 (or --video CAMERA=FILE.y4m)"};
+        return {
+            "V4L2 devices", false, "no /dev/video*",
+            "sudo modprobe v4l2loopback video_nr=10 exclusive_caps=1 max_buffers=8 (or --video CAMERA=FILE.y4m)"};
     return {"V4L2 devices", true, found, ""};
 }
 
 Finding real_time() {
     rlimit limit{};
     ::getrlimit(RLIMIT_RTPRIO, &limit);
-    if (::geteuid() == 0 || limit.rlim_cur >= 60) return {"real-time priority", true, "SCHED_FIFO is permitted", ""};
-    return {"real-time priority", false, "SCHED_FIFO is not permitted: deadlines may slip under load",
-            fmt::format("echo \"{} - rtprio 90\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again", ::getenv("USER") ? ::getenv("USER") : "USER")};
+    if (::geteuid() == 0 || limit.rlim_cur >= 60)
+        return {"real-time priority", true, "SCHED_FIFO is permitted", ""};
+    return {
+        "real-time priority", false, "SCHED_FIFO is not permitted: deadlines may slip under load",
+        fmt::format("echo \"{} - rtprio 90\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
+                    ::getenv("USER") ? ::getenv("USER") : "USER")};
 }
 
 Finding locked_memory() {
     rlimit limit{};
     ::getrlimit(RLIMIT_MEMLOCK, &limit);
-    if (::geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY) return {"locked memory", true, "mlockall is permitted", ""};
-    return {"locked memory", false, fmt::format("limit {} KiB: page faults may cost deadlines", limit.rlim_cur / 1024),
-            fmt::format("echo \"{} - memlock unlimited\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again", ::getenv("USER") ? ::getenv("USER") : "USER")};
+    if (::geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY)
+        return {"locked memory", true, "mlockall is permitted", ""};
+    return {
+        "locked memory", false, fmt::format("limit {} KiB: page faults may cost deadlines", limit.rlim_cur / 1024),
+        fmt::format(
+            "echo \"{} - memlock unlimited\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
+            ::getenv("USER") ? ::getenv("USER") : "USER")};
 }
 
 nlohmann::json describe(const World& world) {
     const Scene& s = world.scene();
-    nlohmann::json bodies = nlohmann::json::array(), cameras = nlohmann::json::array(), lidars = nlohmann::json::array();
+    nlohmann::json bodies = nlohmann::json::array(), cameras = nlohmann::json::array(),
+                   lidars = nlohmann::json::array();
     for (const Body& b : s.bodies) {
-        nlohmann::json body{{"name", b.name}, {"can_id", b.can_id ? nlohmann::json(*b.can_id) : nlohmann::json(nullptr)}};
-        if (const int* mesh = std::get_if<int>(&b.shape)) body["triangles"] = s.meshes[static_cast<std::size_t>(*mesh)].faces.size();
-        else body["sphere_radius_m"] = std::get<Sphere>(b.shape).radius_m;
+        nlohmann::json body{{"name", b.name},
+                            {"can_id", b.can_id ? nlohmann::json(*b.can_id) : nlohmann::json(nullptr)}};
+        if (const int* mesh = std::get_if<int>(&b.shape))
+            body["triangles"] = s.meshes[static_cast<std::size_t>(*mesh)].faces.size();
+        else
+            body["sphere_radius_m"] = std::get<Sphere>(b.shape).radius_m;
         bodies.push_back(body);
     }
     for (const Camera& c : s.cameras)
-        cameras.push_back({{"name", c.name}, {"width", c.width}, {"height", c.height}, {"format", std::string(name(c.format))},
-                           {"rate_hz", 1e9 / static_cast<double>(c.period_ns)}, {"detector", c.detector.has_value()}});
-    for (const Lidar& l : s.lidars) lidars.push_back({{"name", l.name}, {"model", l.model}, {"rate_hz", l.rate_hz}});
-    return {{"name", s.name}, {"bodies", bodies}, {"cameras", cameras}, {"lidars", lidars},
-            {"triangles", world.tracer().triangle_count()}, {"materials", s.materials.size()},
-            {"textures", s.textures.size()}, {"warnings", s.warnings}};
+        cameras.push_back({{"name", c.name},
+                           {"width", c.width},
+                           {"height", c.height},
+                           {"format", std::string(name(c.format))},
+                           {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
+                           {"detector", c.detector.has_value()}});
+    for (const Lidar& l : s.lidars)
+        lidars.push_back({{"name", l.name}, {"model", l.model}, {"rate_hz", l.rate_hz}});
+    return {{"name", s.name},
+            {"bodies", bodies},
+            {"cameras", cameras},
+            {"lidars", lidars},
+            {"triangles", world.tracer().triangle_count()},
+            {"materials", s.materials.size()},
+            {"textures", s.textures.size()},
+            {"warnings", s.warnings}};
 }
 
 void tell(const World& world) {
@@ -90,10 +114,13 @@ void tell(const World& world) {
     say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
                     world.tracer().triangle_count(), s.materials.size(), s.textures.size()));
     for (const Body& b : s.bodies)
-        say(fmt::format("  body {}{}", b.name, b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
+        say(fmt::format("  body {}{}", b.name,
+                        b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
     for (const Camera& c : s.cameras)
-        say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz", c.name, c.width, c.height, name(c.format), 1e9 / static_cast<double>(c.period_ns)));
-    for (const Lidar& l : s.lidars) say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model, l.rate_hz));
+        say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz", c.name, c.width, c.height, name(c.format),
+                        1e9 / static_cast<double>(c.period_ns)));
+    for (const Lidar& l : s.lidars)
+        say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model, l.rate_hz));
 }
 
 Status save_dbc(const Scene& scene, const std::string& path) {
@@ -137,7 +164,8 @@ Outcome check(const Options& o) {
     }
     nlohmann::json machine = nlohmann::json::array();
     for (const Finding& f : findings) {
-        say(fmt::format("  [{}] {}: {}{}", f.there ? "ok" : "--", f.name, f.detail, f.remedy.empty() ? "" : "\n         try: " + f.remedy));
+        say(fmt::format("  [{}] {}: {}{}", f.there ? "ok" : "--", f.name, f.detail,
+                        f.remedy.empty() ? "" : "\n         try: " + f.remedy));
         machine.push_back({{"name", f.name}, {"there", f.there}, {"detail", f.detail}, {"remedy", f.remedy}});
     }
     for (std::size_t i = general; i < findings.size(); ++i)  // what was asked for by name must be there
@@ -148,11 +176,13 @@ Outcome check(const Options& o) {
 
 }  // namespace
 
-Command add_check(CLI::App& app, const Console&) {
+Command add_check(CLI::App& app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("check", "Is the scene good, and can this machine run it? Names what is missing");
+    CLI::App* c =
+        app.add_subcommand("check", "Is the scene good, and can this machine run it? Names what is missing");
     c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
-    c->add_option("DEVICE", o->devices, "Devices that the run will need, to be tried: vcan0, slcan:PORT, /dev/video10 ...");
+    c->add_option("DEVICE", o->devices,
+                  "Devices that the run will need, to be tried: vcan0, slcan:PORT, /dev/video10 ...");
     c->add_option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
     return [o] { return check(*o); };
 }

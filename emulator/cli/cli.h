@@ -18,17 +18,12 @@ namespace narpa::cli {
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 
-/// Options common to all subcommands.
-struct Console {
-    bool json = false;  ///< standard output carries one JSON document
-};
-
 /// Each adds its subcommand and returns what runs when it is chosen.
-Command add_check(CLI::App& app, const Console& console);
-Command add_run(CLI::App& app, const Console& console);
-Command add_fly(CLI::App& app, const Console& console);
-Command add_render(CLI::App& app, const Console& console);
-Command add_scan(CLI::App& app, const Console& console);
+Command add_check(CLI::App& app);
+Command add_run(CLI::App& app);
+Command add_fly(CLI::App& app);
+Command add_render(CLI::App& app);
+Command add_scan(CLI::App& app);
 
 /// Words for people, on standard error.
 void say(std::string_view text);

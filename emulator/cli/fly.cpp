@@ -48,16 +48,19 @@ Result<std::map<std::string, Commander>> commanders(const Options& o, const std:
         auto pair = split_pair(text, "BODY=ID, like chaser=0x100");
         if (!pair) return pair.error();
         const auto at = all.find(pair->first);
-        if (at == all.end()) return Error{fmt::format("--id {}: no such body in the trajectory", text), o.trajectory};
+        if (at == all.end())
+            return Error{fmt::format("--id {}: no such body in the trajectory", text), o.trajectory};
         char* end = nullptr;
         const long id = std::strtol(pair->second.c_str(), &end, 0);
         if (*end != 0) return Error{fmt::format("--id {}, expected BODY=ID, like chaser=0x100", text)};
-        if (auto good = check_body_base_id(id); !good) return Error{fmt::format("--id {}: {}", text, good.error().what)};
+        if (auto good = check_body_base_id(id); !good)
+            return Error{fmt::format("--id {}: {}", text, good.error().what)};
         at->second.base_id = static_cast<std::uint32_t>(id);
     }
     for (const auto& [name, c] : all)
         if (c.base_id == 0 && o.ids.size() < all.size())
-            return Error{fmt::format("body \"{}\" has no identifier, expected --id {}=ID", name, name), o.trajectory};
+            return Error{fmt::format("body \"{}\" has no identifier, expected --id {}=ID", name, name),
+                         o.trajectory};
     return all;
 }
 
@@ -82,7 +85,8 @@ public:
             if (decode(received.frame, newest_ns_, beat) != DecodeStatus::complete) continue;
             newest_ns_ = beat.t_ns;
             // The quickest heartbeat is the truest: all others were held up on their way.
-            offset_ns_ = heard_ ? std::max(offset_ns_, beat.t_ns - received.t_received_ns) : beat.t_ns - received.t_received_ns;
+            offset_ns_ = heard_ ? std::max(offset_ns_, beat.t_ns - received.t_received_ns)
+                                : beat.t_ns - received.t_received_ns;
             heard_ = true;
         }
     }
@@ -151,9 +155,12 @@ private:
         const PoseCommand command{c.counter++, t_ns, row.motion};
         PoseFrames classic;
         CanFrame fd;
-        const EncodeStatus encoded = fd_ ? encode_fd(command, c.base_id, fd) : encode_classic(command, c.base_id, classic);
+        const EncodeStatus encoded =
+            fd_ ? encode_fd(command, c.base_id, fd) : encode_classic(command, c.base_id, classic);
         if (!encoded)
-            return Error{fmt::format("row at {} s of \"{}\": {}", static_cast<double>(row.t_ns) * 1e-9, row.body, encoded.text()), options_.trajectory};
+            return Error{fmt::format("row at {} s of \"{}\": {}", static_cast<double>(row.t_ns) * 1e-9, row.body,
+                                     encoded.text()),
+                         options_.trajectory};
         if (fd_) {
             frames_dropped += !bus_.send(fd);
         } else {
@@ -177,10 +184,11 @@ private:
             if (clock_.heard() && clock_.newest_ns() + rounding > granted) break;
             if (stop_flag()) return Ok{};
             if (monotonic_ns() > deadline)
-                return Error{fmt::format("no heartbeat of {:.6f} s in {} s: is `narpa run --lockstep` there, and are all of "
-                                         "its scene's commanded bodies in the trajectory?",
-                                         static_cast<double>(granted) * 1e-9, options_.wait_s),
-                             options_.bus, 0, 0, ErrorKind::failed};
+                return Error{
+                    fmt::format("no heartbeat of {:.6f} s in {} s: is `narpa run --lockstep` there, and are all of "
+                                "its scene's commanded bodies in the trajectory?",
+                                static_cast<double>(granted) * 1e-9, options_.wait_s),
+                    options_.bus, 0, 0, ErrorKind::failed};
             bus_.wait(20 * kMs);
         }
         return Ok{};
@@ -204,30 +212,41 @@ Outcome fly(const Options& o) {
     stop_on_signals();
     auto bus = connect(o);
     if (!bus) return bus.error();
-    say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), who->size(), (*bus)->description()));
+    say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), who->size(),
+                    (*bus)->description()));
     Player player(o, **bus, *who);
     if (auto played = player.play(*rows); !played) return played.error();
 
     const CanCounters& c = (*bus)->counters();
     say(fmt::format("{} commands sent from {:.3f} s on, {} frames dropped, {} frames heard", player.commands,
                     static_cast<double>(player.start_ns()) * 1e-9, player.frames_dropped, c.received));
-    return nlohmann::json{{"commands", player.commands}, {"start_ns", player.start_ns()}, {"frames_sent", c.sent},
-                          {"frames_dropped", player.frames_dropped}, {"frames_received", c.received},
-                          {"rows", rows->size()}, {"stopped", stop_flag().load()}};
+    return nlohmann::json{{"commands", player.commands},   {"start_ns", player.start_ns()},
+                          {"frames_sent", c.sent},         {"frames_dropped", player.frames_dropped},
+                          {"frames_received", c.received}, {"rows", rows->size()},
+                          {"stopped", stop_flag().load()}};
 }
 
 }  // namespace
 
-Command add_fly(CLI::App& app, const Console&) {
+Command add_fly(CLI::App& app) {
     auto o = std::make_shared<Options>();
     CLI::App* c = app.add_subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
     c->add_option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)")->required();
     c->add_option("--can", o->bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE")->required();
-    c->add_option("--id", o->ids, "BODY=ID: base identifier of a body's commands, the scene's can_id (default: 0x100)")->take_all()->allow_extra_args(false);
-    c->add_option("--start", o->start_s, "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)");
-    c->add_option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")->check(CLI::Range(0.0, 1.0))->capture_default_str();
-    c->add_option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")->check(CLI::Range(0.0, 3600.0))->capture_default_str();
-    c->add_flag("--lockstep", o->lockstep, "Send the next command when the emulator's clock has reached the last one");
+    c->add_option("--id", o->ids,
+                  "BODY=ID: base identifier of a body's commands, the scene's can_id (default: 0x100)")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_option("--start", o->start_s,
+                  "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)");
+    c->add_option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
+    c->add_option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
+        ->check(CLI::Range(0.0, 3600.0))
+        ->capture_default_str();
+    c->add_flag("--lockstep", o->lockstep,
+                "Send the next command when the emulator's clock has reached the last one");
     c->add_flag("--classic", o->classic, "Nine classic frames a command even where the bus carries CAN FD");
     return [o] { return fly(*o); };
 }

@@ -9,7 +9,9 @@
 
 namespace narpa::cli {
 
-void say(std::string_view text) { fmt::print(stderr, "{}\n", text); }
+void say(std::string_view text) {
+    fmt::print(stderr, "{}\n", text);
+}
 
 Result<Scene> load_scene(const std::string& path) {
     auto scene = read_scene(path);
@@ -28,8 +30,13 @@ Result<std::pair<std::string, std::string>> split_pair(const std::string& text, 
 namespace {
 
 nlohmann::json to_json(const Error& e) {
-    return {{"error", {{"what", e.what}, {"file", e.file}, {"line", e.line}, {"column", e.column},
-                       {"remedy", e.remedy}, {"exit_status", exit_status(e.kind)}}}};
+    return {{"error",
+             {{"what", e.what},
+              {"file", e.file},
+              {"line", e.line},
+              {"column", e.column},
+              {"remedy", e.remedy},
+              {"exit_status", exit_status(e.kind)}}}};
 }
 
 void print_json(const nlohmann::json& document) {
@@ -47,19 +54,24 @@ int finish(const Outcome& outcome, bool json) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app{"narpa stands where a spacecraft's camera and LiDAR would stand: poses in on CAN, camera frames out "
-                 "on V4L2, LiDAR packets out on UDP."};
+    CLI::App app{
+        "narpa stands where a spacecraft's camera and LiDAR would stand: poses in on CAN, camera frames out "
+        "on V4L2, LiDAR packets out on UDP."};
     app.set_version_flag("--version", NARPA_VERSION);
     app.require_subcommand(1);
     app.fallthrough();
-    app.footer("Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.");
-    Console console;
-    app.add_flag("--json", console.json, "Put one JSON document on standard output");
+    app.footer(
+        "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.");
+    constexpr const char* kJsonHelp = "Put one JSON document on standard output";
+    bool json = false;
+    app.add_flag("--json", json, kJsonHelp);
 
     Command chosen;
     for (const auto& add : {add_check, add_run, add_fly, add_render, add_scan}) {
-        const Command command = add(app, console);
-        app.get_subcommands([](const CLI::App*) { return true; }).back()->final_callback([&chosen, command] { chosen = command; });
+        const Command command = add(app);
+        CLI::App* subcommand = app.get_subcommands([](const CLI::App*) { return true; }).back();
+        subcommand->add_flag("--json", json, kJsonHelp);
+        subcommand->final_callback([&chosen, command] { chosen = command; });
     }
     try {
         app.parse(argc, argv);
@@ -67,7 +79,7 @@ int run(int argc, char** argv) {
         const int asked_for_help = app.exit(e, std::cout, std::cerr);
         return asked_for_help == 0 ? 0 : exit_status(ErrorKind::bad_input);
     }
-    return finish(chosen(), console.json);
+    return finish(chosen(), json);
 }
 
 }  // namespace

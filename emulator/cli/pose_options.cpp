@@ -19,7 +19,8 @@ Result<Rigid3> parse_pose(const std::string& text) {
         const auto [next, error] = std::from_chars(at, end, v[i]);
         const bool last = i + 1 == v.size();
         if (error != std::errc{} || !std::isfinite(v[i]) || (last ? next != end : next == end || *next != ','))
-            return Error{fmt::format("--pose \"{}\", expected BODY=x,y,z,qw,qx,qy,qz (metres, unit quaternion)", text)};
+            return Error{
+                fmt::format("--pose \"{}\", expected BODY=x,y,z,qw,qx,qy,qz (metres, unit quaternion)", text)};
         at = next + 1;
     }
     Rigid3 T{{v[3], v[4], v[5], v[6]}, {v[0], v[1], v[2]}};
@@ -33,8 +34,12 @@ Result<Rigid3> parse_pose(const std::string& text) {
 
 void PoseOptions::add_to(CLI::App& app) {
     app.add_option("--trajectory", trajectory, "Trajectory or truth log (CSV) that says where bodies are");
-    app.add_option("--pose", poses, "BODY=x,y,z,qw,qx,qy,qz: puts a body there (metres; body to world), at any time")
-        ->type_name("POSE")->expected(1)->take_all()->allow_extra_args(false);
+    app.add_option("--pose", poses,
+                   "BODY=x,y,z,qw,qx,qy,qz: puts a body there (metres; body to world), at any time")
+        ->type_name("POSE")
+        ->expected(1)
+        ->take_all()
+        ->allow_extra_args(false);
 }
 
 Status PoseOptions::place(Scene& scene) const {

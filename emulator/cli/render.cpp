@@ -34,13 +34,15 @@ Status override_scene(const Options& o, Scene& scene, Camera& camera) {
         const auto format = pixel_format_from(o.format);
         if (!format) return Error{fmt::format("--format {}, expected GREY, Y16, YUYV or RGB24", o.format)};
         if (*format == PixelFormat::yuyv && camera.width % 2 != 0)
-            return Error{fmt::format("--format YUYV needs an even width, camera \"{}\" has {}", camera.name, camera.width)};
+            return Error{
+                fmt::format("--format YUYV needs an even width, camera \"{}\" has {}", camera.name, camera.width)};
         camera.format = *format;
     }
     return o.pose.place(scene);
 }
 
-constexpr std::array<std::string_view, 7> kOutputs{"radiance", "depth", "range", "normal", "position", "body", "variance"};
+constexpr std::array<std::string_view, 7> kOutputs{"radiance", "depth", "range",   "normal",
+                                                   "position", "body",  "variance"};
 
 /// The names in "depth,normal"; an Error for one that is not known.
 Result<std::set<std::string>> parse_outputs(const std::string& list) {
@@ -78,7 +80,8 @@ Outcome render(const Options& o) {
 
     const std::int64_t period_ns = camera.period_ns;
     const std::int64_t t_ns = o.time_s ? std::llround(*o.time_s * 1e9) : o.frame.value_or(0) * period_ns;
-    const auto frame = o.frame.value_or(static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period_ns / 2) / period_ns)));
+    const auto frame =
+        o.frame.value_or(static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period_ns / 2) / period_ns)));
 
     TracingThreads threads(o.threads);
     auto world = World::create(*std::move(scene));
@@ -94,20 +97,26 @@ Outcome render(const Options& o) {
 
     auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
     if (!written) return written.error();
-    say(fmt::format("{}: {} x {}, {} spp, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out, unit.camera().width,
-                    unit.camera().height, (*world)->scene().render.spp, frame, static_cast<double>(t_ns) * 1e-9,
-                    (*world)->tracer().triangle_count(), 1e3 * seconds));
-    return nlohmann::json{{"file", o.out}, {"camera", unit.camera().name}, {"frame", frame}, {"t_ns", t_ns},
-                          {"width", unit.camera().width}, {"height", unit.camera().height},
+    say(fmt::format("{}: {} x {}, {} spp, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
+                    unit.camera().width, unit.camera().height, (*world)->scene().render.spp, frame,
+                    static_cast<double>(t_ns) * 1e-9, (*world)->tracer().triangle_count(), 1e3 * seconds));
+    return nlohmann::json{{"file", o.out},
+                          {"camera", unit.camera().name},
+                          {"frame", frame},
+                          {"t_ns", t_ns},
+                          {"width", unit.camera().width},
+                          {"height", unit.camera().height},
                           {"samples_per_pixel", (*world)->scene().render.spp},
-                          {"triangles", (*world)->tracer().triangle_count()}, {"render_s", seconds}};
+                          {"triangles", (*world)->tracer().triangle_count()},
+                          {"render_s", seconds}};
 }
 
 }  // namespace
 
-Command add_render(CLI::App& app, const Console&) {
+Command add_render(CLI::App& app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("render", "Render one frame of a camera, byte for byte as `run` would put it out");
+    CLI::App* c =
+        app.add_subcommand("render", "Render one frame of a camera, byte for byte as `run` would put it out");
     c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
     c->add_option("--camera", o->camera, "Name of the camera (default: the first)");
     c->add_option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)");
@@ -116,9 +125,12 @@ Command add_render(CLI::App& app, const Console&) {
     c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
     c->add_option("--spp", o->spp, "Samples per pixel instead of the scene's")->check(CLI::Range(1, 65535));
     c->add_option("--seed", o->seed, "Seed instead of the scene's");
-    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")->check(CLI::Range(0, 1024));
+    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
+        ->check(CLI::Range(0, 1024));
     c->add_option("--aov", o->aov, "With .exr: depth,range,normal,position,body,variance beside radiance");
-    c->add_option("-o,--output", o->out, "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")->required();
+    c->add_option("-o,--output", o->out,
+                  "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
+        ->required();
     return [o] { return render(*o); };
 }
 

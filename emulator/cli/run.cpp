@@ -40,8 +40,10 @@ void show_progress(const Emulator& emulator, const StopFlag& done) {
 
 Outcome run(const Options& options) {
     RunOptions o = options.run;
-    if (auto good = split_outputs(options.video, "CAMERA=SINK, like nav=/dev/video10", o.video); !good) return good.error();
-    if (auto good = split_outputs(options.lidar, "LIDAR=SINK, like top=udp:127.0.0.1:2368", o.lidar); !good) return good.error();
+    if (auto good = split_outputs(options.video, "CAMERA=SINK, like nav=/dev/video10", o.video); !good)
+        return good.error();
+    if (auto good = split_outputs(options.lidar, "LIDAR=SINK, like top=udp:127.0.0.1:2368", o.lidar); !good)
+        return good.error();
     auto scene = load_scene(options.scene);
     if (!scene) return scene.error();
     auto emulator = Emulator::create(*std::move(scene), o);
@@ -50,9 +52,11 @@ Outcome run(const Options& options) {
     stop_on_signals();
     if (CanNode* can = (*emulator)->can()) say("commands: " + can->bus().description());
     for (const auto& feed : (*emulator)->cameras())
-        for (const auto& sink : feed->sinks()) say(fmt::format("camera {} -> {}", feed->unit().camera().name, sink->description()));
+        for (const auto& sink : feed->sinks())
+            say(fmt::format("camera {} -> {}", feed->unit().camera().name, sink->description()));
     for (const auto& feed : (*emulator)->lidars())
-        for (const auto& sink : feed->sinks()) say(fmt::format("lidar {} -> {}", feed->unit().lidar().name, sink->description()));
+        for (const auto& sink : feed->sinks())
+            say(fmt::format("lidar {} -> {}", feed->unit().lidar().name, sink->description()));
 
     StopFlag done{false};
     std::thread progress([&] { show_progress(**emulator, done); });
@@ -67,17 +71,26 @@ Outcome run(const Options& options) {
 
 }  // namespace
 
-Command add_run(CLI::App& app, const Console&) {
+Command add_run(CLI::App& app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
+    CLI::App* c =
+        app.add_subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
     c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
     c->add_option("--can", o->run.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE");
-    c->add_option("--video", o->video, "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")->take_all()->allow_extra_args(false);
-    c->add_option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")->take_all()->allow_extra_args(false);
-    c->add_flag("--lockstep", o->run.lockstep, "The clock advances only with commands; no wall time enters any result");
-    c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")->check(CLI::Range(0.0, 9e9));
+    c->add_option("--video", o->video,
+                  "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_flag("--lockstep", o->run.lockstep,
+                "The clock advances only with commands; no wall time enters any result");
+    c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
+        ->check(CLI::Range(0.0, 9e9));
     c->add_option("--log", o->run.log_folder, "Folder for truth, ledger, CAN log and contact sheet");
-    c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")->check(CLI::Range(0, 1024));
+    c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
+        ->check(CLI::Range(0, 1024));
     return [o] { return run(*o); };
 }
 

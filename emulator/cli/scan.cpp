@@ -45,7 +45,8 @@ public:
     }
     Status close() {
         const bool bad = std::ferror(file_.get()) != 0;
-        if (std::fclose(file_.release()) != 0 || bad) return Error{"cannot be written to the end", path_, 0, 0, ErrorKind::failed};
+        if (std::fclose(file_.release()) != 0 || bad)
+            return Error{"cannot be written to the end", path_, 0, 0, ErrorKind::failed};
         return Ok{};
     }
 
@@ -69,9 +70,9 @@ public:
             const vlp16::Shot& s = unit.shots()[i];
             const LidarReturn& r = unit.hits()[i];
             const Vec3 p = s.origin_m() + r.range_m * vlp16::direction(s);
-            file_.print("{},{},{},{},{},{},{},{},{},{},{},{}\n", vlp16::packet_start_ns(number) + s.t_offset_ns, number,
-                        i / vlp16::kShotsPerBlock, s.laser, s.azimuth_rad, s.elevation_rad, r.range_m, p.x, p.y, p.z,
-                        r.reflectivity, r.range_m > 0 ? r.body : -1);
+            file_.print("{},{},{},{},{},{},{},{},{},{},{},{}\n", vlp16::packet_start_ns(number) + s.t_offset_ns,
+                        number, i / vlp16::kShotsPerBlock, s.laser, s.azimuth_rad, s.elevation_rad, r.range_m, p.x,
+                        p.y, p.z, r.reflectivity, r.range_m > 0 ? r.body : -1);
         }
     }
     Status close() override { return file_.close(); }
@@ -93,11 +94,16 @@ public:
     }
     Status close() override {
         if (ply_) {
-            file_.print("ply\nformat ascii 1.0\ncomment LiDAR frame, metres\nelement vertex {}\nproperty float x\n"
-                        "property float y\nproperty float z\nproperty float intensity\nend_header\n", points_.size());
+            file_.print(
+                "ply\nformat ascii 1.0\ncomment LiDAR frame, metres\nelement vertex {}\nproperty float x\n"
+                "property float y\nproperty float z\nproperty float intensity\nend_header\n",
+                points_.size());
         } else {
-            file_.print("# .PCD v0.7\n# LiDAR frame, metres\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\n"
-                        "COUNT 1 1 1 1\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA ascii\n", points_.size(), points_.size());
+            file_.print(
+                "# .PCD v0.7\n# LiDAR frame, metres\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F "
+                "F\n"
+                "COUNT 1 1 1 1\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA ascii\n",
+                points_.size(), points_.size());
         }
         for (const ScanPoint& p : points_)
             file_.print("{} {} {} {}\n", static_cast<float>(p.position_m.x), static_cast<float>(p.position_m.y),
@@ -122,7 +128,8 @@ public:
     }
     Status close() override {
         sink_->flush();
-        if (sink_->counters().dropped > 0) return Error{"packets could not be written", sink_->description(), 0, 0, ErrorKind::failed};
+        if (sink_->counters().dropped > 0)
+            return Error{"packets could not be written", sink_->description(), 0, 0, ErrorKind::failed};
         return Ok{};
     }
 
@@ -171,21 +178,28 @@ Outcome scan(const Options& o) {
     }
     if (auto closed = (*writer)->close(); !closed) return closed.error();
     say(fmt::format("{}: {} packets, {} shots, {} returns", o.out, packets, packets * vlp16::kShots, returns));
-    return nlohmann::json{{"file", o.out}, {"lidar", unit.lidar().name}, {"packets", packets},
-                          {"shots", packets * vlp16::kShots}, {"returns", returns}};
+    return nlohmann::json{{"file", o.out},
+                          {"lidar", unit.lidar().name},
+                          {"packets", packets},
+                          {"shots", packets * vlp16::kShots},
+                          {"returns", returns}};
 }
 
 }  // namespace
 
-Command add_scan(CLI::App& app, const Console&) {
+Command add_scan(CLI::App& app) {
     auto o = std::make_shared<Options>();
     CLI::App* c = app.add_subcommand("scan", "Trace what a LiDAR sees from a time on: points, shots or packets");
     c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
     c->add_option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");
-    c->add_option("--time", o->time_s, "Simulation time in seconds of the first packet")->check(CLI::Range(0.0, 9e9))->capture_default_str();
+    c->add_option("--time", o->time_s, "Simulation time in seconds of the first packet")
+        ->check(CLI::Range(0.0, 9e9))
+        ->capture_default_str();
     c->add_option("--duration", o->duration_s, "Seconds (default: one turn)")->check(CLI::Range(0.0, 3600.0));
     o->pose.add_to(*c);
-    c->add_option("-o,--output", o->out, "FILE.ply or .pcd (points), .csv (one row a shot, ranges unquantised), .pcap (packets)")->required();
+    c->add_option("-o,--output", o->out,
+                  "FILE.ply or .pcd (points), .csv (one row a shot, ranges unquantised), .pcap (packets)")
+        ->required();
     return [o] { return scan(*o); };
 }
 

@@ -58,8 +58,8 @@ inline void occluded(RTCScene scene, RTCRay& ray) noexcept {
 #endif
 }
 
-/// Sixteen shadow rays. Without the coherent flag: with it, Embree 3.13 has been seen to loop for ever here (AVX-512,
-/// instances), and it gains little.
+/// Sixteen shadow rays. Without the coherent flag: with it, Embree 3.13 has been seen to loop for ever here
+/// (AVX-512, instances), and it gains little.
 inline void occluded(RTCScene scene, const int* valid, RTCRay16& rays) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
     rtcOccluded16(valid, scene, &rays);

@@ -192,9 +192,10 @@ std::uint32_t MeshScene::intersect(const MeshRays& rays, std::uint32_t wanted,
 
 bool MeshScene::settle(Answer answer, const Vec3& start, const Vec3& direction, double skipped_m, double t_max,
                        MeshHit& hit) const noexcept {
-    // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass through,
-    // to the inner side of the far wall where the mesh is closed, out of it where it is not. They are common where a
-    // camera's pixels line up with a model's grid. One more try, turned by a few roundings, finds what they lost.
+    // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass
+    // through, to the inner side of the far wall where the mesh is closed, out of it where it is not. They are
+    // common where a camera's pixels line up with a model's grid. One more try, turned by a few roundings, finds
+    // what they lost.
     const bool suspicious = answer.hit ? answer.back : !closed_;
     if (suspicious) {
         const Vec3 turn{direction.y - direction.z, direction.z - direction.x, direction.x - direction.y + 0.5};
@@ -229,8 +230,8 @@ MeshScene::Answer MeshScene::ask(const Vec3& start, const Vec3& direction, doubl
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     embree::intersect(scene_.get(), query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-    const float facing = query.hit.Ng_x * query.ray.dir_x + query.hit.Ng_y * query.ray.dir_y +
-                         query.hit.Ng_z * query.ray.dir_z;
+    const float facing =
+        query.hit.Ng_x * query.ray.dir_x + query.hit.Ng_y * query.ray.dir_y + query.hit.Ng_z * query.ray.dir_z;
     return {query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v, true, facing > 0};
 }
 
@@ -251,8 +252,9 @@ std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted) co
         if (!is_set(wanted, i)) continue;
         const auto skipped = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
         if (!skipped) continue;
-        put_lane(embree_ray(rays.origin[i] + *skipped * rays.direction[i], rays.direction[i], rays.t_max[i] - *skipped),
-                 i, query);
+        put_lane(
+            embree_ray(rays.origin[i] + *skipped * rays.direction[i], rays.direction[i], rays.t_max[i] - *skipped),
+            i, query);
         valid[i] = -1;
         asked |= 1u << i;
     }

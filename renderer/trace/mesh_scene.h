@@ -38,7 +38,8 @@ public:
 
     /// The same for those of sixteen rays whose bit is set in `wanted`; returns the bits of those that hit. Rays of
     /// `intersect` run close together, those of `occluded` need not.
-    std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted, std::span<MeshHit, kPacket> hits) const noexcept;
+    std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted,
+                            std::span<MeshHit, kPacket> hits) const noexcept;
     [[nodiscard]] std::uint32_t occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept;
 
     /// How far above a point of this face a ray must start so that rounding in single precision cannot put it

@@ -17,7 +17,8 @@ std::vector<std::uint32_t> welded(const std::vector<Vec3f>& positions) {
     };
     std::vector<std::uint32_t> order(positions.size()), id(positions.size());
     std::iota(order.begin(), order.end(), 0u);
-    tbb::parallel_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+    tbb::parallel_sort(order.begin(), order.end(),
+                       [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
     for (std::size_t i = 0; i < order.size(); ++i)
         id[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? id[order[i - 1]] : order[i];
     return id;

@@ -70,8 +70,8 @@ struct Tracer::Impl {
     void finish_sphere(const Rigid3& T_world_body, const Vec3& o_body, const Vec3& d_body, Hit& hit) const noexcept;
     /// Where a ray starts that leaves the hit, in the frame of its body.
     [[nodiscard]] Vec3 departure(const Placement& at, const Hit& from) const noexcept;
-    [[nodiscard]] bool sphere_hides(const Placement& at, std::size_t sphere, const Hit& from, const Vec3& start_turned,
-                                    const Vec3& direction, double t_max) const noexcept;
+    [[nodiscard]] bool sphere_hides(const Placement& at, std::size_t sphere, const Hit& from,
+                                    const Vec3& start_turned, const Vec3& direction, double t_max) const noexcept;
 };
 
 Status Tracer::Impl::build(const Scene& s, int threads) {
@@ -315,7 +315,8 @@ void Tracer::intersect(const Placement& at, std::span<const Ray> rays, std::span
             } else {
                 for (std::size_t i = 0; i < n; ++i) {
                     if (!is_set(wanted, i)) continue;
-                    const auto t = nearest_root(local.origin[i], local.direction[i], impl_->shapes[e.body].radius_m);
+                    const auto t =
+                        nearest_root(local.origin[i], local.direction[i], impl_->shapes[e.body].radius_m);
                     if (!t || *t >= nearest[i]) continue;
                     nearest[i] = *t;
                     met |= 1u << i;
@@ -361,7 +362,8 @@ bool Tracer::occluded(const Placement& at, const Hit& from, const Vec3& directio
 std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
                                std::uint32_t wanted) const noexcept {
     const std::size_t n = std::min({from.size(), directions.size(), kPacket});
-    std::array<Vec3, kPacket> start, start_turned;  // in the frame of the body it leaves, and turned into the world's
+    std::array<Vec3, kPacket> start,
+        start_turned;  // in the frame of the body it leaves, and turned into the world's
     for (std::size_t i = 0; i < n; ++i) {
         if (!is_set(wanted, i)) continue;
         start[i] = impl_->departure(at, from[i]);
@@ -377,7 +379,8 @@ std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, s
             if (!is_set(wanted & ~dark, i)) continue;
             const std::size_t own = static_cast<std::size_t>(from[i].body);
             if (mesh == nullptr) {
-                if (impl_->sphere_hides(at, body, from[i], start_turned[i], directions[i], kInfinity)) dark |= 1u << i;
+                if (impl_->sphere_hides(at, body, from[i], start_turned[i], directions[i], kInfinity))
+                    dark |= 1u << i;
                 continue;
             }
             if (own == body) {  // the start is on the body, so inside its bounds

@@ -66,8 +66,8 @@ public:
     /// Up to kPacket rays that run close together, as those of neighbouring pixels do: each as above with no end,
     /// several times faster.
     void intersect(const Placement& at, std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
-    /// Which of up to kPacket hits cannot see their light, each in a direction of its own without an end: a bit each.
-    /// Only those whose bit is set in `wanted` are asked.
+    /// Which of up to kPacket hits cannot see their light, each in a direction of its own without an end: a bit
+    /// each. Only those whose bit is set in `wanted` are asked.
     [[nodiscard]] std::uint32_t occluded(const Placement& at, std::span<const Hit> from,
                                          std::span<const Vec3> directions, std::uint32_t wanted) const noexcept;
 

@@ -87,6 +87,9 @@ struct Kind {
     Pair (*open)();
     bool reliable;
 };
+void PrintTo(const Kind& kind, std::ostream* out) {
+    *out << kind.name;
+}
 
 class CanBusSuite : public testing::TestWithParam<Kind> {
 protected:

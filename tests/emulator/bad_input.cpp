@@ -16,11 +16,13 @@ struct Mistake {
     const char* arguments;  ///< SCENE, FOLDER and BAD stand for files
     const char* bad;        ///< content of the file BAD, if any
     int exit_status;
-    const char* words;      ///< must be in the message
+    const char* words;  ///< must be in the message
 };
 
 /// Names the case where GoogleTest would print its bytes.
-void PrintTo(const Mistake& m, std::ostream* out) { *out << m.arguments; }
+void PrintTo(const Mistake& m, std::ostream* out) {
+    *out << m.arguments;
+}
 
 class BadInput : public ::testing::TestWithParam<Mistake> {
 protected:
@@ -50,7 +52,8 @@ TEST_P(BadInput, IsAnsweredWithASentenceAndAnExitStatus) {
 }
 
 constexpr const char* kHeader =
-    "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n0,b,0,0,x,1,0,0,0,0,0,0,0,0,0\n";
+    "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n0,b,0,0,x,1,0,0,0,0,0,0,0,0,"
+    "0\n";
 
 INSTANTIATE_TEST_SUITE_P(
     All, BadInput,
@@ -60,13 +63,22 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"SceneIsNoToml", "check BAD", "[scene\nname = 3", 2, "bad.toml:1:"},
         Mistake{"UnknownKey", "check BAD", "[scene]\nnmae = \"x\"\n", 2, "bad.toml:2:1: unknown key \"nmae\""},
         Mistake{"WrongType", "check BAD", "[scene]\nname = \"x\"\n[sun]\ndirection = \"up\"\n", 2, "bad.toml:4:"},
-        Mistake{"MissingMesh", "check BAD", "[[body]]\nname = \"a\"\nmesh = \"gone.obj\"\n[[lidar]]\nname = \"l\"\nmodel = \"VLP-16\"\nrate_hz = 10\n", 2, "gone.obj"},
-        Mistake{"CameraWithoutIntrinsics", "check BAD", "[[camera]]\nname = \"c\"\nresolution = [8, 8]\nrate_hz = 1\n", 2, "bad.toml:1:"},
-        Mistake{"MountThatIsNotThere", "check BAD", "[[camera]]\nname = \"c\"\nmount = \"x\"\nresolution = [8, 8]\nfov_horizontal_deg = 9\nrate_hz = 1\n", 2, "bad.toml:3:"},
+        Mistake{"MissingMesh", "check BAD",
+                "[[body]]\nname = \"a\"\nmesh = \"gone.obj\"\n[[lidar]]\nname = \"l\"\nmodel = \"VLP-16\"\nrate_hz "
+                "= 10\n",
+                2, "gone.obj"},
+        Mistake{"CameraWithoutIntrinsics", "check BAD",
+                "[[camera]]\nname = \"c\"\nresolution = [8, 8]\nrate_hz = 1\n", 2, "bad.toml:1:"},
+        Mistake{
+            "MountThatIsNotThere", "check BAD",
+            "[[camera]]\nname = \"c\"\nmount = \"x\"\nresolution = [8, 8]\nfov_horizontal_deg = 9\nrate_hz = 1\n",
+            2, "bad.toml:3:"},
         // Trajectories
         Mistake{"NoTrajectory", "fly FOLDERnone.csv --can slcan:1", nullptr, 2, "none.csv: cannot be opened"},
-        Mistake{"TrajectoryWithoutHeader", "fly SCENE --can slcan:1", nullptr, 2, "scene.toml:1:1: expected the header line"},
-        Mistake{"TrajectoryWithAWord", "fly BAD --can slcan:1", kHeader, 2, "bad.toml:2:9: \"x\" where a finite number was expected"},
+        Mistake{"TrajectoryWithoutHeader", "fly SCENE --can slcan:1", nullptr, 2,
+                "scene.toml:1:1: expected the header line"},
+        Mistake{"TrajectoryWithAWord", "fly BAD --can slcan:1", kHeader, 2,
+                "bad.toml:2:9: \"x\" where a finite number was expected"},
         // Buses
         Mistake{"UnknownBus", "run SCENE --can token-ring:1 --video nav=none", nullptr, 2, "token-ring"},
         Mistake{"BadSlcanPort", "run SCENE --can slcan:99999 --video nav=none", nullptr, 2, "99999"},
@@ -77,7 +89,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoSuchVideoDevice", "run SCENE --video nav=/dev/video77", nullptr, 3, "modprobe v4l2loopback"},
         Mistake{"NotAVideoDevice", "run SCENE --video nav=/dev/null", nullptr, 3, "/dev/null"},
         Mistake{"UnknownSink", "run SCENE --video nav=film.mov", nullptr, 2, "film.mov"},
-        Mistake{"UnknownCamera", "run SCENE --video eye=none", nullptr, 2, "no camera named \"eye\", expected one of: nav"},
+        Mistake{"UnknownCamera", "run SCENE --video eye=none", nullptr, 2,
+                "no camera named \"eye\", expected one of: nav"},
         Mistake{"SinkWithoutCamera", "run SCENE --video none", nullptr, 2, "CAMERA=SINK"},
         Mistake{"BadUdpPort", "run SCENE --lidar top=udp:127.0.0.1:x", nullptr, 2, "udp:127.0.0.1:x"},
         Mistake{"NothingToPutOut", "run SCENE", nullptr, 2, "--video"},
@@ -86,8 +99,10 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"UnknownImageKind", "render SCENE -o FOLDERa.gif", nullptr, 2, "a.gif"},
         Mistake{"FolderThatIsNotThere", "render SCENE -o /nowhere/a.png", nullptr, 2, "/nowhere/a.png"},
         Mistake{"UnknownFormat", "render SCENE --format NV12 -o FOLDERa.png", nullptr, 2, "NV12"},
-        Mistake{"PoseOfNobody", "render SCENE --pose x=0,0,0,1,0,0,0 -o FOLDERa.png", nullptr, 2, "no body named \"x\""},
-        Mistake{"PoseThatIsNoRotation", "render SCENE --pose chaser=0,0,0,1,1,0,0 -o FOLDERa.png", nullptr, 2, "norm"},
+        Mistake{"PoseOfNobody", "render SCENE --pose x=0,0,0,1,0,0,0 -o FOLDERa.png", nullptr, 2,
+                "no body named \"x\""},
+        Mistake{"PoseThatIsNoRotation", "render SCENE --pose chaser=0,0,0,1,1,0,0 -o FOLDERa.png", nullptr, 2,
+                "norm"},
         Mistake{"UnknownCloudKind", "scan SCENE -o FOLDERa.xyz", nullptr, 2, "expected .ply, .pcd, .csv or .pcap"},
         Mistake{"NoSubcommand", "", nullptr, 2, "subcommand"},
         Mistake{"UnknownOption", "check SCENE --colour", nullptr, 2, "--colour"}),

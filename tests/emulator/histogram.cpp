@@ -19,7 +19,8 @@ TEST(Histogram, PercentilesAreWithinThreePercentOfTheSamples) {
     }
     std::sort(all.begin(), all.end());
     for (const double p : {0.01, 0.5, 0.9, 0.99, 0.999}) {
-        const auto truth = static_cast<double>(all[static_cast<std::size_t>(p * static_cast<double>(all.size())) - 1]);
+        const auto truth =
+            static_cast<double>(all[static_cast<std::size_t>(p * static_cast<double>(all.size())) - 1]);
         EXPECT_NEAR(h.percentile_ns(p) / truth, 1.0, 0.032) << p;
     }
     EXPECT_EQ(h.max_ns(), static_cast<double>(all.back()));

@@ -35,7 +35,8 @@ protected:
         frames_ = (*emulator)->cameras().front()->stats().frames;
         packets_ = (*emulator)->lidars().front()->stats().packets;
         emulator->reset();
-        return {slurp(out + ".y4m"), slurp(out + ".pcap"), slurp(out + "/nav.truth.csv"), slurp(out + "/nav.ledger.csv")};
+        return {slurp(out + ".y4m"), slurp(out + ".pcap"), slurp(out + "/nav.truth.csv"),
+                slurp(out + "/nav.ledger.csv")};
     }
     std::uint64_t frames_ = 0, packets_ = 0;
 };
@@ -49,7 +50,8 @@ TEST_F(Lockstep, MakesEveryFrameAndPacketUpToTheNewestCommand) {
 TEST_F(Lockstep, IsTheSameBytesOnOneAndOnManyThreads) {
     const std::string bus = record(12);
     const std::string noisy = small_scene(
-        "rate_hz = 20\ndetector = {exposure_s = 0.002, shot_noise = true, read_noise_e = 5.0, bits = 12}\nformat = \"Y16\"\nembedded_line = true");
+        "rate_hz = 20\ndetector = {exposure_s = 0.002, shot_noise = true, read_noise_e = 5.0, bits = 12}\nformat = "
+        "\"Y16\"\nembedded_line = true");
     const Files one = run(noisy, bus, 1, "one");
     EXPECT_GT(one.video.size(), 64U * 48 * 20);
     EXPECT_TRUE(one == run(noisy, bus, 2, "two"));
@@ -92,12 +94,12 @@ TEST_F(Lockstep, DropsAndCountsWhatIsWrongOnTheBus) {
         };
         const auto unchanged = [](CanFrame&) {};
         send(pose(0), unchanged);
-        send(pose(1), [](CanFrame& f) { f.data[9] ^= 0x40; });   // corrupt
-        send(pose(2), [](CanFrame& f) { f.size = 48; });         // short
+        send(pose(1), [](CanFrame& f) { f.data[9] ^= 0x40; });  // corrupt
+        send(pose(2), [](CanFrame& f) { f.size = 48; });        // short
         send(pose(3), unchanged);
-        send(pose(3), unchanged);                                // duplicated
-        send(pose(2), unchanged);                                // from the past
-        send(pose(4), [](CanFrame& f) { f.id = 0x333; });        // foreign
+        send(pose(3), unchanged);                          // duplicated
+        send(pose(2), unchanged);                          // from the past
+        send(pose(4), [](CanFrame& f) { f.id = 0x333; });  // foreign
         send(pose(5), unchanged);
     }
     CommandCounters c;
@@ -108,8 +110,8 @@ TEST_F(Lockstep, DropsAndCountsWhatIsWrongOnTheBus) {
     EXPECT_EQ(c.by_status[static_cast<std::size_t>(DecodeStatus::bad_checksum)], 1U);
     EXPECT_EQ(c.by_status[static_cast<std::size_t>(DecodeStatus::too_short)], 1U);
     EXPECT_EQ(c.by_status[static_cast<std::size_t>(DecodeStatus::duplicate)], 1U);
-    EXPECT_EQ(c.missed, 3U);    // 1, 2 and 4
-    EXPECT_EQ(frames_, 6U);     // still every frame from 0.0 to 0.5 s
+    EXPECT_EQ(c.missed, 3U);  // 1, 2 and 4
+    EXPECT_EQ(frames_, 6U);   // still every frame from 0.0 to 0.5 s
 }
 
 TEST_F(Lockstep, EndsBeforeTheFrameAtItsDuration) {

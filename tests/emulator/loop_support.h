@@ -23,7 +23,8 @@ inline std::string small_scene(const std::string& camera_keys = "rate_hz = 10") 
            "[[body]]\nname = \"target\"\nsphere = {radius_m = 2}\nmaterial = {kind = \"lambert\", albedo = 0.6}\n"
            "[[body]]\nname = \"chaser\"\nsphere = {radius_m = 0.01}\nposition_m = [-10, 0, 0]\ncan_id = 0x100\n"
            "[[camera]]\nname = \"nav\"\nmount = \"chaser\"\nposition_m = [0.1, 0, 0]\n"
-           "attitude_wxyz = [0.5, -0.5, 0.5, -0.5]\nresolution = [64, 48]\nfov_horizontal_deg = 40\n" + camera_keys +
+           "attitude_wxyz = [0.5, -0.5, 0.5, -0.5]\nresolution = [64, 48]\nfov_horizontal_deg = 40\n" +
+           camera_keys +
            "\n[[lidar]]\nname = \"top\"\nmount = \"chaser\"\nposition_m = [0.1, 0, 0]\n"
            "attitude_wxyz = [0.7071067811865476, 0, 0, -0.7071067811865476]\nmodel = \"VLP-16\"\nrate_hz = 10\n"
            "[render]\nspp = 2\nseed = 42\n";

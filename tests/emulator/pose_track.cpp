@@ -10,11 +10,14 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000, kSecond = 1'000 * kMs;
 
-PoseCommand command(std::int64_t t_ns, const Motion& m, std::uint8_t counter = 0) { return {counter, t_ns, m}; }
+PoseCommand command(std::int64_t t_ns, const Motion& m, std::uint8_t counter = 0) {
+    return {counter, t_ns, m};
+}
 
 /// A body that moves and turns at constant rates.
 Motion drifting(double t_s) {
-    const Motion start{{normalized(Quat{0.9, 0.1, -0.3, 0.2}), {10, -20, 30}}, {0.5, -0.25, 0.125}, {0.02, -0.01, 0.03}};
+    const Motion start{
+        {normalized(Quat{0.9, 0.1, -0.3, 0.2}), {10, -20, 30}}, {0.5, -0.25, 0.125}, {0.02, -0.01, 0.03}};
     return extrapolate(start, t_s);
 }
 
@@ -29,7 +32,8 @@ TEST(PoseTrack, IsTheScenesOwnMotionBeforeTheFirstCommand) {
 TEST(PoseTrack, IsExactlyTheCommandAtItsTime) {
     PoseTrack track({}, 0.5);
     for (int i = 0; i < 5; ++i)
-        ASSERT_EQ(track.push(command(i * 100 * kMs, drifting(0.1 * i), static_cast<std::uint8_t>(i)), 0), TrackStatus::taken);
+        ASSERT_EQ(track.push(command(i * 100 * kMs, drifting(0.1 * i), static_cast<std::uint8_t>(i)), 0),
+                  TrackStatus::taken);
     for (int i = 0; i < 5; ++i) {
         const TrackedPose p = track.at(i * 100 * kMs);
         EXPECT_EQ(p.motion.T_world_body, drifting(0.1 * i).T_world_body) << i;
@@ -40,7 +44,8 @@ TEST(PoseTrack, IsExactlyTheCommandAtItsTime) {
 
 TEST(PoseTrack, FollowsConstantRatesBetweenAndBeyondCommands) {
     PoseTrack track({}, 0.5);
-    for (int i = 0; i < 5; ++i) ASSERT_EQ(track.push(command(i * 100 * kMs, drifting(0.1 * i)), 0), TrackStatus::taken);
+    for (int i = 0; i < 5; ++i)
+        ASSERT_EQ(track.push(command(i * 100 * kMs, drifting(0.1 * i)), 0), TrackStatus::taken);
     for (std::int64_t t = 0; t <= 900 * kMs; t += 7 * kMs) {
         const Motion truth = drifting(static_cast<double>(t) * 1e-9);
         const TrackedPose p = track.at(t);
@@ -114,8 +119,9 @@ TEST(PoseTrack, RefusesToForgetWhatIsStillInUse) {
 }
 
 TEST(PoseTrack, ReadersNeverSeeHalfACommand) {
-    // Position and velocity of every command are equal whole numbers, so a torn sample would show: a mixture of two that are
-    // 256 commands apart. A reader that was held up meets a neighbour instead, carried on for at most 0.2 ms.
+    // Position and velocity of every command are equal whole numbers, so a torn sample would show: a mixture of two
+    // that are 256 commands apart. A reader that was held up meets a neighbour instead, carried on for at most 0.2
+    // ms.
     PoseTrack track({}, 1e9);
     ASSERT_EQ(track.push(command(1, {{{}, {1, 1, 1}}, {1, 1, 1}, {}}), 1), TrackStatus::taken);
     std::atomic<bool> done{false};
@@ -130,7 +136,8 @@ TEST(PoseTrack, ReadersNeverSeeHalfACommand) {
     while (!done || reads == 0) {
         const std::int64_t t = track.newest_ns();
         const Motion m = track.at(t).motion;
-        torn += std::abs(m.T_world_body.t.x / m.velocity_m_s.x - 1) > 5e-4 || m.T_world_body.t.x != m.T_world_body.t.z;
+        torn +=
+            std::abs(m.T_world_body.t.x / m.velocity_m_s.x - 1) > 5e-4 || m.T_world_body.t.x != m.T_world_body.t.z;
         ++reads;
     }
     writer.join();

@@ -95,7 +95,8 @@ TEST_P(LateFrames, AreTreatedAsTheSceneSays) {
     EXPECT_EQ(c.frames + c.skipped, 2'000U);
     EXPECT_EQ(c.handed_over, policy == "drop" ? 0U : c.frames);
     const std::string video = slurp(folder_ / "late.y4m");
-    const bool has_light = video.find_first_of("\xff\xfe\xfd\xfc\xfb\xfa\xf0\xe0\x80\x60\x50", video.find('\n')) != std::string::npos;
+    const bool has_light =
+        video.find_first_of("\xff\xfe\xfd\xfc\xfb\xfa\xf0\xe0\x80\x60\x50", video.find('\n')) != std::string::npos;
     if (policy == "late") {
         EXPECT_TRUE(has_light);
     } else {

@@ -29,7 +29,8 @@ TEST_F(TrajectoryFile, RowsReadBackBitForBit) {
     std::vector<TrajectoryRow> truth;
     for (int i = 0; i < 200; ++i) {
         TrajectoryRow r{i * 100'000'007LL, "chaser", {}};
-        r.motion.T_world_body = {normalized(Quat{n(rng), n(rng), n(rng), n(rng)}), {n(rng), n(rng) * 1e6, n(rng) * 1e-9}};
+        r.motion.T_world_body = {normalized(Quat{n(rng), n(rng), n(rng), n(rng)}),
+                                 {n(rng), n(rng) * 1e6, n(rng) * 1e-9}};
         r.motion.velocity_m_s = {n(rng), n(rng), n(rng)};
         r.motion.rate_rad_s = {n(rng), n(rng), n(rng)};
         std::array<char, 512> line{};
@@ -67,6 +68,9 @@ struct BadRow {
     int line, column;
     const char* words;
 };
+void PrintTo(const BadRow& row, std::ostream* out) {
+    *out << row.words;
+}
 class BadTrajectory : public TrajectoryFile, public ::testing::WithParamInterface<BadRow> {};
 
 TEST_P(BadTrajectory, IsNamedWithItsPlace) {
@@ -77,18 +81,18 @@ TEST_P(BadTrajectory, IsNamedWithItsPlace) {
     EXPECT_NE(read.error().what.find(GetParam().words), std::string::npos) << read.error().what;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, BadTrajectory,
-    ::testing::Values(BadRow{"0,b,1,2,3\n", 2, 1, "5 columns, expected 15"},
-                      BadRow{"0,b,1,2,nan,1,0,0,0,0,0,0,0,0,0\n", 2, 9, "finite number"},
-                      BadRow{"0,b,1,2,1e400,1,0,0,0,0,0,0,0,0,0\n", 2, 9, "finite number"},
-                      BadRow{"0,b,1,two,3,1,0,0,0,0,0,0,0,0,0\n", 2, 7, "\"two\""},
-                      BadRow{"0,b,1,2,3,1,1,0,0,0,0,0,0,0,0\n", 2, 11, "unit quaternion"},
-                      BadRow{"0,b,1,2,3,0,0,0,0,0,0,0,0,0,0\n", 2, 11, "unit quaternion"},
-                      BadRow{"0,,1,2,3,1,0,0,0,0,0,0,0,0,0\n", 2, 3, "empty body name"},
-                      BadRow{"1e12,b,1,2,3,1,0,0,0,0,0,0,0,0,0\n", 2, 1, "less than 9e9"},
-                      BadRow{"1,b,1,2,3,1,0,0,0,0,0,0,0,0,0\n1,b,1,2,3,1,0,0,0,0,0,0,0,0,0\n", 3, 1, "does not come after"},
-                      BadRow{"", 0, 0, "no rows"}));
+INSTANTIATE_TEST_SUITE_P(All, BadTrajectory,
+                         ::testing::Values(BadRow{"0,b,1,2,3\n", 2, 1, "5 columns, expected 15"},
+                                           BadRow{"0,b,1,2,nan,1,0,0,0,0,0,0,0,0,0\n", 2, 9, "finite number"},
+                                           BadRow{"0,b,1,2,1e400,1,0,0,0,0,0,0,0,0,0\n", 2, 9, "finite number"},
+                                           BadRow{"0,b,1,two,3,1,0,0,0,0,0,0,0,0,0\n", 2, 7, "\"two\""},
+                                           BadRow{"0,b,1,2,3,1,1,0,0,0,0,0,0,0,0\n", 2, 11, "unit quaternion"},
+                                           BadRow{"0,b,1,2,3,0,0,0,0,0,0,0,0,0,0\n", 2, 11, "unit quaternion"},
+                                           BadRow{"0,,1,2,3,1,0,0,0,0,0,0,0,0,0\n", 2, 3, "empty body name"},
+                                           BadRow{"1e12,b,1,2,3,1,0,0,0,0,0,0,0,0,0\n", 2, 1, "less than 9e9"},
+                                           BadRow{"1,b,1,2,3,1,0,0,0,0,0,0,0,0,0\n1,b,1,2,3,1,0,0,0,0,0,0,0,0,0\n",
+                                                  3, 1, "does not come after"},
+                                           BadRow{"", 0, 0, "no rows"}));
 
 }  // namespace
 }  // namespace narpa

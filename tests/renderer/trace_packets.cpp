@@ -43,7 +43,8 @@ TEST(Packets, MeetWhatEachRayMeetsAlone) {
         Placement at(scene.bodies.size());
         for (std::size_t i = 0; i < scene.bodies.size(); ++i) at.set(i, scene.bodies[i].initial.T_world_body);
         for (int k = 0; k < 500; ++k) {
-            const Vec3 eye{20 * n(rng), 20 * n(rng), 20 * n(rng)}, axis = normalized(Vec3{n(rng), n(rng), n(rng)} - eye);
+            const Vec3 eye{20 * n(rng), 20 * n(rng), 20 * n(rng)},
+                axis = normalized(Vec3{n(rng), n(rng), n(rng)} - eye);
             const std::size_t count = 1 + static_cast<std::size_t>(k) % kPacket;
             std::array<Ray, kPacket> rays;
             for (Ray& r : rays) r = {eye, normalized(axis + 0.02 * Vec3{n(rng), n(rng), n(rng)})};
@@ -58,7 +59,8 @@ TEST(Packets, MeetWhatEachRayMeetsAlone) {
                 if (alone.body < 0) continue;
                 ++seen;
                 wanted |= 1u << i;
-                // On an edge either of two faces may be named: the point is the same to rounding in single precision.
+                // On an edge either of two faces may be named: the point is the same to rounding in single
+                // precision.
                 EXPECT_LE(norm(hits[i].position - alone.position), 1e-5);
                 EXPECT_NEAR(hits[i].range_m, alone.range_m, 1e-5);
             }

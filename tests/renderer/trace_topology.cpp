@@ -13,7 +13,9 @@ Mesh tetrahedron() {
     return m;
 }
 
-TEST(IsClosed, ASolidsSkinIs) { EXPECT_TRUE(is_closed(tetrahedron())); }
+TEST(IsClosed, ASolidsSkinIs) {
+    EXPECT_TRUE(is_closed(tetrahedron()));
+}
 
 TEST(IsClosed, VerticesSplitAtSeamsAreOnePlace) {
     Mesh m = tetrahedron();

@@ -83,7 +83,7 @@ void CameraFeed::account(const FrameLedger& ledger) noexcept {
     stats_.deadline_missed += !ledger.deadline_met;
     stats_.stale += ledger.pose_stale;
     stats_.hand_over.add(ledger.t_hand_over_ns - ledger.t_exposure_mid_ns);
-    stats_.ledgers_lost += !ledgers_.push(ledger);
+    if (keeps_ledgers_) stats_.ledgers_lost += !ledgers_.push(ledger);
 }
 
 /// A frame whose successor is already due is not made any more: the stream stays in step with the clock.

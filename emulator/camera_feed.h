@@ -48,7 +48,8 @@ public:
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }
     [[nodiscard]] const std::vector<std::unique_ptr<VideoSink>>& sinks() const noexcept { return sinks_; }
-    /// Ledgers for the CAN thread.
+    /// Ledgers for the CAN thread: kept only where there is one.
+    void keep_ledgers() noexcept { keeps_ledgers_ = true; }
     SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
     /// Flushes sinks and logs and writes the contact sheet.
     Status finish();
@@ -66,6 +67,7 @@ private:
     std::uint32_t next_ = 0;
     std::vector<std::uint8_t> spare_;  ///< `repeat`: the last frame in time; `blank`: black; else empty
     SpscRing<FrameLedger, 64> ledgers_;
+    bool keeps_ledgers_ = false;
     CameraStats stats_;
 
     std::string folder_;

@@ -82,6 +82,7 @@ Status Emulator::open_outputs() {
         if (!sinks) return sinks.error();
         if (sinks->empty()) continue;  // a camera that nobody asked for costs nothing
         cameras_.push_back(std::make_unique<CameraFeed>(*world_, i, *std::move(sinks)));
+        if (can_) cameras_.back()->keep_ledgers();
         if (!options_.log_folder.empty())
             if (auto logs = cameras_.back()->log_to(options_.log_folder, wait); !logs) return logs.error();
     }

@@ -40,11 +40,10 @@ struct Hit {
 /// Where every body is at one instant. Reused from frame to frame: no allocation after the first `place`.
 class Placement {
 public:
-    explicit Placement(std::size_t bodies) : T_world_body(bodies), T_body_world(bodies) {}
-    void set(std::size_t body, const Rigid3& T) { T_world_body[body] = T, T_body_world[body] = inverse(T); }
+    explicit Placement(std::size_t bodies) : T_world_body(bodies) {}
+    void set(std::size_t body, const Rigid3& T) { T_world_body[body] = T; }
 
     std::vector<Rigid3> T_world_body;
-    std::vector<Rigid3> T_body_world;
 };
 
 class Tracer {

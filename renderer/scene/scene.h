@@ -16,24 +16,62 @@
 
 namespace narpa {
 
-/// Colour image in linear light, 16 bits a band (65535 = 1.0), rows from the top.
+/// Image in linear light, 16 bits a band (65535 = 1.0), rows from the top; with the same picture at half, a quarter
+/// ... of the size, each texel the mean of what it covers, down to 1 x 1: what a distant surface is looked up in.
 struct Texture {
+    enum class Wrap : std::uint8_t { repeat, clamp };
+    struct Level {
+        int width = 0, height = 0;
+        std::vector<std::uint16_t> rgb;  ///< 3 * width * height
+    };
     std::string name;
     int width = 0, height = 0;
     std::vector<std::uint16_t> rgb;  ///< 3 * width * height
+    Wrap wrap = Wrap::repeat;
+    std::vector<Level> coarser{};  ///< empty: filtered from the finest alone
 };
 
-/// Reflectance as a BRDF. Phong is the energy-conserving form of Lafortune and Willems (1994):
-/// f = kd / pi + ks (n + 2) / (2 pi) max(0, R.V)^n with kd + ks <= 1 in every band.
+/// Parameters of B. Hapke's model (Theory of Reflectance and Emittance Spectroscopy, 2nd ed. 2012) beside the single
+/// scattering albedo w, which is Material::diffuse.
+struct Hapke {
+    float phase_b = 0.25f, phase_c = 0.4f;            ///< double Henyey-Greenstein: width, backward (> 0) or forward
+    float opposition_b0 = 0, opposition_h = 0.05f;    ///< shadow hiding: amplitude, width
+    float roughness_rad = 0;                          ///< macroscopic mean slope, theta-bar
+};
+
+/// How a surface sends light on. Directions and forms: renderer/material/bsdf.h. What a kind does not name it does
+/// not use.
 struct Material {
-    enum class Kind : std::uint8_t { lambert, phong };
+    enum class Kind : std::uint8_t {
+        lambert,          ///< diffuse
+        phong,            ///< diffuse, specular, exponent: Lafortune and Willems 1994, diffuse + specular <= 1
+        phong_classic,    ///< diffuse, specular, exponent, ambient: the paper's, no BRDF; direct light only
+        mirror,           ///< specular
+        dielectric,       ///< smooth glass: ior, schlick
+        ggx,              ///< diffuse (base colour), metallic, roughness, ior
+        lommel_seeliger,  ///< diffuse (single scattering albedo w), asymmetry
+        lunar_lambert,    ///< diffuse (normal albedo): McEwen 1996
+        hapke,            ///< diffuse (single scattering albedo w), hapke
+    };
     std::string name;
     Kind kind = Kind::lambert;
-    Rgb diffuse{0.5f, 0.5f, 0.5f};  ///< kd: Lambert albedo
+    Rgb diffuse{0.5f, 0.5f, 0.5f};  ///< kd, or what the kind says
     Rgb specular{};                 ///< ks
-    float exponent = 1;             ///< n
+    float exponent = 1;             ///< n of Phong's lobe
     Rgb emission{};                 ///< radiance that the surface sends out by itself, W m^-2 sr^-1
+    Rgb ambient{};                  ///< ka
+    float roughness = 0.5f;         ///< perceptual: GGX alpha = roughness^2
+    float metallic = 0;             ///< 0 dielectric over Lambert, 1 metal
+    float ior = 1.5f;               ///< refractive index inside over outside
+    bool schlick = false;           ///< Schlick's approximation in place of Fresnel's equations
+    float asymmetry = 0;            ///< Henyey-Greenstein's g of the single particle: negative is backward
+    Hapke hapke{};
     int texture = -1;               ///< index into Scene::textures: multiplies `diffuse`; -1 is none
+    int emission_texture = -1;      ///< multiplies `emission`
+    int normal_texture = -1;        ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
+    int height_texture = -1;        ///< bumps: height in metres = bump_height_m * mean of rgb
+    float normal_scale = 1;
+    float bump_height_m = 0;
 };
 
 /// Triangles in the body's own frame, metres. Degenerate and non-finite ones were dropped when it was read.
@@ -51,9 +89,15 @@ struct Sphere {
     int material = 0;  ///< index into Scene::materials
 };
 
+/// (x/a)^2 + (y/b)^2 + (z/c)^2 = 1 in the body's frame.
+struct Ellipsoid {
+    Vec3 semi_axes_m{1, 1, 1};
+    int material = 0;  ///< index into Scene::materials
+};
+
 struct Body {
     std::string name;
-    std::variant<int, Sphere> shape;        ///< index into Scene::meshes, or an exact sphere
+    std::variant<int, Sphere, Ellipsoid> shape;  ///< index into Scene::meshes, or an exact shape
     Motion initial{};                       ///< at time 0; moves on with its velocity and rate
     std::optional<std::uint32_t> can_id{};  ///< base identifier of its pose commands on CAN
 };
@@ -62,6 +106,23 @@ struct Sun {
     Vec3 direction{0, 0, 1};  ///< unit, world: from the scene towards the Sun
     double irradiance_w_m2 = 1361.0;
     double angular_diameter_rad = 0.533 * 3.14159265358979323846 / 180.0;
+};
+
+/// A lamp or any other source that is not a body's surface. In its own frame it shines along +z.
+struct Light {
+    enum class Kind : std::uint8_t {
+        point,        ///< emission is the radiant intensity, W sr^-1 a band, the same in all directions
+        directional,  ///< emission is the irradiance on a surface that faces it, W m^-2 a band
+        rectangle,    ///< emission is the radiance of its +z side, W m^-2 sr^-1 a band; seen by cameras and mirrors
+        disc,         ///< the same
+    };
+    std::string name;
+    Kind kind = Kind::point;
+    int mount = -1;  ///< body it rides on; -1 is the world
+    Rigid3 T_mount_light{};
+    Rgb emission{};
+    double width_m = 1, height_m = 1;  ///< rectangle: along its x and y, centred
+    double radius_m = 0.5;             ///< disc
 };
 
 /// Photons to digital numbers. Absent: an ideal sensor without noise (see Camera::white_radiance).
@@ -78,6 +139,12 @@ struct Detector {
     int bits = 12;  ///< ADC, 8..12
 };
 
+/// Thin lens: what is not at the focus distance is blurred to a circle of aperture * fx * |1/focus - 1/z| pixels.
+struct Lens {
+    double aperture_diameter_m = 0;
+    double focus_distance_m = 0;  ///< from the lens, along z; infinite is allowed
+};
+
 enum class LatePolicy : std::uint8_t { drop, repeat, late, blank };
 
 struct Camera {
@@ -92,6 +159,7 @@ struct Camera {
     LatePolicy late = LatePolicy::late;
     double white_radiance = 0;  ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
     std::optional<Detector> detector;
+    std::optional<Lens> lens{};  ///< none: a pinhole
 };
 
 struct Lidar {
@@ -104,6 +172,12 @@ struct Lidar {
 };
 
 struct RenderSettings {
+    enum class Method : std::uint8_t {
+        direct,  ///< light that reaches a surface straight from the Sun and the lights, with shadows, and ambient
+        path,    ///< all light, by path tracing
+    };
+    Method method = Method::direct;
+    int max_depth = 8;  ///< path: surfaces that a path may meet, 1..40 (1 is direct light alone)
     int spp = 1;
     std::uint64_t seed = 0;
     double stale_after_s = 0.5;  ///< commands older than this: the body holds still and is reported stale
@@ -114,6 +188,7 @@ struct Scene {
     std::int64_t epoch_unix_ns = 0;  ///< UTC of simulation time 0
     std::optional<Sun> sun;
     Rgb ambient{};  ///< radiance arriving from everywhere, W m^-2 sr^-1 a band
+    std::vector<Light> lights;
     std::vector<Body> bodies;
     std::vector<Mesh> meshes;
     std::vector<Material> materials;

@@ -31,6 +31,7 @@ struct Frame {
     const Rigid3& T_world_camera;
     const FrameSettings& settings;
     std::optional<SunDisc> sun;
+    double pixel_angle_rad;  ///< width of a sample's beam
 };
 
 /// Pixels that are traced together: a square of the image, cut off at its edges.
@@ -62,12 +63,12 @@ void direct_radiance(const Frame& f, std::size_t n, const Lanes<Ray>& rays, cons
     for (std::size_t i = 0; i < n; ++i) {
         radiance[i] = {};
         if (hits[i].body < 0) continue;
-        const Surface surface = surface_at(scene, hits[i]);
+        const Surface surface = surface_at(f.tracer, f.at, hits[i], rays[i].direction, hits[i].range_m * f.pixel_angle_rad);
         radiance[i] = surface.emission + scene.ambient * ambient_reflectance(surface);
         if (!f.sun) continue;
-        const double cosine = dot(hits[i].shading_normal, to_sun[i]);
+        const double cosine = dot(surface.normal, to_sun[i]);
         if (cosine <= 0) continue;
-        const Rgb reflected = brdf(surface, hits[i].shading_normal, to_sun[i], -rays[i].direction);
+        const Rgb reflected = bsdf(surface, surface.normal, to_sun[i], -rays[i].direction);
         if (reflected == Rgb{}) continue;
         sunlit[i] = reflected * (f.sun->irradiance() * static_cast<float>(cosine));
         towards_sun |= 1u << i;
@@ -161,7 +162,8 @@ void render_radiance(const Tracer& tracer, const Placement& at, const Camera& ca
                      const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
     const Frame frame{tracer,   at,
                       camera,   T_world_camera,
-                      settings, tracer.scene().sun ? std::optional<SunDisc>(*tracer.scene().sun) : std::nullopt};
+                      settings, tracer.scene().sun ? std::optional<SunDisc>(*tracer.scene().sun) : std::nullopt,
+                      1 / (camera.fx * std::sqrt(settings.spp))};
     if (aovs != nullptr) resize(*aovs, out.pixels.size());
     const bool one_sample = settings.spp == 1;
     // Blocks lie on a grid of their own, so that which rays travel together does not depend on the threads.

@@ -7,8 +7,9 @@ LidarReturn shoot(const Tracer& tracer, const Placement& at, const Ray& beam, do
     const Hit hit = tracer.intersect(at, beam, range_max_m);
     if (hit.body < 0) return {};
     const Vec3 back = -beam.direction;
-    const Rgb f = brdf(surface_at(tracer.scene(), hit), hit.shading_normal, back, back);
-    const double cosine = dot(hit.shading_normal, back);
+    const Surface surface = surface_at(tracer, at, hit, beam.direction, 0);
+    const Rgb f = bsdf(surface, surface.normal, back, back);
+    const double cosine = dot(surface.normal, back);
     constexpr double kPi = 3.14159265358979323846;
     return {hit.range_m, static_cast<float>(kPi * cosine * static_cast<double>(f.x + f.y + f.z) / 3), hit.body};
 }

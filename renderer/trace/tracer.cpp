@@ -154,6 +154,7 @@ void Tracer::Impl::finish_mesh(const Rigid3& T_world_body, const Vec3& d_body, c
     hit.shading_normal = T_world_body.q * (side * smooth);
     hit.departure_body = departure;
     hit.material = mesh.face_material[at.face];
+    hit.outside = side > 0;
     if (!mesh.uvs.empty() && textured[static_cast<std::size_t>(hit.material)]) {
         double u = 0, w = 0;
         for (std::size_t k = 0; k < 3; ++k) {
@@ -174,6 +175,7 @@ void Tracer::Impl::finish_sphere(const Rigid3& T_world_body, const Vec3& o_body,
     hit.position = T_world_body * hit.departure_body;
     hit.geometric_normal = hit.shading_normal = T_world_body.q * (side * outwards);
     hit.material = shape.sphere_material;
+    hit.outside = side > 0;
     if (textured[static_cast<std::size_t>(hit.material)]) {
         const auto uv = sphere_uv(outwards);
         hit.u = uv[0], hit.v = uv[1];
@@ -223,7 +225,7 @@ Tracer::Tracer(Tracer&&) noexcept = default;
 Tracer& Tracer::operator=(Tracer&&) noexcept = default;
 Tracer::~Tracer() = default;
 
-Hit Tracer::intersect(const Placement& at, const Ray& ray, double t_max) const noexcept {
+Hit Tracer::intersect(const Placement& at, const Ray& ray, double t_max, int skip_body) const noexcept {
     Hit hit;
     MeshHit mesh_hit;
     Vec3 o_hit, d_hit;  // the ray in the frame of the body it hit
@@ -236,7 +238,7 @@ Hit Tracer::intersect(const Placement& at, const Ray& ray, double t_max) const n
             // Differences of positions come before anything else: a common offset of the whole scene cancels.
             const Vec3 o = ray.origin - at.T_world_body[next].t;
             const SphereSpan span = bounding_span(o, ray.direction, impl_->shapes[next].bound_m);
-            if (span.exit < 0 || span.entry >= nearest) continue;
+            if (span.exit < 0 || span.entry >= nearest || static_cast<int>(next) == skip_body) continue;
             std::size_t k = n++;
             for (; k > 0 && batch[k - 1].entry_m > span.entry; --k) batch[k] = batch[k - 1];
             batch[k] = {static_cast<std::uint32_t>(next), span.entry};

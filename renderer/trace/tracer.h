@@ -16,6 +16,8 @@
 
 namespace narpa {
 
+class Lights;
+
 inline constexpr std::size_t kPacket = 16;  ///< rays that are traced together
 
 struct Ray {
@@ -33,8 +35,18 @@ struct Hit {
     Vec3 shading_normal{};    ///< world, unit, same side
     float u = 0, v = 0;       ///< texture coordinates; 0 where the material has no texture
     int material = 0;         ///< index into Scene::materials
+    bool outside = true;      ///< the ray came from the outer side, by the winding of the face
     Vec3 departure_body{};    ///< body frame: where rays that leave start, before the offset for rounding: the
                               ///< position, or above it on the smooth surface that vertex normals describe
+};
+
+/// The same point, left on its other side: for light that goes through.
+[[nodiscard]] Hit other_side(const Hit& hit) noexcept;
+
+/// How the surface lies under its texture at a hit: world metres per unit of u and of v, along the surface. Zero where
+/// there are no texture coordinates.
+struct TextureFrame {
+    Vec3 dp_du{}, dp_dv{};
 };
 
 /// Where every body is at one instant. Reused from frame to frame: no allocation after the first `place`.
@@ -54,8 +66,8 @@ public:
     Tracer& operator=(Tracer&&) noexcept;
     ~Tracer();
 
-    /// Nearest hit with 0 <= range < t_max. Thread-safe, allocates nothing.
-    [[nodiscard]] Hit intersect(const Placement& at, const Ray& ray, double t_max) const noexcept;
+    /// Nearest hit with 0 <= range < t_max. Thread-safe, allocates nothing. `skip_body` is looked through; -1: none.
+    [[nodiscard]] Hit intersect(const Placement& at, const Ray& ray, double t_max, int skip_body = -1) const noexcept;
     /// Is anything between the surface point and the distance t_max in this direction? `from` is the hit that
     /// the ray leaves on the side of its geometric normal; the start is lifted by the bound of the rounding error
     /// in that body's own frame, so that a surface never shadows itself and nothing further off is skipped.
@@ -69,6 +81,25 @@ public:
     /// each. Only those whose bit is set in `wanted` are asked.
     [[nodiscard]] std::uint32_t occluded(const Placement& at, std::span<const Hit> from,
                                          std::span<const Vec3> directions, std::uint32_t wanted) const noexcept;
+
+    /// Nearest hits of rays that leave surfaces, each from its hit on the side of its geometric normal, in any
+    /// direction, without an end; only those whose bit is set in `wanted` are asked, and only their `hits` written.
+    /// The start is lifted as for `occluded`. Rays need not run close together. `hits` may be `from`'s own array.
+    void intersect(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                   std::uint32_t wanted, std::span<Hit> hits) const noexcept;
+    /// As the packet above, each ray with an end of its own: t_max[i] metres.
+    [[nodiscard]] std::uint32_t occluded(const Placement& at, std::span<const Hit> from,
+                                         std::span<const Vec3> directions, std::span<const double> t_max,
+                                         std::uint32_t wanted) const noexcept;
+
+    [[nodiscard]] TextureFrame texture_frame(const Placement& at, const Hit& hit) const noexcept;
+
+    /// Bound of the error of a range that ends on this body, from rounding in single precision in its own frame,
+    /// metres: a shadow ray towards a point of an emitter stops that much before it.
+    [[nodiscard]] double rounding_m(std::size_t body) const noexcept;
+
+    /// Emitters of the scene, made ready once.
+    [[nodiscard]] const Lights& lights() const noexcept;
 
     /// Radius of the body's bounding sphere about its own origin, metres.
     [[nodiscard]] double bounding_radius_m(std::size_t body) const noexcept;

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "renderer/material/bsdf.h"
+#include "renderer/material/texture_lookup.h"
 #include "renderer/trace/shading.h"
 #include "renderer/trace/sphere_roots.h"
 #include "tests/support/shapes.h"
@@ -153,7 +155,7 @@ double albedo(const Surface& s, double theta) {
             const double phi = 2 * std::numbers::pi * (j + 0.5) / steps;
             const Vec3 l = sine * std::cos(phi) * x + sine * std::sin(phi) * y + cosine * r;
             const double density = (m + 1) / (2 * std::numbers::pi) * std::pow(cosine, m);
-            sum += static_cast<double>(brdf(s, n, l, v).x) * std::max(0.0, l.z) / density;
+            sum += static_cast<double>(bsdf(s, n, l, v).x) * std::max(0.0, l.z) / density;
         }
     return sum / (static_cast<double>(steps) * steps);
 }

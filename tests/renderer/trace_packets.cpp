@@ -19,7 +19,7 @@ Scene crowd(std::mt19937_64& rng) {
     scene.sun = Sun{normalized(Vec3{n(rng), n(rng), n(rng)}), 1361, 0};
     scene.meshes.push_back(test::icosphere(3, 1.0, true));
     scene.meshes.push_back(test::icosphere(2, 1.5, false));
-    const auto add = [&](std::variant<int, Sphere> shape, const Vec3& at) {
+    const auto add = [&](decltype(Body::shape) shape, const Vec3& at) {
         Body b;
         b.name = std::to_string(scene.bodies.size());
         b.shape = shape;

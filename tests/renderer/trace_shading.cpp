@@ -6,6 +6,8 @@
 #include "renderer/trace/camera_image.h"
 #include "renderer/trace/camera_ray.h"
 #include "renderer/trace/sampler.h"
+#include "renderer/material/bsdf.h"
+#include "renderer/material/texture_lookup.h"
 #include "renderer/trace/shading.h"
 #include "renderer/trace/sun_disc.h"
 #include "tests/support/shapes.h"
@@ -210,16 +212,16 @@ TEST(Brdf, PhongIsReciprocalAndDarkBelowTheHorizon) {
     for (int i = 0; i < 1000; ++i) {
         Vec3 a = random_direction(random), b = random_direction(random);
         if (a.z < 0 || b.z < 0) {
-            EXPECT_EQ(brdf(s, n, a, b), Rgb{});
+            EXPECT_EQ(bsdf(s, n, a, b), Rgb{});
             continue;
         }
-        const Rgb f = brdf(s, n, a, b), g = brdf(s, n, b, a);
+        const Rgb f = bsdf(s, n, a, b), g = bsdf(s, n, b, a);
         EXPECT_NEAR(f.x, g.x, 1e-5f * f.x);
         EXPECT_NEAR(f.z, g.z, 1e-5f * f.z);
     }
     // The mirror direction sees the peak: ks (n + 2) / (2 pi) over the diffuse kd / pi.
     const Vec3 l = normalized(Vec3{1, 0, 1}), v = normalized(Vec3{-1, 0, 1});
-    EXPECT_NEAR(brdf(s, n, l, v).y, 0.2 / kPi + 0.5 * 42 / (2 * kPi), 1e-4);
+    EXPECT_NEAR(bsdf(s, n, l, v).y, 0.2 / kPi + 0.5 * 42 / (2 * kPi), 1e-4);
 }
 
 /// A lit point that comes out dark, seen by the sphere that the mesh stands for.

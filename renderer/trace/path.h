@@ -1,0 +1,26 @@
+/// renderer/trace/path.h - all light that comes back along a ray: path tracing.
+///
+/// Kajiya 1986 with next-event estimation towards the Sun, the lights and emissive surfaces, importance sampling of the
+/// BSDF, and multiple importance sampling between the two by the power heuristic (Veach 1997); Russian roulette
+/// after the first bounces, by the path's throughput. Unbiased but for paths longer than max_depth. Kept light is never
+/// clamped.
+#pragma once
+
+#include "renderer/trace/sampler.h"
+#include "renderer/trace/tracer.h"
+
+namespace narpa {
+
+struct PathSettings {
+    int max_depth = 8;               ///< surfaces that a path may meet
+    double pixel_angle_rad = 0;      ///< width of a camera ray's beam per metre of its way, for textures
+};
+
+/// Radiance, W m^-2 sr^-1, that comes back along up to kPacket rays whose first hits are known. `samplers` and `sample` say
+/// which random numbers each takes (the first four dimensions belong to the caller). Same values whatever stands in
+/// the other lanes. Thread-safe, allocates nothing.
+void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings, std::span<const Ray> rays,
+                   std::span<const Hit> first, std::span<const PixelSampler> samplers, std::uint32_t sample,
+                   std::span<Rgb> radiance) noexcept;
+
+}  // namespace narpa

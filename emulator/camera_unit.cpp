@@ -21,12 +21,13 @@ std::int64_t CameraUnit::exposure_ns() const noexcept {
     return camera_.detector ? static_cast<std::int64_t>(camera_.detector->exposure_s * 1e9) : 0;
 }
 
-FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs* aovs) {
+FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs* aovs,
+                               std::atomic<std::size_t>* pixels_done) {
     const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_);
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
-    render_radiance(world_.tracer(), placement_, camera_, T_world_camera, {render.spp, render.seed, frame},
-                    radiance_, aovs);
+    const FrameSettings settings{render.spp, render.seed, frame, render.method, render.max_depth, pixels_done};
+    render_radiance(world_.tracer(), placement_, camera_, T_world_camera, settings, radiance_, aovs);
     narpa::expose(camera_, radiance_, render.seed, frame, bytes_);
 
     FrameLedger ledger;

@@ -1,6 +1,7 @@
 /// emulator/camera_unit.h - one camera under emulation: frame number -> the bytes that the sensor would put out.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -24,7 +25,9 @@ public:
 
     /// Renders frame `frame` as it is at t_mid. The same frame number, time and poses give the same bytes.
     /// Fills the ledger's identity, pose and exposure; the caller adds when it was made. `aovs` may be null.
-    FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs* aovs = nullptr);
+    /// `pixels_done` is counted up meanwhile, for who wants to watch; null: nobody does.
+    FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs* aovs = nullptr,
+                       std::atomic<std::size_t>* pixels_done = nullptr);
     /// Writes the ledger into the last row, where the scene asks for it.
     void embed(const FrameLedger& ledger) noexcept;
 

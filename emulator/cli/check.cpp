@@ -9,12 +9,14 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "drivers/can/can_bus.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/cli/cli.h"
 #include "emulator/world.h"
 #include "protocols/can/dbc.h"
+#include "renderer/scene/kind_names.h"
 
 namespace narpa::cli {
 namespace {
@@ -77,17 +79,30 @@ Finding locked_memory() {
             ::getenv("USER") ? ::getenv("USER") : "USER")};
 }
 
+/// How many materials there are of each kind that the scene has.
+std::map<std::string_view, int> material_kinds(const Scene& scene) {
+    std::map<std::string_view, int> count;
+    for (const Material& m : scene.materials) ++count[name_of(m.kind, kMaterialKinds)];
+    return count;
+}
+
+nlohmann::json describe_shape(const Scene& scene, const Body& body) {
+    if (const auto* sphere = std::get_if<Sphere>(&body.shape)) return {{"sphere_radius_m", sphere->radius_m}};
+    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&body.shape)) {
+        const Vec3& axes = ellipsoid->semi_axes_m;
+        return {{"ellipsoid_semi_axes_m", {axes.x, axes.y, axes.z}}};
+    }
+    return {{"triangles", scene.meshes[static_cast<std::size_t>(std::get<int>(body.shape))].faces.size()}};
+}
+
 nlohmann::json describe(const World& world) {
     const Scene& s = world.scene();
     nlohmann::json bodies = nlohmann::json::array(), cameras = nlohmann::json::array(),
-                   lidars = nlohmann::json::array();
+                   lidars = nlohmann::json::array(), lights = nlohmann::json::array();
     for (const Body& b : s.bodies) {
         nlohmann::json body{{"name", b.name},
                             {"can_id", b.can_id ? nlohmann::json(*b.can_id) : nlohmann::json(nullptr)}};
-        if (const int* mesh = std::get_if<int>(&b.shape))
-            body["triangles"] = s.meshes[static_cast<std::size_t>(*mesh)].faces.size();
-        else
-            body["sphere_radius_m"] = std::get<Sphere>(b.shape).radius_m;
+        body.update(describe_shape(s, b));
         bodies.push_back(body);
     }
     for (const Camera& c : s.cameras)
@@ -96,29 +111,62 @@ nlohmann::json describe(const World& world) {
                            {"height", c.height},
                            {"format", std::string(name(c.format))},
                            {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
-                           {"detector", c.detector.has_value()}});
+                           {"detector", c.detector.has_value()},
+                           {"lens", c.lens.has_value()}});
     for (const Lidar& l : s.lidars)
         lidars.push_back({{"name", l.name}, {"model", l.model}, {"rate_hz", l.rate_hz}});
+    for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
+    nlohmann::json render{{"method", name_of(s.render.method, kMethods)}, {"spp", s.render.spp}};
+    if (s.render.method == RenderSettings::Method::path) render["max_depth"] = s.render.max_depth;
     return {{"name", s.name},
+            {"render", render},
+            {"lights", lights},
             {"bodies", bodies},
             {"cameras", cameras},
             {"lidars", lidars},
             {"triangles", world.tracer().triangle_count()},
             {"materials", s.materials.size()},
+            {"material_kinds", material_kinds(s)},
             {"textures", s.textures.size()},
             {"warnings", s.warnings}};
+}
+
+std::string light_words(const Light& l) {
+    switch (l.kind) {
+        case Light::Kind::rectangle: return fmt::format("rectangle of {:g} x {:g} m", l.width_m, l.height_m);
+        case Light::Kind::disc: return fmt::format("disc of radius {:g} m", l.radius_m);
+        case Light::Kind::point:
+        case Light::Kind::directional: break;
+    }
+    return std::string(name_of(l.kind, kLightKinds));
+}
+
+void tell_light(const Scene& s) {
+    const bool path = s.render.method == RenderSettings::Method::path;
+    say(fmt::format(
+        "  render: {}, {} sample{} a pixel",
+        path ? fmt::format("path tracing over at most {} surfaces", s.render.max_depth) : "direct light",
+        s.render.spp, s.render.spp > 1 ? "s" : ""));
+    std::string kinds;
+    for (const auto& [kind, count] : material_kinds(s))
+        kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", count, kind);
+    if (!kinds.empty()) say("  materials: " + kinds);
+    for (const Light& l : s.lights)
+        say(fmt::format("  light {}: {}{}", l.name, light_words(l),
+                        l.mount < 0 ? "" : " on body " + s.bodies[static_cast<std::size_t>(l.mount)].name));
 }
 
 void tell(const World& world) {
     const Scene& s = world.scene();
     say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
                     world.tracer().triangle_count(), s.materials.size(), s.textures.size()));
+    tell_light(s);
     for (const Body& b : s.bodies)
         say(fmt::format("  body {}{}", b.name,
                         b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
     for (const Camera& c : s.cameras)
-        say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz", c.name, c.width, c.height, name(c.format),
-                        1e9 / static_cast<double>(c.period_ns)));
+        say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
+                        1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
     for (const Lidar& l : s.lidars)
         say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model, l.rate_hz));
 }

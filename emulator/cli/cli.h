@@ -14,7 +14,8 @@
 
 namespace narpa::cli {
 
-/// What a subcommand found out, for --json; or why it could not.
+/// What a subcommand found out, for --json; or why it could not. Where it judges, the document says `passed`, and false
+/// is exit status 1.
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 
@@ -24,6 +25,7 @@ Command add_run(CLI::App& app);
 Command add_fly(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_scan(CLI::App& app);
+Command add_bench(CLI::App& app);
 
 /// Words for people, on standard error.
 void say(std::string_view text);

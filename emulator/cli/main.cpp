@@ -50,7 +50,7 @@ int finish(const Outcome& outcome, bool json) {
         return exit_status(outcome.error().kind);
     }
     if (json) print_json(*outcome);
-    return 0;
+    return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
 }
 
 int run(int argc, char** argv) {
@@ -67,10 +67,11 @@ int run(int argc, char** argv) {
     app.add_flag("--json", json, kJsonHelp);
 
     Command chosen;
-    for (const auto& add : {add_check, add_run, add_fly, add_render, add_scan}) {
+    for (const auto& add : {add_check, add_run, add_fly, add_render, add_scan, add_bench}) {
         const Command command = add(app);
         CLI::App* subcommand = app.get_subcommands([](const CLI::App*) { return true; }).back();
         subcommand->add_flag("--json", json, kJsonHelp);
+        for (CLI::App* part : subcommand->get_subcommands({})) part->add_flag("--json", json, kJsonHelp);
         subcommand->final_callback([&chosen, command] { chosen = command; });
     }
     try {

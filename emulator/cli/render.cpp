@@ -1,10 +1,16 @@
 // narpa render - one frame of one camera, as the run would make it, to an image file.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <mutex>
 #include <set>
+#include <thread>
 
 #include "emulator/camera_unit.h"
 #include "emulator/cli/cli.h"
@@ -16,12 +22,14 @@
 namespace narpa::cli {
 namespace {
 
+using Method = RenderSettings::Method;
+
 struct Options {
-    std::string scene, camera, format, out, aov;
+    std::string scene, camera, format, out, aov, method;
     PoseOptions pose;
     std::optional<double> time_s;
     std::optional<std::uint32_t> frame;
-    std::optional<int> spp;
+    std::optional<int> spp, max_depth;
     std::optional<std::uint64_t> seed;
     int threads = 0;
 };
@@ -30,6 +38,8 @@ struct Options {
 Status override_scene(const Options& o, Scene& scene, Camera& camera) {
     if (o.spp) scene.render.spp = *o.spp;
     if (o.seed) scene.render.seed = *o.seed;
+    if (!o.method.empty()) scene.render.method = o.method == "path" ? Method::path : Method::direct;
+    if (o.max_depth) scene.render.max_depth = *o.max_depth;
     if (!o.format.empty()) {
         const auto format = pixel_format_from(o.format);
         if (!format) return Error{fmt::format("--format {}, expected GREY, Y16, YUYV or RGB24", o.format)};
@@ -41,8 +51,8 @@ Status override_scene(const Options& o, Scene& scene, Camera& camera) {
     return o.pose.place(scene);
 }
 
-constexpr std::array<std::string_view, 7> kOutputs{"radiance", "depth", "range",   "normal",
-                                                   "position", "body",  "variance"};
+constexpr std::array<std::string_view, 8> kOutputs{"radiance", "depth", "range",  "normal",
+                                                   "position", "body",  "albedo", "variance"};
 
 /// The names in "depth,normal"; an Error for one that is not known.
 Result<std::set<std::string>> parse_outputs(const std::string& list) {
@@ -65,8 +75,42 @@ void keep_only(const std::set<std::string>& names, Aovs& a) {
     if (!names.contains("normal")) a.normal.clear();
     if (!names.contains("position")) a.position.clear();
     if (!names.contains("body")) a.body.clear();
+    if (!names.contains("albedo")) a.albedo.clear();
     if (!names.contains("variance")) a.variance.clear();
 }
+
+std::string_view name(Method m) {
+    return m == Method::path ? "path" : "direct";
+}
+
+/// Shows on standard error how far a long frame is, where that is a terminal.
+class Progress {
+public:
+    explicit Progress(std::size_t pixels) : pixels_(pixels) {
+        if (isatty(STDERR_FILENO) != 0)
+            watcher_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
+    }
+    std::atomic<std::size_t> pixels_done{0};
+
+private:
+    void watch(const std::stop_token& stop) {
+        using namespace std::chrono_literals;
+        std::mutex m;
+        std::unique_lock lock(m);
+        std::condition_variable_any woken;
+        const auto wait = [&](auto time) { return woken.wait_for(lock, stop, time, [] { return false; }); };
+        for (wait(2s); !stop.stop_requested(); wait(500ms)) {
+            const double part = static_cast<double>(pixels_done) / static_cast<double>(pixels_);
+            fmt::print(stderr, "\r{:5.1f} % ", 100 * part);
+            shown_ = true;
+        }
+        if (shown_) fmt::print(stderr, "\r        \r");
+    }
+
+    std::size_t pixels_;
+    bool shown_ = false;
+    std::jthread watcher_;  // last: it is joined before what it looks at goes
+};
 
 Outcome render(const Options& o) {
     auto scene = load_scene(o.scene);
@@ -91,24 +135,31 @@ Outcome render(const Options& o) {
     Aovs values;
     Aovs* const aovs = outputs->empty() ? nullptr : &values;
     const std::int64_t start_ns = monotonic_ns();
-    threads.arena.execute([&] { unit.embed(unit.expose(frame, t_ns, aovs)); });
+    {
+        Progress progress(unit.radiance().pixels.size());
+        threads.arena.execute([&] { unit.embed(unit.expose(frame, t_ns, aovs, &progress.pixels_done)); });
+    }
     const double seconds = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
     keep_only(*outputs, values);
 
     auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
     if (!written) return written.error();
-    say(fmt::format("{}: {} x {}, {} spp, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
-                    unit.camera().width, unit.camera().height, (*world)->scene().render.spp, frame,
+    const RenderSettings& settings = (*world)->scene().render;
+    say(fmt::format("{}: {} x {}, {}, {} spp, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
+                    unit.camera().width, unit.camera().height, name(settings.method), settings.spp, frame,
                     static_cast<double>(t_ns) * 1e-9, (*world)->tracer().triangle_count(), 1e3 * seconds));
-    return nlohmann::json{{"file", o.out},
-                          {"camera", unit.camera().name},
-                          {"frame", frame},
-                          {"t_ns", t_ns},
-                          {"width", unit.camera().width},
-                          {"height", unit.camera().height},
-                          {"samples_per_pixel", (*world)->scene().render.spp},
-                          {"triangles", (*world)->tracer().triangle_count()},
-                          {"render_s", seconds}};
+    nlohmann::json document{{"file", o.out},
+                            {"camera", unit.camera().name},
+                            {"frame", frame},
+                            {"t_ns", t_ns},
+                            {"width", unit.camera().width},
+                            {"height", unit.camera().height},
+                            {"method", name(settings.method)},
+                            {"samples_per_pixel", settings.spp},
+                            {"triangles", (*world)->tracer().triangle_count()},
+                            {"render_s", seconds}};
+    if (settings.method == Method::path) document["max_depth"] = settings.max_depth;
+    return document;
 }
 
 }  // namespace
@@ -124,10 +175,14 @@ Command add_render(CLI::App& app) {
     o->pose.add_to(*c);
     c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
     c->add_option("--spp", o->spp, "Samples per pixel instead of the scene's")->check(CLI::Range(1, 65535));
+    c->add_option("--method", o->method, "direct: light straight from its sources; path: all light")
+        ->check(CLI::IsMember({"direct", "path"}));
+    c->add_option("--max-depth", o->max_depth, "With path: surfaces that light may meet on its way")
+        ->check(CLI::Range(1, 40));
     c->add_option("--seed", o->seed, "Seed instead of the scene's");
     c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
         ->check(CLI::Range(0, 1024));
-    c->add_option("--aov", o->aov, "With .exr: depth,range,normal,position,body,variance beside radiance");
+    c->add_option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance");
     c->add_option("-o,--output", o->out,
                   "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
         ->required();

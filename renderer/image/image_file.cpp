@@ -90,6 +90,9 @@ Planes planes_of(const RenderedFrame& frame) {
         if (!a.position.empty())
             planes.add_exact("position." + axis, [&, k](std::size_t i) { return a.position[i][k]; });
     }
+    for (int b = 0; b < 3 && !a.albedo.empty(); ++b)
+        planes.add(std::string("albedo.") + kBand[static_cast<std::size_t>(b)],
+                   [&, b](std::size_t i) { return a.albedo[i][b]; });
     if (!a.body.empty()) planes.add("body", [&](std::size_t i) { return a.body[i]; });
     if (!a.variance.empty()) planes.add("variance", [&](std::size_t i) { return a.variance[i]; });
     return planes;

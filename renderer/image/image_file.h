@@ -20,11 +20,10 @@ struct RenderedFrame {
 
 /// Writes by the extension of `path`:
 ///   .exr  linear radiance R, G, B (W m^-2 sr^-1) and beside it, where `aovs` has them, depth.Z and range (m,
-///   infinite
-///         where nothing is hit), normal.X/Y/Z and position.X/Y/Z (world, m), body (index, -1 none), variance; all
-///         32-bit floats. OpenEXR has no doubles, so depth, range and position come with a second channel
-///         that holds what rounding took away (depth.Z.rest, range.rest, position.X.rest ...): their sum is good
-///         to 2^-48, 1e-7 m at the distance of the Moon.
+///         infinite where nothing is hit), normal.X/Y/Z and position.X/Y/Z (world, m), body (index, -1 none),
+///         albedo.R/G/B, variance; all 32-bit floats. OpenEXR has no doubles, so depth, range and position
+///         come with a second channel that holds what rounding took away (depth.Z.rest, range.rest,
+///         position.X.rest ...): their sum is good to 2^-48, 1e-7 m at the distance of the Moon.
 ///   .pfm  linear radiance, little-endian, rows from the bottom
 ///   .png  the camera's own output: GREY 8-bit, Y16 16-bit grey, RGB24 and YUYV 8-bit colour
 ///   .raw  the camera's own output, byte for byte as a video device gets it

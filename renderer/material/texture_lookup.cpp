@@ -1,37 +1,218 @@
 #include "renderer/material/texture_lookup.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <numbers>
 
 namespace narpa {
 namespace {
 
-Rgb texel(const Texture& t, int x, int y) {
-    const std::size_t at =
-        3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(t.width) + static_cast<std::size_t>(x));
-    return Rgb{static_cast<float>(t.rgb[at]), static_cast<float>(t.rgb[at + 1]),
-               static_cast<float>(t.rgb[at + 2])} *
-           (1.0f / 65535.0f);
+constexpr int kMostTaps = 15;
+constexpr float kFullScale = 1.0f / 65535.0f;
+
+struct Image {
+    int width, height;
+    const std::uint16_t* rgb;
+};
+
+inline Image image_of(const Texture& t, std::size_t level) {
+    if (level == 0) return {t.width, t.height, t.rgb.data()};
+    const Texture::Level& l = t.coarser[level - 1];
+    return {l.width, l.height, l.rgb.data()};
 }
 
-int wrap(double i, int n) {
-    const double w = i - n * std::floor(i / n);
-    return std::min(static_cast<int>(w), n - 1);
+struct Edges {
+    bool repeat_u, repeat_v, poles;
+};
+
+Edges edges_of(const Texture& t, TextureLayout layout) {
+    if (layout == TextureLayout::globe) return {true, false, true};
+    const bool repeat = t.wrap == Texture::Wrap::repeat;
+    return {repeat, repeat, false};
+}
+
+inline double into_unit(double x, bool repeat) {
+    if (x >= 0 && x <= 1) return x;
+    return repeat ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
+}
+
+/// The two texels about a place in [0, 1], and how far it is from the first to the second.
+struct Between {
+    int first, second;
+    float part;
+};
+
+inline Between between(double place, int n, bool repeat) {
+    const double x = place * n - 0.5;
+    int first = static_cast<int>(x + 1) - 1, second = first + 1;  // x >= -0.5
+    const float part = static_cast<float>(x - first);
+    if (first < 0) first = repeat ? n - 1 : 0;
+    if (second >= n) second = repeat ? 0 : n - 1;
+    return {first, second, part};
+}
+
+/// Adds two neighbours in a row of texels; 65535 = 1.
+inline void add_pair(const Image& t, const Between& x, int y, float weight, Rgb& sum) {
+    const std::uint16_t* row = t.rgb + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(t.width);
+    const std::uint16_t *const a = row + 3 * x.first, *const b = row + 3 * x.second;
+    const float of_b = weight * x.part, of_a = weight - of_b;
+    sum.x += of_a * static_cast<float>(a[0]) + of_b * static_cast<float>(b[0]);
+    sum.y += of_a * static_cast<float>(a[1]) + of_b * static_cast<float>(b[1]);
+    sum.z += of_a * static_cast<float>(a[2]) + of_b * static_cast<float>(b[2]);
+}
+
+/// `u` and `v` in [0, 1].
+inline void add_bilinear(const Image& t, const Edges& edges, double u, double v, float weight, Rgb& sum) {
+    const Between x = between(u, t.width, edges.repeat_u), y = between(1 - v, t.height, edges.repeat_v);
+    const float of_lower = weight * y.part, of_upper = weight - of_lower;
+    if (edges.poles && y.first == y.second) {  // beyond the outermost row lies the same row, half a turn on
+        const Between opposite = between(u < 0.5 ? u + 0.5 : u - 0.5, t.width, true);
+        add_pair(t, v > 0.5 ? opposite : x, y.first, of_upper, sum);
+        add_pair(t, v > 0.5 ? x : opposite, y.first, of_lower, sum);
+        return;
+    }
+    add_pair(t, x, y.first, of_upper, sum);
+    add_pair(t, x, y.second, of_lower, sum);
+}
+
+/// How a footprint is covered: lookups in a row about its middle, each from two neighbouring levels.
+struct Filter {
+    std::size_t level = 0;
+    float towards_coarser = 0;  ///< weight of the next level
+    float level_texel = 1;      ///< width of what a single lookup stands for, in texels of the finest level
+    int beside = 0;             ///< lookups on either side of the middle one
+    float last_weight = 1;      ///< of the outermost two, where the others count 1
+    double du = 0, dv = 0;      ///< from one to the next
+};
+
+/// A footprint as the ellipse that it is: lengths in texels of the finest level.
+struct Ellipse {
+    double major = 0, minor = 0;      ///< half axes
+    double along_x = 1, along_y = 0;  ///< unit, of the longer one; y up
+};
+
+Ellipse ellipse_of(const Texture& t, const TextureFootprint& f) {
+    const double x1 = static_cast<double>(f.axis1[0]) * t.width, y1 = static_cast<double>(f.axis1[1]) * t.height;
+    const double x2 = static_cast<double>(f.axis2[0]) * t.width, y2 = static_cast<double>(f.axis2[1]) * t.height;
+    // Singular values of the matrix whose columns are the two axes.
+    const double xx = x1 * x1 + x2 * x2, yy = y1 * y1 + y2 * y2, xy = x1 * y1 + x2 * y2;
+    const double half = 0.5 * (xx - yy), q = std::sqrt(half * half + xy * xy);
+    Ellipse e;
+    e.major = std::sqrt(0.5 * (xx + yy) + q);
+    if (!(e.major > 0)) return e;
+    e.minor = std::abs(x1 * y2 - x2 * y1) / e.major;
+    const double ex = half >= 0 ? q + half : xy, ey = half >= 0 ? xy : q - half,
+                 length = std::sqrt(ex * ex + ey * ey);
+    if (length > 0) e.along_x = ex / length, e.along_y = ey / length;
+    return e;
+}
+
+/// The level whose texels are this wide, as a mix of two. Between two levels the weight grows linearly with the
+/// width.
+void choose_level(const Texture& t, float width, Filter& f) {
+    const std::uint32_t bits = std::bit_cast<std::uint32_t>(width);  // width >= 1: 2^level (1 + towards_coarser)
+    f.level_texel = width;
+    f.level = (bits >> 23) - 127;
+    f.towards_coarser = std::bit_cast<float>((bits & 0x7fffffu) | 0x3f800000u) - 1;
+    if (f.level >= t.coarser.size()) f.level = t.coarser.size(), f.towards_coarser = 0;
+}
+
+/// Width of a texel on a globe over its height, at most 1: towards the poles they are narrow, and what a map shows
+/// there does not change from one to the next.
+double narrowness(const Texture& t, float v) {
+    return std::clamp(std::sin(std::numbers::pi * static_cast<double>(v)) * 2 * t.height / t.width, 0.0, 1.0);
+}
+
+Filter filter_for(const Texture& t, const TextureFootprint& footprint, float v, TextureLayout layout) {
+    Filter f;
+    const Ellipse e = ellipse_of(t, footprint);
+    const double length = 2 * e.major;
+    if (length <= 1) return f;
+    if (!std::isfinite(length)) {  // or no number: all of the image
+        f.level = t.coarser.size();
+        return f;
+    }
+    double gap = length / kMostTaps;
+    double width = gap;
+    if (layout == TextureLayout::globe) {
+        // Where texels are narrow, lookups may leave some out before v is blurred too.
+        const double x = e.along_x * narrowness(t, v), y = e.along_y;
+        width *= std::sqrt(x * x + y * y);
+    }
+    width = std::max({1.0, 2 * e.minor, width});
+    gap = std::max(gap, width);
+    choose_level(t, static_cast<float>(std::min(width, 1e9)), f);
+    const double taps = std::max(1.0, length / gap);
+    f.beside = static_cast<int>(std::ceil(0.5 * (taps - 1)));
+    f.last_weight = static_cast<float>(0.5 * (taps - 1) - (f.beside - 1));
+    f.du = gap * e.along_x / t.width, f.dv = gap * e.along_y / t.height;
+    return f;
+}
+
+void add_from_levels(const Texture& t, const Edges& edges, const Filter& f, double u, double v, float weight,
+                     Rgb& sum) {
+    if (edges.poles && !(v >= 0 && v <= 1)) {
+        v -= 2 * std::floor(0.5 * v);  // once around over both poles is 2
+        if (v > 1) v = 2 - v, u += 0.5;
+    }
+    u = into_unit(u, edges.repeat_u), v = into_unit(v, edges.repeat_v);
+    const float of_coarser = weight * f.towards_coarser;
+    add_bilinear(image_of(t, f.level), edges, u, v, weight - of_coarser, sum);
+    if (of_coarser > 0) add_bilinear(image_of(t, f.level + 1), edges, u, v, of_coarser, sum);
+}
+
+Rgb filtered(const Texture& t, const Edges& edges, const Filter& f, double u, double v) {
+    Rgb sum{};
+    add_from_levels(t, edges, f, u, v, 1, sum);
+    float weights = 1;
+    for (int i = 1; i <= f.beside; ++i) {
+        const float weight = i == f.beside ? f.last_weight : 1;
+        add_from_levels(t, edges, f, u + i * f.du, v + i * f.dv, weight, sum);
+        add_from_levels(t, edges, f, u - i * f.du, v - i * f.dv, weight, sum);
+        weights += 2 * weight;
+    }
+    const float scale = kFullScale / weights;  // and rounding makes nothing whiter than white
+    return {std::min(sum.x * scale, 1.0f), std::min(sum.y * scale, 1.0f), std::min(sum.z * scale, 1.0f)};
+}
+
+bool can_look_up(const Texture& t, float u, float v) {
+    return t.width > 0 && t.height > 0 && std::isfinite(u) && std::isfinite(v);
+}
+
+float mean_band(const Rgb& c) {
+    return (c.x + c.y + c.z) * (1.0f / 3);
 }
 
 }  // namespace
 
-Rgb texture_lookup(const Texture& texture, float u, float v) noexcept {
-    if (texture.width <= 0 || texture.height <= 0 || !std::isfinite(u) || !std::isfinite(v)) return {1, 1, 1};
-    const double x = static_cast<double>(u) * texture.width - 0.5;
-    const double y = (1 - static_cast<double>(v)) * texture.height - 0.5;
-    const double x0 = std::floor(x), y0 = std::floor(y);
-    const float fx = static_cast<float>(x - x0), fy = static_cast<float>(y - y0);
-    const int left = wrap(x0, texture.width), right = wrap(x0 + 1, texture.width);
-    const int top = wrap(y0, texture.height), bottom = wrap(y0 + 1, texture.height);
-    const Rgb upper = texel(texture, left, top) * (1 - fx) + texel(texture, right, top) * fx;
-    const Rgb lower = texel(texture, left, bottom) * (1 - fx) + texel(texture, right, bottom) * fx;
-    return upper * (1 - fy) + lower * fy;
+Rgb texture_lookup(const Texture& texture, float u, float v, TextureLayout layout) noexcept {
+    if (!can_look_up(texture, u, v)) return {1, 1, 1};
+    return filtered(texture, edges_of(texture, layout), Filter{}, static_cast<double>(u), static_cast<double>(v));
+}
+
+Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootprint& footprint,
+                   TextureLayout layout) noexcept {
+    if (!can_look_up(texture, u, v)) return {1, 1, 1};
+    return filtered(texture, edges_of(texture, layout), filter_for(texture, footprint, v, layout),
+                    static_cast<double>(u), static_cast<double>(v));
+}
+
+TextureSlope texture_slope(const Texture& texture, float u, float v, const TextureFootprint& footprint,
+                           TextureLayout layout) noexcept {
+    if (!can_look_up(texture, u, v)) return {};
+    const Edges edges = edges_of(texture, layout);
+    const Filter f = filter_for(texture, footprint, v, layout);
+    const double texel = static_cast<double>(f.level_texel), dv = texel / texture.height;
+    double du = texel / texture.width;
+    // On a globe as far over the ground as along v, or rounded heights would be cliffs where texels are narrow.
+    if (layout == TextureLayout::globe) du /= std::max(narrowness(texture, v), 1e-6);
+    const double most_u = std::min(du, 0.25);  // within a texel of a pole less than that: the slope fades away
+    const auto height = [&](double by_u, double by_v) {
+        return mean_band(filtered(texture, edges, f, static_cast<double>(u) + by_u, static_cast<double>(v) + by_v));
+    };
+    return {(height(0.5 * most_u, 0) - height(-0.5 * most_u, 0)) / static_cast<float>(du),
+            (height(0, 0.5 * dv) - height(0, -0.5 * dv)) / static_cast<float>(dv)};
 }
 
 }  // namespace narpa

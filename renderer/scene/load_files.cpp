@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <map>
+#include <set>
+#include <tuple>
 #include <utility>
 
 #include "renderer/scene/mesh_file.h"
@@ -37,13 +41,19 @@ public:
     }
 
     void load_texture(const NamedTexture& named) {
-        const Result<int> texture = texture_index(named.path, {});
-        if (!texture) return r_.problems.add(named.place, "texture: " + texture.error().text());
-        r_.scene.materials[static_cast<std::size_t>(named.material)].texture = *texture;
+        const Result<int> texture = texture_index({.file = named.path}, named.use);
+        if (!texture) return r_.problems.add(named.place, named.key + ": " + texture.error().text());
+        r_.scene.materials[static_cast<std::size_t>(named.material)].*named.slot = *texture;
     }
 
 private:
+    using Colour = TextureUse::Colour;
     using MeshKey = std::pair<std::string, double>;
+    using TextureKey = std::tuple<std::string, Colour, Texture::Wrap>;
+
+    static TextureKey texture_key(const MeshTexture& texture, const TextureUse& use) {
+        return {canonical(texture.file), use.colour, use.wrap};
+    }
 
     /// A line of the mesh file, where it is known, else the scene's.
     void blame(const NamedMesh& named, Error error) {
@@ -66,36 +76,95 @@ private:
         std::map<std::uint16_t, std::uint16_t> scene_material;  // only those that some face has
         for (std::uint16_t& m : mesh.face_material) {
             auto [it, is_new] = scene_material.try_emplace(m);
-            if (is_new) it->second = add_material(file.materials[m]);
+            if (is_new) it->second = add_material(file.materials[m], key.second);
             m = it->second;
         }
         r_.scene.meshes.push_back(std::move(mesh));
         return plain_[key] = static_cast<int>(r_.scene.meshes.size()) - 1;
     }
 
-    std::uint16_t add_material(const MeshMaterial& given) {
-        Material material = given.material;
-        if (!given.texture_file.empty()) {
-            const Result<int> texture = texture_index(given.texture_file, given.texture_bytes);
-            if (texture) {
-                material.texture = *texture;
-            } else {
-                material.diffuse *= 0.5f;
-                warn(texture.error().text() + "; grey 0.5 is used in place of this texture");
-            }
+    /// `scale`: metres per unit of the mesh file.
+    std::uint16_t add_material(const MeshMaterial& given, double scale) {
+        Material m = given.material;
+        if (given.colour.named()) {
+            m.texture =
+                index_or_warn(given.colour, Colour::by_depth, "; grey 0.5 is used in place of this texture");
+            if (m.texture < 0) m.diffuse *= 0.5f;
         }
-        r_.scene.materials.push_back(std::move(material));
+        if (given.emission.named()) {
+            m.emission_texture = index_or_warn(given.emission, Colour::by_depth, "; without it nothing shines");
+            if (m.emission_texture < 0) m.emission = {};
+        }
+        if (given.normal.named())
+            m.normal_texture = index_or_warn(given.normal, Colour::normals, "; normals stay as they are");
+        if (given.bump.named()) add_bump(given, scale, m);
+        r_.scene.materials.push_back(std::move(m));
         return static_cast<std::uint16_t>(r_.scene.materials.size() - 1);
     }
 
-    /// `bytes`: the image itself, where a mesh file holds it; else the file is read.
-    Result<int> texture_index(const std::string& path, const std::vector<std::uint8_t>& bytes) {
-        const std::string key = canonical(path);
-        if (const auto known = textures_.find(key); known != textures_.end()) return known->second;
-        Result<Texture> texture = bytes.empty() ? read_texture(path) : decode_texture(path, bytes);
+    /// MTL has one word for normal maps and for heights: the picture tells which.
+    void add_bump(const MeshMaterial& given, double scale, Material& m) {
+        const Result<int> normals = normal_map_index(given.bump);
+        if (!normals) {
+            warn(normals.error().text() + "; normals stay as they are");
+        } else if (*normals >= 0) {
+            if (m.normal_texture >= 0) return;
+            m.normal_texture = *normals;
+            m.normal_scale = std::clamp(given.bump_multiplier.value_or(1.0f), 0.0f, 100.0f);
+        } else if (!given.bump_multiplier) {
+            warn(given.bump.file + ": heights without a -bm that says how high they are, not used");
+        } else {
+            m.height_texture = index_or_warn(given.bump, Colour::linear, "");
+            m.bump_height_m = static_cast<float>(std::clamp(*given.bump_multiplier * scale, -1e6, 1e6));
+        }
+    }
+
+    /// -1 where the image holds heights.
+    Result<int> normal_map_index(const MeshTexture& bump) {
+        const TextureUse use{.colour = Colour::normals, .wrap = bump.wrap};
+        if (heights_.contains(canonical(bump.file))) return -1;
+        if (const auto known = textures_.find(texture_key(bump, use)); known != textures_.end())
+            return known->second;
+        Result<Texture> texture = read(bump, use);
         if (!texture) return texture.error();
-        r_.scene.textures.push_back(std::move(*texture));
-        return textures_[key] = static_cast<int>(r_.scene.textures.size()) - 1;
+        if (is_normal_map(*texture)) return add_texture(bump, use, std::move(*texture));
+        heights_.insert(canonical(bump.file));
+        return -1;
+    }
+
+    /// A normal map is blue, as most of it points outward, and heights are grey: blue is on average 0.2 above red
+    /// and green.
+    static bool is_normal_map(const Texture& texture) {
+        std::array<double, 3> sum{};
+        for (std::size_t i = 0; i < texture.rgb.size(); ++i) sum[i % 3] += texture.rgb[i];
+        const double white = 65535.0 * static_cast<double>(texture.rgb.size() / 3);
+        return sum[2] - std::max(sum[0], sum[1]) > 0.2 * white;
+    }
+
+    /// -1 where the image cannot be read, which is told with what follows from it.
+    int index_or_warn(const MeshTexture& texture, Colour colour, const char* otherwise) {
+        const Result<int> index = texture_index(texture, {.colour = colour, .wrap = texture.wrap});
+        if (index) return *index;
+        warn(index.error().text() + otherwise);
+        return -1;
+    }
+
+    static Result<Texture> read(const MeshTexture& t, const TextureUse& use) {
+        return t.bytes.empty() ? read_texture(t.file, use) : decode_texture(t.file, t.bytes, use);
+    }
+
+    /// Each image is read once for each use of it.
+    Result<int> texture_index(const MeshTexture& wanted, const TextureUse& use) {
+        if (const auto known = textures_.find(texture_key(wanted, use)); known != textures_.end())
+            return known->second;
+        Result<Texture> texture = read(wanted, use);
+        if (!texture) return texture.error();
+        return add_texture(wanted, use, std::move(*texture));
+    }
+
+    int add_texture(const MeshTexture& wanted, const TextureUse& use, Texture&& texture) {
+        r_.scene.textures.push_back(std::move(texture));
+        return textures_[texture_key(wanted, use)] = static_cast<int>(r_.scene.textures.size()) - 1;
     }
 
     void warn(std::string text) {
@@ -106,7 +175,8 @@ private:
     SceneReading& r_;
     std::map<MeshKey, MeshFile> meshes_;
     std::map<MeshKey, int> plain_;  ///< with the materials of the file
-    std::map<std::string, int> textures_;
+    std::map<TextureKey, int> textures_;
+    std::set<std::string> heights_;  ///< images under MTL's `bump` that are no normal maps
 };
 
 /// A texture laid over a mesh that has no texture coordinates would show one texel.
@@ -115,7 +185,7 @@ void check_coordinates(const NamedTexture& named, SceneReading& r) {
         if (mesh.material != named.material) continue;
         const auto index = static_cast<std::size_t>(std::get<int>(r.scene.bodies[mesh.body].shape));
         if (r.scene.meshes[index].uvs.empty())
-            r.problems.add(named.place, fmt::format("texture: {} has no texture coordinates", mesh.path));
+            r.problems.add(named.place, fmt::format("{}: {} has no texture coordinates", named.key, mesh.path));
     }
 }
 

@@ -1,14 +1,13 @@
-#include <assimp/GltfMaterial.h>
-#include <assimp/material.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <cmath>
 #include <stdexcept>
 
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/mesh_material.h"
+#include "renderer/scene/text_cursor.h"
 #include "renderer/scene/triangle_soup.h"
 #include "renderer/scene/triangulate.h"
 
@@ -26,68 +25,24 @@ namespace narpa {
 
 namespace {
 
-Rgb rgb(const aiColor3D& c) {
-    return {c.r, c.g, c.b};
-}
-
-Rgb colour(const aiMaterial& m, const char* key, unsigned type, unsigned index, const Rgb& otherwise) {
-    aiColor3D c;
-    return m.Get(key, type, index, c) == AI_SUCCESS ? rgb(c) : otherwise;
-}
-
-/// Phong from what MTL, 3DS, PLY and DAE give.
-Material classic_material(const aiMaterial& m) {
-    float exponent = 0;
-    m.Get(AI_MATKEY_SHININESS, exponent);
-    return make_material(m.GetName().C_Str(), colour(m, AI_MATKEY_COLOR_DIFFUSE, {0.5f, 0.5f, 0.5f}),
-                         colour(m, AI_MATKEY_COLOR_SPECULAR, {}), exponent,
-                         colour(m, AI_MATKEY_COLOR_EMISSIVE, {}));
-}
-
-/// glTF's metallic-roughness, told with the two lobes that there are: Lambert of (1 - metallic) base colour, Phong
-/// of metallic base colour and 0.04 of the rest. GGX with roughness r is as wide as Blinn's lobe with 2 / r^4 - 2,
-/// and Phong's lobe, about the mirror direction, is as wide as Blinn's with a quarter of the exponent.
-Material metallic_material(const aiMaterial& m) {
-    aiColor4D base(1, 1, 1, 1);
-    float metallic = 1, roughness = 1;
-    m.Get(AI_MATKEY_BASE_COLOR, base);
-    m.Get(AI_MATKEY_METALLIC_FACTOR, metallic);
-    m.Get(AI_MATKEY_ROUGHNESS_FACTOR, roughness);
-    metallic = std::clamp(metallic, 0.0f, 1.0f);
-    roughness = std::clamp(roughness, 0.05f, 1.0f);
-    const Rgb albedo{base.r, base.g, base.b}, dielectric{0.04f, 0.04f, 0.04f};
-    return make_material(m.GetName().C_Str(), albedo * (1 - metallic),
-                         albedo * metallic + dielectric * (1 - metallic), (2 / std::pow(roughness, 4.0f) - 2) / 4,
-                         colour(m, AI_MATKEY_COLOR_EMISSIVE, {}));
-}
-
-bool is_gltf(const std::string& path) {
-    const std::string extension = extension_of(path);
-    return extension == ".gltf" || extension == ".glb";
-}
-
-/// The image of the diffuse (or base) colour, as a file or as the bytes that the mesh file holds.
-void find_texture(const aiScene& scene, const aiMaterial& m, const std::string& path, MeshMaterial& out) {
-    aiString name;
-    if (m.GetTexture(aiTextureType_BASE_COLOR, 0, &name) != AI_SUCCESS &&
-        m.GetTexture(aiTextureType_DIFFUSE, 0, &name) != AI_SUCCESS)
-        return;
-    if (const aiTexture* inside = scene.GetEmbeddedTexture(name.C_Str())) {
-        const auto* bytes = reinterpret_cast<const std::uint8_t*>(inside->pcData);
-        if (inside->mHeight == 0)
-            out.texture_file = path + name.C_Str(), out.texture_bytes.assign(bytes, bytes + inside->mWidth);
-        return;
-    }
-    out.texture_file = texture_path(path, name.C_Str());
-}
-
-/// Assimp 5.2 looks for the end of a PLY header for ever where there is none.
+/// Assimp 5.2 looks for the end of a PLY header for ever where there is none, and for elements that a header
+/// promises and no file of this size can hold.
 Status check_ply_header(const std::string& path) {
     if (extension_of(path) != ".ply") return Ok{};
     const Result<std::string> bytes = read_file(path);
     if (!bytes) return bytes.error();
-    if (bytes->find("\nend_header\n") == bytes->npos && bytes->find("\nend_header\r") == bytes->npos)
-        return Error{.what = "no \"end_header\" line, expected a PLY header", .file = path};
+    const std::size_t end = std::min(bytes->find("\nend_header\n"), bytes->find("\nend_header\r"));
+    if (end == bytes->npos) return Error{.what = "no \"end_header\" line, expected a PLY header", .file = path};
+    TextCursor header(bytes->substr(0, end), path);
+    while (header.next_line()) {
+        if (header.token() != "element") continue;
+        header.token();  // its name
+        const std::string_view count = header.token();
+        const std::optional<double> number = number_from(count);
+        if (!number || !(*number >= 0 && *number <= static_cast<double>(bytes->size())))
+            return header.error(count,
+                                fmt::format("\"{}\" is not a number of elements that this file can hold", count));
+    }
     return Ok{};
 }
 
@@ -100,15 +55,10 @@ public:
             return Error{
                 .what = fmt::format("{} materials, at most {} can be used", scene_.mNumMaterials, kMaxMaterials),
                 .file = path_};
-        const bool gltf = is_gltf(path_);
-        for (unsigned i = 0; i < scene_.mNumMaterials; ++i) {
-            const aiMaterial& m = *scene_.mMaterials[i];
-            MeshMaterial& out = soup_.materials.emplace_back();
-            out.material = gltf ? metallic_material(m) : classic_material(m);
-            find_texture(scene_, m, path_, out);
-        }
+        for (unsigned i = 0; i < scene_.mNumMaterials; ++i)
+            soup_.materials.push_back(from_assimp(scene_, *scene_.mMaterials[i], path_, soup_.warnings));
         if (soup_.materials.empty()) soup_.materials.emplace_back();  // grey 0.5
-        if (gltf) warn_of_lost_textures();
+        warn_of_lost_textures();
         if (scene_.mRootNode) read_node(*scene_.mRootNode, aiMatrix4x4t<double>());
         if (!problem_.empty()) return Error{.what = problem_, .file = path_};
         return std::move(soup_);
@@ -117,6 +67,7 @@ public:
 private:
     /// Assimp 5.2 passes over this extension and the textures with it, in silence.
     void warn_of_lost_textures() {
+        if (const std::string kind = extension_of(path_); kind != ".gltf" && kind != ".glb") return;
         const Result<std::string> bytes = read_file(path_);
         if (bytes && bytes->find("\"EXT_texture_webp\"") != std::string::npos)
             soup_.warnings.push_back(path_ + ": its textures (EXT_texture_webp) cannot be read and are not used");

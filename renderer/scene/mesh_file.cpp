@@ -162,14 +162,14 @@ void take_textures_off_bare_triangles(TriangleSoup& soup, const std::string& pat
     for (TriangleSoup::Triangle& t : soup.triangles) {
         const bool has_uvs = std::all_of(t.corners.begin(), t.corners.end(),
                                          [](const auto& c) { return c.uv != TriangleSoup::kNone; });
-        if (has_uvs || soup.materials[t.material].texture_file.empty()) continue;
+        if (has_uvs || !soup.materials[t.material].has_textures()) continue;
         std::size_t& without = bare[t.material];
         if (without == 0) {
             if (soup.materials.size() >= kMaxMaterials) return;
             without = soup.materials.size();
             soup.warnings.push_back(
                 fmt::format("{}: triangles of material \"{}\" have no texture coordinates; its "
-                            "texture is not used on them",
+                            "textures are not used on them",
                             path, soup.materials[t.material].material.name));
             soup.materials.push_back({.material = soup.materials[t.material].material});
         }
@@ -205,24 +205,6 @@ std::string texture_path(const std::string& mesh_path, std::string name) {
     std::error_code problem;
     const bool other = !std::filesystem::exists(as_written, problem) && std::filesystem::exists(beside, problem);
     return (other ? beside : as_written).string();
-}
-
-Material make_material(std::string name, Rgb kd, Rgb ks, float exponent, Rgb emission) {
-    float most = 1;
-    for (int b = 0; b < 3; ++b) {
-        const auto clamped = [](float x, float high) { return x > 0 ? std::min(x, high) : 0.0f; };  // NaN is 0
-        kd[b] = clamped(kd[b], 1);
-        ks[b] = clamped(ks[b], 1);
-        emission[b] = clamped(emission[b], 1e30f);
-        most = std::max(most, kd[b] + ks[b]);
-    }
-    const bool phong = ks.x > 0 || ks.y > 0 || ks.z > 0;
-    Material m{.name = std::move(name), .kind = phong ? Material::Kind::phong : Material::Kind::lambert};
-    m.diffuse = kd / most;
-    m.specular = ks / most;
-    m.exponent = exponent > 0 ? std::min(exponent, 1e4f) : 0.0f;
-    m.emission = emission;
-    return m;
 }
 
 Result<MeshFile> read_mesh(const std::string& path, double scale) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,11 +12,24 @@
 
 namespace narpa {
 
-/// A material as a mesh file gives it: its texture is named, not read.
+/// An image that a mesh file's material names: not read yet.
+struct MeshTexture {
+    std::string file{};                 ///< full path, or a name for what the mesh file holds itself; empty: none
+    std::vector<std::uint8_t> bytes{};  ///< the encoded image, where the mesh file holds it
+    Texture::Wrap wrap = Texture::Wrap::repeat;
+
+    [[nodiscard]] bool named() const { return !file.empty(); }
+};
+
+/// A material as a mesh file gives it.
 struct MeshMaterial {
     Material material;
-    std::string texture_file{};                 ///< full path; empty: none, or held in the file itself
-    std::vector<std::uint8_t> texture_bytes{};  ///< an encoded image that the mesh file holds
+    MeshTexture colour{}, emission{}, normal{};
+    MeshTexture bump{};                      ///< MTL's: a normal map or a height map, as its picture tells
+    std::optional<float> bump_multiplier{};  ///< MTL's -bm
+    [[nodiscard]] bool has_textures() const {
+        return colour.named() || emission.named() || normal.named() || bump.named();
+    }
 };
 
 /// One mesh file in the body's frame.

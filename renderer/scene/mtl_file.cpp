@@ -1,6 +1,10 @@
 #include <fmt/format.h>
 
+#include <cmath>
+#include <set>
+
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/mesh_material.h"
 #include "renderer/scene/obj_file.h"
 #include "renderer/scene/text_cursor.h"
 
@@ -19,25 +23,22 @@ public:
             if (!read_line()) return *error_;
         finish();
         tell(transparent_, "transparent (d, Tr), drawn opaque");
-        tell(with_options_, "options of map_Kd passed over");
-        tell(spectral_, "spectral or xyz colours passed over");
+        tell(with_options_, "options of maps passed over, all but -clamp and -bm");
+        tell_unused_maps();
         return Ok{};
     }
 
 private:
-    /// The material that is being read; what the file leaves out is absent.
-    struct Given {
-        std::string name{}, map_kd{};
-        std::optional<Rgb> kd{};
-        Rgb ks{}, ke{};
-        float ns = 0;
-        bool transparent = false;
-    };
-
     void tell(int materials, std::string_view what) {
         if (materials > 0)
             warnings_.push_back(
                 fmt::format("{}: {} material{}: {}", path_, materials, materials > 1 ? "s" : "", what));
+    }
+
+    void tell_unused_maps() {
+        std::string all;
+        for (const std::string& keyword : unused_maps_) all += (all.empty() ? "" : ", ") + keyword;
+        if (!all.empty()) warnings_.push_back(fmt::format("{}: maps that are not used: {}", path_, all));
     }
 
     bool fail(std::string_view token, std::string what) {
@@ -49,16 +50,36 @@ private:
         const std::string_view keyword = in_.token();
         if (keyword == "newmtl") {
             finish();
-            given_ = Given{.name = std::string(in_.rest())};
+            given_ = MtlMaterial{.name = std::string(in_.rest())};
             return true;
         }
-        if (!given_) return true;
-        if (keyword == "Kd") return read_rgb(given_->kd.emplace());
-        if (keyword == "Ks") return read_rgb(given_->ks);
-        if (keyword == "Ke") return read_rgb(given_->ke);
-        if (keyword == "Ns") return read_float(given_->ns);
-        if (keyword == "map_Kd") return read_map();
-        if (keyword == "d" || keyword == "Tr") return read_opacity(keyword == "Tr");
+        return !given_ || read_statement(keyword, *given_);
+    }
+
+    bool read_statement(std::string_view keyword, MtlMaterial& m) {
+        if (keyword == "Kd") return read_rgb(m.kd.emplace());
+        if (keyword == "Ks") return read_rgb(m.ks);
+        if (keyword == "Ke") return read_rgb(m.ke.emplace());
+        if (keyword == "Ns") return read_float(m.ns);
+        if (keyword == "Ni") return read_float(m.ni.emplace());
+        if (keyword == "Pr") return read_float(m.pr.emplace());
+        if (keyword == "Pm") return read_float(m.pm.emplace());
+        if (keyword == "d") return read_opacity(m.d.emplace());
+        if (keyword == "Tr") return read_opacity(m.tr.emplace());
+        if (keyword == "illum") return read_illumination(m.illum);
+        if (keyword == "map_Kd") return read_map(m.map_kd);
+        if (keyword == "map_Ke") return read_map(m.map_ke);
+        if (keyword == "norm") return read_map(m.norm);
+        if (keyword == "bump" || keyword == "map_bump" || keyword == "map_Bump") return read_map(m.bump);
+        if (keyword.starts_with("map_") || keyword == "disp" || keyword == "decal" || keyword == "refl")
+            unused_maps_.emplace(keyword);
+        return true;
+    }
+
+    bool read_illumination(int& illum) {
+        float number = 0;
+        if (!read_float(number)) return false;
+        illum = number >= 0 && number <= 10 ? static_cast<int>(number) : 2;
         return true;
     }
 
@@ -89,53 +110,63 @@ private:
         return read_float(c.z);
     }
 
-    bool read_opacity(bool is_transparency) {
+    bool read_opacity(float& x) {
         std::string_view token = in_.token();
         if (token == "-halo") token = in_.token();
-        const std::optional<double> x = number_from(token);
-        if (!x) return fail(token, fmt::format("\"{}\" is not a number", token));
-        given_->transparent = is_transparency ? *x > 0 : *x < 1;
+        const std::optional<double> number = number_from(token);
+        if (!number) return fail(token, fmt::format("\"{}\" is not a number", token));
+        x = static_cast<float>(*number);
         return true;
     }
 
     /// `map_Kd [-option arguments]... file name`; the name may hold spaces.
-    bool read_map() {
-        std::string_view name = in_.rest();
-        if (name.starts_with('-')) ++with_options_;
-        while (name.starts_with('-')) name.remove_prefix(option_length(name));
-        given_->map_kd = name;
+    bool read_map(MeshTexture& map) {
+        std::string_view left = in_.rest();
+        bool with_others = false;
+        while (left.starts_with('-')) {
+            const std::string_view option = take_word(left);
+            if (option == "-clamp") {
+                map.wrap = take_word(left) == "on" ? Texture::Wrap::clamp : Texture::Wrap::repeat;
+            } else if (option == "-bm") {
+                const std::string_view word = take_word(left);
+                const std::optional<double> number = number_from(word);
+                if (!number || !std::isfinite(*number))
+                    return fail(word, fmt::format("\"{}\" is not a finite number", word));
+                given_->bump_multiplier = static_cast<float>(*number);
+            } else {
+                take_arguments(option, left);
+                with_others = true;
+            }
+        }
+        with_options_ += with_others;
+        if (!left.empty()) map.file = texture_path(path_, std::string(left));
         return true;
     }
 
-    /// Characters of one option, its arguments and the spaces after them.
-    static std::size_t option_length(std::string_view text) {
-        const auto word_end = [text](std::size_t from) {
-            const std::size_t end = std::min(text.find_first_of(" \t", from), text.size());
-            return std::min(text.find_first_not_of(" \t", end), text.size());
-        };
-        const auto word = [text](std::size_t from) {
-            return text.substr(from, std::min(text.find_first_of(" \t", from), text.size()) - from);
-        };
-        std::size_t at = word_end(0);
-        const std::string_view option = word(0);
-        const bool up_to_three = option == "-o" || option == "-s" || option == "-t";
-        const int most = up_to_three ? 3 : option == "-mm" ? 2 : 1;
-        for (int i = 0; i < most && at < text.size(); ++i) {
-            if (up_to_three && i > 0 && !number_from(word(at))) break;
-            at = word_end(at);
-        }
-        return at;
+    /// The first word, and `text` without it and the spaces after it.
+    static std::string_view take_word(std::string_view& text) {
+        const std::string_view word = text.substr(0, text.find_first_of(" \t"));
+        text.remove_prefix(word.size());
+        text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+        return word;
     }
 
-    /// Hands on the material that ends here. Without a Kd: 1 under a map, else grey 0.5.
+    static void take_arguments(std::string_view option, std::string_view& text) {
+        const bool up_to_three = option == "-o" || option == "-s" || option == "-t";
+        const int most = up_to_three ? 3 : option == "-mm" ? 2 : 1;
+        for (int i = 0; i < most; ++i) {
+            std::string_view after = text;
+            const std::string_view word = take_word(after);
+            if (up_to_three && i > 0 && !number_from(word)) return;
+            text = after;
+        }
+    }
+
+    /// Hands on the material that ends here.
     void finish() {
         if (!given_) return;
-        const float otherwise = given_->map_kd.empty() ? 0.5f : 1.0f;
-        MeshMaterial m;
-        m.material = make_material(given_->name, given_->kd.value_or(Rgb{otherwise, otherwise, otherwise}),
-                                   given_->ks, given_->ns, given_->ke);
-        if (!given_->map_kd.empty()) m.texture_file = texture_path(path_, given_->map_kd);
-        if (given_->transparent) ++transparent_;
+        MeshMaterial m = from_mtl(*given_);
+        if (given_->transparent() && m.material.kind != Material::Kind::dielectric) ++transparent_;
         materials_.insert_or_assign(given_->name, std::move(m));
         given_.reset();
     }
@@ -144,9 +175,10 @@ private:
     const std::string& path_;
     std::map<std::string, MeshMaterial>& materials_;
     std::vector<std::string>& warnings_;
-    std::optional<Given> given_;
+    std::optional<MtlMaterial> given_;
     std::optional<Error> error_;
-    int transparent_ = 0, with_options_ = 0, spectral_ = 0;
+    int transparent_ = 0, with_options_ = 0;
+    std::set<std::string> unused_maps_;
 };
 
 }  // namespace

@@ -1,8 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -12,76 +9,61 @@ namespace {
 /// DESIGN of the CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
 constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
 
-void check_energy(TableReader& table, const Material& m) {
-    for (int b = 0; b < 3; ++b)
-        if (m.diffuse[b] + m.specular[b] > 1.0f + 1e-6f) {
-            table.fail("specular", fmt::format("albedo + specular is {} in band {}, expected at most 1: a surface "
-                                               "cannot send back more than it gets",
-                                               m.diffuse[b] + m.specular[b], b));
-            return;
-        }
+constexpr Range kLength{.low = 0, .high = 1e15, .low_open = true};
+
+Sphere read_sphere(TableReader& table, int material) {
+    Sphere sphere{.material = material};
+    table.require("radius_m", "a number > 0");
+    sphere.radius_m = table.number("radius_m", kLength).value_or(sphere.radius_m);
+    table.finish();
+    return sphere;
 }
 
-/// `material = {...}` of a body; its index, or nullopt where there is none.
-std::optional<int> read_material(TableReader& body, const std::string& name, SceneReading& reading) {
-    using enum Material::Kind;
-    static constexpr std::array<std::pair<std::string_view, Material::Kind>, 2> kKinds{
-        {{"lambert", lambert}, {"phong", phong}}};
-    auto table = body.table("material");
-    if (!table) return std::nullopt;
-    Material m;
-    m.name = name;
-    m.kind = table->choice<Material::Kind>("kind", kKinds).value_or(lambert);
-    m.diffuse = table->rgb("albedo", kUnit).value_or(m.diffuse);
-    m.specular = table->rgb("specular", kUnit).value_or(Rgb{});
-    m.exponent = static_cast<float>(table->number("exponent", {.low = 0, .high = 1e4}).value_or(1));
-    m.emission = table->rgb("emission", {.low = 0, .high = 1e30}).value_or(Rgb{});
-    if (m.kind == phong) {
-        table->require("specular", "a number or [r, g, b] in [0, 1], as the kind is \"phong\"");
-        table->require("exponent", "a number in [0, 10000], as the kind is \"phong\"");
-        check_energy(*table, m);
-    } else {
-        for (const char* key : {"specular", "exponent"})
-            if (table->has(key)) table->fail(key, "belongs to kind = \"phong\", and this is \"lambert\"");
+Ellipsoid read_ellipsoid(TableReader& table, int material) {
+    Ellipsoid ellipsoid{.material = material};
+    table.require("semi_axes_m", "[a, b, c], the half lengths along the body's x, y and z");
+    ellipsoid.semi_axes_m = table.vec3("semi_axes_m", kLength).value_or(ellipsoid.semi_axes_m);
+    table.finish();
+    return ellipsoid;
+}
+
+NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<int> material,
+                     const SceneReading& reading) {
+    if (file.empty()) table.fail("mesh", "expected the name of a mesh file");
+    return {.body = reading.scene.bodies.size(),
+            .path = (reading.folder / file).string(),
+            .scale = table.number("scale", {.low = 0, .high = 1e12, .low_open = true}).value_or(1),
+            .material = material,
+            .place = table.place("mesh")};
+}
+
+/// Notes a problem unless the body has exactly one shape.
+void check_one_shape(TableReader& table) {
+    const char* first = nullptr;
+    for (const char* key : {"mesh", "sphere", "ellipsoid", "dem"}) {
+        if (!table.has(key)) continue;
+        if (first) table.fail(key, fmt::format("this body has a {} already, expected one of the two", first));
+        if (!first) first = key;
     }
-    const int index = static_cast<int>(reading.scene.materials.size());
-    if (const auto file = table->text("texture"))
-        reading.textures.push_back({index, (reading.folder / *file).string(), table->place("texture")});
-    table->finish();
-    reading.scene.materials.push_back(std::move(m));
-    return index;
-}
-
-int grey_material(const std::string& name, Scene& scene) {
-    scene.materials.push_back({.name = name});
-    return static_cast<int>(scene.materials.size()) - 1;
+    if (!first)
+        table.require("mesh",
+                      "mesh = \"FILE\" or sphere = {radius_m = ...} or ellipsoid = {semi_axes_m = [a, b, c]}");
 }
 
 void read_shape(TableReader& table, Body& body, SceneReading& reading) {
-    const std::optional<int> material = read_material(table, body.name, reading);
+    const std::optional<int> own = read_material(table, body.name, reading);
+    const auto material = [&] { return own ? *own : add_grey_material(body.name, reading.scene); };
     const auto mesh = table.text("mesh");
-    auto sphere = table.table("sphere");
-    const auto scale = table.number("scale", {.low = 0, .high = 1e12, .low_open = true});
-    table.not_in_this_version("ellipsoid", "give a sphere or a mesh");
+    auto sphere = table.table("sphere"), ellipsoid = table.table("ellipsoid");
     table.not_in_this_version("dem", "give a mesh");
-    if (table.has("mesh") && table.has("sphere")) {
-        table.fail("sphere", "this body has a mesh already, expected one of the two");
-    } else if (!table.has("mesh") && !table.has("sphere") && !table.has("ellipsoid") && !table.has("dem")) {
-        table.require("mesh", "mesh = \"FILE\" or sphere = {radius_m = ...}");
-    }
-    if (sphere) {
-        sphere->require("radius_m", "a number > 0");
-        const double radius_m = sphere->number("radius_m", {.low = 0, .high = 1e15, .low_open = true}).value_or(1);
-        sphere->finish();
-        if (scale) table.fail("scale", "belongs to a mesh; a sphere has its radius_m");
-        body.shape = Sphere{radius_m, material ? *material : grey_material(body.name, reading.scene)};
-    } else if (mesh) {
-        if (mesh->empty()) table.fail("mesh", "expected the name of a mesh file");
-        reading.meshes.push_back({.body = reading.scene.bodies.size(),
-                                  .path = (reading.folder / *mesh).string(),
-                                  .scale = scale.value_or(1),
-                                  .material = material,
-                                  .place = table.place("mesh")});
+    check_one_shape(table);
+    if (!table.has("mesh")) table.refuse("scale", "belongs to a mesh; other shapes have their size in metres");
+    if (mesh) {
+        reading.meshes.push_back(named_mesh(table, *mesh, own, reading));
+    } else if (sphere) {
+        body.shape = read_sphere(*sphere, material());
+    } else if (ellipsoid) {
+        body.shape = read_ellipsoid(*ellipsoid, material());
     }
 }
 

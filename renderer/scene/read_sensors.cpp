@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "renderer/scene/read_mounting.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -11,63 +12,6 @@ namespace narpa {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-
-/// Where a sensor sits: on a body or in the world.
-struct Mounting {
-    int mount = -1;
-    Rigid3 T_mount_sensor{};
-};
-
-int read_mount(TableReader& table, const std::vector<Body>& bodies) {
-    const auto name = table.text("mount");
-    if (!name) return -1;
-    std::string all;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        if (bodies[i].name == *name) return static_cast<int>(i);
-        all += (all.empty() ? "\"" : ", \"") + bodies[i].name + "\"";
-    }
-    table.fail("mount",
-               fmt::format("there is no body \"{}\", expected one of {}", *name, all.empty() ? "none" : all));
-    return -1;
-}
-
-/// The sensor's attitude that looks along `forward`, its picture upright with respect to `up`.
-Quat camera_attitude(const Vec3& forward, const Vec3& right) {
-    return quat_from_columns(right, cross(forward, right), forward);  // x right, y down, z forward
-}
-Quat lidar_attitude(const Vec3& forward, const Vec3& right) {
-    return quat_from_columns(right, forward, cross(right, forward));  // x right, y forward, z up
-}
-
-template <class AttitudeOf>
-void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
-    const auto target = table.vec3("look_at");
-    const Vec3 up = table.vec3("up").value_or(Vec3{0, 0, 1});
-    if (!table.has("look_at")) {
-        if (table.has("up")) table.fail("up", "belongs to look_at, which is not here");
-        return;
-    }
-    if (table.has("attitude_wxyz")) table.fail("look_at", "there is an attitude_wxyz too, expected one of the two");
-    if (!target) return;
-    const Vec3 line = *target - T.t;
-    if (!(norm(line) > 1e-9) || !std::isfinite(norm(line)))
-        return table.fail("look_at", "is where the sensor is, expected another point");
-    const Vec3 right = cross(normalized(line), up);
-    if (!(norm(right) > 1e-6 * norm(up)) || !std::isfinite(norm(right)))
-        return table.fail("look_at",
-                          fmt::format("lies along up = [{}, {}, {}], expected another \"up\"", up.x, up.y, up.z));
-    T.q = attitude_of(normalized(line), normalized(right));
-}
-
-template <class AttitudeOf>
-Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of) {
-    Mounting m;
-    m.mount = read_mount(table, bodies);
-    m.T_mount_sensor.t = table.vec3("position_m").value_or(Vec3{});
-    m.T_mount_sensor.q = table.attitude("attitude_wxyz").value_or(Quat{});
-    read_look_at(table, m.T_mount_sensor, attitude_of);
-    return m;
-}
 
 void read_resolution(TableReader& table, Camera& camera) {
     constexpr int kMostPixels = 16384;
@@ -104,7 +48,6 @@ void read_projection(TableReader& table, Camera& camera) {
         camera.fx = camera.fy = 0.5 * std::hypot(camera.width, camera.height) / std::tan(*diagonal * kPi / 360.0);
     if (horizontal) camera.fx = camera.fy = 0.5 * camera.width / std::tan(*horizontal * kPi / 360.0);
     table.not_in_this_version("distortion", "the projection is a pinhole so far");
-    table.not_in_this_version("lens", "the projection is a pinhole so far");
 }
 
 std::int64_t read_period_ns(TableReader& table, std::int64_t otherwise) {
@@ -155,6 +98,35 @@ std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_n
     return d;
 }
 
+/// Thin lens, by the diameter of its aperture or by focal length and f-number.
+std::optional<Lens> read_lens(TableReader& camera) {
+    auto table = camera.table("lens");
+    if (!table) return std::nullopt;
+    Lens lens;
+    const auto diameter = table->number("aperture_diameter_m", kPositive);
+    const auto focal_length = table->number("focal_length_m", kPositive),
+               f_number = table->number("f_number", kPositive);
+    if (table->has("aperture_diameter_m")) {
+        for (const char* key : {"focal_length_m", "f_number"})
+            table->refuse(key, "there is an aperture_diameter_m already, expected one of the two");
+    } else if (!table->has("focal_length_m") && !table->has("f_number")) {
+        table->require("aperture_diameter_m", "a number > 0, or focal_length_m and f_number");
+    } else {
+        table->require("focal_length_m", "a number > 0, as there is an f_number");
+        table->require("f_number", "a number > 0, as there is a focal_length_m");
+    }
+    if (diameter) lens.aperture_diameter_m = *diameter;
+    if (focal_length && f_number) lens.aperture_diameter_m = *focal_length / *f_number;
+    table->require("focus_distance_m", "a number > 0, or inf");
+    lens.focus_distance_m =
+        table->number("focus_distance_m", {.low = 0, .low_open = true, .infinite = true}).value_or(1);
+    if (focal_length && table->has("focus_distance_m") && lens.focus_distance_m <= *focal_length)
+        table->fail("focus_distance_m", fmt::format("got {}, expected more than the focal length of {} m",
+                                                    lens.focus_distance_m, *focal_length));
+    table->finish();
+    return lens;
+}
+
 /// What an ideal sensor maps to full scale: a white Lambert surface that faces the Sun, or the brightest band of
 /// the ambient light where there is no Sun. 0: neither is there.
 double white_radiance(const Scene& scene) {
@@ -167,7 +139,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, camera_attitude);
     camera.mount = mounting.mount;
-    camera.T_mount_camera = mounting.T_mount_sensor;
+    camera.T_mount_camera = mounting.T_mount_thing;
     read_resolution(table, camera);
     read_projection(table, camera);
     camera.period_ns = read_period_ns(table, camera.period_ns);
@@ -177,6 +149,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
         table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");
     camera.late = read_late_policy(table);
     camera.detector = read_detector(table, camera.period_ns);
+    camera.lens = read_lens(table);
     camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
     if (!camera.detector && !(camera.white_radiance > 0))
         table.require("white_radiance", "a number > 0, as there is neither [sun] nor [ambient] to take it from");
@@ -191,7 +164,7 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
     lidar.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
     lidar.mount = mounting.mount;
-    lidar.T_mount_lidar = mounting.T_mount_sensor;
+    lidar.T_mount_lidar = mounting.T_mount_thing;
     table.require("model", "\"VLP-16\"");
     lidar.model = table.choice<std::string_view>("model", kModels).value_or("VLP-16");
     lidar.rate_hz = table.number("rate_hz", {.low = 5, .high = 20}).value_or(lidar.rate_hz);

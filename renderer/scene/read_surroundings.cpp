@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "renderer/scene/kind_names.h"
 #include "renderer/scene/scene_parts.h"
 #include "renderer/scene/sun_direction.h"
 
@@ -104,9 +105,10 @@ void read_render(TableReader& root, Scene& scene) {
     auto table = root.table("render");
     if (!table) return;
     RenderSettings& render = scene.render;
-    if (table->text("method").value_or("direct") != "direct")
-        table->fail("method", "expected \"direct\": only direct light exists in this version of narpa");
-    table->not_in_this_version("max_depth", "only direct light exists so far, which has no bounces");
+    render.method = table->choice<RenderSettings::Method>("method", kMethods).value_or(render.method);
+    if (render.method == RenderSettings::Method::direct)
+        table->refuse("max_depth", "belongs to method = \"path\", and this is \"direct\"");
+    render.max_depth = static_cast<int>(table->integer("max_depth", 1, 40).value_or(render.max_depth));
     table->not_in_this_version("budget_ms", "give spp");
     table->not_in_this_version("budget_rays", "give spp");
     render.spp = static_cast<int>(table->integer("spp", 1, 65535).value_or(render.spp));

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/kind_names.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -19,11 +20,25 @@ bool allowed_in_name(char c) {
 void read_root(TableReader& root, SceneReading& reading) {
     read_surroundings(root, reading);
     read_bodies(root, reading);
+    read_lights(root, reading);
     read_sensors(root, reading);
     root.not_in_this_version("atmosphere", "leave [atmosphere] out: scenes are in vacuum so far");
-    root.not_in_this_version("light", "leave [[light]] out: light comes from [sun], [ambient] and emission so far");
     root.finish();
     if (reading.problems.none()) load_named_files(reading);
+}
+
+/// Direct light is sampled towards its sources, and a mirror or a pane of glass sends on only what comes from one
+/// direction.
+void warn_of_dark_materials(Scene& scene) {
+    if (scene.render.method != RenderSettings::Method::direct) return;
+    std::string names;
+    for (const Material& m : scene.materials)
+        if (m.kind == Material::Kind::mirror || m.kind == Material::Kind::dielectric)
+            names +=
+                fmt::format("{}\"{}\" ({})", names.empty() ? "" : ", ", m.name, name_of(m.kind, kMaterialKinds));
+    if (!names.empty())
+        scene.warnings.push_back(
+            fmt::format("black in direct light: {}; method = \"path\" in [render] shows them", names));
 }
 
 Result<Scene> read_text(const std::string& path, const std::string& text) {
@@ -38,6 +53,7 @@ Result<Scene> read_text(const std::string& path, const std::string& text) {
         reading.problems.add(e.source(), std::string(e.description()));
     }
     if (!reading.problems.none()) return reading.problems.first();
+    warn_of_dark_materials(reading.scene);
     return std::move(reading.scene);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "renderer/scene/scene.h"
+#include "renderer/scene/texture_file.h"
 #include "renderer/scene/toml_reader.h"
 
 namespace narpa {
@@ -23,7 +24,10 @@ struct NamedMesh {
 /// A texture that a `material` table names.
 struct NamedTexture {
     int material = 0;
+    int Material::*slot = &Material::texture;  ///< where its index goes
+    std::string key;                           ///< "texture", "normal_texture" ...
     std::string path;
+    TextureUse use{};
     toml::source_region place;
 };
 
@@ -40,10 +44,17 @@ struct SceneReading {
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [[body]], without opening any mesh.
 void read_bodies(TableReader& root, SceneReading& reading);
+/// [[light]]; bodies come first.
+void read_lights(TableReader& root, SceneReading& reading);
 /// [[camera]] and [[lidar]]; bodies and surroundings come first.
 void read_sensors(TableReader& root, SceneReading& reading);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);
+
+/// `material = {...}` of a body, added to the scene: its index, or nullopt where there is none.
+std::optional<int> read_material(TableReader& body, const std::string& name, SceneReading& reading);
+/// The material of a shape for which the scene names none; its index.
+int add_grey_material(const std::string& name, Scene& scene);
 
 /// `name`: 1 to 64 of letters, digits, '_', '-', '.'; used by no other table of its kind (`taken`).
 std::string read_name(TableReader& table, std::vector<std::string>& taken);

@@ -1,10 +1,15 @@
 target_sources(narpa_renderer PRIVATE
+    scene/assimp_material.cpp
     scene/load_files.cpp
     scene/mesh_assimp.cpp
     scene/mesh_file.cpp
+    scene/mesh_material.cpp
     scene/mtl_file.cpp
     scene/obj_file.cpp
     scene/read_bodies.cpp
+    scene/read_lights.cpp
+    scene/read_materials.cpp
+    scene/read_mounting.cpp
     scene/read_sensors.cpp
     scene/read_surroundings.cpp
     scene/scene_file.cpp

@@ -1,57 +1,90 @@
 #include "renderer/scene/texture_file.h"
 
-#include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <vector>
 
+#include "renderer/material/texture_lookup.h"
 #include "renderer/scene/file_bytes.h"
 
 namespace narpa {
-
 namespace {
 
-/// sRGB code value -> linear, 65535 = 1.0.
-std::array<std::uint16_t, 256> linear_from_srgb() {
-    std::array<std::uint16_t, 256> table{};
-    for (std::size_t i = 0; i < table.size(); ++i) {
-        const double s = static_cast<double>(i) / 255.0;
-        const double linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
-        table[i] = static_cast<std::uint16_t>(std::lround(65535.0 * linear));
-    }
+using Colour = TextureUse::Colour;
+
+/// Code of `count` -> linear, 65535 = 1.0.
+using Table = std::vector<std::uint16_t>;
+
+template <class Curve>
+Table table_of(int count, Curve linear) {
+    Table table;
+    for (int code = 0; code < count; ++code)
+        table.push_back(static_cast<std::uint16_t>(std::lround(65535.0 * linear(code / (count - 1.0)))));
     return table;
 }
 
+/// IEC 61966-2-1.
+double linear_from_srgb(double s) {
+    return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+}
+
+double from_middle_at_128(double s) {
+    const double code = 255 * s;
+    return code <= 128 ? code / 256 : 0.5 + (code - 128) / 254;
+}
+
+/// Every code of these bits to linear light, made once.
+const Table& table_for(int bits, Colour colour) {
+    const int count = 1 << bits;
+    if (colour == Colour::srgb || (colour == Colour::by_depth && bits == 8)) {
+        static const Table eight = table_of(1 << 8, linear_from_srgb);
+        if (bits == 8) return eight;
+        static const Table sixteen = table_of(1 << 16, linear_from_srgb);
+        return sixteen;
+    }
+    if (colour == Colour::normals && bits == 8) {
+        static const Table normals = table_of(count, from_middle_at_128);
+        return normals;
+    }
+    const auto same = [](double s) { return s; };
+    static const Table eight = table_of(1 << 8, same);
+    if (bits == 8) return eight;
+    static const Table sixteen = table_of(1 << 16, same);
+    return sixteen;
+}
+
 /// OpenCV keeps blue first.
-template <class Sample, class Convert>
-void copy_rgb(const cv::Mat& bgr, std::uint16_t* out, Convert convert) {
+template <class Sample>
+void copy_rgb(const cv::Mat& bgr, const Table& linear, std::uint16_t* out) {
     for (int y = 0; y < bgr.rows; ++y) {
         const Sample* in = bgr.ptr<Sample>(y);
         for (int x = 0; x < bgr.cols; ++x, in += 3, out += 3) {
-            out[0] = convert(in[2]);
-            out[1] = convert(in[1]);
-            out[2] = convert(in[0]);
+            out[0] = linear[in[2]];
+            out[1] = linear[in[1]];
+            out[2] = linear[in[0]];
         }
     }
 }
 
-Result<Texture> from_image(const std::string& name, const cv::Mat& bgr) {
-    Texture texture{.name = name, .width = bgr.cols, .height = bgr.rows, .rgb = {}};
+Result<Texture> from_image(const std::string& name, const cv::Mat& bgr, const TextureUse& use) {
+    Texture texture{.name = name, .width = bgr.cols, .height = bgr.rows, .rgb = {}, .wrap = use.wrap};
     texture.rgb.resize(3 * bgr.total());
     if (bgr.type() == CV_8UC3) {
-        static const std::array<std::uint16_t, 256> linear = linear_from_srgb();
-        copy_rgb<std::uint8_t>(bgr, texture.rgb.data(), [](std::uint8_t s) { return linear[s]; });
+        copy_rgb<std::uint8_t>(bgr, table_for(8, use.colour), texture.rgb.data());
     } else if (bgr.type() == CV_16UC3) {
-        copy_rgb<std::uint16_t>(bgr, texture.rgb.data(), [](std::uint16_t s) { return s; });
+        copy_rgb<std::uint16_t>(bgr, table_for(16, use.colour), texture.rgb.data());
     } else {
         return Error{.what = "image samples of an unknown kind, expected 8 or 16 bits a band", .file = name};
     }
+    build_coarser_levels(texture);
     return texture;
 }
 
 }  // namespace
 
-Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes) {
+Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,
+                               const TextureUse& use) {
     try {
         if (bytes.empty()) return Error{.what = "empty file, expected an image", .file = name};
         const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
@@ -59,16 +92,16 @@ Result<Texture> decode_texture(const std::string& name, std::span<const std::uin
             cv::imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
         if (bgr.empty())
             return Error{.what = "not an image that can be read, expected PNG, JPEG, TIFF ...", .file = name};
-        return from_image(name, bgr);
+        return from_image(name, bgr, use);
     } catch (const std::exception& e) {
         return Error{.what = std::string("image cannot be decoded: ") + e.what(), .file = name};
     }
 }
 
-Result<Texture> read_texture(const std::string& path) {
+Result<Texture> read_texture(const std::string& path, const TextureUse& use) {
     Result<std::string> bytes = read_file(path);
     if (!bytes) return bytes.error();
-    return decode_texture(path, {reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()});
+    return decode_texture(path, {reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, use);
 }
 
 }  // namespace narpa

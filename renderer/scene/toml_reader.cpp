@@ -93,6 +93,7 @@ Error Problems::first() const {
 }
 
 bool Range::holds(double x) const {
+    if (infinite && x == std::numeric_limits<double>::infinity()) return true;
     return std::isfinite(x) && (low_open ? x > low : x >= low) && (high_open ? x < high : x <= high);
 }
 
@@ -100,7 +101,7 @@ std::string Range::words() const {
     const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
     if (has_low && has_high)
         return fmt::format("a number in {}{}, {}{}", low_open ? '(' : '[', low, high, high_open ? ')' : ']');
-    if (has_low) return fmt::format("a number {} {}", low_open ? ">" : ">=", low);
+    if (has_low) return fmt::format("a number {} {}{}", low_open ? ">" : ">=", low, infinite ? ", or inf" : "");
     if (has_high) return fmt::format("a number {} {}", high_open ? "<" : "<=", high);
     return "a finite number";
 }
@@ -189,6 +190,12 @@ std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) 
     return Vec3{(*v)[0], (*v)[1], (*v)[2]};
 }
 
+std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, const Range& range) {
+    const auto v = numbers(key, 2, range);
+    if (!v) return std::nullopt;
+    return std::array{(*v)[0], (*v)[1]};
+}
+
 std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
     const toml::node* node = find(key);
     if (node && node->is_array()) {
@@ -251,10 +258,32 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
     return out;
 }
 
-void TableReader::not_in_this_version(std::string_view key, std::string_view instead) {
+void TableReader::refuse(std::string_view key, const std::string& why) {
     if (table_->get(key) == nullptr) return;  // and it stays unknown to the suggestions
     find(key);
-    fail(key, fmt::format("not in this version of narpa; {}", instead));
+    fail(key, why);
+}
+
+void TableReader::refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds) {
+    const auto has_key = [](const KindKeys& k, std::string_view key) {
+        return std::find(k.keys.begin(), k.keys.end(), key) != k.keys.end();
+    };
+    for (const auto& [node_key, value] : *table_) {
+        const std::string_view key = node_key.str();
+        std::string owners;
+        bool is_own = false;
+        for (const KindKeys& k : kinds)
+            if (has_key(k, key)) {
+                owners += fmt::format("{}\"{}\"", owners.empty() ? "" : " or ", k.kind);
+                is_own |= k.kind == kind;
+            }
+        if (!owners.empty() && !is_own)
+            refuse(key, fmt::format("belongs to kind = {}, and this is \"{}\"", owners, kind));
+    }
+}
+
+void TableReader::not_in_this_version(std::string_view key, std::string_view instead) {
+    refuse(key, fmt::format("not in this version of narpa; {}", instead));
 }
 
 void TableReader::finish() {

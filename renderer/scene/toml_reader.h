@@ -7,6 +7,7 @@
 
 #include <toml++/toml.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -51,6 +52,7 @@ private:
 struct Range {
     double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
     bool low_open = false, high_open = false;
+    bool infinite = false;  ///< inf is in it too
 
     [[nodiscard]] bool holds(double x) const;
     [[nodiscard]] std::string words() const;  ///< "a number > 0"
@@ -59,6 +61,12 @@ inline constexpr Range kAnyNumber{};
 inline constexpr Range kPositive{.low = 0, .low_open = true};
 inline constexpr Range kNotNegative{.low = 0};
 inline constexpr Range kUnit{.low = 0, .high = 1};
+
+/// The keys that a table has when its `kind` is this word, beside those that every kind has.
+struct KindKeys {
+    std::string_view kind;
+    std::vector<std::string_view> keys;
+};
 
 /// One table of the file.
 class TableReader {
@@ -77,6 +85,7 @@ public:
     std::optional<bool> boolean(std::string_view key);
     std::optional<std::string> text(std::string_view key);
     std::optional<Vec3> vec3(std::string_view key, const Range& range = kAnyNumber);
+    std::optional<std::array<double, 2>> pair(std::string_view key, const Range& range = kAnyNumber);
     /// One number for the three bands, or [r, g, b].
     std::optional<Rgb> rgb(std::string_view key, const Range& range);
     /// [w, x, y, z]; made exactly unit when | |q| - 1 | < 1e-3, else a problem.
@@ -102,6 +111,10 @@ public:
 
     /// The node of a key, counted as read; null when absent.
     const toml::node* find(std::string_view key);
+    /// A key that is known and must not be here; `why` completes "KEY: ...". Nothing where it is not here.
+    void refuse(std::string_view key, const std::string& why);
+    /// Refuses the keys that belong to other kinds only: each kind of table has its own.
+    void refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds);
     /// A key that the design names and this version does not know.
     void not_in_this_version(std::string_view key, std::string_view instead);
     /// Notes a problem at the value of a key (at the table when absent).

@@ -38,7 +38,4 @@ std::string extension_of(const std::string& path);
 /// The file that a material names, looked for as written and then by its last part beside the mesh.
 std::string texture_path(const std::string& mesh_path, std::string name);
 
-/// Lambert, or Phong when ks > 0; every band clamped to [0, 1] and both scaled so that kd + ks <= 1.
-Material make_material(std::string name, Rgb kd, Rgb ks, float exponent, Rgb emission);
-
 }  // namespace narpa

@@ -1,6 +1,7 @@
 /// renderer/trace/camera_image.h - a camera's linear radiance image, and the exact outputs beside it.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -14,7 +15,10 @@ struct Aovs {
     std::vector<double> range_m, depth_m;  ///< along the ray; along the camera's z axis
     std::vector<Vec3> position, normal;    ///< world
     std::vector<std::int32_t> body;
-    std::vector<float> variance;  ///< of the pixel's mean over the bands, from its samples (0 for spp < 2)
+    std::vector<Rgb> albedo;  ///< base colour with its texture: a mirror's reflectance, white for glass
+    /// Of the pixel's mean over the bands (0 for spp < 2), W^2 m^-4 sr^-2: pixel_samples.h says how it is estimated
+    /// and which 95 % interval goes with it.
+    std::vector<float> variance;
 };
 
 /// Row-major, height x width, linear radiance in W m^-2 sr^-1 a band.
@@ -30,14 +34,27 @@ struct FrameSettings {
     int spp = 1;             ///< 1: the ray through each pixel's centre
     std::uint64_t seed = 0;  ///< scene seed; samples depend on (seed, frame, pixel, sample) and nothing else
     std::uint32_t frame = 0;
+    RenderSettings::Method method = RenderSettings::Method::direct;
+    int max_depth = 8;                                ///< of method path
+    std::atomic<std::size_t>* pixels_done = nullptr;  ///< counted up while the frame is made; null: nobody looks
 };
 
-/// Light that reaches the camera over one surface: sunlight with its shadow, ambient (never shadowed), emission;
-/// black where nothing is hit. With spp = 1 the Sun is the centre of its disc, with more each sample takes a point
-/// of the disc, so shadows have their penumbra. No light goes from surface to surface yet.
+/// The light that reaches the camera.
+///
+/// Method direct: light that comes to a surface straight from the Sun and the scene's lights, with shadows;
+/// ambient, never shadowed; emission of what is seen; black where nothing is hit, and on mirrors and glass but for
+/// ambient and emission: what they show comes from elsewhere. Method path: all light (path.h), with the ambient as
+/// a sky.
+///
+/// One sample a pixel goes through the middle of the pixel and of the lens, and where the method is direct and the
+/// Sun the only light, to the middle of the Sun: the image of a pinhole, without noise, with hard shadows. With
+/// more, each takes a point of the pixel, of the lens and of the Sun: edges are smooth, what is out of focus is
+/// blurred, shadows have their penumbra.
+///
+/// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: tiny_bodies.h.
 ///
 /// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. After a first call with the
-/// same sizes it allocates nothing. `aovs` may be null.
+/// same sizes it allocates nothing. `aovs` may be null; they show a pinhole's view, tiny bodies among the rest.
 void render_radiance(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
                      const FrameSettings& settings, RadianceImage& out, Aovs* aovs = nullptr);
 

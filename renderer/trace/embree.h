@@ -32,17 +32,20 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) noexcept {
 #endif
 }
 
-/// Sixteen rays that run close together; lanes whose `valid` is 0 are left alone, others have -1.
-inline void intersect_coherent(RTCScene scene, const int* valid, RTCRayHit16& rays) noexcept {
+/// How the rays of a packet run.
+enum class Run { together, apart };
+
+/// Sixteen rays; lanes whose `valid` is 0 are left alone, others have -1.
+inline void intersect(RTCScene scene, const int* valid, RTCRayHit16& rays, Run run) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
     RTCIntersectArguments arguments;
     rtcInitIntersectArguments(&arguments);
-    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    if (run == Run::together) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
     rtcIntersect16(valid, scene, &rays, &arguments);
 #else
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    if (run == Run::together) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcIntersect16(valid, scene, &context, &rays);
 #endif
 }

@@ -11,30 +11,30 @@ namespace narpa {
 namespace {
 
 constexpr double kHalfUlp = 0x1p-24;  ///< largest relative rounding error of single precision
+constexpr float kOccluded = -std::numeric_limits<float>::infinity();  ///< Embree's mark, in a ray's tfar
 
 double largest(const Vec3& a) {
     return std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)});
 }
 
-/// Puts one ray into a lane of sixteen.
-void put_lane(const RTCRay& ray, std::size_t i, auto& lanes) {
-    lanes.org_x[i] = ray.org_x, lanes.org_y[i] = ray.org_y, lanes.org_z[i] = ray.org_z;
-    lanes.dir_x[i] = ray.dir_x, lanes.dir_y[i] = ray.dir_y, lanes.dir_z[i] = ray.dir_z;
-    lanes.tnear[i] = ray.tnear, lanes.tfar[i] = ray.tfar;
-    lanes.time[i] = ray.time, lanes.mask[i] = ray.mask, lanes.id[i] = ray.id, lanes.flags[i] = ray.flags;
-}
+/// A point of a triangle with this normal, moved towards the middle of the circle that touches its edges until it
+/// is `clearance_m` away from each, by at most `most_m`.
+Vec3 away_from_edges(const std::array<Vec3, 3>& v, const Vec3& n, const Vec3& p, double clearance_m,
+                     double most_m) {
+    const std::array<Vec3, 3> edge{v[1] - v[0], v[2] - v[1], v[0] - v[2]};
+    const std::array<double, 3> length{norm(edge[0]), norm(edge[1]), norm(edge[2])};
+    std::array<double, 3> height;
+    for (std::size_t k = 0; k < 3; ++k) height[k] = dot(cross(n, edge[k]), p - v[k]) / length[k];
+    if (std::min({height[0], height[1], height[2]}) >= clearance_m) return p;
 
-/// A ray of no length: what a lane that asks nothing holds. Where the processor has no sixteen lanes, Embree 3.13
-/// looks into these too.
-constexpr RTCRay kNoRay = [] {
-    RTCRay ray{};
-    ray.dir_z = 1;
-    ray.tfar = -1;
-    return ray;
-}();
-
-bool is_set(std::uint32_t bits, std::size_t i) {
-    return (bits >> i & 1u) != 0;
+    const double perimeter = length[0] + length[1] + length[2];
+    const Vec3 middle = (length[1] * v[0] + length[2] * v[1] + length[0] * v[2]) / perimeter;
+    const double radius = dot(cross(n, edge[0]), middle - v[0]) / length[0];
+    double part = 0;
+    for (const double h : height)
+        if (h < clearance_m) part = std::max(part, (clearance_m - h) / std::max(radius - h, clearance_m));
+    const Vec3 way = middle - p;
+    return p + std::min(part, most_m / norm(way)) * way;
 }
 
 Status check_mesh(const Mesh& mesh) {
@@ -150,57 +150,91 @@ bool MeshScene::intersect(const Vec3& origin, const Vec3& direction, double entr
     const auto skipped = advance(origin, direction, entry_m, t_max);
     if (!skipped) return false;
     const Vec3 start = origin + *skipped * direction;
-    return settle(ask(start, direction, t_max - *skipped), start, direction, *skipped, t_max, hit);
+    return settle(ask(start, direction, t_max - *skipped), start, direction, *skipped, t_max, false, hit);
 }
 
-std::uint32_t MeshScene::intersect(const MeshRays& rays, std::uint32_t wanted,
+MeshScene::Starts MeshScene::advance(const MeshRays& rays, std::uint32_t wanted, RTCRay16& query) const noexcept {
+    const VecPerRay &o = rays.origin, &d = rays.direction;
+    PerRay<double> entry_m = off_centre_ ? bounding_entries(o - centre_, d, radius_m_) : rays.entry_m;
+    Starts s;
+    PerRay<double> length;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const bool ask = is_set(wanted, i) && entry_m[i] < rays.t_max[i];
+        s.valid[i] = -static_cast<int>(ask);
+        s.skipped_m[i] = ask ? std::max(0.0, entry_m[i]) : 0;
+        // A lane that asks nothing holds a ray of no length: where the processor has no sixteen lanes, Embree 3.13
+        // looks into these too.
+        length[i] = ask ? std::min<double>(rays.t_max[i] - s.skipped_m[i], std::numeric_limits<float>::max()) : -1;
+        s.asked |= static_cast<std::uint32_t>(ask) << i;
+    }
+    for (std::size_t i = 0; i < kPacket; ++i) s.at.x[i] = o.x[i] + s.skipped_m[i] * d.x[i];
+    for (std::size_t i = 0; i < kPacket; ++i) s.at.y[i] = o.y[i] + s.skipped_m[i] * d.y[i];
+    for (std::size_t i = 0; i < kPacket; ++i) s.at.z[i] = o.z[i] + s.skipped_m[i] * d.z[i];
+    const auto put = [](const PerRay<double>& from, double minus, float* to) {
+        for (std::size_t i = 0; i < kPacket; ++i) to[i] = static_cast<float>(from[i] - minus);
+    };
+    put(s.at.x, vertex_origin_.x, query.org_x);
+    put(s.at.y, vertex_origin_.y, query.org_y);
+    put(s.at.z, vertex_origin_.z, query.org_z);
+    put(d.x, 0, query.dir_x);
+    put(d.y, 0, query.dir_y);
+    put(d.z, 0, query.dir_z);
+    put(length, 0, query.tfar);
+    std::fill_n(query.tnear, kPacket, 0.0f);
+    std::fill_n(query.time, kPacket, 0.0f);
+    std::fill_n(query.mask, kPacket, ~0u);
+    std::fill_n(query.id, kPacket, 0u);
+    std::fill_n(query.flags, kPacket, 0u);
+    return s;
+}
+
+std::uint32_t MeshScene::intersect(const MeshRays& rays, std::uint32_t wanted, embree::Run run,
                                    std::span<MeshHit, kPacket> hits) const noexcept {
     alignas(64) RTCRayHit16 query;
-    alignas(64) std::array<int, kPacket> valid{};
-    std::array<Vec3, kPacket> start;
-    std::array<double, kPacket> skipped;
-    std::uint32_t asked = 0;
-    for (std::size_t i = 0; i < kPacket; ++i) {
-        put_lane(kNoRay, i, query.ray);
-        query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-        if (!is_set(wanted, i)) continue;
-        const auto to_entry = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
-        if (!to_entry) continue;
-        skipped[i] = *to_entry;
-        start[i] = rays.origin[i] + skipped[i] * rays.direction[i];
-        put_lane(embree_ray(start[i], rays.direction[i], rays.t_max[i] - skipped[i]), i, query.ray);
-        valid[i] = -1;
-        asked |= 1u << i;
-    }
-    if (asked == 0) return 0;
-    embree::intersect_coherent(scene_.get(), valid.data(), query);
+    const Starts start = advance(rays, wanted, query.ray);
+    if (start.asked == 0) return 0;
+    std::fill_n(query.hit.geomID, kPacket, RTC_INVALID_GEOMETRY_ID);
+    std::fill_n(query.hit.instID[0], kPacket, RTC_INVALID_GEOMETRY_ID);
+    embree::intersect(scene_.get(), start.valid.data(), query, run);
 
     std::uint32_t hit = 0;
     for (std::size_t i = 0; i < kPacket; ++i) {
-        if (!is_set(asked, i)) continue;
+        if (!is_set(start.asked, i)) continue;
+        const bool inside = closed_ && is_set(rays.inside, i);  // an open mesh has no inside
         Answer answer;
         if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
             const float facing = query.hit.Ng_x[i] * query.ray.dir_x[i] + query.hit.Ng_y[i] * query.ray.dir_y[i] +
                                  query.hit.Ng_z[i] * query.ray.dir_z[i];
             answer = {query.hit.primID[i], query.ray.tfar[i], query.hit.u[i], query.hit.v[i], true, facing > 0};
+        } else if (closed_ && !inside) {
+            continue;  // nothing to settle
         }
-        if (settle(answer, start[i], rays.direction[i], skipped[i], rays.t_max[i], hits[i])) hit |= 1u << i;
+        if (settle(answer, start.at[i], rays.direction[i], start.skipped_m[i], rays.t_max[i], inside, hits[i]))
+            hit |= 1u << i;
     }
     return hit;
 }
 
 bool MeshScene::settle(Answer answer, const Vec3& start, const Vec3& direction, double skipped_m, double t_max,
-                       MeshHit& hit) const noexcept {
+                       bool inside, MeshHit& hit) const noexcept {
     // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass
-    // through, to the inner side of the far wall where the mesh is closed, out of it where it is not. They are
-    // common where a camera's pixels line up with a model's grid. One more try, turned by a few roundings, finds
-    // what they lost.
-    const bool suspicious = answer.hit ? answer.back : !closed_;
-    if (suspicious) {
+    // through, and where the mesh is closed what they meet next shows them its wrong side, or from inside nothing.
+    // They are common where a camera's pixels line up with a model's grid. Another try, turned by a few roundings,
+    // finds what they lost; one that leaves the inner side close to an edge and runs along it needs to be turned by
+    // more.
+    const auto ahead = [&](std::uint32_t face) {  // of the ray itself, not only of the turned one
+        const auto [v0, v1, v2] = corners(face);
+        const Vec3 n = cross(v1 - v0, v2 - v0);
+        return dot(n, v0 - start) * dot(n, direction) >= 0;
+    };
+    const auto plausible = [&] { return answer.hit ? answer.back == inside : closed_ && !inside; };
+    for (const double angle : {4e-7, -4e-7, 4e-3, -4e-3}) {
+        if (plausible()) break;
         const Vec3 turn{direction.y - direction.z, direction.z - direction.x, direction.x - direction.y + 0.5};
-        const Answer again = ask(start, direction + 4e-7 * turn, t_max - skipped_m);
-        if (again.hit && (!answer.hit || (!again.back && again.t < answer.t))) answer = again;
+        const Answer again = ask(start, direction + angle * turn, t_max - skipped_m);
+        const bool better = again.hit && (!answer.hit || (again.back == inside && again.t < answer.t));
+        if (better && (inside || ahead(again.face))) answer = again;
+        if (!inside) break;  // one will do: a ray from elsewhere may well see inner sides, as in a room
     }
     if (!answer.hit) return false;
 
@@ -219,7 +253,7 @@ bool MeshScene::settle(Answer answer, const Vec3& start, const Vec3& direction, 
     const Vec3 position = v0 + b1 * e1 + b2 * e2;
     const double range = skipped_m + std::max(0.0, dot(position - start, direction));
     if (!(range < t_max)) return false;
-    hit = {answer.face, range, position, b1, b2};
+    hit = {answer.face, range, position, b1, b2, inside && answer.back};
     return true;
 }
 
@@ -240,39 +274,36 @@ bool MeshScene::occluded(const Vec3& origin, const Vec3& direction, double entry
     if (!skipped) return false;
     RTCRay ray = embree_ray(origin + *skipped * direction, direction, t_max - *skipped);
     embree::occluded(scene_.get(), ray);
-    return ray.tfar < 0;
+    return ray.tfar == kOccluded;
 }
 
 std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept {
     alignas(64) RTCRay16 query;
-    alignas(64) std::array<int, kPacket> valid{};
-    std::uint32_t asked = 0;
-    for (std::size_t i = 0; i < kPacket; ++i) {
-        put_lane(kNoRay, i, query);
-        if (!is_set(wanted, i)) continue;
-        const auto skipped = advance(rays.origin[i], rays.direction[i], rays.entry_m[i], rays.t_max[i]);
-        if (!skipped) continue;
-        put_lane(
-            embree_ray(rays.origin[i] + *skipped * rays.direction[i], rays.direction[i], rays.t_max[i] - *skipped),
-            i, query);
-        valid[i] = -1;
-        asked |= 1u << i;
-    }
-    if (asked == 0) return 0;
-    embree::occluded(scene_.get(), valid.data(), query);
+    const Starts start = advance(rays, wanted, query);
+    if (start.asked == 0) return 0;
+    embree::occluded(scene_.get(), start.valid.data(), query);
     std::uint32_t dark = 0;
     for (std::size_t i = 0; i < kPacket; ++i)
-        if (is_set(asked, i) && query.tfar[i] < 0) dark |= 1u << i;
+        if (is_set(start.asked, i) && query.tfar[i] == kOccluded) dark |= 1u << i;
     return dark;
 }
 
-double MeshScene::departure_offset_m(std::uint32_t face, const Vec3& position) const noexcept {
+Vec3 MeshScene::departure(std::uint32_t face, const Vec3& position, bool outside) const noexcept {
+    const std::array<Vec3, 3> v = corners(face);
+    const Vec3 outwards = cross(v[1] - v[0], v[2] - v[0]);
+    const double area2 = norm(outwards);
+    if (!(area2 > 0)) return position;
+    const Vec3 n = outwards / area2;
+
     // The start is rounded to single precision (an error of the position's size); Embree's test then rounds the
     // corners relative to it and their cross products (errors of the triangle's size). First-order bounds after
     // Pharr, Jakob, Humphreys, Physically Based Rendering, section 3.9.
     double extent = 0;
-    for (const Vec3& c : corners(face)) extent = std::max(extent, largest(c - position));
-    return kHalfUlp * (4 * largest(position - vertex_origin_) + 16 * extent);
+    for (const Vec3& c : v) extent = std::max(extent, largest(c - position));
+    const double lift_m = kHalfUlp * (4 * largest(position - vertex_origin_) + 16 * extent);
+
+    const Vec3 start = away_from_edges(v, n, position, 8 * lift_m, 64 * lift_m);
+    return start + (outside ? lift_m : -lift_m) * n;
 }
 
 std::array<Vec3, 3> MeshScene::corners(std::uint32_t face) const noexcept {

@@ -6,7 +6,7 @@
 #include "base/result.h"
 #include "renderer/scene/scene.h"
 #include "renderer/trace/embree.h"
-#include "renderer/trace/tracer.h"
+#include "renderer/trace/packet.h"
 
 namespace narpa {
 
@@ -16,12 +16,14 @@ struct MeshHit {
     double range_m = 0;     ///< from the ray's origin
     Vec3 position{};        ///< body frame, on the triangle to rounding in double
     double b1 = 0, b2 = 0;  ///< barycentric weights of the face's second and third vertex
+    bool inner = false;     ///< surely the inner side: the ray left this mesh's inner side before
 };
 
-/// Rays in the body's frame, as `MeshScene::intersect` takes one.
+/// Rays in the body's frame, as `MeshScene::intersect` takes one. All are finite, also those that are not asked.
 struct MeshRays {
-    std::array<Vec3, kPacket> origin, direction;
-    std::array<double, kPacket> entry_m, t_max;
+    VecPerRay origin, direction;
+    PerRay<double> entry_m, t_max;
+    std::uint32_t inside = 0;  ///< a bit for each that starts on the inner side of this mesh
 };
 
 class MeshScene {
@@ -36,15 +38,15 @@ public:
                    MeshHit& hit) const noexcept;
     bool occluded(const Vec3& origin, const Vec3& direction, double entry_m, double t_max) const noexcept;
 
-    /// The same for those of sixteen rays whose bit is set in `wanted`; returns the bits of those that hit. Rays of
-    /// `intersect` run close together, those of `occluded` need not.
-    std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted,
+    /// The same for those of sixteen rays whose bit is set in `wanted`; returns the bits of those that hit.
+    std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted, embree::Run run,
                             std::span<MeshHit, kPacket> hits) const noexcept;
     [[nodiscard]] std::uint32_t occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept;
 
-    /// How far above a point of this face a ray must start so that rounding in single precision cannot put it
-    /// below.
-    [[nodiscard]] double departure_offset_m(std::uint32_t face, const Vec3& position) const noexcept;
+    /// Where a ray starts that leaves this face at `position` (on it, or above it by a smooth surface's bulge) on
+    /// its outer or inner side: lifted by as much as rounding in single precision can lower it, and as far from the
+    /// face's edges that the lift does not take it through a neighbour at an angle of 7 degrees or more.
+    [[nodiscard]] Vec3 departure(std::uint32_t face, const Vec3& position, bool outside) const noexcept;
 
     /// Three corners in the body's frame, as the hierarchy holds them.
     [[nodiscard]] std::array<Vec3, 3> corners(std::uint32_t face) const noexcept;
@@ -57,6 +59,14 @@ private:
     /// where that is worth while. 0 from inside; none if the ray misses, or meets the sphere beyond t_max.
     [[nodiscard]] std::optional<double> advance(const Vec3& origin, const Vec3& direction, double entry_m,
                                                 double t_max) const noexcept;
+    /// Rays where Embree takes over.
+    struct Starts {
+        std::uint32_t asked = 0;        ///< those that Embree is to trace
+        alignas(64) PerRay<int> valid;  ///< the same, for Embree
+        PerRay<double> skipped_m;
+        VecPerRay at;
+    };
+    [[nodiscard]] Starts advance(const MeshRays& rays, std::uint32_t wanted, RTCRay16& query) const noexcept;
     /// What Embree says of a ray: which triangle, roughly where, from which side.
     struct Answer {
         std::uint32_t face = 0;
@@ -67,7 +77,7 @@ private:
     [[nodiscard]] RTCRay embree_ray(const Vec3& origin, const Vec3& direction, double length) const noexcept;
     /// Asks once more where the answer is suspicious, and solves the hit in double.
     bool settle(Answer answer, const Vec3& start, const Vec3& direction, double skipped_m, double t_max,
-                MeshHit& hit) const noexcept;
+                bool inside, MeshHit& hit) const noexcept;
 
     const Mesh* mesh_ = nullptr;
     embree::Owned<RTCScene> scene_;

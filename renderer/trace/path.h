@@ -1,9 +1,12 @@
 /// renderer/trace/path.h - all light that comes back along a ray: path tracing.
 ///
-/// Kajiya 1986 with next-event estimation towards the Sun, the lights and emissive surfaces, importance sampling of the
-/// BSDF, and multiple importance sampling between the two by the power heuristic (Veach 1997); Russian roulette
-/// after the first bounces, by the path's throughput. Unbiased but for paths longer than max_depth. Kept light is never
-/// clamped.
+/// Kajiya 1986 with next-event estimation towards the Sun, the lights and emissive surfaces, importance sampling of
+/// the BSDF and of bodies that look small (guide.h), and multiple importance sampling between the two by the power
+/// heuristic (Veach 1997); Russian roulette after the first bounces, by the path's throughput. Unbiased but for
+/// paths longer than max_depth. Kept light is never clamped.
+///
+/// The sky is the scene's ambient radiance, the same in all directions. It and the Sun's disc are seen where
+/// nothing is in the way, by the camera too.
 #pragma once
 
 #include "renderer/trace/sampler.h"
@@ -12,15 +15,20 @@
 namespace narpa {
 
 struct PathSettings {
-    int max_depth = 8;               ///< surfaces that a path may meet
-    double pixel_angle_rad = 0;      ///< width of a camera ray's beam per metre of its way, for textures
+    int max_depth = 8;           ///< surfaces on which light may turn on its way; the next may still shine itself
+    double pixel_angle_rad = 0;  ///< width of a camera ray's beam per metre of its way, for textures
+    /// Light of method "direct", for scenes with lights (Lights::beyond_the_sun): what the Sun and the lights send
+    /// straight to the first surface, with shadows; what it shines by itself; the ambient as an even term without
+    /// shadows, ambient_reflectance(surface) times it; black where nothing is hit. Lights with extent are seen, in
+    /// mirrors too. max_depth is not read.
+    bool direct = false;
 };
 
-/// Radiance, W m^-2 sr^-1, that comes back along up to kPacket rays whose first hits are known. `samplers` and `sample` say
-/// which random numbers each takes (the first four dimensions belong to the caller). Same values whatever stands in
-/// the other lanes. Thread-safe, allocates nothing.
-void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings, std::span<const Ray> rays,
-                   std::span<const Hit> first, std::span<const PixelSampler> samplers, std::uint32_t sample,
-                   std::span<Rgb> radiance) noexcept;
+/// Radiance, W m^-2 sr^-1, that comes back along up to kPacket rays whose first hits are known. `samplers` and
+/// `sample` say which random numbers each takes (the first four dimensions belong to the caller). Same values
+/// whatever stands in the other lanes. Thread-safe, allocates nothing.
+void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
+                   std::span<const Ray> rays, std::span<const Hit> first, std::span<const PixelSampler> samplers,
+                   std::uint32_t sample, std::span<Rgb> radiance) noexcept;
 
 }  // namespace narpa

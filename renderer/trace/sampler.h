@@ -4,7 +4,9 @@
 /// The first four dimensions of Sobol's sequence (direction numbers: S. Joe, F. Kuo, "Constructing Sobol sequences
 /// with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008), each nested-uniformly scrambled by a
 /// hash of the pixel (A. Owen 1995; B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Any power
-/// of two of samples is stratified in each dimension, and in both of the pixel at once.
+/// of two of samples is stratified in each dimension, and in both of the pixel at once. Paths need more dimensions
+/// than that: they take further groups of four, each the same sequence in an order and a scrambling of its own
+/// (Burley's padding), so that every group is as well stratified and no group knows of another.
 #pragma once
 
 #include <array>
@@ -13,7 +15,8 @@
 
 namespace narpa {
 
-/// Coordinates in [0, 1): dimensions 0, 1 are the place in the pixel, 2, 3 the place on the Sun's disc.
+/// Coordinates in [0, 1). Of the first group dimensions 0, 1 are the place in the pixel, 2, 3 the place on the
+/// lens, or on the Sun's disc where a camera has none.
 using SamplePoint = std::array<double, 4>;
 
 namespace sampler_detail {
@@ -43,10 +46,25 @@ constexpr std::array<Directions, 4> sobol_directions() {
     return v;
 }
 inline constexpr std::array<Directions, 4> kSobol = sobol_directions();
+inline constexpr auto kSobolByBit = [] {
+    std::array<std::array<std::uint32_t, 4>, 32> by_bit{};
+    for (unsigned bit = 0; bit < 32; ++bit)
+        for (unsigned dim = 0; dim < 4; ++dim) by_bit[bit][dim] = kSobol[dim][bit];
+    return by_bit;
+}();
 
 constexpr std::uint32_t sobol(std::uint32_t index, unsigned dim) {
     std::uint32_t x = 0;
     for (; index != 0; index &= index - 1) x ^= kSobol[dim][static_cast<unsigned>(std::countr_zero(index))];
+    return x;
+}
+
+/// All four dimensions at once: a quarter of the steps where many bits of the index are set.
+constexpr std::array<std::uint32_t, 4> sobol(std::uint32_t index) {
+    std::array<std::uint32_t, 4> x{};
+    for (; index != 0; index &= index - 1)
+        for (unsigned dim = 0; dim < 4; ++dim)
+            x[dim] ^= kSobolByBit[static_cast<unsigned>(std::countr_zero(index))][dim];
     return x;
 }
 
@@ -92,6 +110,19 @@ public:
         SamplePoint p{};
         for (unsigned dim = 0; dim < 4; ++dim)
             p[dim] = 0x1p-32 * sampler_detail::scramble(sampler_detail::sobol(sample, dim), key_[dim]);
+        return p;
+    }
+    /// Another four dimensions, of any number of groups; group 0 is the one above.
+    [[nodiscard]] constexpr SamplePoint point(std::uint32_t sample, std::uint32_t group) const {
+        using sampler_detail::mix, sampler_detail::scramble;
+        if (group == 0) return point(sample);
+        const std::uint64_t a = mix(((std::uint64_t{key_[1]} << 32) | key_[0]) + group), b = mix(a), c = mix(b);
+        const std::array<std::uint32_t, 4> key{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a >> 32),
+                                               static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b >> 32)};
+        // A nested shuffle of the order keeps every aligned power of two of samples together.
+        const auto x = sampler_detail::sobol(scramble(sample, static_cast<std::uint32_t>(c)));
+        SamplePoint p{};
+        for (unsigned dim = 0; dim < 4; ++dim) p[dim] = 0x1p-32 * scramble(x[dim], key[dim]);
         return p;
     }
 

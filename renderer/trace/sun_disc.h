@@ -1,38 +1,53 @@
-/// renderer/trace/sun_disc.h - the Sun as a disc of even radiance: its centre, or a point of it.
+/// renderer/trace/sun_disc.h - the Sun as a disc of even radiance: its centre, a point of it, what a ray sees of
+/// it.
 #pragma once
 
 #include <cmath>
 #include <numbers>
 
 #include "renderer/scene/scene.h"
+#include "renderer/trace/cone_frame.h"
 
 namespace narpa {
 
 class SunDisc {
 public:
     explicit SunDisc(const Sun& sun)
-        : centre_(normalized(sun.direction)),
+        : frame_(normalized(sun.direction)),
           sin_half_angle_(std::sin(0.5 * sun.angular_diameter_rad)),
-          irradiance_(static_cast<float>(sun.irradiance_w_m2)) {
-        // Any frame about the centre will do, but it must not jump where one axis is singled out.
-        const Vec3 c = centre_;
-        const double s = std::copysign(1.0, c.z), a = -1 / (s + c.z), b = c.x * c.y * a;
-        right_ = {1 + s * c.x * c.x * a, s * b, -s * c.x};  // Duff et al., JCGT 6(1), 2017
-        up_ = {b, s + c.y * c.y * a, -c.y};
-    }
+          irradiance_(static_cast<float>(sun.irradiance_w_m2)) {}
 
-    [[nodiscard]] const Vec3& centre() const { return centre_; }
+    [[nodiscard]] const Vec3& centre() const { return frame_.axis; }
     /// Irradiance of a surface that faces the centre, W m^-2.
     [[nodiscard]] float irradiance() const { return irradiance_; }
 
     /// Direction to a point of the disc, even in its projected area, for u, v in [0, 1).
     [[nodiscard]] Vec3 sample(double u, double v) const {
-        const double r = sin_half_angle_ * std::sqrt(u), phi = 2 * std::numbers::pi * v;
-        return r * std::cos(phi) * right_ + r * std::sin(phi) * up_ + std::sqrt(1 - r * r) * centre_;
+        const double r = sin_half_angle_ * std::sqrt(u);
+        return frame_.direction(r, std::sqrt(1 - r * r), 2 * std::numbers::pi * v);
+    }
+
+    /// A point source, which no ray meets.
+    [[nodiscard]] bool is_point() const { return sin_half_angle_ == 0; }
+    /// Density of `sample` per solid angle in a unit direction, 0 beside the disc. Not for a point source.
+    [[nodiscard]] double pdf(const Vec3& direction) const {
+        const double cosine = dot(direction, frame_.axis);
+        const Vec3 across = cross(direction, frame_.axis);  // as long as the sine, without cancellation
+        if (cosine <= 0 || !(dot(across, across) < sin_half_angle_ * sin_half_angle_)) return 0;
+        return cosine / projected_solid_angle();
+    }
+    /// The same all over the disc, W m^-2 sr^-1. Not for a point source.
+    [[nodiscard]] float radiance() const {
+        return static_cast<float>(static_cast<double>(irradiance_) / projected_solid_angle());
     }
 
 private:
-    Vec3 centre_, right_{}, up_{};
+    /// On the plane that faces the disc.
+    [[nodiscard]] double projected_solid_angle() const {
+        return std::numbers::pi * sin_half_angle_ * sin_half_angle_;
+    }
+
+    ConeFrame frame_;
     double sin_half_angle_;
     float irradiance_;
 };

@@ -2,8 +2,8 @@
 ///
 /// Each body's triangles stand in an Embree scene of their own, in the body's frame, in robust mode, built once.
 /// A ray enters that frame in double, its origin advanced to the body's bounding sphere, and its range stays
-/// double: 0.3 um at any distance, where Embree's own instances (float) lose 0.2 m at 6778 km. Spheres are solved
-/// in double. Bodies move by handing other poses to `place`; nothing is ever rebuilt.
+/// double: 0.3 um at any distance, where Embree's own instances (float) lose 0.2 m at 6778 km. Spheres and
+/// ellipsoids are solved in double. Bodies move by handing other poses to `place`; nothing is ever rebuilt.
 #pragma once
 
 #include <memory>
@@ -13,6 +13,7 @@
 #include "base/pose.h"
 #include "base/result.h"
 #include "renderer/scene/scene.h"
+#include "renderer/trace/body_bounds.h"
 
 namespace narpa {
 
@@ -38,13 +39,14 @@ struct Hit {
     bool outside = true;      ///< the ray came from the outer side, by the winding of the face
     Vec3 departure_body{};    ///< body frame: where rays that leave start, before the offset for rounding: the
                               ///< position, or above it on the smooth surface that vertex normals describe
+    Vec3 beyond_body{};       ///< the same for rays that leave on the other side
 };
 
 /// The same point, left on its other side: for light that goes through.
 [[nodiscard]] Hit other_side(const Hit& hit) noexcept;
 
-/// How the surface lies under its texture at a hit: world metres per unit of u and of v, along the surface. Zero where
-/// there are no texture coordinates.
+/// How the surface lies under its texture at a hit: world metres per unit of u and of v, along the surface. Zero
+/// where there are no texture coordinates.
 struct TextureFrame {
     Vec3 dp_du{}, dp_dv{};
 };
@@ -66,11 +68,14 @@ public:
     Tracer& operator=(Tracer&&) noexcept;
     ~Tracer();
 
-    /// Nearest hit with 0 <= range < t_max. Thread-safe, allocates nothing. `skip_body` is looked through; -1: none.
-    [[nodiscard]] Hit intersect(const Placement& at, const Ray& ray, double t_max, int skip_body = -1) const noexcept;
+    /// Nearest hit with 0 <= range < t_max. Thread-safe, allocates nothing. `skip_body` is looked through; -1:
+    /// none.
+    [[nodiscard]] Hit intersect(const Placement& at, const Ray& ray, double t_max,
+                                int skip_body = -1) const noexcept;
     /// Is anything between the surface point and the distance t_max in this direction? `from` is the hit that
     /// the ray leaves on the side of its geometric normal; the start is lifted by the bound of the rounding error
-    /// in that body's own frame, so that a surface never shadows itself and nothing further off is skipped.
+    /// in that body's own frame, and kept as far from the edges of its face as a few times that, so that a surface
+    /// never shadows itself and nothing further off is skipped.
     [[nodiscard]] bool occluded(const Placement& at, const Hit& from, const Vec3& direction,
                                 double t_max) const noexcept;
 
@@ -84,7 +89,9 @@ public:
 
     /// Nearest hits of rays that leave surfaces, each from its hit on the side of its geometric normal, in any
     /// direction, without an end; only those whose bit is set in `wanted` are asked, and only their `hits` written.
-    /// The start is lifted as for `occluded`. Rays need not run close together. `hits` may be `from`'s own array.
+    /// The start is lifted as for `occluded`, and ranges count from there. A direction below the horizon of its own
+    /// surface meets that surface at once. Rays that leave the inner side of a closed mesh, a sphere or an
+    /// ellipsoid meet it again from inside. Rays need not run close together. `hits` may be `from`'s own array.
     void intersect(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
                    std::uint32_t wanted, std::span<Hit> hits) const noexcept;
     /// As the packet above, each ray with an end of its own: t_max[i] metres.
@@ -94,13 +101,15 @@ public:
 
     [[nodiscard]] TextureFrame texture_frame(const Placement& at, const Hit& hit) const noexcept;
 
-    /// Bound of the error of a range that ends on this body, from rounding in single precision in its own frame,
-    /// metres: a shadow ray towards a point of an emitter stops that much before it.
+    /// Bound of the error of a range that ends on this body at up to 85 degrees from its normal, from rounding in
+    /// its own frame, metres: a shadow ray towards a point of an emitter stops that much before it.
     [[nodiscard]] double rounding_m(std::size_t body) const noexcept;
 
     /// Emitters of the scene, made ready once.
     [[nodiscard]] const Lights& lights() const noexcept;
 
+    /// An ellipsoid that holds the body.
+    [[nodiscard]] const BodyBounds& bounds(std::size_t body) const noexcept;
     /// Radius of the body's bounding sphere about its own origin, metres.
     [[nodiscard]] double bounding_radius_m(std::size_t body) const noexcept;
     [[nodiscard]] std::size_t triangle_count() const noexcept;

@@ -75,7 +75,8 @@ TEST(ImageFile, ExrHoldsEveryChannelExactly) {
         file.readPixels(0, 7);
         return values;
     };
-    const auto red = plane("R"), blue = plane("B"), body = plane("body"), variance = plane("variance");
+    const auto red = plane("R"), blue = plane("B"), body = plane("body"), variance = plane("variance"),
+               albedo = plane("albedo.G");
     const auto range = plane("range"), range_rest = plane("range.rest"), depth = plane("depth.Z");
     const auto x = plane("position.X"), x_rest = plane("position.X.rest"), nz = plane("normal.Z");
     int seen = 0;
@@ -84,6 +85,7 @@ TEST(ImageFile, ExrHoldsEveryChannelExactly) {
         EXPECT_EQ(blue[i], shot.image.pixels[i].z);
         EXPECT_EQ(body[i], static_cast<float>(shot.aovs.body[i]));
         EXPECT_EQ(variance[i], shot.aovs.variance[i]);
+        EXPECT_EQ(albedo[i], shot.aovs.body[i] < 0 ? 0 : 0.5f);
         EXPECT_EQ(nz[i], static_cast<float>(shot.aovs.normal[i].z));
         EXPECT_EQ(depth[i], static_cast<float>(shot.aovs.depth_m[i]));
         if (shot.aovs.body[i] < 0) {

@@ -1,6 +1,7 @@
 /// Real meshes, where the folder that holds them is there. Counts are those of the files' own documentation.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <set>
 
@@ -57,7 +58,7 @@ TEST_P(RealMesh, HasTheTrianglesSizeAndTexturesThatItSays) {
     EXPECT_LT(m->degenerate + m->duplicate + m->non_finite, asset.triangles / 100 + 1);
     std::set<std::string> textures;
     for (const MeshMaterial& material : m->materials)
-        if (!material.texture_file.empty()) textures.insert(material.texture_file);
+        if (material.colour.named()) textures.insert(material.colour.file);
     EXPECT_EQ(textures.size(), asset.textures);
     Vec3f low = m->mesh.positions[0], high = low;
     for (const Vec3f& p : m->mesh.positions)
@@ -76,7 +77,10 @@ TEST(RealScene, StationLoadsWithItsMaterialsAndTextures) {
                       "\"\n[[camera]]\nname = \"c\"\nresolution = [640, 480]\nfov_diagonal_deg = 30\n"));
     ASSERT_TRUE(s) << s.error().text();
     EXPECT_EQ(s->materials.size(), 28u);
-    EXPECT_EQ(s->textures.size(), 15u);
+    EXPECT_EQ(s->textures.size(), 15u + 4u) << "colours, and what its four `bump` lines name";
+    EXPECT_EQ(std::count_if(s->materials.begin(), s->materials.end(),
+                            [](const Material& m) { return m.normal_texture >= 0; }),
+              4);
     const std::set<std::string> names = [&] {
         std::set<std::string> all;
         for (const Material& m : s->materials) all.insert(m.name);

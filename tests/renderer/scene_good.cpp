@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
@@ -50,6 +51,8 @@ TEST(SceneFile, ReadsSurroundings) {
     expect_near(s.sun->direction, normalized(Vec3{1, -0.5, 0.2}), 1e-15);
     EXPECT_DOUBLE_EQ(s.sun->angular_diameter_rad, 0.533 * kPi / 180);
     EXPECT_EQ(s.ambient, (Rgb{0.1f, 0.1f, 0.2f}));
+    EXPECT_EQ(s.render.method, RenderSettings::Method::path);
+    EXPECT_EQ(s.render.max_depth, 12);
     EXPECT_EQ(s.render.spp, 4);
     EXPECT_EQ(s.render.seed, 7u);
     EXPECT_EQ(s.render.stale_after_s, 0.5);
@@ -58,7 +61,7 @@ TEST(SceneFile, ReadsSurroundings) {
 
 TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
     const Scene s = read_good(data_file("complete.toml"));
-    ASSERT_EQ(s.bodies.size(), 3u);
+    ASSERT_EQ(s.bodies.size(), 9u);
     const Body& target = s.bodies[0];
     EXPECT_EQ(target.name, "target");
     EXPECT_EQ(target.initial.T_world_body.t, (Vec3{10, 0, 0}));
@@ -71,6 +74,7 @@ TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
     const Sphere& moon = std::get<Sphere>(s.bodies[2].shape);
     EXPECT_EQ(moon.radius_m, 1737400.0);
     EXPECT_FLOAT_EQ(s.materials[static_cast<std::size_t>(moon.material)].diffuse.x, 0.12f);
+    EXPECT_EQ(std::get<Ellipsoid>(s.bodies[3].shape).semi_axes_m, (Vec3{13000, 11400, 9100}));
 
     const Mesh& overridden = s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[1].shape))];
     const Material& phong = s.materials[overridden.face_material.front()];
@@ -78,7 +82,10 @@ TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
     EXPECT_EQ(phong.specular, (Rgb{0.3f, 0.3f, 0.3f}));
     EXPECT_EQ(phong.exponent, 40);
     ASSERT_GE(phong.texture, 0);
-    EXPECT_EQ(s.textures.size(), 1u) << "the mesh and the material name the same file";
+    EXPECT_EQ(
+        s.materials[s.meshes[static_cast<std::size_t>(std::get<int>(target.shape))].face_material.front()].texture,
+        phong.texture)
+        << "the mesh and the material name the same file";
 }
 
 TEST(SceneFile, ReadsCamerasAndLidars) {
@@ -111,6 +118,11 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     EXPECT_EQ(overview.period_ns, 400'000'000);
     EXPECT_EQ(overview.white_radiance, 300);
     EXPECT_FALSE(overview.detector);
+    ASSERT_TRUE(overview.lens && c.lens);
+    EXPECT_DOUBLE_EQ(overview.lens->aperture_diameter_m, 0.05 / 2.8);
+    EXPECT_EQ(overview.lens->focus_distance_m, 20);
+    EXPECT_EQ(c.lens->aperture_diameter_m, 0.004);
+    EXPECT_EQ(c.lens->focus_distance_m, std::numeric_limits<double>::infinity());
 
     ASSERT_EQ(s.lidars.size(), 1u);
     EXPECT_EQ(s.lidars[0].mount, 1);
@@ -118,6 +130,38 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 2, 0}, {2.5, 0, 0.5},
                 1e-15);  // y is forward: along +x of the body
     expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 0, 1}, {0.5, 0, 1.5}, 1e-15);  // z is up
+}
+
+TEST(SceneFile, ReadsLights) {
+    const Scene s = read_good(data_file("complete.toml"));
+    ASSERT_EQ(s.lights.size(), 4u);
+    const Light &beacon = s.lights[0], &earthshine = s.lights[1], &floodlight = s.lights[2], &panel = s.lights[3];
+    EXPECT_EQ(beacon.name, "beacon");
+    EXPECT_EQ(beacon.kind, Light::Kind::point);
+    EXPECT_EQ(beacon.mount, 0);
+    EXPECT_EQ(beacon.T_mount_light.t, (Vec3{0, 0, 1.5}));
+    EXPECT_EQ(beacon.emission, (Rgb{2, 0.5f, 0.5f}));
+    EXPECT_EQ(earthshine.kind, Light::Kind::directional);
+    EXPECT_EQ(earthshine.mount, -1);
+    EXPECT_EQ(earthshine.emission, (Rgb{80, 90, 120}));
+    expect_near(earthshine.T_mount_light.q * Vec3{0, 0, 1}, {0, 0, -1}, 1e-15);  // shines along its z: downward
+    EXPECT_EQ(floodlight.kind, Light::Kind::disc);
+    EXPECT_EQ(floodlight.mount, 1);
+    EXPECT_EQ(floodlight.radius_m, 0.05);
+    EXPECT_EQ(floodlight.emission, (Rgb{5000, 5000, 5000}));
+    expect_near(floodlight.T_mount_light.q * Vec3{0, 0, 1}, normalized(Vec3{9.5, -0.3, 0}), 1e-15);
+    EXPECT_EQ(panel.kind, Light::Kind::rectangle);
+    EXPECT_EQ(panel.width_m, 1);
+    EXPECT_EQ(panel.height_m, 0.5);
+    expect_near(panel.T_mount_light.q * Vec3{0, 0, 1}, {0, 0, -1}, 1e-15);
+}
+
+TEST(SceneFile, LightsSitAsCamerasDo) {
+    const std::string place = "position_m = [1, 2, 3]\nlook_at = [-4, 5, 2]\nup = [0, 1, 0.5]\n";
+    const Scene s =
+        read_good_text(std::string("[ambient]\nradiance = 1\n") + kSphere + kCamera + place +
+                       "[[light]]\nname = \"l\"\nkind = \"disc\"\nradius_m = 1\nradiance_w_m2_sr = 1\n" + place);
+    EXPECT_EQ(s.lights.at(0).T_mount_light, s.cameras.at(0).T_mount_camera);
 }
 
 TEST(SceneFile, LookAtPutsTheTargetAheadAndUpUpward) {
@@ -146,7 +190,11 @@ TEST(SceneFile, DefaultsAreTheManuals) {
     EXPECT_FALSE(c.embedded_line);
     EXPECT_EQ(c.late, LatePolicy::late);
     EXPECT_FALSE(c.detector);
+    EXPECT_FALSE(c.lens);
+    EXPECT_TRUE(s.lights.empty());
     EXPECT_TRUE(s.lidars.empty());
+    EXPECT_EQ(s.render.method, RenderSettings::Method::direct);
+    EXPECT_EQ(s.render.max_depth, 8);
     EXPECT_EQ(s.render.spp, 1);
     EXPECT_EQ(s.render.stale_after_s, 0.5);
 }

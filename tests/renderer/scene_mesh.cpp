@@ -119,7 +119,7 @@ TEST(MeshFile, MtlBecomesLambertAndPhong) {
     EXPECT_EQ(painted.material.name, "painted panel");
     EXPECT_EQ(painted.material.kind, Material::Kind::lambert);
     EXPECT_EQ(painted.material.diffuse, (Rgb{0.8f, 0.8f, 0.8f}));
-    EXPECT_EQ(painted.texture_file, data_file("checker.ppm"));
+    EXPECT_EQ(painted.colour.file, data_file("checker.ppm"));
     const Material& foil = cube.materials[1].material;
     EXPECT_EQ(foil.kind, Material::Kind::phong);
     EXPECT_FLOAT_EQ(foil.diffuse.x, 0.5f / 1.25f);  // 0.5 + 0.75 > 1: both divided by the largest sum
@@ -199,7 +199,7 @@ TEST(MeshFile, TextureNamesWithSpacesOptionsAndForeignFolders) {
     folder.write("m.mtl", "newmtl a\nmap_Kd -o 0.5 0 -clamp on C:\\models\\my skin.ppm  \n");
     const MeshFile m = read_good(
         folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
-    EXPECT_EQ(m.materials.at(0).texture_file, folder / "my skin.ppm");
+    EXPECT_EQ(m.materials.at(0).colour.file, folder / "my skin.ppm");
     EXPECT_EQ(m.materials.at(0).material.diffuse, (Rgb{1, 1, 1})) << "no Kd under a map is 1";
 }
 
@@ -222,8 +222,8 @@ TEST(MeshFile, TextureStaysOffTrianglesWithoutCoordinates) {
     folder.write("m.mtl", "newmtl a\nmap_Kd t.ppm\n");
     const MeshFile m = read_good(
         folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "v 0 0 1\nvt 0 0\nf 1/1 2/1 3/1\nf 1 2 4\n"));
-    EXPECT_FALSE(m.materials.at(m.mesh.face_material[0]).texture_file.empty());
-    EXPECT_TRUE(m.materials.at(m.mesh.face_material[1]).texture_file.empty());
+    EXPECT_TRUE(m.materials.at(m.mesh.face_material[0]).has_textures());
+    EXPECT_FALSE(m.materials.at(m.mesh.face_material[1]).has_textures());
     EXPECT_EQ(m.warnings.size(), 1u);
 }
 
@@ -265,9 +265,11 @@ TEST(MeshFile, GltfNodesAndMaterialsAreApplied) {
     EXPECT_EQ(low->x, 4);
     EXPECT_EQ(high->x, 5);
     const Material& material = m.materials.at(m.mesh.face_material[0]).material;
-    EXPECT_FLOAT_EQ(material.diffuse.x, 0.75f * 0.8f);
-    EXPECT_FLOAT_EQ(material.specular.y, 0.25f * 0.4f + 0.75f * 0.04f);
-    EXPECT_FLOAT_EQ(material.exponent, (2 / 0.0625f - 2) / 4);  // r = 0.5
+    EXPECT_EQ(material.kind, Material::Kind::ggx);
+    EXPECT_EQ(material.diffuse, (Rgb{0.8f, 0.4f, 0.2f}));
+    EXPECT_EQ(material.metallic, 0.25f);
+    EXPECT_EQ(material.roughness, 0.5f);
+    EXPECT_EQ(material.ior, 1.5f);
     EXPECT_EQ(material.emission, (Rgb{0, 0, 1}));
 }
 
@@ -279,6 +281,17 @@ TEST(MeshFile, FormatsThatAreNoneGiveAnError) {
         ASSERT_FALSE(m) << name;
         EXPECT_EQ(m.error().file, folder / name);
     }
+}
+
+TEST(MeshFile, PlyHeaderPromisesNoMoreThanTheFileHolds) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("m.ply",
+                                          "ply\nformat ascii 1.0\nelement vertex 49999999999999999999\n"
+                                          "property float x\nend_header\n0\n");
+    const Result<MeshFile> m = read_mesh(path, 1);
+    ASSERT_FALSE(m);
+    EXPECT_EQ(m.error().text(),
+              path + ":3:16: \"49999999999999999999\" is not a number of elements that this file can hold");
 }
 
 double area(std::span<const Vec3> p, const std::vector<std::array<std::uint32_t, 3>>& triangles) {

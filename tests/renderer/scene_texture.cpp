@@ -34,6 +34,100 @@ TEST(TextureFile, EightBitsAreMadeLinear) {
     }
 }
 
+TEST(TextureFile, EveryEightBitCodeIsWithinHalfACodeOfTheStandard) {
+    // Points of IEC 61966-2-1 worked out by hand: the end of the straight part, the middle, the ends.
+    EXPECT_NEAR(srgb_to_linear(10 / 255.0), 0.00303527, 1e-8);
+    EXPECT_NEAR(srgb_to_linear(128 / 255.0), 0.21586050, 1e-8);
+    const TemporaryFolder folder;
+    cv::Mat codes(16, 16, CV_8UC1);
+    for (int i = 0; i < 256; ++i) codes.at<uchar>(i / 16, i % 16) = static_cast<uchar>(i);
+    cv::imwrite(folder / "t.png", codes);
+    const Result<Texture> t = read_texture(folder / "t.png");
+    ASSERT_TRUE(t);
+    for (std::size_t i = 0; i < 256; ++i)
+        for (std::size_t band = 0; band < 3; ++band)
+            EXPECT_NEAR(t->rgb[3 * i + band], 65535 * srgb_to_linear(static_cast<double>(i) / 255), 0.5) << i;
+    EXPECT_EQ(t->rgb.front(), 0);
+    EXPECT_EQ(t->rgb.back(), 65535);
+}
+
+TEST(TextureFile, UseChoosesTheCurveWhateverTheDepth) {
+    using Colour = TextureUse::Colour;
+    const TemporaryFolder folder;
+    cv::Mat eight(1, 256, CV_8UC1), sixteen(1, 256, CV_16UC1);
+    for (int i = 0; i < 256; ++i) {
+        eight.at<uchar>(0, i) = static_cast<uchar>(i);
+        sixteen.at<std::uint16_t>(0, i) = static_cast<std::uint16_t>(257 * i);
+    }
+    cv::imwrite(folder / "8.png", eight);
+    cv::imwrite(folder / "16.png", sixteen);
+    const auto codes = [&](const char* file, Colour colour) {
+        const Result<Texture> t = read_texture(folder / file, {.colour = colour});
+        EXPECT_TRUE(t);
+        return t->rgb;
+    };
+    EXPECT_EQ(codes("8.png", Colour::srgb), codes("8.png", Colour::by_depth));
+    EXPECT_EQ(codes("16.png", Colour::linear), codes("16.png", Colour::by_depth));
+    EXPECT_EQ(codes("8.png", Colour::linear), codes("16.png", Colour::linear));
+    EXPECT_EQ(codes("8.png", Colour::srgb), codes("16.png", Colour::srgb));
+    EXPECT_NE(codes("8.png", Colour::srgb), codes("8.png", Colour::linear));
+    EXPECT_EQ(codes("16.png", Colour::normals), codes("16.png", Colour::linear));
+    EXPECT_EQ(codes("8.png", Colour::linear)[3 * 100], 25700);
+}
+
+TEST(TextureFile, SixteenBitsOfSrgbAreMadeLinear) {
+    const TemporaryFolder folder;
+    cv::Mat image(4, 1000, CV_16UC1);
+    for (int i = 0; i < 4000; ++i) image.at<std::uint16_t>(i / 1000, i % 1000) = static_cast<std::uint16_t>(i * 16);
+    cv::imwrite(folder / "t.png", image);
+    const Result<Texture> t = read_texture(folder / "t.png", {.colour = TextureUse::Colour::srgb});
+    ASSERT_TRUE(t);
+    for (std::size_t i = 0; i < 4000; ++i)
+        ASSERT_NEAR(t->rgb[3 * i], 65535 * srgb_to_linear(static_cast<double>(i * 16) / 65535), 0.5) << i;
+}
+
+TEST(TextureFile, EightAndSixteenBitsOfTheSamePictureAgreeWithinHalfACode) {
+    // Linear light in 16 bits, and its sRGB in 8 bits: the 8-bit code is the nearest one.
+    const TemporaryFolder folder;
+    cv::Mat sixteen(1, 4096, CV_16UC1), eight(1, 4096, CV_8UC1);
+    const auto srgb = [](double l) { return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055; };
+    for (int i = 0; i < 4096; ++i) {
+        sixteen.at<std::uint16_t>(0, i) = static_cast<std::uint16_t>(16 * i);
+        eight.at<uchar>(0, i) = static_cast<uchar>(std::lround(255 * srgb(16 * i / 65535.0)));
+    }
+    cv::imwrite(folder / "16.png", sixteen);
+    cv::imwrite(folder / "8.png", eight);
+    const Result<Texture> a = read_texture(folder / "16.png"), b = read_texture(folder / "8.png");
+    ASSERT_TRUE(a && b);
+    for (std::size_t i = 0; i < 4096; ++i)  // rounding to 16 bits: a half more of a code of 65535
+        ASSERT_NEAR(255 * srgb(a->rgb[3 * i] / 65535.0), 255 * srgb(b->rgb[3 * i] / 65535.0), 0.5 + 0.06) << i;
+}
+
+TEST(TextureFile, NormalMapsOfEightBitsAreFlatAt128) {
+    const TemporaryFolder folder;
+    cv::imwrite(folder / "n.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 128, 128)));
+    cv::imwrite(folder / "ends.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 64, 0)));
+    const Result<Texture> n = read_texture(folder / "n.png", {.colour = TextureUse::Colour::normals});
+    const Result<Texture> ends = read_texture(folder / "ends.png", {.colour = TextureUse::Colour::normals});
+    ASSERT_TRUE(n && ends);
+    EXPECT_EQ(n->rgb, (std::vector<std::uint16_t>{32768, 32768, 65535}));
+    EXPECT_EQ(ends->rgb, (std::vector<std::uint16_t>{0, 16384, 65535}));
+}
+
+TEST(TextureFile, BringsItsCoarserLevelsAndItsWrap) {
+    const TemporaryFolder folder;
+    cv::Mat image(2, 4, CV_16UC1, cv::Scalar(1000));
+    image.at<std::uint16_t>(0, 0) = 3000;
+    cv::imwrite(folder / "t.png", image);
+    const Result<Texture> t = read_texture(folder / "t.png", {.wrap = Texture::Wrap::clamp});
+    ASSERT_TRUE(t);
+    EXPECT_EQ(t->wrap, Texture::Wrap::clamp);
+    ASSERT_EQ(t->coarser.size(), 2u);
+    EXPECT_EQ(t->coarser[0].rgb, (std::vector<std::uint16_t>{1500, 1500, 1500, 1000, 1000, 1000}));
+    EXPECT_EQ(t->coarser[1].rgb, (std::vector<std::uint16_t>{1250, 1250, 1250}));
+    EXPECT_EQ(read_texture(folder / "t.png")->wrap, Texture::Wrap::repeat);
+}
+
 TEST(TextureFile, SixteenBitsAreLinearAlready) {
     const TemporaryFolder folder;
     const cv::Mat image(2, 3, CV_16UC3, cv::Scalar(300, 200, 100));

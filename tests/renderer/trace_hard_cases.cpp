@@ -169,6 +169,50 @@ TEST(TraceFar, AnEarthBehindChangesNoNearRange) {
     EXPECT_GT(earth, 100);
 }
 
+TEST(TraceFar, OneMillimetreFeaturesBesideAPlanetOfAMillionKilometres) {
+    Scene alone, both;
+    for (Scene* s : {&alone, &both}) {
+        s->materials.push_back(lambert(0.4f));
+        add_mesh(*s, bumpy(4, 5e-3, 0.3));  // waves of about a millimetre
+        add_sphere(*s, 5e-4, {8e-3, 0, 0});
+    }
+    const double radius = 1e9, depth = radius + 0.1;
+    add_sphere(both, radius, {0, 0, -depth});
+    const auto a = tracer_of(alone), b = tracer_of(both);
+    ASSERT_TRUE(a && b);
+    std::mt19937_64 random(8);
+    int near = 0, planet = 0, shadows = 0;
+    for (int i = 0; i < 20'000; ++i) {
+        Vec3 eye = 0.05 * random_direction(random);
+        eye.z = std::abs(eye.z);
+        const Ray ray{eye, normalized(6e-3 * random_direction(random) - eye)};
+        const Hit one = a->intersect(placed(alone), ray, kInfinity),
+                  two = b->intersect(placed(both), ray, kInfinity);
+        if (one.body < 0) {
+            if (ray.direction.z > -0.1) continue;
+            ASSERT_EQ(two.body, 2);
+            ++planet;
+            // Depth of the sphere's surface below a point near its top, to the second order.
+            const double x =
+                norm(Vec3{ray.origin.x, ray.origin.y, 0} + two.range_m * Vec3{ray.direction.x, ray.direction.y, 0});
+            EXPECT_NEAR(ray.origin.z + two.range_m * ray.direction.z, -0.1 - x * x / (2 * radius), 1e-6);
+            continue;
+        }
+        ASSERT_EQ(two.body, one.body);
+        ASSERT_EQ(two.range_m, one.range_m);
+        ++near;
+        Vec3 sun = random_direction(random);
+        sun.z = std::abs(sun.z);
+        const bool dark = a->occluded(placed(alone), one, sun, kInfinity);
+        ASSERT_EQ(b->occluded(placed(both), two, sun, kInfinity), dark);
+        ASSERT_TRUE(b->occluded(placed(both), two, {0, 0, -1}, kInfinity));
+        shadows += dark;
+    }
+    EXPECT_GT(near, 10'000);
+    EXPECT_GT(planet, 500);
+    EXPECT_GT(shadows, 1'000);
+}
+
 TEST(TraceShadow, LitFacetsOfAConvexBodyAreNeverDark) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
@@ -180,7 +224,8 @@ TEST(TraceShadow, LitFacetsOfAConvexBodyAreNeverDark) {
         const Placement at = placed(s, offset);
         int lit = 0, dark = 0;
         for (int i = 0; lit < 400'000 / kFewer && i < 2'000'000; ++i) {
-            const Vec3 eye = offset + 50.0 * random_direction(random);
+            const double distance = std::array{50.0, 1e4, 1e7}[static_cast<std::size_t>(i) % 3];
+            const Vec3 eye = offset + distance * random_direction(random);
             const Ray ray{eye, normalized(offset + 4.9 * random_direction(random) - eye)};
             const Hit hit = tracer->intersect(at, ray, kInfinity);
             if (hit.body < 0) continue;
@@ -238,6 +283,37 @@ TEST(TraceShadow, APlateOneMillimetreAboveAFacetAlwaysBlocks) {
     }
 }
 
+TEST(TraceShadow, AnOverhangOneMillimetreUpHidesTheSunAtAnyDistanceOfTheCamera) {
+    // The overhang ends at x = 0. Points of the facet within 2 mm of its foot, seen from above and from far; the
+    // Sun stands behind a point of the overhang that is at least 0.1 mm inside it, and then as far outside.
+    Scene s;
+    s.materials.push_back(lambert(0.4f));
+    std::mt19937_64 random(14);
+    const Rigid3 T{random_attitude(random), {}};
+    add_mesh(s, box(10, 10, 4), T);
+    add_mesh(s, plate(4, 8, 3), T * Rigid3{{}, {-2, 0, 2.001}});
+    const auto tracer = tracer_of(s);
+    ASSERT_TRUE(tracer);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (const double distance : {50.0, 1e4, 1e6, 1e7}) {
+        const Placement at = placed(s, {3.844e8, 0, -7e6});
+        const Rigid3& T_world = at.T_world_body[0];
+        for (int i = 0; i < 10'000; ++i) {
+            const Vec3 foot{2e-3 * unit(random), 6 * unit(random) - 3, 2};
+            const Vec3 eye = foot + distance * normalized(Vec3{1 + unit(random), unit(random) - 0.5, 1});
+            const Vec3 world_eye = T_world * eye;
+            const Hit hit = tracer->intersect(at, {world_eye, normalized(T_world * foot - world_eye)}, kInfinity);
+            ASSERT_EQ(hit.body, 0);
+            const auto dark = [&](double beyond_the_rim) {
+                const Vec3 behind{beyond_the_rim, foot.y + 1e-3 * (unit(random) - 0.5), 2.001};
+                return tracer->occluded(at, hit, T_world.q * normalized(behind - foot), kInfinity);
+            };
+            ASSERT_TRUE(dark(-1e-4 - 1e-3 * unit(random))) << distance;
+            ASSERT_FALSE(dark(1e-4 + 1e-3 * unit(random))) << distance;
+        }
+    }
+}
+
 struct Leaks {
     int rays = 0, lost = 0;
 };
@@ -288,6 +364,28 @@ TEST(TraceWatertight, RandomEdgeAndVertexRaysAreNotLost) {
     const Leaks vertices =
         leaks_of(s, 1'000'000 / kFewer, [&](auto& random) { return vertex(m.faces[face(random)], 0); });
     EXPECT_LE(vertices.lost, 2e-5 * vertices.rays);
+}
+
+TEST(TraceWatertight, NoneOfTenMillionRandomRaysInPacketsIsLost) {
+    Scene s;
+    s.materials.push_back(lambert(0.4f));
+    add_mesh(s, icosphere(5, 4));
+    const auto tracer = tracer_of(s);
+    ASSERT_TRUE(tracer);
+    const Placement at = placed(s);
+    std::mt19937_64 random(15);
+    std::uniform_real_distribution<double> within(-0.3, 0.3);
+    int rays = 0, lost = 0;
+    while (rays < 10'000'000 / kFewer) {
+        const Vec3 towards = random_direction(random), eye = 12.0 * towards, beside = cross(towards, {0.6, 0.8, 0});
+        std::array<Ray, kPacket> packet;
+        std::array<Hit, kPacket> hits;
+        for (Ray& r : packet) r = {eye, normalized(within(random) * 7.0 * beside - eye)};
+        tracer->intersect(at, packet, hits);
+        for (const Hit& hit : hits) lost += hit.body < 0 || !hit.outside || hit.range_m > 12;
+        rays += static_cast<int>(kPacket);
+    }
+    EXPECT_EQ(lost, 0) << "of " << rays;
 }
 
 TEST(TraceWatertight, PixelsThatMeetAGridsVerticesAreNotLost) {
@@ -400,6 +498,18 @@ TEST(TraceErrors, BadMeshesAreToldByName) {
     EXPECT_TRUE(tracer_of(s));
     add_sphere(s, -1, {});
     EXPECT_FALSE(tracer_of(s));
+    s.bodies.back().shape = Ellipsoid{{1, 0, 1}, 0};
+    tracer = tracer_of(s);
+    ASSERT_FALSE(tracer);
+    EXPECT_NE(tracer.error().what.find("semi-axes"), std::string::npos);
+    s.bodies.back().shape = Ellipsoid{{1, 2, 1}, 3};
+    EXPECT_FALSE(tracer_of(s));
+    s.bodies.back().shape = Ellipsoid{{1, 2, 1}, 0};
+    EXPECT_TRUE(tracer_of(s));
+    s.materials[0].normal_texture = 4;
+    tracer = tracer_of(s);
+    ASSERT_FALSE(tracer);
+    EXPECT_NE(tracer.error().what.find("texture 4"), std::string::npos);
 }
 
 TEST(TraceErrors, AnEmptyMeshIsInvisible) {

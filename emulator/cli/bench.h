@@ -1,0 +1,10 @@
+/// emulator/cli/bench.h - the subcommands of `narpa bench`, one file each.
+#pragma once
+
+#include "emulator/cli/cli.h"
+
+namespace narpa::cli {
+
+Command add_bench_render(CLI::App& bench);
+
+}  // namespace narpa::cli

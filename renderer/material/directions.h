@@ -1,0 +1,47 @@
+/// renderer/material/directions.h - choosing directions about an axis.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/vec3.h"
+
+namespace narpa {
+
+/// Two directions that make a right-handed frame with the unit vector z (T. Duff et al., "Building an Orthonormal
+/// Basis, Revisited", JCGT 6(1), 2017).
+struct Basis {
+    Vec3 x, y, z;
+
+    explicit Basis(const Vec3& axis) noexcept : z(axis) {
+        const double sign = std::copysign(1.0, z.z), a = -1 / (sign + z.z), b = z.x * z.y * a;
+        x = {1 + sign * z.x * z.x * a, sign * b, -sign * z.x};
+        y = {b, sign + z.y * z.y * a, -z.y};
+    }
+    [[nodiscard]] Vec3 to_world(const Vec3& local) const noexcept {
+        return local.x * x + local.y * y + local.z * z;
+    }
+    [[nodiscard]] Vec3 to_local(const Vec3& world) const noexcept {
+        return {dot(world, x), dot(world, y), dot(world, z)};
+    }
+};
+
+/// At `cosine` from the z axis, at the azimuth 2 pi u.
+[[nodiscard]] inline Vec3 direction_at(double cosine, double u) noexcept {
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine)), phi = 2 * std::numbers::pi * u;
+    return {sine * std::cos(phi), sine * std::sin(phi), cosine};
+}
+
+/// Density cosine / pi about n.
+[[nodiscard]] inline Vec3 cosine_direction(const Vec3& n, double u1, double u2) noexcept {
+    return Basis(n).to_world(direction_at(std::sqrt(1 - u1), u2));
+}
+
+/// A direction below the surface is mirrored to above it: its light is not lost, and the densities of the two add.
+[[nodiscard]] inline Vec3 folded(const Vec3& l, const Vec3& n) noexcept {
+    const double below = dot(n, l);
+    return below < 0 ? l - 2 * below * n : l;
+}
+
+}  // namespace narpa

@@ -1,0 +1,46 @@
+/// renderer/material/lobes.h - the kinds of material one by one: what bsdf.cpp chooses among.
+///
+/// Each kind has its f in 1/sr (`_f`), the density of the directions it chooses (`_pdf`, 1/sr) and that choice
+/// (`_direction`, which may fall below the surface: then f is 0). All assume n.v > 0, the first two n.l > 0 as
+/// well. Phong's f stands in bsdf.cpp itself.
+#pragma once
+
+#include <numbers>
+
+#include "renderer/material/bsdf.h"
+
+namespace narpa::lobes {
+
+inline constexpr double kPi = std::numbers::pi;
+using Random3 = std::array<double, 3>;
+/// Directions of less density are never drawn but by rounding, and could overflow the weight.
+inline constexpr double kLeastDensity = 1e-30;
+
+double phong_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
+Vec3 phong_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept;
+Rgb phong_classic_f(const Surface& s, double n_l, double n_v, double l_v) noexcept;
+
+BsdfSample mirror_sample(const Surface& s, const Vec3& n, const Vec3& v) noexcept;
+BsdfSample dielectric_sample(const Surface& s, const Vec3& n, const Vec3& v, double choice) noexcept;
+
+Rgb ggx_f(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
+double ggx_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
+BsdfSample ggx_sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept;
+Rgb ggx_mean_albedo(const Surface& s) noexcept;
+
+Rgb lommel_seeliger_f(const Surface& s, double n_l, double n_v, double l_v) noexcept;
+double lommel_seeliger_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
+Vec3 lommel_seeliger_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept;
+Rgb lommel_seeliger_mean_albedo(const Surface& s) noexcept;
+
+Rgb lunar_lambert_f(const Surface& s, double n_l, double n_v, double l_v) noexcept;
+double lunar_lambert_pdf(const Vec3& n, const Vec3& l) noexcept;
+Vec3 lunar_lambert_direction(const Vec3& n, const Random3& u) noexcept;
+Rgb lunar_lambert_mean_albedo(const Surface& s) noexcept;
+
+Rgb hapke_f(const Surface& s, double n_l, double n_v, double l_v) noexcept;
+double hapke_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
+Vec3 hapke_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept;
+Rgb hapke_mean_albedo(const Surface& s) noexcept;
+
+}  // namespace narpa::lobes

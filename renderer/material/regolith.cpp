@@ -1,0 +1,86 @@
+// Lommel-Seeliger and lunar-Lambert surfaces.
+#include "renderer/material/regolith.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/material/directions.h"
+#include "renderer/material/lobes.h"
+
+namespace narpa {
+
+double henyey_greenstein(double g, double cos_phase) noexcept {
+    const double d = 1 + g * g + 2 * g * cos_phase;
+    return (1 - g * g) / (d * std::sqrt(d));
+}
+
+// The inverse of the distribution, multiplied out: the usual form divides by g.
+double henyey_greenstein_cosine(double g, double u) noexcept {
+    const double s = 2 * u - 1, d = 1 + g * s;
+    const double cos_scattering = (s + g * (3 + s * s) / 2 + g * g * s + g * g * g * (s * s - 1) / 2) / (d * d);
+    return std::clamp(-cos_scattering, -1.0, 1.0);
+}
+
+// The sphere's phase curve 1 - sin(a/2) tan(a/2) ln cot(a/4), as Legendre's series in cos a (coefficients by
+// quadrature), meets Henyey and Greenstein's, whose coefficients are (2 n + 1) (-g)^n.
+double lommel_seeliger_bond_albedo(double g) noexcept {
+    constexpr double kCoefficients[] = {0.20456855, 0.23177662, 0.03575057, 0.01225415, 0.00564312, 0.00306012,
+                                        0.00184385, 0.00119633, 0.00082006, 0.00058652, 0.00043394, 0.00033003};
+    double sum = 0, power = 1;
+    for (const double k : kCoefficients) {
+        sum += k * power;
+        power *= -g;
+    }
+    return sum;
+}
+
+double lunar_lambert_weight(double phase_rad) noexcept {
+    const double a = phase_rad * 180 / std::numbers::pi;
+    return std::max(0.0, 1 + a * (-0.019 + a * (2.42e-4 - a * 1.46e-6)));
+}
+
+namespace lobes {
+
+// f = w / (4 pi) p(a) / (n.l + n.v)
+Rgb lommel_seeliger_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
+    const double p = henyey_greenstein(static_cast<double>(s.material->asymmetry), l_v);
+    return s.diffuse * static_cast<float>(p / (4 * kPi * (n_l + n_v)));
+}
+
+double lommel_seeliger_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
+    const double g = static_cast<double>(s.material->asymmetry), l_v = dot(l, v);
+    const double mirrored = l_v - 2 * dot(n, l) * dot(n, v);
+    return (henyey_greenstein(g, l_v) + henyey_greenstein(g, mirrored)) / (4 * kPi);
+}
+
+Vec3 lommel_seeliger_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
+    const double cosine = henyey_greenstein_cosine(static_cast<double>(s.material->asymmetry), u[1]);
+    return folded(Basis(v).to_world(direction_at(cosine, u[2])), n);
+}
+
+Rgb lommel_seeliger_mean_albedo(const Surface& s) noexcept {
+    return s.diffuse * static_cast<float>(lommel_seeliger_bond_albedo(static_cast<double>(s.material->asymmetry)));
+}
+
+// f = A / pi (2 L(a) / (n.l + n.v) + 1 - L(a))
+Rgb lunar_lambert_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
+    const double weight = lunar_lambert_weight(std::acos(std::clamp(l_v, -1.0, 1.0)));
+    return s.diffuse * static_cast<float>((2 * weight / (n_l + n_v) + 1 - weight) / kPi);
+}
+
+// Half as the Lommel-Seeliger part (even over the hemisphere), half as Lambert's.
+double lunar_lambert_pdf(const Vec3& n, const Vec3& l) noexcept {
+    return 0.25 / kPi + 0.5 * dot(n, l) / kPi;
+}
+
+Vec3 lunar_lambert_direction(const Vec3& n, const Random3& u) noexcept {
+    return u[0] < 0.5 ? Basis(n).to_world(direction_at(1 - u[1], u[2])) : cosine_direction(n, u[1], u[2]);
+}
+
+// The factor is the mean of the directional albedo over the hemisphere, by quadrature.
+Rgb lunar_lambert_mean_albedo(const Surface& s) noexcept {
+    return s.diffuse * 1.2117f;
+}
+
+}  // namespace lobes
+}  // namespace narpa

@@ -1,0 +1,119 @@
+#include <assimp/GltfMaterial.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "renderer/scene/mesh_material.h"
+#include "renderer/scene/triangle_soup.h"
+
+namespace narpa {
+
+namespace {
+
+Rgb colour(const aiMaterial& m, const char* key, unsigned type, unsigned index, const Rgb& otherwise) {
+    aiColor3D c;
+    return m.Get(key, type, index, c) == AI_SUCCESS ? Rgb{c.r, c.g, c.b} : otherwise;
+}
+
+float number(const aiMaterial& m, const char* key, unsigned type, unsigned index, float otherwise) {
+    float x = otherwise;
+    m.Get(key, type, index, x);
+    return x;
+}
+
+/// What 3DS, PLY, DAE and others give.
+Material classic_material(const aiMaterial& m) {
+    return diffuse_and_lobe(m.GetName().C_Str(), colour(m, AI_MATKEY_COLOR_DIFFUSE, {0.5f, 0.5f, 0.5f}),
+                            colour(m, AI_MATKEY_COLOR_SPECULAR, {}), number(m, AI_MATKEY_SHININESS, 0),
+                            colour(m, AI_MATKEY_COLOR_EMISSIVE, {}));
+}
+
+/// glTF 2.0's metallic-roughness, KHR_materials_transmission and KHR_materials_ior.
+Material gltf_material(const aiMaterial& m) {
+    constexpr float kGlass = 0.5f;  // of the light that goes through
+    const std::string name = m.GetName().C_Str();
+    const Rgb emission = colour(m, AI_MATKEY_COLOR_EMISSIVE, {});
+    const float ior = number(m, AI_MATKEY_REFRACTI, 1.5f);
+    if (number(m, AI_MATKEY_TRANSMISSION_FACTOR, 0) >= kGlass) return smooth_glass(name, ior, emission);
+    return metallic_roughness(name, colour(m, AI_MATKEY_BASE_COLOR, {1, 1, 1}),
+                              number(m, AI_MATKEY_METALLIC_FACTOR, 1), number(m, AI_MATKEY_ROUGHNESS_FACTOR, 1),
+                              ior, emission);
+}
+
+/// Reads what a material names, and tells what is passed over.
+class TextureFinder {
+public:
+    TextureFinder(const aiScene& scene, const aiMaterial& m, const std::string& path,
+                  std::vector<std::string>& warnings)
+        : scene_(scene), m_(m), path_(path), warnings_(warnings) {}
+
+    /// The image of this kind, as a file or as the bytes that the mesh file holds; empty where there is none.
+    [[nodiscard]] MeshTexture find(aiTextureType type) {
+        MeshTexture out;
+        aiString name;
+        unsigned channel = 0;
+        aiTextureMapMode modes[3] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
+        if (m_.GetTexture(type, 0, &name, nullptr, &channel, nullptr, nullptr, modes) != AI_SUCCESS) return out;
+        if (channel != 0) {
+            tell("a texture that lies by the second texture coordinates is not used");
+            return out;
+        }
+        aiUVTransform transform;
+        if (m_.Get(AI_MATKEY_UVTRANSFORM(type, 0), transform) == AI_SUCCESS)
+            tell("shifts, turns and scales of textures (KHR_texture_transform) are not used");
+        if (modes[0] == aiTextureMapMode_Clamp) out.wrap = Texture::Wrap::clamp;
+        if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
+            const auto* bytes = reinterpret_cast<const std::uint8_t*>(inside->pcData);
+            if (inside->mHeight == 0)
+                out.file = path_ + name.C_Str(), out.bytes.assign(bytes, bytes + inside->mWidth);
+        } else {
+            out.file = texture_path(path_, name.C_Str());
+        }
+        return out;
+    }
+
+    [[nodiscard]] bool has(aiTextureType type) const { return m_.GetTextureCount(type) > 0; }
+
+    /// Once a file, however many materials it is true of.
+    void tell(std::string_view what) {
+        std::string text = fmt::format("{}: {}", path_, what);
+        if (std::find(warnings_.begin(), warnings_.end(), text) == warnings_.end())
+            warnings_.push_back(std::move(text));
+    }
+
+private:
+    const aiScene& scene_;
+    const aiMaterial& m_;
+    const std::string& path_;
+    std::vector<std::string>& warnings_;
+};
+
+bool is_gltf(const std::string& path) {
+    const std::string extension = extension_of(path);
+    return extension == ".gltf" || extension == ".glb";
+}
+
+}  // namespace
+
+MeshMaterial from_assimp(const aiScene& scene, const aiMaterial& m, const std::string& path,
+                         std::vector<std::string>& warnings) {
+    const bool gltf = is_gltf(path);
+    TextureFinder textures(scene, m, path, warnings);
+    MeshMaterial out{.material = gltf ? gltf_material(m) : classic_material(m)};
+    out.colour = textures.find(aiTextureType_BASE_COLOR);
+    if (!out.colour.named()) out.colour = textures.find(aiTextureType_DIFFUSE);
+    out.emission = textures.find(aiTextureType_EMISSIVE);
+    out.normal = textures.find(aiTextureType_NORMALS);
+    out.material.normal_scale =
+        std::clamp(number(m, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1), 0.0f, 100.0f);
+    const bool opaque = out.material.kind != Material::Kind::dielectric;
+    if (opaque && (number(m, AI_MATKEY_OPACITY, 1) < 1 || number(m, AI_MATKEY_TRANSMISSION_FACTOR, 0) > 0))
+        textures.tell("transparent materials are drawn opaque");
+    if (gltf && textures.has(aiTextureType_UNKNOWN))
+        textures.tell("metallic-roughness textures are not used, their factors are");
+    return out;
+}
+
+}  // namespace narpa

@@ -1,0 +1,66 @@
+/// renderer/trace/packet.h - sixteen rays side by side, in double, laid out so that the compiler works on several
+/// of them with each instruction.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "base/pose.h"
+#include "renderer/trace/tracer.h"
+
+namespace narpa {
+
+template <class T>
+using PerRay = std::array<T, kPacket>;
+
+inline constexpr std::uint32_t kAllRays = (1u << kPacket) - 1;
+
+inline bool is_set(std::uint32_t bits, std::size_t i) noexcept {
+    return (bits >> i & 1u) != 0;
+}
+
+/// A vector for each ray.
+struct alignas(64) VecPerRay {
+    PerRay<double> x, y, z;
+
+    [[nodiscard]] Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
+    void put(std::size_t i, const Vec3& v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
+};
+
+[[nodiscard]] inline VecPerRay operator-(const VecPerRay& a, const Vec3& b) noexcept {
+    VecPerRay out;
+    for (std::size_t i = 0; i < kPacket; ++i) out.x[i] = a.x[i] - b.x;
+    for (std::size_t i = 0; i < kPacket; ++i) out.y[i] = a.y[i] - b.y;
+    for (std::size_t i = 0; i < kPacket; ++i) out.z[i] = a.z[i] - b.z;
+    return out;
+}
+
+/// The vectors, in the world's axes, in those of a body.
+[[nodiscard]] inline VecPerRay to_body(const Quat& q_world_body, const VecPerRay& v) noexcept {
+    const auto [bx, by, bz] = columns(q_world_body);  // the body's axes
+    VecPerRay out;
+    for (std::size_t i = 0; i < kPacket; ++i) out.x[i] = bx.x * v.x[i] + bx.y * v.y[i] + bx.z * v.z[i];
+    for (std::size_t i = 0; i < kPacket; ++i) out.y[i] = by.x * v.x[i] + by.y * v.y[i] + by.z * v.z[i];
+    for (std::size_t i = 0; i < kPacket; ++i) out.z[i] = bz.x * v.x[i] + bz.y * v.y[i] + bz.z * v.z[i];
+    return out;
+}
+
+/// Where each ray enters a bounding sphere about the origin, as `bounding_span` has it; infinity where it misses.
+[[nodiscard]] inline PerRay<double> bounding_entries(const VecPerRay& o, const VecPerRay& unit_d,
+                                                     double radius) noexcept {
+    PerRay<double> entry, exit;  // NaN where the line misses: no comparison holds
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const double b = -(o.x[i] * unit_d.x[i] + o.y[i] * unit_d.y[i] + o.z[i] * unit_d.z[i]);
+        const double cx = o.x[i] + b * unit_d.x[i], cy = o.y[i] + b * unit_d.y[i], cz = o.z[i] + b * unit_d.z[i];
+        const double half_chord = std::sqrt(radius * radius - (cx * cx + cy * cy + cz * cz));
+        entry[i] = b - half_chord;
+        exit[i] = b + half_chord;
+    }
+    for (std::size_t i = 0; i < kPacket; ++i)
+        if (!(exit[i] >= 0)) entry[i] = std::numeric_limits<double>::infinity();
+    return entry;
+}
+
+}  // namespace narpa

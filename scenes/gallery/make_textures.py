@@ -1,0 +1,109 @@
+"""The pictures that the gallery's scenes put on their surfaces.
+
+With a folder of real maps (earth-blue-marble.jpg, 2k_mars.jpg, lunar_surface_4096x2048.jpg; longitude across, latitude
+up) these are taken; a map that is not there is made up.
+"""
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+SIZE = (1024, 512)
+REAL_MAPS = {"earth": "earth-blue-marble.jpg", "mars": "2k_mars.jpg", "moon": "lunar_surface_4096x2048.jpg"}
+
+
+def make_all(folder, assets=None):
+    """Writes all textures into the folder; maps from the folder `assets` where it has them."""
+    for name, make in {"earth": graticule, "mars": mars, "moon": moon}.items():
+        real = Path(assets) / REAL_MAPS[name] if assets else None
+        image = cv2.imread(str(real)) if real and real.exists() else make()
+        cv2.imwrite(str(folder / f"{name}.png"), cv2.resize(image, (2048, 1024), interpolation=cv2.INTER_AREA))
+    cv2.imwrite(str(folder / "checker.png"), checker(16))
+    heights = craters()
+    cv2.imwrite(str(folder / "craters.png"), np.uint16(np.round(65535 * heights)))
+    cv2.imwrite(str(folder / "crater_normals.png"), sphere_normals(heights, radius_m=1.0, height_m=0.06))
+
+
+def checker(squares):
+    """Light and dark squares in two hues each, so that no two neighbours across the middle are alike."""
+    y, x = np.indices((512, 512)) * squares // 512
+    dark = (x + y) % 2 == 1
+    image = np.where(dark[..., None], (96, 60, 30), (235, 240, 245)).astype(np.uint8)
+    image[dark & (x >= squares // 2)] = (40, 40, 150)
+    return image
+
+
+def graticule():
+    """A made-up map: parallels and meridians every 15 degrees, a colour for each octant, and names."""
+    width, height = 2 * SIZE[0], 2 * SIZE[1]
+    y, x = np.indices((height, width))
+    image = np.empty((height, width, 3), np.uint8)
+    image[..., 0] = np.where((x * 4 // width) % 2 == 0, 150, 110)
+    image[..., 1] = np.where(y < height // 2, 120, 80)
+    image[..., 2] = 40 + 150 * (x * 4 // width) // 3
+    step = width // 24
+    for i in range(24):
+        cv2.line(image, (i * step, 0), (i * step, height), (220, 220, 220), 7 if i % 6 == 0 else 2)
+    for i in range(1, 12):
+        cv2.line(image, (0, i * step), (width, i * step), (220, 220, 220), 7 if i == 6 else 2)
+    for i in range(0, 24, 2):
+        east = 15 * i - 180
+        name = str(abs(east)) if east in (0, -180) else f"{abs(east)}{'E' if east > 0 else 'W'}"
+        cv2.putText(image, name, (i * step + 10, height // 2 - 12), cv2.FONT_HERSHEY_SIMPLEX, 1.3, (255, 255, 255), 3, cv2.LINE_AA)
+        for j in (2, 4, 8, 10):
+            north = 90 - 15 * j
+            name = f"{abs(north)}{'N' if north > 0 else 'S'}"
+            cv2.putText(image, name, (i * step + 10, j * step - 12), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (255, 255, 255), 2, cv2.LINE_AA)
+    return image
+
+
+def clouds(seed, octaves=6):
+    """Noise in 0..1 over a map, the same on its left and right edges."""
+    random = np.random.default_rng(seed)
+    total = np.zeros(SIZE[::-1], np.float32)
+    for octave in range(octaves):
+        coarse = random.random((3 * 2**octave, 6 * 2**octave)).astype(np.float32)
+        coarse = np.hstack([coarse, coarse[:, :1]])
+        total += cv2.resize(coarse, SIZE, interpolation=cv2.INTER_CUBIC) / 1.7**octave
+    return np.clip((total - total.min()) / np.ptp(total), 0, 1)
+
+
+def mars():
+    tone = clouds(3)[..., None]
+    return np.uint8(np.array([45, 80, 130]) * (1 - tone) + np.array([95, 150, 215]) * tone)
+
+
+def moon():
+    tone = (0.55 * clouds(5) + 0.45 * craters())[..., None]
+    return np.uint8(np.repeat(90 + 140 * tone, 3, axis=2))
+
+
+def craters():
+    """Heights in 0..1 of a cratered sphere."""
+    random = np.random.default_rng(7)
+    latitude, longitude = np.meshgrid(
+        np.pi / 2 - (np.arange(SIZE[1]) + 0.5) * np.pi / SIZE[1],
+        (np.arange(SIZE[0]) + 0.5) * 2 * np.pi / SIZE[0],
+        indexing="ij",
+    )
+    points = np.stack([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)], -1)
+    heights = np.zeros(SIZE[::-1])
+    for radius in np.sort(0.04 + 0.3 * random.random(90) ** 4)[::-1]:
+        centre = random.normal(size=3)
+        centre /= np.linalg.norm(centre)
+        distance = np.arccos(np.clip(points @ centre, -1, 1)) / radius
+        bowl = np.where(distance < 1, distance**2 - 1, 0) + 0.45 * np.exp(-(((distance - 1) / 0.22) ** 2))
+        heights += radius * bowl
+    return (heights - heights.min()) / np.ptp(heights)
+
+
+def sphere_normals(heights, radius_m, height_m):
+    """The tangent-space normal map of these heights on a sphere: slopes along east and north."""
+    rows, columns = heights.shape
+    latitude = np.pi / 2 - (np.arange(rows) + 0.5) * np.pi / rows
+    east = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * height_m / 2
+    east /= 2 * np.pi * radius_m / columns * np.cos(latitude)[:, None]
+    north = -np.gradient(heights, axis=0) * height_m / (np.pi * radius_m / rows)
+    normals = np.stack([np.ones_like(east), -north, -east], -1)  # blue, green, red
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.uint16(np.round(65535 * (normals + 1) / 2))

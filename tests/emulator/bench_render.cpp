@@ -1,0 +1,107 @@
+// `narpa bench render` as it is run: the real path tracer on the Cornell box that ships, and what a user can get
+// wrong.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/support/temporary_folder.h"
+
+namespace narpa {
+namespace {
+
+struct Done {
+    int status = 0;
+    std::string out;
+};
+
+Done bench(const std::string& arguments, const char* streams) {
+    const std::string command = std::string("timeout 120 ") + NARPA_BIN + " bench render " + arguments + streams;
+    std::FILE* pipe = ::popen(command.c_str(), "r");
+    Done done;
+    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
+        done.out.append(buffer.data(), n);
+    done.status = WEXITSTATUS(::pclose(pipe));
+    return done;
+}
+
+TEST(BenchRender, TheCornellBoxConvergesToItsReferenceWithoutBias) {
+    const test::TemporaryFolder folder;
+    const Done done =
+        bench("--size 20x20 --seeds 16 --reference-spp 2048 --json -o " + (folder / "plot.png"), " 2>/dev/null");
+    const auto document = nlohmann::json::parse(done.out);
+    SCOPED_TRACE(document.dump(2));
+    EXPECT_EQ(done.status, 0);
+    EXPECT_TRUE(document["passed"]);
+    EXPECT_GT(std::filesystem::file_size(folder / "plot.png"), 5000u);
+
+    const double slope = document["slope"]["value"], slope_error = document["slope"]["standard_error"];
+    EXPECT_LT(slope, -0.47);
+    EXPECT_GT(slope, -1.5);  // what the best low-discrepancy points reach on smooth integrands
+    EXPECT_LT(slope_error, 0.2);
+    const double relative = document["relative_slope"]["value"];
+    EXPECT_LT(relative, -0.47);
+    EXPECT_GT(relative, -1.0);
+    ASSERT_EQ(document["rows"].size(), 4u);
+    double before = INFINITY;
+    for (const auto& row : document["rows"]) {
+        // 16 seeds on either side: Student's t of about 30 degrees is beyond 3.5 in 0.15 % of all cases.
+        EXPECT_LT(std::abs(row["bias"]["value"].get<double>()), 3.5 * row["bias"]["standard_error"].get<double>());
+        const double rmse = row["rmse"]["value"];
+        EXPECT_GT(rmse, 0);
+        EXPECT_LT(rmse, before);
+        EXPECT_GT(row["samples_per_s"], 0);
+        before = rmse;
+    }
+    EXPECT_LT(document["reference"]["noise_rms"], before / 3);
+    EXPECT_GT(document["reference"]["mean"], 0.05);  // the lamp of 10 W m^-2 sr^-1 lights the walls
+    EXPECT_LT(document["reference"]["mean"], 1.0);
+}
+
+TEST(BenchRender, AFailedComparisonEndsWithStatusOneAndSaysSo) {
+    // The even light of [ambient] on a surface that fills the view: no sample differs from another.
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "flat.toml")
+        << "[ambient]\nradiance = 1.0\n[[body]]\nname = \"b\"\nsphere = {radius_m = 1.0}\n"
+           "[[camera]]\nname = \"c\"\nposition_m = [0.0, -2.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\n"
+           "resolution = [8, 8]\nfov_horizontal_deg = 20.0\n";
+    const Done done = bench((folder / "flat.toml") + " --reference-spp 64 --json", " 2>/dev/null");
+    EXPECT_EQ(done.status, 1);
+    const auto document = nlohmann::json::parse(done.out);
+    EXPECT_FALSE(document["passed"]);
+    EXPECT_NE(document["faults"][0].get<std::string>().find("no slope"), std::string::npos) << document["faults"];
+}
+
+struct Mistake {
+    const char* arguments;
+    const char* words;  ///< must be in the message
+};
+void PrintTo(const Mistake& m, std::ostream* out) {
+    *out << m.arguments;
+}
+class BenchRenderMistake : public ::testing::TestWithParam<Mistake> {};
+
+TEST_P(BenchRenderMistake, IsAnsweredWithASentence) {
+    const Done done = bench(GetParam().arguments, " 2>&1 >/dev/null");
+    EXPECT_EQ(done.status, 2) << done.out;
+    EXPECT_NE(done.out.find(GetParam().words), std::string::npos) << done.out;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BenchRenderMistake,
+                         ::testing::Values(Mistake{"--spp 1,4", "--spp 1, expected 2 to 65535"},
+                                           Mistake{"--size 64", "--size 64, expected WIDTHxHEIGHT"},
+                                           Mistake{"--size 64x0", "expected WIDTHxHEIGHT"},
+                                           Mistake{"--size 64x64x64", "expected WIDTHxHEIGHT"},
+                                           Mistake{"--seeds 1", "--seeds"},
+                                           Mistake{"--reference-spp 100", "multiple of 16"},
+                                           Mistake{"--camera nadir", "no camera named \"nadir\""},
+                                           Mistake{"nowhere.toml", "nowhere.toml"}));
+
+}  // namespace
+}  // namespace narpa

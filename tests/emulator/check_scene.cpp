@@ -1,0 +1,70 @@
+// What `narpa check` tells of a scene's light and materials: the program itself is run.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/emulator/loop_support.h"
+
+namespace narpa::test {
+namespace {
+
+struct Said {
+    int exit_status = -1;
+    std::string text;
+};
+
+Said run_check(const std::string& arguments) {
+    Said said;
+    std::FILE* pipe = ::popen((std::string("timeout 20 ") + NARPA_BIN + " check " + arguments).c_str(), "r");
+    if (pipe == nullptr) return said;
+    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
+        said.text.append(buffer.data(), n);
+    said.exit_status = WEXITSTATUS(::pclose(pipe));
+    return said;
+}
+
+constexpr const char* kComplete = NARPA_SOURCE_DIR "/tests/data/scenes/complete.toml";
+
+TEST(Check, TellsLightsMethodAndMaterialsByKind) {
+    const Said said = run_check(std::string(kComplete) + " 2>&1 >/dev/null");
+    EXPECT_EQ(said.exit_status, 0) << said.text;
+    for (const char* words :
+         {"render: path tracing over at most 12 surfaces, 4 samples a pixel\n",
+          "materials: 1 dielectric, 1 ggx, 1 hapke, 2 lambert, 1 lommel_seeliger, 1 lunar_lambert, 1 mirror, 2 "
+          "phong\n",
+          "light beacon: point on body target\n", "light earthshine: directional\n",
+          "light floodlight: disc of radius 0.05 m on body chaser\n", "light panel: rectangle of 1 x 0.5 m\n",
+          "camera overview: 500 x 500 RGB24 at 2.5 Hz, with a lens\n"})
+        EXPECT_NE(said.text.find(words), std::string::npos) << words << "in\n" << said.text;
+}
+
+TEST(Check, JsonHasTheSame) {
+    const Said said = run_check(std::string("--json ") + kComplete + " 2>/dev/null");
+    ASSERT_EQ(said.exit_status, 0) << said.text;
+    const nlohmann::json scene = nlohmann::json::parse(said.text).at("scene");
+    EXPECT_EQ(scene.at("render"), (nlohmann::json{{"method", "path"}, {"spp", 4}, {"max_depth", 12}}));
+    EXPECT_EQ(scene.at("material_kinds").at("phong"), 2);
+    EXPECT_EQ(scene.at("lights").size(), 4u);
+    EXPECT_EQ(scene.at("lights")[2], (nlohmann::json{{"name", "floodlight"}, {"kind", "disc"}}));
+    EXPECT_EQ(scene.at("bodies")[3].at("ellipsoid_semi_axes_m"), (nlohmann::json{13000.0, 11400.0, 9100.0}));
+    EXPECT_EQ(scene.at("cameras")[0].at("lens"), true);
+}
+
+TEST(Check, WarnsOfMirrorsInDirectLight) {
+    const TemporaryFolder folder;
+    std::ofstream(folder / "s.toml")
+        << small_scene() + "[[body]]\nname = \"ball\"\nsphere = {radius_m = 1}\nmaterial = {kind = \"mirror\"}\n";
+    const Said said = run_check((folder / "s.toml") + " 2>&1 >/dev/null");
+    EXPECT_EQ(said.exit_status, 0);
+    EXPECT_NE(said.text.find("warning: black in direct light: \"ball\" (mirror); method = \"path\""),
+              std::string::npos)
+        << said.text;
+    EXPECT_NE(said.text.find("render: direct light, 2 samples a pixel\n"), std::string::npos) << said.text;
+}
+
+}  // namespace
+}  // namespace narpa::test

@@ -1,0 +1,169 @@
+// The thin lens: Gauss's equation, the circle of confusion, and the blur of whole pictures against it.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "renderer/trace/camera_image.h"
+#include "renderer/trace/lens.h"
+#include "tests/support/shapes.h"
+
+namespace narpa {
+namespace {
+
+using namespace test;
+constexpr double kPi = std::numbers::pi;
+
+TEST(ThinLens, OracleOfImageDistanceAndCircleOfConfusion) {
+    std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/thin_lens.json");
+    if (!file) GTEST_SKIP() << "no reference numbers beside the project: ../shared/oracles/thin_lens.json";
+    const nlohmann::json reference = nlohmann::json::parse(file);
+    int judged = 0;
+    for (const auto& c : reference["cases"]) {
+        const auto &in = c["in"], &out = c["out"];
+        const double f = in["f_m"], focus = in["inv_focus_distance_per_m"], depth = in["inv_object_distance_per_m"];
+        const double aperture = in["aperture_diameter_m"], pitch = in["pixel_pitch_m"];
+        const double image = image_distance_m(f, focus), coc = circle_of_confusion_m(f, aperture, focus, depth);
+        const auto near = [&](double got, const char* name, double tolerance = 1e-13) {
+            const double expected = out[name];
+            EXPECT_NEAR(got, expected, tolerance * expected) << c["id"] << " " << name;
+        };
+        near(image, "image_distance_m");
+        near(image / pitch, "focal_px_effective");
+        const double loose = c["description"].get<std::string>().starts_with("almost in focus") ? 1e-8 : 1e-13;
+        near(coc, "coc_diameter_m", loose);
+        near(coc / pitch, "coc_diameter_px", loose);
+        near(circle_of_confusion_px({aperture, 1 / focus}, image / pitch, 1 / depth), "coc_diameter_px",
+             std::max(loose, 1e-12));  // 1 / (1 / x) rounds twice more
+        ++judged;
+    }
+    EXPECT_EQ(judged, 27);
+}
+
+TEST(ThinLens, ImageOfAnObjectAtTwiceTheFocalLengthIsAsFar) {
+    EXPECT_DOUBLE_EQ(image_distance_m(0.05, 1 / 0.1), 0.1);
+    EXPECT_EQ(image_distance_m(0.05, 0), 0.05);
+    // f/2.8, 50 mm, focused at 2 m, a star: c = A s_i / 2 m.
+    const double aperture = 0.05 / 2.8, image = 1 / (1 / 0.05 - 1 / 2.0);
+    EXPECT_NEAR(circle_of_confusion_m(0.05, aperture, 0.5, 0), aperture * image / 2, 1e-18);
+    EXPECT_EQ(circle_of_confusion_m(0.05, aperture, 0.5, 0.5), 0);
+    EXPECT_EQ(circle_of_confusion_px({aperture, kInfinity}, 1000, kInfinity), 0);
+}
+
+Camera with_lens(Camera c, double aperture_m, double focus_m) {
+    c.lens = Lens{aperture_m, focus_m};
+    return c;
+}
+
+TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> unit(0, 1);
+    const Rigid3 T = looking({1, 2, 3}, {-4, 1, 0});
+    for (const double focus : {0.3, 5.0, 1e4, kInfinity})
+        for (int i = 0; i < 100; ++i) {
+            const Camera c = with_lens(camera(640, 480, 700), 0.05, focus);
+            const double x = 640 * unit(random), y = 480 * unit(random);
+            const Vec3 from = aperture_point(*c.lens, unit(random), unit(random));
+            EXPECT_LE(norm(from), 0.025);
+            const Ray pinhole = camera_ray(c, T, x, y), ray = lens_ray(c, *c.lens, T, x, y, from);
+            EXPECT_NEAR(norm(ray.direction), 1, 1e-14);
+            const Vec3 axis = T.q * Vec3{0, 0, 1};
+            if (std::isinf(focus)) {
+                EXPECT_LE(norm(ray.direction - pinhole.direction), 1e-15);
+            } else {
+                const Vec3 p = pinhole.origin + focus / dot(pinhole.direction, axis) * pinhole.direction;
+                const Vec3 q = ray.origin + focus / dot(ray.direction, axis) * ray.direction;
+                EXPECT_LE(norm(p - q), 1e-13 * (focus + 10));
+            }
+            const auto [back_x, back_y] = image_point(c, *c.lens, from, conjugate(T.q) * ray.direction);
+            EXPECT_NEAR(back_x, x, 1e-9);
+            EXPECT_NEAR(back_y, y, 1e-9);
+        }
+}
+
+RadianceImage render(const Scene& s, const Camera& c, int spp, const Rigid3& T = {}) {
+    const auto tracer = Tracer::create(s, 1);
+    EXPECT_TRUE(tracer);
+    RadianceImage image(c.width, c.height);
+    FrameSettings settings;
+    settings.spp = spp;
+    render_radiance(*tracer, placed(s), c, T, settings, image);
+    return image;
+}
+
+Scene shining() {
+    Scene s;
+    s.materials.push_back(lambert(0));
+    s.materials[0].emission = {1, 1, 1};
+    return s;
+}
+
+/// What part of a blur disc of this diameter, centred d beyond a straight edge, lies beyond it.
+double beyond_edge(double d, double diameter) {
+    const double t = std::clamp(2 * d / diameter, -1.0, 1.0);
+    return 1 - (std::acos(t) - t * std::sqrt(1 - t * t)) / kPi;
+}
+
+TEST(Lens, AnEdgeOutOfFocusIsSpreadOverTheCircleOfConfusion) {
+    for (const double depth : {2.0, 40.0})  // nearer and farther than the focus
+        for (const double focus : {8.0, kInfinity}) {
+            if (depth > 10 && std::isinf(focus)) continue;
+            const Camera c = with_lens(camera(61, 1, 400), 0.1, focus);
+            Scene s = shining();
+            const double wide = 100 * depth;
+            add_mesh(s, plate(wide, wide), {{0, 1, 0, 0}, {wide / 2, 0, depth}});  // its edge on the axis
+            const RadianceImage image = render(s, c, 1024);
+            const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
+            EXPECT_GT(blur, 3);
+            for (int x = 0; x < c.width; ++x) {
+                double expected = 0;  // the pixel is a window one wide
+                for (int k = 0; k < 16; ++k) expected += beyond_edge(x - c.cx + (k + 0.5) / 16 - 0.5, blur) / 16;
+                // 1024 stratified samples of a step: the error of each is below 1 / 64.
+                EXPECT_NEAR(static_cast<double>(image.pixels[static_cast<std::size_t>(x)].x), expected, 0.012)
+                    << "depth " << depth << " focus " << focus << " x " << x;
+            }
+        }
+}
+
+TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
+    // A shining ball 0.2 px wide, behind the plane of focus: its blur is 14 px wide.
+    const double depth = 500, radius = 0.1 * depth / 700;
+    const Camera c = with_lens(camera(41, 41, 700), 0.1, 4.9);
+    const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
+    Scene s = shining();
+    add_sphere(s, radius, {0.3 * depth / 700, -0.2 * depth / 700, depth});
+    const RadianceImage image = render(s, c, 4);
+    double sum = 0, x1 = 0, y1 = 0, r2 = 0, outside = 0;
+    for (int y = 0; y < c.height; ++y)
+        for (int x = 0; x < c.width; ++x) {
+            const double l = static_cast<double>(image.pixels[static_cast<std::size_t>(y * c.width + x)].x);
+            const double dx = x - c.cx - 0.3, dy = y - c.cy + 0.2;
+            sum += l, x1 += l * dx, y1 += l * dy, r2 += l * (dx * dx + dy * dy);
+            if (std::hypot(dx, dy) > 0.5 * blur + 0.2 + std::sqrt(0.5)) outside += l;
+        }
+    EXPECT_NEAR(sum / (kPi * 0.01), 1, 5e-3);  // its disc, pi 0.1^2 px^2, of radiance 1
+    EXPECT_NEAR(x1 / sum, 0, 0.1);
+    EXPECT_NEAR(y1 / sum, 0, 0.1);
+    EXPECT_EQ(outside, 0);
+    // A disc's mean squared radius is half of its radius squared; a pixel adds 1/6.
+    EXPECT_NEAR(r2 / sum, blur * blur / 8 + 1.0 / 6, 0.02 * blur * blur / 8);
+}
+
+TEST(Lens, OneSampleAPixelAndWhatIsInFocusAreAsThroughAPinhole) {
+    Scene s = shining();
+    add_mesh(s, plate(3, 3), {normalized(Quat{1, 0.1, 0.2, 0.1}), {0.3, 0.1, 8}});
+    const Camera pinhole = camera(48, 36, 60), wide_open = with_lens(pinhole, 0.3, 2);
+    EXPECT_EQ(render(s, pinhole, 1).pixels, render(s, wide_open, 1).pixels);
+    EXPECT_NE(render(s, pinhole, 16).pixels, render(s, wide_open, 16).pixels);
+    EXPECT_EQ(render(s, pinhole, 16).pixels, render(s, with_lens(pinhole, 0, 2), 16).pixels);
+
+    Scene facing = shining();
+    add_mesh(facing, plate(3, 3), {{0, 1, 0, 0}, {0.3, 0.1, 8}});
+    const auto sharp = render(facing, pinhole, 64), focused = render(facing, with_lens(pinhole, 0.3, 8), 64);
+    for (std::size_t i = 0; i < sharp.pixels.size(); ++i)
+        EXPECT_NEAR(sharp.pixels[i].x, focused.pixels[i].x, 1e-6) << i;
+}
+
+}  // namespace
+}  // namespace narpa

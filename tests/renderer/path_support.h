@@ -1,0 +1,82 @@
+/// tests/renderer/path_support.h - the light along a ray, with how well it is known.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "renderer/trace/path.h"
+#include "tests/support/shapes.h"
+
+namespace narpa::test {
+
+inline Ray ray_to(const Vec3& origin, const Vec3& target) {
+    return {origin, normalized(target - origin)};
+}
+
+/// So many standard errors of sixteen lanes' mean an estimate may be off: Student's t with 15 degrees of freedom is
+/// beyond in one of 40 000 cases, and the seeds are fixed.
+inline constexpr double kSigmas = 6;
+
+struct Estimate {
+    Vec3 mean{};
+    double error = 0;  ///< standard error of the mean of the first band
+};
+
+/// Mean of kPacket independent pixels' means of `samples` each; their scatter tells the error.
+inline Estimate light_along(const Tracer& tracer, const Placement& at, const Ray& ray, const PathSettings& settings,
+                            std::uint32_t samples, std::uint64_t seed = 1) {
+    std::array<Ray, kPacket> rays;
+    rays.fill(ray);
+    std::array<Hit, kPacket> first;
+    first.fill(tracer.intersect(at, ray, kInfinity));
+    std::vector<PixelSampler> samplers;
+    for (std::uint32_t i = 0; i < kPacket; ++i) samplers.emplace_back(seed, 0, i);
+    std::array<Vec3, kPacket> sum{};
+    for (std::uint32_t s = 0; s < samples; ++s) {
+        std::array<Rgb, kPacket> radiance;
+        path_radiance(tracer, at, settings, rays, first, samplers, s, radiance);
+        for (std::size_t i = 0; i < kPacket; ++i) sum[i] += vec_cast<double>(radiance[i]);
+    }
+    Estimate e;
+    for (const Vec3& lane : sum) e.mean += lane / (samples * static_cast<double>(kPacket));
+    double deviations = 0;
+    for (const Vec3& lane : sum) deviations += std::pow(lane.x / samples - e.mean.x, 2);
+    e.error = std::sqrt(deviations / (kPacket * (kPacket - 1.0)));
+    return e;
+}
+inline Estimate light_along(const Scene& scene, const Ray& ray, const PathSettings& settings, std::uint32_t samples,
+                            std::uint64_t seed = 1) {
+    const auto tracer = Tracer::create(scene, 1);
+    EXPECT_TRUE(tracer);
+    return light_along(*tracer, placed(scene), ray, settings, samples, seed);
+}
+
+inline Material shining(float albedo, const Rgb& emission) {
+    Material m = lambert(albedo);
+    m.emission = emission;
+    return m;
+}
+inline Material phong(float diffuse, float specular, float exponent) {
+    Material m = lambert(diffuse);
+    m.kind = Material::Kind::phong;
+    m.specular = {specular, specular, specular};
+    m.exponent = exponent;
+    return m;
+}
+inline Material mirror(float reflectance) {
+    Material m = lambert(0);
+    m.kind = Material::Kind::mirror;
+    m.specular = {reflectance, reflectance, reflectance};
+    return m;
+}
+inline Material glass(float ior) {
+    Material m = lambert(0);
+    m.kind = Material::Kind::dielectric;
+    m.ior = ior;
+    return m;
+}
+
+}  // namespace narpa::test

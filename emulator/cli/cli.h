@@ -14,8 +14,8 @@
 
 namespace narpa::cli {
 
-/// What a subcommand found out, for --json; or why it could not. Where it judges, the document says `passed`, and false
-/// is exit status 1.
+/// What a subcommand found out, for --json; or why it could not. Where it judges, the document says `passed`, and
+/// false is exit status 1.
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 

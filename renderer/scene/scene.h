@@ -31,12 +31,12 @@ struct Texture {
     std::vector<Level> coarser{};  ///< empty: filtered from the finest alone
 };
 
-/// Parameters of B. Hapke's model (Theory of Reflectance and Emittance Spectroscopy, 2nd ed. 2012) beside the single
-/// scattering albedo w, which is Material::diffuse.
+/// Parameters of B. Hapke's model (Theory of Reflectance and Emittance Spectroscopy, 2nd ed. 2012) beside the
+/// single scattering albedo w, which is Material::diffuse.
 struct Hapke {
-    float phase_b = 0.25f, phase_c = 0.4f;            ///< double Henyey-Greenstein: width, backward (> 0) or forward
-    float opposition_b0 = 0, opposition_h = 0.05f;    ///< shadow hiding: amplitude, width
-    float roughness_rad = 0;                          ///< macroscopic mean slope, theta-bar
+    float phase_b = 0.25f, phase_c = 0.4f;          ///< double Henyey-Greenstein: width, backward (> 0) or forward
+    float opposition_b0 = 0, opposition_h = 0.05f;  ///< shadow hiding: amplitude, width
+    float roughness_rad = 0;                        ///< macroscopic mean slope, theta-bar
 };
 
 /// How a surface sends light on. Directions and forms: renderer/material/bsdf.h. What a kind does not name it does
@@ -66,10 +66,10 @@ struct Material {
     bool schlick = false;           ///< Schlick's approximation in place of Fresnel's equations
     float asymmetry = 0;            ///< Henyey-Greenstein's g of the single particle: negative is backward
     Hapke hapke{};
-    int texture = -1;               ///< index into Scene::textures: multiplies `diffuse`; -1 is none
-    int emission_texture = -1;      ///< multiplies `emission`
-    int normal_texture = -1;        ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
-    int height_texture = -1;        ///< bumps: height in metres = bump_height_m * mean of rgb
+    int texture = -1;           ///< index into Scene::textures: multiplies `diffuse`; -1 is none
+    int emission_texture = -1;  ///< multiplies `emission`
+    int normal_texture = -1;    ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
+    int height_texture = -1;    ///< bumps: height in metres = bump_height_m * mean of rgb
     float normal_scale = 1;
     float bump_height_m = 0;
 };
@@ -98,8 +98,8 @@ struct Ellipsoid {
 struct Body {
     std::string name;
     std::variant<int, Sphere, Ellipsoid> shape;  ///< index into Scene::meshes, or an exact shape
-    Motion initial{};                       ///< at time 0; moves on with its velocity and rate
-    std::optional<std::uint32_t> can_id{};  ///< base identifier of its pose commands on CAN
+    Motion initial{};                            ///< at time 0; moves on with its velocity and rate
+    std::optional<std::uint32_t> can_id{};       ///< base identifier of its pose commands on CAN
 };
 
 struct Sun {

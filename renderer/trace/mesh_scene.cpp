@@ -290,7 +290,10 @@ std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted) co
 
 Vec3 MeshScene::departure(std::uint32_t face, const Vec3& position, bool outside) const noexcept {
     const std::array<Vec3, 3> v = corners(face);
-    const Vec3 outwards = cross(v[1] - v[0], v[2] - v[0]);
+    const std::array<Vec3, 3> to{v[0] - position, v[1] - position, v[2] - position};
+    // Twice the areas of the three triangles that the position makes with the edges; their sum is the face's.
+    const std::array<Vec3, 3> part{cross(to[0], to[1]), cross(to[1], to[2]), cross(to[2], to[0])};
+    const Vec3 outwards = part[0] + part[1] + part[2];
     const double area2 = norm(outwards);
     if (!(area2 > 0)) return position;
     const Vec3 n = outwards / area2;
@@ -298,11 +301,14 @@ Vec3 MeshScene::departure(std::uint32_t face, const Vec3& position, bool outside
     // The start is rounded to single precision (an error of the position's size); Embree's test then rounds the
     // corners relative to it and their cross products (errors of the triangle's size). First-order bounds after
     // Pharr, Jakob, Humphreys, Physically Based Rendering, section 3.9.
-    double extent = 0;
-    for (const Vec3& c : v) extent = std::max(extent, largest(c - position));
+    const double extent = std::max({largest(to[0]), largest(to[1]), largest(to[2])});
     const double lift_m = kHalfUlp * (4 * largest(position - vertex_origin_) + 16 * extent);
+    const double clearance_m = 8 * lift_m, longest_m = 2 * std::sqrt(3.0) * extent;
 
-    const Vec3 start = away_from_edges(v, n, position, 8 * lift_m, 64 * lift_m);
+    const double nearest = std::min({dot(n, part[0]), dot(n, part[1]), dot(n, part[2])});  // times an edge's length
+    const Vec3 start = nearest > clearance_m * longest_m
+                           ? position
+                           : away_from_edges(v, n, position, clearance_m, 8 * clearance_m);
     return start + (outside ? lift_m : -lift_m) * n;
 }
 

@@ -17,8 +17,6 @@ struct Candidate {
     double entry_m;
 };
 
-constexpr double kHalfUlp = 0x1p-24;  ///< largest relative rounding error of single precision
-
 Status check_textures(const Scene& s, const Material& m) {
     for (const int texture : {m.texture, m.emission_texture, m.normal_texture, m.height_texture})
         if (texture >= static_cast<int>(s.textures.size()))
@@ -181,16 +179,6 @@ bool Tracer::Impl::exact_hides(const Placement& at, std::size_t body, const Hit&
                                                     to_body(T.q, direction))
                        : shape.exact.first_crossing(start_turned + (at.T_world_body[own].t - T.t), direction);
     return crossing && crossing->range < t_max;
-}
-
-double Tracer::rounding_m(std::size_t body) const noexcept {
-    const Impl::Shape& shape = impl_->shapes[body];
-    // A mesh: the ray's start is rounded (by up to the body's size), and its length (up to twice that), each told
-    // along the ray by up to twelve times as much where it meets the surface at 85 degrees.
-    if (shape.mesh != nullptr) return 32 * kHalfUlp * shape.radius_m;
-    // An exact shape: the half chord near the limb is the root of a difference that rounding leaves uncertain by a
-    // few parts in 10^16 of the squared radius.
-    return 1e-7 * shape.radius_m;
 }
 
 const Lights& Tracer::lights() const noexcept {

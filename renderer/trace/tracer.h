@@ -101,10 +101,6 @@ public:
 
     [[nodiscard]] TextureFrame texture_frame(const Placement& at, const Hit& hit) const noexcept;
 
-    /// Bound of the error of a range that ends on this body at up to 85 degrees from its normal, from rounding in
-    /// its own frame, metres: a shadow ray towards a point of an emitter stops that much before it.
-    [[nodiscard]] double rounding_m(std::size_t body) const noexcept;
-
     /// Emitters of the scene, made ready once.
     [[nodiscard]] const Lights& lights() const noexcept;
 

@@ -3,11 +3,11 @@
 
 #include <numbers>
 
+#include "renderer/material/bsdf.h"
+#include "renderer/material/texture_lookup.h"
 #include "renderer/trace/camera_image.h"
 #include "renderer/trace/camera_ray.h"
 #include "renderer/trace/sampler.h"
-#include "renderer/material/bsdf.h"
-#include "renderer/material/texture_lookup.h"
 #include "renderer/trace/shading.h"
 #include "renderer/trace/sun_disc.h"
 #include "tests/support/shapes.h"

@@ -157,14 +157,16 @@ std::vector<std::string> convergence_faults(std::span<const ErrorRow> rows) {
                             r.spp, std::sqrt(r.pixel_bias_squared.value), r.pixel_bias_squared.sigmas()));
     }
     if (rows.size() < 2) return faults;
-    const auto measured =
-        std::count_if(rows.begin(), rows.end(), [](const ErrorRow& r) { return r.rmse.value > 0; });
-    if (measured < 2)
-        faults.push_back(
-            "no error stands out from the reference's noise, so there is no slope: take a better reference");
     const auto judge = [&](const char* name, Estimate ErrorRow::*error) {
+        const auto measured =
+            std::count_if(rows.begin(), rows.end(), [&](const ErrorRow& r) { return (r.*error).value > 0; });
         const Estimate slope = fit_slope(rows, error);
-        if (measured >= 2 && slope.value > kSlopeMax)
+        if (measured < 2)
+            faults.push_back(
+                fmt::format("the {} does not stand out from the reference's noise, so there is no slope: "
+                            "take a better reference",
+                            name));
+        else if (slope.value - slope.standard_error > kSlopeMax)
             faults.push_back(fmt::format("the {} falls as spp^{:.3f} +- {:.3f}, expected {} or steeper", name,
                                          slope.value, slope.standard_error, kSlopeMax));
     };

@@ -29,8 +29,8 @@ Command add_bench(CLI::App& app);
 
 /// Words for people, on standard error.
 void say(std::string_view text);
-/// Reads a scene and tells its warnings.
-Result<Scene> load_scene(const std::string& path);
+/// Reads a scene, with another method than its own if one is given, and tells its warnings.
+Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
 /// "NAME=VALUE" -> {NAME, VALUE}; an Error that says what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);
 

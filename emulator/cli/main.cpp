@@ -13,10 +13,12 @@ void say(std::string_view text) {
     fmt::print(stderr, "{}\n", text);
 }
 
-Result<Scene> load_scene(const std::string& path) {
+Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method) {
     auto scene = read_scene(path);
-    if (scene)
-        for (const std::string& w : scene->warnings) say("warning: " + w);
+    if (!scene) return scene;
+    if (method)
+        if (const Status good = use_method(*scene, *method); !good) return good.error();
+    for (const std::string& w : scene->warnings) say("warning: " + w);
     return scene;
 }
 

@@ -38,7 +38,8 @@ struct Options {
 Status override_scene(const Options& o, Scene& scene, Camera& camera) {
     if (o.spp) scene.render.spp = *o.spp;
     if (o.seed) scene.render.seed = *o.seed;
-    if (!o.method.empty()) scene.render.method = o.method == "path" ? Method::path : Method::direct;
+    if (o.max_depth && scene.render.method == Method::direct)
+        return Error{"--max-depth belongs to --method path, and the method is \"direct\""};
     if (o.max_depth) scene.render.max_depth = *o.max_depth;
     if (!o.format.empty()) {
         const auto format = pixel_format_from(o.format);
@@ -113,7 +114,9 @@ private:
 };
 
 Outcome render(const Options& o) {
-    auto scene = load_scene(o.scene);
+    std::optional<Method> method;
+    if (!o.method.empty()) method = o.method == "path" ? Method::path : Method::direct;
+    auto scene = load_scene(o.scene, method);
     if (!scene) return scene.error();
     auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
     if (!index) return index.error();
@@ -121,6 +124,9 @@ Outcome render(const Options& o) {
     if (auto good = override_scene(o, *scene, camera); !good) return good.error();
     auto outputs = parse_outputs(o.aov);
     if (!outputs) return outputs.error();
+    if (!outputs->empty() && !o.out.ends_with(".exr"))
+        return Error{fmt::format(
+            "--aov with {}, expected FILE.exr: other files hold radiance or digital numbers alone", o.out)};
 
     const std::int64_t period_ns = camera.period_ns;
     const std::int64_t t_ns = o.time_s ? std::llround(*o.time_s * 1e9) : o.frame.value_or(0) * period_ns;
@@ -170,7 +176,8 @@ Command add_render(CLI::App& app) {
         app.add_subcommand("render", "Render one frame of a camera, byte for byte as `run` would put it out");
     c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
     c->add_option("--camera", o->camera, "Name of the camera (default: the first)");
-    c->add_option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)");
+    c->add_option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)")
+        ->check(CLI::Range(-9e9, 9e9));
     c->add_option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
     o->pose.add_to(*c);
     c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");

@@ -63,11 +63,16 @@ public:
         aiUVTransform transform;
         if (m_.Get(AI_MATKEY_UVTRANSFORM(type, 0), transform) == AI_SUCCESS)
             tell("shifts, turns and scales of textures (KHR_texture_transform) are not used");
-        if (modes[0] == aiTextureMapMode_Clamp) out.wrap = Texture::Wrap::clamp;
+        if (modes[0] == aiTextureMapMode_Clamp && modes[1] == aiTextureMapMode_Clamp)
+            out.wrap = Texture::Wrap::clamp;
+        else if (modes[0] != aiTextureMapMode_Wrap || modes[1] != aiTextureMapMode_Wrap)
+            tell("textures that are mirrored, or clamped along one axis only, repeat");
         if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
             const auto* bytes = reinterpret_cast<const std::uint8_t*>(inside->pcData);
             if (inside->mHeight == 0)
                 out.file = path_ + name.C_Str(), out.bytes.assign(bytes, bytes + inside->mWidth);
+            else
+                tell("textures that the file holds as bare pixels are not used");
         } else {
             out.file = texture_path(path_, name.C_Str());
         }

@@ -6,7 +6,7 @@ namespace narpa {
 
 namespace {
 
-/// DESIGN of the CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
+/// CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
 constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
 
 constexpr Range kLength{.low = 0, .high = 1e15, .low_open = true};

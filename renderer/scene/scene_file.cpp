@@ -30,15 +30,16 @@ void read_root(TableReader& root, SceneReading& reading) {
 /// Direct light is sampled towards its sources, and a mirror or a pane of glass sends on only what comes from one
 /// direction.
 void warn_of_dark_materials(Scene& scene) {
-    if (scene.render.method != RenderSettings::Method::direct) return;
     std::string names;
     for (const Material& m : scene.materials)
         if (m.kind == Material::Kind::mirror || m.kind == Material::Kind::dielectric)
             names +=
                 fmt::format("{}\"{}\" ({})", names.empty() ? "" : ", ", m.name, name_of(m.kind, kMaterialKinds));
-    if (!names.empty())
-        scene.warnings.push_back(
-            fmt::format("black in direct light: {}; method = \"path\" in [render] shows them", names));
+    if (names.empty()) return;
+    const std::string warning =
+        fmt::format("black in direct light: {}; method = \"path\" in [render] shows them", names);
+    std::erase(scene.warnings, warning);
+    if (scene.render.method == RenderSettings::Method::direct) scene.warnings.push_back(warning);
 }
 
 Result<Scene> read_text(const std::string& path, const std::string& text) {
@@ -58,6 +59,19 @@ Result<Scene> read_text(const std::string& path, const std::string& text) {
 }
 
 }  // namespace
+
+Status use_method(Scene& scene, RenderSettings::Method method) {
+    for (const Material& m : scene.materials)
+        if (m.kind == Material::Kind::phong_classic && method == RenderSettings::Method::path)
+            return Error{
+                .what = fmt::format("material \"{}\" is \"phong_classic\", which keeps no energy, expected "
+                                    "\"phong\" for method path",
+                                    m.name),
+                .file = scene.file};
+    scene.render.method = method;
+    warn_of_dark_materials(scene);
+    return Ok{};
+}
 
 std::string read_name(TableReader& table, std::vector<std::string>& taken) {
     constexpr std::size_t kLongest = 64;

@@ -12,4 +12,8 @@ namespace narpa {
 /// docs/scene.md. Errors carry file, line and column; a key that is not known is an error.
 Result<Scene> read_scene(const std::string& path);
 
+/// Gives a scene that has been read another method, by the rules of reading: its warnings follow; an error where a
+/// material does not allow it.
+Status use_method(Scene& scene, RenderSettings::Method method);
+
 }  // namespace narpa

@@ -16,8 +16,8 @@ struct Aovs {
     std::vector<Vec3> position, normal;    ///< world
     std::vector<std::int32_t> body;
     std::vector<Rgb> albedo;  ///< base colour with its texture: a mirror's reflectance, white for glass
-    /// Of the pixel's mean over the bands (0 for spp < 2), W^2 m^-4 sr^-2: pixel_samples.h says how it is estimated
-    /// and which 95 % interval goes with it.
+    /// Of the pixel's mean over the bands (0 for spp < 2, but for tiny bodies), W^2 m^-4 sr^-2: pixel_samples.h
+    /// says how it is estimated and which 95 % interval goes with it.
     std::vector<float> variance;
 };
 
@@ -42,9 +42,9 @@ struct FrameSettings {
 /// The light that reaches the camera.
 ///
 /// Method direct: light that comes to a surface straight from the Sun and the scene's lights, with shadows;
-/// ambient, never shadowed; emission of what is seen; black where nothing is hit, and on mirrors and glass but for
-/// ambient and emission: what they show comes from elsewhere. Method path: all light (path.h), with the ambient as
-/// a sky.
+/// ambient, never shadowed; emission of what is seen; lamps of some size too, and these in mirrors and glass; black
+/// where nothing is hit, and where mirrors and glass would show other surfaces. Method path: all light (path.h),
+/// with the ambient as a sky.
 ///
 /// One sample a pixel goes through the middle of the pixel and of the lens, and where the method is direct and the
 /// Sun the only light, to the middle of the Sun: the image of a pinhole, without noise, with hard shadows. With

@@ -26,7 +26,9 @@ void direct_light(const Frame& f, const Packet& p, Lanes<Rgb>& radiance) {
         if (cosine <= 0) continue;
         const Rgb reflected = bsdf(surface, surface.normal, p.to_sun[i], -direction);
         if (reflected == Rgb{}) continue;
-        sunlit[i] = reflected * (f.sun->irradiance() * static_cast<float>(cosine));
+        const double projected =
+            cosine / dot(p.to_sun[i], f.sun->centre());  // the disc is sampled evenly as it faces
+        sunlit[i] = reflected * (f.sun->irradiance() * static_cast<float>(projected));
         towards_sun |= 1u << i;
     }
     if (towards_sun == 0) return;

@@ -43,7 +43,7 @@ struct Packet {
     // Where the frame is quick:
     Lanes<Vec3> to_sun;  ///< a point of the Sun for each, if there is one
     // Where it is not: which random numbers each takes.
-    Lanes<std::uint32_t> number;  ///< its PixelSampler's "pixel"
+    Lanes<std::uint32_t> number{};  ///< its PixelSampler's "pixel"
     std::uint32_t sample = 0;
 };
 

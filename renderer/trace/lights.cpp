@@ -11,8 +11,9 @@ namespace narpa {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// What stands so close before a light, as a part of its distance, cannot be told from what it is mounted on.
-constexpr double kTouching = 1e-6;
+/// What stands so close before a light cannot be told from what it is mounted on: a part of the size of both, for
+/// rounding in single precision there, and of the distance, for rounding in double.
+constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;
 
 double mean_band(const Rgb& c) {
     return (static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z)) / 3;
@@ -115,10 +116,12 @@ void Lights::add_light(std::size_t index) {
     const Light& l = scene_->lights[index];
     Emitter e{static_cast<int>(index), -1, l.mount, l.T_mount_light.t, 0, mean_band(l.emission)};
     if (e.power <= 0) return;
+    e.touching_m = l.mount >= 0 ? kTouching * norm(e.centre) : 0;
     if (has_extent(l)) {
         any_with_extent_ = true;
         e.power *= area_m2(l);
         e.radius_m = l.kind == Light::Kind::disc ? l.radius_m : 0.5 * std::hypot(l.width_m, l.height_m);
+        e.touching_m += kTouching * e.radius_m;
     }
     emitters_.push_back(e);
 }
@@ -247,7 +250,7 @@ LightSample Lights::sample_light(const Placement& at, const Receiver& to, const 
     const Vec3 there = way(to, T, T.q * e.centre + q_world_light * point);
     const double distance = norm(there);
     s.direction = there / distance;
-    s.range_m = distance * (1 - kTouching);
+    s.range_m = distance * (1 - kTouchingFarOff) - e.touching_m;
     s.pdf = l.kind == Light::Kind::point
                 ? kInfinity
                 : per_solid_angle(1 / area_m2(l), distance, dot(s.direction, shines_along));
@@ -317,7 +320,7 @@ Rgb Lights::met_before(double range_m, const Placement& at, const Receiver& to, 
         if (against >= 0) continue;
         const Vec3 centre = way(to, T, T.q * e.centre);
         const double t = dot(centre, z) / against;
-        if (!(t > 0 && t * (1 - kTouching) < range_m)) continue;
+        if (!(t > 0 && t * (1 - kTouchingFarOff) - e.touching_m < range_m)) continue;
         const Vec3 p = t * direction - centre;
         const double px = dot(p, x), py = dot(p, y);
         const bool on_it = l.kind == Light::Kind::disc

@@ -83,7 +83,8 @@ private:
         int mount = -1;  ///< body whose frame the rest stands in; -1: the world
         Vec3 centre{};   ///< of a sphere that holds what shines
         double radius_m = 0;
-        double power = 0;  ///< mean band of radiance times area, or intensity, or irradiance
+        double power = 0;       ///< mean band of radiance times area, or intensity, or irradiance
+        double touching_m = 0;  ///< what stands closer before it is its mounting
     };
     /// Faces of a mesh that shine, each to be chosen in proportion to its area times its radiance.
     struct Faces {

@@ -15,8 +15,6 @@ namespace narpa {
 template <class T>
 using PerRay = std::array<T, kPacket>;
 
-inline constexpr std::uint32_t kAllRays = (1u << kPacket) - 1;
-
 inline bool is_set(std::uint32_t bits, std::size_t i) noexcept {
     return (bits >> i & 1u) != 0;
 }

@@ -128,7 +128,8 @@ private:
         Lane& lane = lanes_[i];
         const Hit& hit = hits_[i];
         lane.length_m += hit.range_m;
-        lane.point = PathPoint(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * lane.length_m);
+        lane.point = PathPoint(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * lane.length_m,
+                               !settings_.direct);
         const Surface& surface = lane.point.surface();
         if (surface.emission != Rgb{}) {
             const double light_pdf =
@@ -220,6 +221,7 @@ private:
             for (const std::size_t i : EachLane(to_bodies)) {
                 if (found[i].body != samples[i].body || found[i].face != samples[i].face) continue;
                 const double pdf = lights_.pdf(at_, lanes_[i].start, group_, towards[i], found[i]);
+                if (!(pdf > 0)) continue;  // met where the ray starts
                 const double weight = power_heuristic(pdf, responses[i].pdf);
                 add(i, responses[i].f_cos * emission(lanes_[i], towards[i], found[i]) *
                            static_cast<float>(weight / pdf));
@@ -241,7 +243,8 @@ private:
             const BsdfSample s = next_direction(lane);
             lane.throughput = lane.throughput * s.weight;
             lane.radiance_scale *= s.radiance_scale;
-            if (lane.throughput == Rgb{} || !survives(i, met)) {
+            // Out of many shells of dense glass, one in another, it may outgrow single precision.
+            if (lane.throughput == Rgb{} || !is_finite(lane.throughput) || !survives(i, met)) {
                 going_ &= ~bit(i);
                 continue;
             }

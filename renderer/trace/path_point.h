@@ -20,10 +20,14 @@ namespace narpa {
 class PathPoint {
 public:
     PathPoint() = default;
-    /// Seen along a unit direction with a beam of this width (see surface_at).
-    PathPoint(const Tracer& tracer, const Placement& at, const Hit& hit, const Vec3& ray_direction,
-              double width_m) noexcept
-        : surface_(surface_at(tracer, at, hit, ray_direction, width_m)), view_(-ray_direction) {
+    /// Seen along a unit direction with a beam of this width (see surface_at). Unless `fold`, light counts as it
+    /// does in the quick direct light: by the surface's normal alone.
+    PathPoint(const Tracer& tracer, const Placement& at, const Hit& hit, const Vec3& ray_direction, double width_m,
+              bool fold) noexcept
+        : surface_(surface_at(tracer, at, hit, ray_direction, width_m)),
+          plane_(surface_.normal),
+          view_(-ray_direction) {
+        if (!fold) return;
         const Vec3 flat = at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body;
         plane_ = flat == hit.position ? hit.geometric_normal : hit.shading_normal;
         // Vertex normals that face away from the viewer say nothing of what he sees.
@@ -32,7 +36,7 @@ public:
     }
 
     [[nodiscard]] const Surface& surface() const noexcept { return surface_; }
-    /// Normal of the plane, unit, on the viewer's side.
+    /// Normal of the plane, unit, on the viewer's side but for silhouettes of smooth meshes.
     [[nodiscard]] const Vec3& plane() const noexcept { return plane_; }
 
     struct Response {

@@ -28,7 +28,7 @@ public:
     }
 
     /// A point source, which no ray meets.
-    [[nodiscard]] bool is_point() const { return sin_half_angle_ == 0; }
+    [[nodiscard]] bool is_point() const { return sin_half_angle_ < 1e-12; }
     /// Density of `sample` per solid angle in a unit direction, 0 beside the disc. Not for a point source.
     [[nodiscard]] double pdf(const Vec3& direction) const {
         const double cosine = dot(direction, frame_.axis);

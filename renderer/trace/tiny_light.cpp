@@ -28,14 +28,21 @@ DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
 
 /// The part of the disc that the Sun can light gets half of the samples, however thin its crescent, the rest the
 /// other half. Either part is the disc, squeezed along x.
-DiscPoint disc_point(double lit, std::uint32_t s) {
+DiscPoint disc_point(double lit, std::uint32_t s, std::uint32_t samples) {
     constexpr double kMostlyLit = 0.75;
-    constexpr std::uint32_t kHalf = kTinySamples / 2;
-    if (lit > kMostlyLit) return lattice_point(s, kTinySamples);
-    const auto [a, y, area] = lattice_point(s % kHalf, kHalf);
+    const std::uint32_t half = samples / 2;
+    if (lit > kMostlyLit) return lattice_point(s, samples);
+    const auto [a, y, area] = lattice_point(s % half, half);
     const double half_chord = std::sqrt(std::max(0.0, 1 - y * y));
-    if (s < kHalf) return {lit * a + (1 - lit) * half_chord, y, lit * area};
+    if (s < half) return {lit * a + (1 - lit) * half_chord, y, lit * area};
     return {(1 - lit) * a - lit * half_chord, y, (1 - lit) * area};
+}
+
+/// As many as pixels of this many samples each would take, within limits; even.
+std::uint32_t samples_of(const TinyDisc& disc, int spp) {
+    const double as_pixels = spp * std::numbers::pi * disc.radius_px * disc.radius_px;
+    const double samples = std::clamp<double>(as_pixels, kTinySamplesLeast, kTinySamplesMost);
+    return 2 * static_cast<std::uint32_t>(samples / 2);
 }
 
 /// Collects what the samples bring to the pixels of a block.
@@ -47,7 +54,7 @@ public:
     void put_into(RadianceImage& out, std::vector<float>* variance) const;
 
 private:
-    void add(const TinyDisc& disc, std::uint32_t s);
+    void add(const TinyDisc& disc, std::uint32_t s, std::uint32_t samples);
     void trace(std::size_t body);
 
     const Frame& f_;
@@ -63,16 +70,17 @@ private:
 void Collector::sample(const TinyDisc& disc) {
     body_sum_.fill(0);
     body_squares_.fill(0);
-    for (std::uint32_t s = 0; s < kTinySamples; ++s) {
-        add(disc, s);
+    const std::uint32_t samples = samples_of(disc, f_.settings.spp);
+    for (std::uint32_t s = 0; s < samples; ++s) {
+        add(disc, s, samples);
         if (packet_.n == kPacket) trace(disc.body);
     }
     if (packet_.n > 0) trace(disc.body);
     for (std::size_t i = 0; i < block_.n; ++i)
-        variance_[i] += body_squares_[i] - body_sum_[i] * body_sum_[i] / kTinySamples;
+        variance_[i] += body_squares_[i] - body_sum_[i] * body_sum_[i] / samples;
 }
 
-void Collector::add(const TinyDisc& disc, std::uint32_t s) {
+void Collector::add(const TinyDisc& disc, std::uint32_t s, std::uint32_t samples) {
     const Camera& c = f_.camera;
     const PixelSampler numbers(0, 0, 0);  // the same for every body and frame, as the points are
     Vec3 from{};                          // on the aperture, camera axes
@@ -80,7 +88,7 @@ void Collector::add(const TinyDisc& disc, std::uint32_t s) {
         const SamplePoint u = numbers.point(s);
         from = aperture_point(*f_.lens, u[2], u[3]);
     }
-    const DiscPoint at = disc_point(disc.lit, s);
+    const DiscPoint at = disc_point(disc.lit, s, samples);
     const Vec3 start = f_.T_world_camera.q * from;  // world axes, from the camera's centre, as the disc
     const Vec3 way = disc.centre + at.x * disc.right + at.y * disc.up - start;
     const double range = norm(way);
@@ -94,7 +102,7 @@ void Collector::add(const TinyDisc& disc, std::uint32_t s) {
     pixel_[i] = pixel;
     area_px2_[i] = solid_angle * c.fx * c.fy / (seen.z * seen.z * seen.z);
     packet_.rays[i] = {f_.T_world_camera.t + start, direction};
-    packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kTinySamples + s;
+    packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kTinySamplesMost + s;
     if (!f_.sun) return;
     const SamplePoint u = numbers.point(s, 1);
     packet_.to_sun[i] = f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]);

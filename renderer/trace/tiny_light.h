@@ -19,8 +19,9 @@ struct PixelBlock {
     [[nodiscard]] std::size_t holding(double image_x, double image_y) const;
 };
 
-/// Samples of each tiny body's disc. Any that is spread over several blocks is divided among them.
-inline constexpr std::uint32_t kTinySamples = 1024;
+/// Samples of each tiny body's disc: spp for each pixel that its image and the lens's blur cover, within these
+/// limits. Any that is spread over several blocks is divided among them.
+inline constexpr std::uint32_t kTinySamplesLeast = 1024, kTinySamplesMost = 16384;
 
 /// Adds the light of the tiny bodies in the block to its pixels, which hold what is seen past them, and takes away
 /// what they cover. Their points are fixed on the disc, whatever pixels it falls on, so that the light does not

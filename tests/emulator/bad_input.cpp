@@ -98,6 +98,9 @@ INSTANTIATE_TEST_SUITE_P(
         // Pictures and scans
         Mistake{"UnknownImageKind", "render SCENE -o FOLDERa.gif", nullptr, 2, "a.gif"},
         Mistake{"FolderThatIsNotThere", "render SCENE -o /nowhere/a.png", nullptr, 2, "/nowhere/a.png"},
+        Mistake{"DepthWithoutPaths", "render SCENE --max-depth 3 -o FOLDERa.png", nullptr, 2, "--max-depth"},
+        Mistake{"OutputsThatAPngCannotHold", "render SCENE --aov depth -o FOLDERa.png", nullptr, 2, "FILE.exr"},
+        Mistake{"TimeBeyondTheClock", "render SCENE --time 1e12 -o FOLDERa.png", nullptr, 2, "--time"},
         Mistake{"UnknownFormat", "render SCENE --format NV12 -o FOLDERa.png", nullptr, 2, "NV12"},
         Mistake{"PoseOfNobody", "render SCENE --pose x=0,0,0,1,0,0,0 -o FOLDERa.png", nullptr, 2,
                 "no body named \"x\""},

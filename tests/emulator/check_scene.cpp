@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "renderer/scene/scene_file.h"
 #include "tests/emulator/loop_support.h"
 
 namespace narpa::test {
@@ -28,6 +29,17 @@ Said run_check(const std::string& arguments) {
 }
 
 constexpr const char* kComplete = NARPA_SOURCE_DIR "/tests/data/scenes/complete.toml";
+
+TEST(UseMethod, RefusesWhatKeepsNoEnergyAndWarnsOfWhatIsDark) {
+    Scene s;
+    s.materials = {{.name = "old", .kind = Material::Kind::phong_classic}};
+    EXPECT_FALSE(use_method(s, RenderSettings::Method::path));
+    s.materials = {{.name = "pane", .kind = Material::Kind::dielectric}};
+    EXPECT_TRUE(use_method(s, RenderSettings::Method::direct));
+    EXPECT_EQ(s.warnings.size(), 1u);
+    EXPECT_TRUE(use_method(s, RenderSettings::Method::path));
+    EXPECT_TRUE(s.warnings.empty());
+}
 
 TEST(Check, TellsLightsMethodAndMaterialsByKind) {
     const Said said = run_check(std::string(kComplete) + " 2>&1 >/dev/null");

@@ -100,6 +100,19 @@ TEST(ClosedForm, LambertPlaneUnderTheSunByPathsFollowsTheCosine) {
     }
 }
 
+TEST(ClosedForm, LambertPlaneUnderAVeryLargeSunFacingItGetsItsIrradiance) {
+    Scene s;
+    s.materials.push_back(lambert(0.25f));
+    add_mesh(s, plate(10, 10));
+    add_sun(s, {0, 0, 1});
+    s.sun->angular_diameter_rad = 2 * kPi / 3;
+    const Camera c = camera(8, 8, 20);
+    const Rigid3 T = looking({0.1, 0.2, 5}, {0, 0, 0}, {0, 1, 0});
+    for (const Method method : {Method::direct, Method::path})
+        for (const Rgb& p : render(s, c, T, by(method, 64, 4)).pixels)
+            EXPECT_NEAR(static_cast<double>(p.x) / (0.25 * kSolar / kPi), 1, 1e-5);
+}
+
 TEST(ClosedForm, SkySunAndLampsThatTheCameraLooksAt) {
     // Nothing but the sky: the ambient by paths, black by direct light.
     Scene s;

@@ -131,7 +131,7 @@ TEST(Detector, MeanOfNoisyPixelsIsTheTruthFromOneDnUp) {
 }
 
 TEST(Detector, QuantisationBiasesFaintLightByLessThanOnePerMille) {
-    // math.md H22: rounding alone loses a signal of 1 DN or doubles it; 0.7 DN of noise before it carry the signal
+    // Rounding alone loses a signal of 1 DN or doubles it; 0.7 DN of noise before it carry the signal
     // through. The standard error of a frame of 1e5 pixels is 0.0025 DN, of the mean of all a quarter of 0.1 %.
     Camera c = sensor(500, 200, PixelFormat::y16);
     c.detector->full_well_e = 4e6;

@@ -117,6 +117,22 @@ TEST(Lights, HideNothing) {
     EXPECT_EQ(light_along(s, {{0.3, 0.3, 0.5}, {0, 0, -1}}, kDirectLight, 1).mean, (Vec3{1, 1, 1}));  // behind
 }
 
+TEST(Lights, AreHiddenByWhatStandsACentimetreBeforeThemAtAnyDistance) {
+    for (const double distance : {3.0, 2e3, 3.8e8}) {
+        Scene s;
+        s.materials.push_back(shining(0, {1, 1, 1}));
+        add_mesh(s, plate(4, 4));
+        s.lights.push_back(lamp(Light::Kind::disc, {{}, {0, 0, -0.01}}, {5, 4, 3}));
+        EXPECT_EQ(light_along(s, {{0.1, 0.1, distance}, {0, 0, -1}}, kDirectLight, 1).mean, (Vec3{1, 1, 1}));
+        s.lights[0].T_mount_light.t.z = 0.01;
+        EXPECT_EQ(light_along(s, {{0.1, 0.1, distance}, {0, 0, -1}}, kDirectLight, 1).mean, (Vec3{6, 5, 4}));
+        // Flush with what it is mounted on, it still shines.
+        s.lights[0].mount = 0;
+        s.lights[0].T_mount_light.t.z = 0;
+        EXPECT_EQ(light_along(s, {{0.1, 0.1, distance}, {0, 0, -1}}, kDirectLight, 1).mean, (Vec3{6, 5, 4}));
+    }
+}
+
 // Parallel coaxial discs: the form factor of the small one to the large one, point by point and averaged over the
 // disc.
 TEST(DiscLight, IsTheFormFactorOfParallelDiscs) {

@@ -69,7 +69,7 @@ TEST(SunDisc, CastsThePenumbraOfAnEdge) {
     }
 }
 
-// H18: a lobe of exponent n meets the Sun with a probability of 1e-4 (n = 10): found by asking for it, with no
+// a lobe of exponent n meets the Sun with a probability of 1e-4 (n = 10): found by asking for it, with no
 // clamping.
 TEST(SunDisc, GlossySurfacesHaveNoFireflies) {
     for (const float n : {10.0f, 100.0f, 1e3f, 1e4f}) {

@@ -20,7 +20,7 @@ TEST(PixelSamples, TwoToThe24EqualSamplesAreExactToOneInAMillion) {
     for (int i = 0; i < 1 << 24; ++i) p.add(sample);
     const Vec3 mean = p.mean();
     for (int b = 0; b < 3; ++b)
-        EXPECT_NEAR(mean[b] / static_cast<double>(sample[b]), 1, 1e-6) << b;  // math.md H19; measured 1e-9
+        EXPECT_NEAR(mean[b] / static_cast<double>(sample[b]), 1, 1e-6) << b;  // measured 1e-9
     EXPECT_EQ(p.count(), 1 << 24);
     EXPECT_LE(p.squared_deviations() / p.count(), 1e-12 * mean[2] * mean[2]);
 }
@@ -69,7 +69,7 @@ double coverage(int samples, double truth, const Draw& draw) {
     return held / (16.0 * kBlocks);
 }
 
-// math.md H20: with a pixel's own variance these hold the truth in 65 to 83 % (lognormal, 4 to 64 samples) and 20 %
+// With a pixel's own variance these hold the truth in 65 to 83 % (lognormal, 4 to 64 samples) and 20 %
 // (a spot on 0.0137 of the pixel, 16 samples).
 TEST(Interval, HoldsTheTruthOfALognormalInNineOfTenPixels) {
     std::mt19937_64 random(20);
@@ -159,7 +159,7 @@ TEST(Interval, OfASmoothPictureHoldsTheTruth) {
 }
 
 TEST(Interval, OfASphereOnAFewThousandthsOfAPixelHoldsTheTruth) {
-    // math.md H20's target: 10 m at 100 km, full phase, 0.0137 px^2, anywhere about the middle of one pixel.
+    // The target: 10 m at 100 km, full phase, 0.0137 px^2, anywhere about the middle of one pixel.
     constexpr double distance = 1e5, f = 1319.4792168823421;
     Scene s;
     s.materials.push_back(lambert(0.5f));

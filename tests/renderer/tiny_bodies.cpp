@@ -1,4 +1,4 @@
-// Bodies smaller than a pixel keep their light: math.md H7.
+// Bodies smaller than a pixel keep their light.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>

@@ -478,6 +478,20 @@ TEST(TraceBodies, NearestOfManyWins) {
     EXPECT_GT(hits, 100);
 }
 
+TEST(TraceErrors, BadLightsAreToldByName) {
+    Scene s;
+    s.materials.push_back(lambert(0.4f));
+    add_mesh(s, box(1, 1, 1));
+    s.lights.push_back({.name = "beacon", .mount = 7});
+    const auto on_nobody = tracer_of(s);
+    ASSERT_FALSE(on_nobody);
+    EXPECT_NE(on_nobody.error().what.find("beacon"), std::string::npos);
+    s.lights[0] = {.name = "panel", .kind = Light::Kind::rectangle, .width_m = 0};
+    EXPECT_FALSE(tracer_of(s));
+    s.lights[0].width_m = 1;
+    EXPECT_TRUE(tracer_of(s));
+}
+
 TEST(TraceErrors, BadMeshesAreToldByName) {
     Scene s;
     s.materials.push_back(lambert(0.4f));

@@ -45,41 +45,34 @@ constexpr std::array<Directions, 4> sobol_directions() {
     }
     return v;
 }
-inline constexpr std::array<Directions, 4> kSobol = sobol_directions();
-inline constexpr auto kSobolByBit = [] {
-    std::array<std::array<std::uint32_t, 4>, 32> by_bit{};
-    for (unsigned bit = 0; bit < 32; ++bit)
-        for (unsigned dim = 0; dim < 4; ++dim) by_bit[bit][dim] = kSobol[dim][bit];
-    return by_bit;
-}();
-
-constexpr std::uint32_t sobol(std::uint32_t index, unsigned dim) {
-    std::uint32_t x = 0;
-    for (; index != 0; index &= index - 1) x ^= kSobol[dim][static_cast<unsigned>(std::countr_zero(index))];
-    return x;
-}
-
-/// All four dimensions at once: a quarter of the steps where many bits of the index are set.
-constexpr std::array<std::uint32_t, 4> sobol(std::uint32_t index) {
-    std::array<std::uint32_t, 4> x{};
-    for (; index != 0; index &= index - 1)
-        for (unsigned dim = 0; dim < 4; ++dim)
-            x[dim] ^= kSobolByBit[static_cast<unsigned>(std::countr_zero(index))][dim];
-    return x;
-}
-
 constexpr std::uint32_t reverse_bits(std::uint32_t x) {
     x = ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
     x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
     x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
-    x = ((x & 0x00ff00ffu) << 8) | ((x >> 8) & 0x00ff00ffu);
-    return (x << 16) | (x >> 16);
+    return __builtin_bswap32(x);
 }
 
-/// Owen scrambling of a binary fraction: each bit is flipped by a hash of the bits above it (Laine and Karras, with
-/// the constants of N. Vegdahl's improvement).
-constexpr std::uint32_t scramble(std::uint32_t x, std::uint32_t seed) {
-    x = reverse_bits(x);
+/// What each bit of an index brings to the four dimensions, lowest bit first, as scrambling takes it.
+inline constexpr auto kReversedSobol = [] {
+    const std::array<Directions, 4> directions = sobol_directions();
+    std::array<std::array<std::uint32_t, 4>, 32> by_bit{};
+    for (unsigned bit = 0; bit < 32; ++bit)
+        for (unsigned dim = 0; dim < 4; ++dim) by_bit[bit][dim] = reverse_bits(directions[dim][bit]);
+    return by_bit;
+}();
+
+/// Sobol's point of this index, the bits of its fractions reversed.
+constexpr std::array<std::uint32_t, 4> reversed_sobol(std::uint32_t index) {
+    std::array<std::uint32_t, 4> x{};
+    for (; index != 0; index &= index - 1)
+        for (unsigned dim = 0; dim < 4; ++dim)
+            x[dim] ^= kReversedSobol[static_cast<unsigned>(std::countr_zero(index))][dim];
+    return x;
+}
+
+/// Owen scrambling of a binary fraction whose bits stand reversed: each is flipped by a hash of those above it in
+/// the fraction (Laine and Karras, with the constants of N. Vegdahl's improvement).
+constexpr std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
     x *= (seed >> 16) | 1u;
@@ -107,26 +100,30 @@ public:
                 static_cast<std::uint32_t>(b >> 32)};
     }
     [[nodiscard]] constexpr SamplePoint point(std::uint32_t sample) const {
-        SamplePoint p{};
-        for (unsigned dim = 0; dim < 4; ++dim)
-            p[dim] = 0x1p-32 * sampler_detail::scramble(sampler_detail::sobol(sample, dim), key_[dim]);
-        return p;
+        return scrambled(sampler_detail::reversed_sobol(sample), key_);
     }
     /// Another four dimensions, of any number of groups; group 0 is the one above.
     [[nodiscard]] constexpr SamplePoint point(std::uint32_t sample, std::uint32_t group) const {
-        using sampler_detail::mix, sampler_detail::scramble;
+        using sampler_detail::mix;
         if (group == 0) return point(sample);
         const std::uint64_t a = mix(((std::uint64_t{key_[1]} << 32) | key_[0]) + group), b = mix(a), c = mix(b);
-        const std::array<std::uint32_t, 4> key{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a >> 32),
-                                               static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b >> 32)};
         // A nested shuffle of the order keeps every aligned power of two of samples together.
-        const auto x = sampler_detail::sobol(scramble(sample, static_cast<std::uint32_t>(c)));
-        SamplePoint p{};
-        for (unsigned dim = 0; dim < 4; ++dim) p[dim] = 0x1p-32 * scramble(x[dim], key[dim]);
-        return p;
+        const std::uint32_t shuffled =
+            sampler_detail::scramble_reversed(sampler_detail::reverse_bits(sample), static_cast<std::uint32_t>(c));
+        return scrambled(sampler_detail::reversed_sobol(shuffled),
+                         {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a >> 32),
+                          static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b >> 32)});
     }
 
 private:
+    static constexpr SamplePoint scrambled(const std::array<std::uint32_t, 4>& reversed,
+                                           const std::array<std::uint32_t, 4>& key) {
+        SamplePoint p{};
+        for (unsigned dim = 0; dim < 4; ++dim)
+            p[dim] = 0x1p-32 * sampler_detail::scramble_reversed(reversed[dim], key[dim]);
+        return p;
+    }
+
     std::array<std::uint32_t, 4> key_{};
 };
 

@@ -22,6 +22,7 @@ struct Vec {
     friend constexpr Vec operator*(const Vec& a, T s) { return {a.x * s, a.y * s, a.z * s}; }
     friend constexpr Vec operator*(T s, const Vec& a) { return a * s; }
     friend constexpr Vec operator/(const Vec& a, T s) { return a * (T(1) / s); }
+    friend constexpr Vec operator/(const Vec& a, const Vec& b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }
     friend constexpr bool operator==(const Vec&, const Vec&) = default;
 };
 
@@ -40,6 +41,11 @@ T norm(const Vec<T>& a) {
 template <class T>
 Vec<T> normalized(const Vec<T>& a) {
     return a / norm(a);
+}
+/// Of three bands: what a monochrome sensor would weigh.
+template <class T>
+constexpr T mean_band(const Vec<T>& a) {
+    return (a.x + a.y + a.z) / 3;
 }
 template <class T>
 bool is_finite(const Vec<T>& a) {

@@ -27,10 +27,13 @@ struct Basis {
     }
 };
 
-/// At `cosine` from the z axis, at the azimuth 2 pi u.
-[[nodiscard]] inline Vec3 direction_at(double cosine, double u) noexcept {
-    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine)), phi = 2 * std::numbers::pi * u;
+/// At an angle from the z axis that is given by both, at the azimuth 2 pi u.
+[[nodiscard]] inline Vec3 direction_at(double sine, double cosine, double u) noexcept {
+    const double phi = 2 * std::numbers::pi * u;
     return {sine * std::cos(phi), sine * std::sin(phi), cosine};
+}
+[[nodiscard]] inline Vec3 direction_at(double cosine, double u) noexcept {
+    return direction_at(std::sqrt(std::max(0.0, 1 - cosine * cosine)), cosine, u);
 }
 
 /// Density cosine / pi about n.

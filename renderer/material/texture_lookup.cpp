@@ -180,10 +180,6 @@ bool can_look_up(const Texture& t, float u, float v) {
     return t.width > 0 && t.height > 0 && std::isfinite(u) && std::isfinite(v);
 }
 
-float mean_band(const Rgb& c) {
-    return (c.x + c.y + c.z) * (1.0f / 3);
-}
-
 }  // namespace
 
 Rgb texture_lookup(const Texture& texture, float u, float v, TextureLayout layout) noexcept {

@@ -24,7 +24,7 @@ BodyBounds bounds_of_mesh(const Mesh& mesh) {
     for (int k = 0; k < 3; ++k) b.semi_axes_m[k] = std::max(b.semi_axes_m[k], 1e-3 * largest);
     double farthest2 = 0;  // at most 3, at a corner of the box
     for_each_vertex([&](const Vec3& p) {
-        const Vec3 d = p - b.centre_m, unit{d.x / b.semi_axes_m.x, d.y / b.semi_axes_m.y, d.z / b.semi_axes_m.z};
+        const Vec3 unit = (p - b.centre_m) / b.semi_axes_m;
         farthest2 = std::max(farthest2, dot(unit, unit));
     });
     b.semi_axes_m *= std::sqrt(farthest2) * (1 + 1e-9);

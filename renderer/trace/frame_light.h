@@ -12,9 +12,6 @@
 
 namespace narpa {
 
-template <class T>
-using Lanes = std::array<T, kPacket>;
-
 struct Frame {
     const Tracer& tracer;
     const Placement& at;

@@ -65,8 +65,7 @@ Vec3 Guide::direction(const Tracer& tracer, const Placement& at, const Receiver&
         left -= c.importance;
     }
     const double drop = u * chosen.one_minus_cosine();  // 1 - cosine of the angle from the axis
-    return ConeFrame(normalized(chosen.to_centre))
-        .direction(std::sqrt(drop * (2 - drop)), 1 - drop, 2 * std::numbers::pi * v);
+    return Basis(normalized(chosen.to_centre)).to_world(direction_at(std::sqrt(drop * (2 - drop)), 1 - drop, v));
 }
 
 double Guide::pdf(const Tracer& tracer, const Placement& at, const Receiver& to,

@@ -15,10 +15,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// rounding in single precision there, and of the distance, for rounding in double.
 constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;
 
-double mean_band(const Rgb& c) {
-    return (static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z)) / 3;
-}
-
 Rigid3 frame_of(const Placement& at, int mount) {
     return mount < 0 ? Rigid3{} : at.T_world_body[static_cast<std::size_t>(mount)];
 }
@@ -57,13 +53,6 @@ int exact_material(const Body& body) {
     if (const Ellipsoid* e = std::get_if<Ellipsoid>(&body.shape)) return e->material;
     return std::get<Sphere>(body.shape).material;
 }
-Vec3 multiplied(const Vec3& a, const Vec3& b) {
-    return {a.x * b.x, a.y * b.y, a.z * b.z};
-}
-Vec3 divided(const Vec3& a, const Vec3& b) {
-    return {a.x / b.x, a.y / b.y, a.z / b.z};
-}
-
 /// An ellipsoid seen from outside, in its own frame with its axes scaled to 1: the cone of directions that meet it.
 struct ScaledView {
     Vec3 semi_axes_m{};
@@ -72,9 +61,7 @@ struct ScaledView {
     double one_minus_cos = 0;  ///< of the cone's half angle
 
     ScaledView(const Body& body, const Vec3& to_centre_body)
-        : semi_axes_m(semi_axes(body)),
-          towards(divided(to_centre_body, semi_axes_m)),
-          distance2(dot(towards, towards)) {
+        : semi_axes_m(semi_axes(body)), towards(to_centre_body / semi_axes_m), distance2(dot(towards, towards)) {
         const double sin2 = std::min(1.0, 1 / distance2);
         one_minus_cos = sin2 / (1 + std::sqrt(1 - sin2));
     }
@@ -82,7 +69,7 @@ struct ScaledView {
     /// Density per solid angle of an even choice in the cone. A linear map A takes the scaled solid angle to
     /// |det A| / |A w|^3 times as much.
     [[nodiscard]] double pdf(const Vec3& direction_body) const {
-        const double shrink = norm(divided(direction_body, semi_axes_m));
+        const double shrink = norm(direction_body / semi_axes_m);
         const double det = semi_axes_m.x * semi_axes_m.y * semi_axes_m.z;
         return 1 / (2 * std::numbers::pi * one_minus_cos * det * shrink * shrink * shrink);
     }
@@ -114,7 +101,7 @@ Lights::Lights(const Scene& scene)
 
 void Lights::add_light(std::size_t index) {
     const Light& l = scene_->lights[index];
-    Emitter e{static_cast<int>(index), -1, l.mount, l.T_mount_light.t, 0, mean_band(l.emission)};
+    Emitter e{static_cast<int>(index), -1, l.mount, l.T_mount_light.t, 0, mean_band(vec_cast<double>(l.emission))};
     if (e.power <= 0) return;
     e.touching_m = l.mount >= 0 ? kTouching * norm(e.centre) : 0;
     if (has_extent(l)) {
@@ -149,7 +136,8 @@ void Lights::add_body(std::size_t index) {
         const Vec3 a = semi_axes(body);
         const Material& m = scene_->materials[static_cast<std::size_t>(exact_material(body))];
         e.radius_m = std::max({a.x, a.y, a.z});
-        e.power = mean_band(m.emission) * std::numbers::pi * std::cbrt(std::pow(a.x * a.y * a.z, 2));
+        e.power =
+            mean_band(vec_cast<double>(m.emission)) * std::numbers::pi * std::cbrt(std::pow(a.x * a.y * a.z, 2));
         if (e.power <= 0) return;
     }
     emitter_of_body_[index] = static_cast<int>(emitters_.size());
@@ -161,7 +149,7 @@ Lights::Faces Lights::shining_faces(const Mesh& mesh) const {
     double sum = 0;
     for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
         // A texture counts as white: it can only darken, so that all that shines can be chosen.
-        const double radiance = mean_band(scene_->materials[mesh.face_material[f]].emission);
+        const double radiance = mean_band(vec_cast<double>(scene_->materials[mesh.face_material[f]].emission));
         if (!(radiance > 0)) continue;
         const auto corner = [&](std::size_t k) { return vec_cast<double>(mesh.positions[mesh.faces[f][k]]); };
         const double area = 0.5 * norm(cross(corner(1) - corner(0), corner(2) - corner(0)));
@@ -282,11 +270,11 @@ LightSample Lights::sample_exact(const Placement& at, const Receiver& to, const 
     const Rigid3 T = frame_of(at, e.mount);
     const ScaledView view(scene_->bodies[static_cast<std::size_t>(e.body)], conjugate(T.q) * way(to, T, {}));
     const double drop = u * view.one_minus_cos;  // 1 - cos of the angle from the axis
-    const Vec3 scaled = ConeFrame(normalized(view.towards))
-                            .direction(std::sqrt(drop * (2 - drop)), 1 - drop, 2 * std::numbers::pi * v);
+    const Vec3 scaled =
+        Basis(normalized(view.towards)).to_world(direction_at(std::sqrt(drop * (2 - drop)), 1 - drop, v));
     LightSample s;
     s.body = e.body;
-    s.direction = T.q * normalized(multiplied(scaled, view.semi_axes_m));
+    s.direction = T.q * normalized(scaled * view.semi_axes_m);
     return s;
 }
 
@@ -299,7 +287,8 @@ double Lights::pdf(const Placement& at, const Receiver& to, Group group, const V
     if (chosen == 0) return 0;
     const Body& body = scene_->bodies[static_cast<std::size_t>(met.body)];
     if (is_mesh(body)) {
-        const double radiance = mean_band(scene_->materials[static_cast<std::size_t>(met.material)].emission);
+        const double radiance =
+            mean_band(vec_cast<double>(scene_->materials[static_cast<std::size_t>(met.material)].emission));
         const double per_area = radiance / faces_[mesh_of(body)].cumulative.back();
         return chosen * per_solid_angle(per_area, met.range_m, dot(direction, met.geometric_normal));
     }

@@ -155,9 +155,9 @@ bool MeshScene::intersect(const Vec3& origin, const Vec3& direction, double entr
 
 MeshScene::Starts MeshScene::advance(const MeshRays& rays, std::uint32_t wanted, RTCRay16& query) const noexcept {
     const VecPerRay &o = rays.origin, &d = rays.direction;
-    PerRay<double> entry_m = off_centre_ ? bounding_entries(o - centre_, d, radius_m_) : rays.entry_m;
+    Lanes<double> entry_m = off_centre_ ? bounding_entries(o - centre_, d, radius_m_) : rays.entry_m;
     Starts s;
-    PerRay<double> length;
+    Lanes<double> length;
     for (std::size_t i = 0; i < kPacket; ++i) {
         const bool ask = is_set(wanted, i) && entry_m[i] < rays.t_max[i];
         s.valid[i] = -static_cast<int>(ask);
@@ -170,7 +170,7 @@ MeshScene::Starts MeshScene::advance(const MeshRays& rays, std::uint32_t wanted,
     for (std::size_t i = 0; i < kPacket; ++i) s.at.x[i] = o.x[i] + s.skipped_m[i] * d.x[i];
     for (std::size_t i = 0; i < kPacket; ++i) s.at.y[i] = o.y[i] + s.skipped_m[i] * d.y[i];
     for (std::size_t i = 0; i < kPacket; ++i) s.at.z[i] = o.z[i] + s.skipped_m[i] * d.z[i];
-    const auto put = [](const PerRay<double>& from, double minus, float* to) {
+    const auto put = [](const Lanes<double>& from, double minus, float* to) {
         for (std::size_t i = 0; i < kPacket; ++i) to[i] = static_cast<float>(from[i] - minus);
     };
     put(s.at.x, vertex_origin_.x, query.org_x);

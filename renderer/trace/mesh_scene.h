@@ -22,7 +22,7 @@ struct MeshHit {
 /// Rays in the body's frame, as `MeshScene::intersect` takes one. All are finite, also those that are not asked.
 struct MeshRays {
     VecPerRay origin, direction;
-    PerRay<double> entry_m, t_max;
+    Lanes<double> entry_m, t_max;
     std::uint32_t inside = 0;  ///< a bit for each that starts on the inner side of this mesh
 };
 
@@ -61,9 +61,9 @@ private:
                                                 double t_max) const noexcept;
     /// Rays where Embree takes over.
     struct Starts {
-        std::uint32_t asked = 0;        ///< those that Embree is to trace
-        alignas(64) PerRay<int> valid;  ///< the same, for Embree
-        PerRay<double> skipped_m;
+        std::uint32_t asked = 0;       ///< those that Embree is to trace
+        alignas(64) Lanes<int> valid;  ///< the same, for Embree
+        Lanes<double> skipped_m;
         VecPerRay at;
     };
     [[nodiscard]] Starts advance(const MeshRays& rays, std::uint32_t wanted, RTCRay16& query) const noexcept;

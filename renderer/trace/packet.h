@@ -12,16 +12,13 @@
 
 namespace narpa {
 
-template <class T>
-using PerRay = std::array<T, kPacket>;
-
 inline bool is_set(std::uint32_t bits, std::size_t i) noexcept {
     return (bits >> i & 1u) != 0;
 }
 
 /// A vector for each ray.
 struct alignas(64) VecPerRay {
-    PerRay<double> x, y, z;
+    Lanes<double> x, y, z;
 
     [[nodiscard]] Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
     void put(std::size_t i, const Vec3& v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
@@ -46,9 +43,9 @@ struct alignas(64) VecPerRay {
 }
 
 /// Where each ray enters a bounding sphere about the origin, as `bounding_span` has it; infinity where it misses.
-[[nodiscard]] inline PerRay<double> bounding_entries(const VecPerRay& o, const VecPerRay& unit_d,
-                                                     double radius) noexcept {
-    PerRay<double> entry, exit;  // NaN where the line misses: no comparison holds
+[[nodiscard]] inline Lanes<double> bounding_entries(const VecPerRay& o, const VecPerRay& unit_d,
+                                                    double radius) noexcept {
+    Lanes<double> entry, exit;  // NaN where the line misses: no comparison holds
     for (std::size_t i = 0; i < kPacket; ++i) {
         const double b = -(o.x[i] * unit_d.x[i] + o.y[i] * unit_d.y[i] + o.z[i] * unit_d.z[i]);
         const double cx = o.x[i] + b * unit_d.x[i], cy = o.y[i] + b * unit_d.y[i], cz = o.z[i] + b * unit_d.z[i];

@@ -20,9 +20,6 @@ constexpr float kFaint = 0.25f;
 /// Random numbers: two groups for each surface of the longest path, then the roulette's.
 constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40;
 
-template <class T>
-using Lanes = std::array<T, kPacket>;
-
 /// The lanes whose bit is set, lowest first.
 class EachLane {
 public:

@@ -9,11 +9,6 @@
 
 namespace narpa {
 
-/// Mean of the three bands: what a monochrome sensor would weigh.
-[[nodiscard]] inline double mean_band(const Vec3& radiance) {
-    return (radiance.x + radiance.y + radiance.z) / 3;
-}
-
 /// Samples of one pixel, summed in double: 2^24 equal ones are exact to 1e-9, where float stops growing.
 class PixelSamples {
 public:

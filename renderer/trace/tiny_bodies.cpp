@@ -15,9 +15,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 double largest(const Vec3& v) {
     return std::max({v.x, v.y, v.z});
 }
-Vec3 divided(const Vec3& a, const Vec3& b) {
-    return {a.x / b.x, a.y / b.y, a.z / b.z};
-}
 
 /// Two axes that complete the unit vector z; x is the direction of `towards` as z sees it, where it has one.
 std::array<Vec3, 2> frame_about(const Vec3& z, const Vec3& towards) {
@@ -80,12 +77,12 @@ void TinyBodies::span_disc(TinyDisc& disc) const noexcept {
     const BodyBounds& bounds = tracer_.bounds(disc.body);
     const Rigid3& T = at_.T_world_body[disc.body];
     const Vec3 eye_body = conjugate(T.q) * (T_world_camera_.t - T.t) - bounds.centre_m;
-    const Vec3 eye = divided(eye_body, bounds.semi_axes_m);
+    const Vec3 eye = eye_body / bounds.semi_axes_m;
     const double distance = norm(eye);
     const Vec3 z = eye / distance;
     Vec3 to_sun{};
     if (const auto& sun = tracer_.scene().sun) {
-        to_sun = normalized(divided(conjugate(T.q) * sun->direction, bounds.semi_axes_m));
+        to_sun = normalized(conjugate(T.q) * sun->direction / bounds.semi_axes_m);
         // The whole disc of the Sun counts: its edge rises first.
         const double phase = std::atan2(norm(cross(to_sun, z)), dot(to_sun, z));
         disc.lit = 0.5 * (1 + std::cos(std::max(0.0, phase - 0.5 * sun->angular_diameter_rad)));

@@ -6,6 +6,7 @@
 /// ellipsoids are solved in double. Bodies move by handing other poses to `place`; nothing is ever rebuilt.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -20,6 +21,8 @@ namespace narpa {
 class Lights;
 
 inline constexpr std::size_t kPacket = 16;  ///< rays that are traced together
+template <class T>
+using Lanes = std::array<T, kPacket>;
 
 struct Ray {
     Vec3 origin{};

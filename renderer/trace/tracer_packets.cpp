@@ -84,16 +84,16 @@ private:
     const Placement& at_;
     std::uint32_t wanted_, outside_ = 0;
     VecPerRay direction_;
-    PerRay<int> own_;                    ///< the body that it leaves; -1: not wanted
-    PerRay<Vec3> start_, start_turned_;  ///< in the frame of that body, and turned into the world's axes
+    Lanes<int> own_;                    ///< the body that it leaves; -1: not wanted
+    Lanes<Vec3> start_, start_turned_;  ///< in the frame of that body, and turned into the world's axes
 };
 
 namespace {
 
 /// Where each ray enters the bounds of a body; infinity where it misses them.
 template <class Rays>
-PerRay<double> entries_into(const Rays& rays, std::size_t body, const VecPerRay& origin, double bound_m) {
-    PerRay<double> entry_m = bounding_entries(origin, rays.directions(), bound_m);
+Lanes<double> entries_into(const Rays& rays, std::size_t body, const VecPerRay& origin, double bound_m) {
+    Lanes<double> entry_m = bounding_entries(origin, rays.directions(), bound_m);
     if (const std::uint32_t leave = rays.leave(body); leave != 0)  // they start inside
         for (std::size_t i = 0; i < kPacket; ++i)
             if (is_set(leave, i)) entry_m[i] = 0;
@@ -130,17 +130,17 @@ void Tracer::Impl::nearest_hits(const Placement& at, const Rays& rays, std::uint
     struct Entries {
         std::size_t body;
         double nearest_m;  ///< of the packet
-        PerRay<double> entry_m;
+        Lanes<double> entry_m;
     };
     struct Found {
         int body = -1;
         bool outside = true;
     };
-    PerRay<Found> found;
-    PerRay<double> nearest;
+    Lanes<Found> found;
+    Lanes<double> nearest;
     nearest.fill(kInfinity);
-    PerRay<MeshHit> mesh_hits;
-    PerRay<Vec3> o_met, d_met;
+    Lanes<MeshHit> mesh_hits;
+    Lanes<Vec3> o_met, d_met;
 
     std::array<Entries, kBatch> batch;
     std::array<std::size_t, kBatch> order;
@@ -217,7 +217,7 @@ std::uint32_t Tracer::Impl::hidden(const Placement& at, std::span<const Hit> fro
     for (std::size_t body = 0; body < shapes.size() && dark != wanted; ++body) {
         const Shape& shape = shapes[body];
         const VecPerRay origin = rays.origins_from(body);
-        const PerRay<double> entry_m = entries_into(rays, body, origin, shape.bound_m);
+        const Lanes<double> entry_m = entries_into(rays, body, origin, shape.bound_m);
         std::uint32_t asked = 0;
         for (std::size_t i = 0; i < kPacket; ++i) asked |= static_cast<std::uint32_t>(entry_m[i] < t_max(i)) << i;
         asked &= wanted & ~dark;

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "renderer/trace/camera_image.h"
+#include "tests/renderer/camera_support.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -28,18 +29,6 @@ FrameSettings by(Method method, int spp, int max_depth = 1) {
     settings.method = method;
     settings.max_depth = max_depth;
     return settings;
-}
-
-/// Irradiance at the camera: radiance times solid angle over all pixels.
-double irradiance(const RadianceImage& image, const Camera& c) {
-    double sum = 0;
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const double u = (x - c.cx) / c.fx, v = (y - c.cy) / c.fy, cosine = 1 / std::sqrt(1 + u * u + v * v);
-            sum += static_cast<double>(image.pixels[static_cast<std::size_t>(y * image.width + x)].y) * cosine *
-                   cosine * cosine / (c.fx * c.fy);
-        }
-    return sum;
 }
 
 constexpr double kAlbedo = 0.5, kRadius = 5, kDistance = 1e6;

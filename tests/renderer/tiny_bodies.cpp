@@ -11,6 +11,7 @@
 #include "renderer/trace/camera_image.h"
 #include "renderer/trace/camera_ray.h"
 #include "renderer/trace/tiny_bodies.h"
+#include "tests/renderer/camera_support.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/shapes.h"
 
@@ -25,18 +26,6 @@ RadianceImage render(const Tracer& tracer, const Camera& c, const Rigid3& T, Fra
     RadianceImage image(c.width, c.height);
     render_radiance(tracer, placed(tracer.scene()), c, T, settings, image);
     return image;
-}
-
-/// Irradiance at the camera, W m^-2 a band: radiance times solid angle, over all pixels.
-double flux(const RadianceImage& image, const Camera& c) {
-    double sum = 0;
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const double u = (x - c.cx) / c.fx, v = (y - c.cy) / c.fy, cosine = 1 / std::sqrt(1 + u * u + v * v);
-            sum += static_cast<double>(image.pixels[static_cast<std::size_t>(y * image.width + x)].y) * cosine *
-                   cosine * cosine / (c.fx * c.fy);
-        }
-    return sum;
 }
 
 /// What a Lambert sphere sends to a far camera under a point Sun.
@@ -98,7 +87,7 @@ std::vector<double> fluxes(const Far& far, FrameSettings settings) {
         c.cx = 10 + (special ? 0.5 * (k & 1) : shift(random));
         c.cy = 10 + (special ? 0.25 * (k & 2) : shift(random));
         settings.frame = k;
-        out.push_back(flux(render(tracer, c, far.view(), settings), c));
+        out.push_back(irradiance(render(tracer, c, far.view(), settings), c));
     }
     return out;
 }
@@ -181,7 +170,7 @@ TEST(TinyBody, LightStaysTheSameWhileItMovesOverPixelsAndBlocks) {
     for (int k = 0; k < 64; ++k) {
         Camera c = far.c;
         c.cx = 8.5 + 0.11 * k, c.cy = 9.3 + 0.05 * k;  // seven pixels along, over corners of pixels and of blocks
-        seen.push_back(flux(render(tracer, c, far.view()), c));
+        seen.push_back(irradiance(render(tracer, c, far.view()), c));
     }
     const Moments m = moments(seen);
     EXPECT_GT(m.mean, 0);
@@ -205,7 +194,7 @@ TEST(TinyBody, OneThatTurnsKeepsItsLightToOnePercent) {
             const Vec3 v = conjugate(q) * Vec3{1, 0, 0};
             const double area =
                 std::abs(v.x) * size.y * size.z + std::abs(v.y) * size.x * size.z + std::abs(v.z) * size.x * size.y;
-            ratio.push_back(flux(render(far.tracer(), far.c, far.view()), far.c) / (area / 1e10));
+            ratio.push_back(irradiance(render(far.tracer(), far.c, far.view()), far.c) / (area / 1e10));
         }
         const Moments m = moments(ratio);
         EXPECT_NEAR(m.mean, 1, 5e-3) << size.x << " x " << size.y << " x " << size.z;
@@ -227,7 +216,7 @@ TEST(TinyBody, EllipsoidIsSampledOverItsOwnOutline) {
         far.scene.bodies[0].initial.T_world_body.q = q;
         const Vec3 v = conjugate(q) * Vec3{1, 0, 0};
         const double area = kPi * norm(Vec3{v.x * a.y * a.z, v.y * a.z * a.x, v.z * a.x * a.y});
-        EXPECT_NEAR(flux(render(far.tracer(), far.c, far.view()), far.c) / (area / 1e10), 1, 1e-3);
+        EXPECT_NEAR(irradiance(render(far.tracer(), far.c, far.view()), far.c) / (area / 1e10), 1, 1e-3);
     }
 }
 
@@ -245,7 +234,7 @@ TEST(TinyBody, CrossingTheLimitOfSizeChangesTheLightByLessThanOnePercent) {
                     add_sphere(far.scene, 5, {});
                 // Where a body is sampled with the rest, 4096 samples a pixel find its light to 0.2 %.
                 const auto image = render(far.tracer(), far.c, far.view(), {.spp = side == 0 ? 1 : 4096});
-                scaled[static_cast<std::size_t>(side)] = flux(image, far.c) * distance * distance;
+                scaled[static_cast<std::size_t>(side)] = irradiance(image, far.c) * distance * distance;
             }
             EXPECT_NEAR(scaled[1] / scaled[0], 1, 1e-2) << "phase " << phase << (mesh ? " mesh" : " sphere");
         }
@@ -331,7 +320,7 @@ TEST(TinyBody, OffTheAxisAndOverTheEdgeOfTheImage) {
         const auto tracer = Tracer::create(w.s, 1);
         ASSERT_TRUE(tracer);
         const double d2 = x * x + 1e6, solid_angle = 2 * kPi * (1 - std::sqrt(1 - kWide * kWide / d2));
-        EXPECT_NEAR(flux(render(*tracer, w.c, {}), w.c) / solid_angle, 1, 5e-3) << x;
+        EXPECT_NEAR(irradiance(render(*tracer, w.c, {}), w.c) / solid_angle, 1, 5e-3) << x;
     }
     w.c = camera(16, 16, 1000);
     w.s.bodies.clear();

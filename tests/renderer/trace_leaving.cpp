@@ -17,8 +17,6 @@ constexpr int kFewer = 20;  // the sanitizers are that much slower
 constexpr int kFewer = 1;
 #endif
 
-template <class T>
-using PerRay = std::array<T, kPacket>;
 constexpr std::uint32_t kAll = (1u << kPacket) - 1;
 
 bool is_set(std::uint32_t bits, std::size_t i) {
@@ -71,8 +69,8 @@ TEST_P(LeavingAConvexBody, OutwardsMissesItAndInwardsMeetsItFromInside) {
             ASSERT_TRUE(tracer) << tracer.error().text();
             const Placement at = placed(s, offset);
             for (int k = 0; k < 7500 / kFewer; ++k) {
-                PerRay<Hit> from, met;
-                PerRay<Vec3> out, in;
+                Lanes<Hit> from, met;
+                Lanes<Vec3> out, in;
                 std::uint32_t seen = 0;
                 for (std::size_t i = 0; i < kPacket; ++i) {
                     const Vec3 eye = offset + 5 * radius * random_direction(random);
@@ -119,8 +117,8 @@ TEST(LeavingAPlate, ItsInnerSideIsAsFreeAsItsOuterSide) {
     std::uniform_real_distribution<double> within(-1.9, 1.9);
     int met = 0, dark = 0;
     for (int k = 0; k < 4000; ++k) {
-        PerRay<Hit> from, next;
-        PerRay<Vec3> directions;
+        Lanes<Hit> from, next;
+        Lanes<Vec3> directions;
         for (std::size_t i = 0; i < kPacket; ++i) {
             const Vec3 above{within(random), within(random), 1};
             from[i] = other_side(tracer->intersect(at, {T * above, T.q * Vec3{0, 0, -1}}, kInfinity));
@@ -148,10 +146,10 @@ Bounces bounce_inside(const Scene& s, const Vec3& offset, int wanted) {
     const auto start = [&] {
         return tracer->intersect(at, {at.T_world_body[0].t, random_direction(random)}, kInfinity);
     };
-    PerRay<Hit> hits;
+    Lanes<Hit> hits;
     for (Hit& h : hits) h = start();
     Bounces b;
-    PerRay<Vec3> directions;
+    Lanes<Vec3> directions;
     while (b.bounces < wanted) {
         for (std::size_t i = 0; i < kPacket; ++i) directions[i] = leaving(hits[i], random, b.bounces);
         tracer->intersect(at, hits, directions, kAll, hits);

@@ -5,11 +5,9 @@
 
 #include <algorithm>
 
-#include "renderer/trace/camera_ray.h"
+#include "renderer/trace/camera_packet.h"
 #include "renderer/trace/first_hit.h"
 #include "renderer/trace/flush_denormals.h"
-#include "renderer/trace/frame_light.h"
-#include "renderer/trace/lens.h"
 #include "renderer/trace/pixel_samples.h"
 #include "renderer/trace/tiny_light.h"
 
@@ -29,70 +27,41 @@ PixelBlock block_at(int bx, int by, int width, int height) {
     return b;
 }
 
-/// Finds what the packet's rays meet and the light that comes back from there.
-void trace(const Frame& f, Packet& p, Lanes<Rgb>& radiance) {
-    f.tracer.intersect(f.at, std::span(p.rays).first(p.n), p.hits);
-    if (f.tiny.any())
-        for (std::size_t i = 0; i < p.n; ++i) p.hits[i] = f.tiny.beyond(p.rays[i], p.hits[i]);
-    light_along(f, p, radiance);
+/// A sample of each of the block's pixels.
+CameraSamples samples_of(const PixelBlock& block, int image_width, bool middle) {
+    CameraSamples s;
+    s.n = block.n;
+    s.middle = middle;
+    s.sample.fill(0);
+    for (std::size_t i = 0; i < block.n; ++i) {
+        s.x[i] = block.x[i], s.y[i] = block.y[i];
+        s.number[i] = static_cast<std::uint32_t>(block.index(i, image_width));
+    }
+    return s;
 }
 
-void set_numbers(const PixelBlock& block, int image_width, Packet& p) {
-    for (std::size_t i = 0; i < block.n; ++i) p.number[i] = static_cast<std::uint32_t>(block.index(i, image_width));
-}
-
-void aim_at_centres(const Frame& f, const PixelBlock& block, Packet& p) {
-    p.n = block.n;
-    for (std::size_t i = 0; i < block.n; ++i)
-        p.rays[i] = camera_ray(f.camera, f.T_world_camera, block.x[i], block.y[i]);
-}
-
-/// The ray through each pixel's centre: what the outputs beside the radiance show.
+/// The ray through each pixel's middle: what the outputs beside the radiance show.
 void store_first_hits(const Frame& f, const PixelBlock& block, int image_width, Packet& p, Aovs& aovs) {
-    aim_at_centres(f, block, p);
-    f.tracer.intersect(f.at, std::span(p.rays).first(p.n), p.hits);
+    trace_middles(f, samples_of(block, image_width, true), p);
     for (std::size_t i = 0; i < block.n; ++i)
         store_first_hit(f, p.rays[i], p.hits[i], block.index(i, image_width), aovs);
 }
 
 /// The same ray: the whole picture for one sample a pixel.
-void render_centres(const Frame& f, const PixelBlock& block, Packet& p, RadianceImage& out) {
-    Lanes<Rgb> radiance;
-    aim_at_centres(f, block, p);
-    if (f.sun) p.to_sun.fill(f.sun->centre());
-    if (!f.quick) set_numbers(block, out.width, p);
-    trace(f, p, radiance);
+void render_middles(const Frame& f, const PixelBlock& block, Packet& p, RadianceImage& out) {
+    RgbPerRay radiance;
+    trace_samples(f, samples_of(block, out.width, true), f.tracer.all_bodies(), p, radiance);
     for (std::size_t i = 0; i < block.n; ++i) out.pixels[block.index(i, out.width)] = radiance[i];
-}
-
-/// Points the packet's rays at this sample of each pixel.
-void aim(const Frame& f, const PixelBlock& block, std::uint32_t sample, Packet& p) {
-    p.sample = sample;
-    for (std::size_t i = 0; i < block.n; ++i) {
-        const PixelSampler sampler(f.settings.seed, f.settings.frame, p.number[i]);
-        const SamplePoint u = sampler.point(sample);
-        const double x = block.x[i] + u[0] - 0.5, y = block.y[i] + u[1] - 0.5;
-        if (f.lens == nullptr) {
-            p.rays[i] = camera_ray(f.camera, f.T_world_camera, x, y);
-            if (f.sun) p.to_sun[i] = f.sun->sample(u[2], u[3]);
-        } else {
-            p.rays[i] = lens_ray(f.camera, *f.lens, f.T_world_camera, x, y, aperture_point(*f.lens, u[2], u[3]));
-            if (!f.sun || !f.quick) continue;
-            const SamplePoint more = sampler.point(sample, 1);
-            p.to_sun[i] = f.sun->sample(more[0], more[1]);
-        }
-    }
 }
 
 /// Mean of several samples a pixel, and the variance of that mean.
 void render_samples(const Frame& f, const PixelBlock& block, Packet& p, RadianceImage& out, Aovs* aovs) {
     Lanes<PixelSamples> samples;
-    Lanes<Rgb> radiance;
-    p.n = block.n;
-    set_numbers(block, out.width, p);
+    RgbPerRay radiance;
+    CameraSamples wanted = samples_of(block, out.width, false);
     for (int s = 0; s < f.settings.spp; ++s) {
-        aim(f, block, static_cast<std::uint32_t>(s), p);
-        trace(f, p, radiance);
+        wanted.sample.fill(static_cast<std::uint32_t>(s));
+        trace_samples(f, wanted, f.tracer.all_bodies(), p, radiance);
         for (std::size_t i = 0; i < block.n; ++i) samples[i].add(radiance[i]);
     }
     for (std::size_t i = 0; i < block.n; ++i)
@@ -107,7 +76,7 @@ void render_samples(const Frame& f, const PixelBlock& block, Packet& p, Radiance
 void render_block(const Frame& f, const PixelBlock& block, Packet& p, RadianceImage& out, Aovs* aovs) {
     if (aovs != nullptr) store_first_hits(f, block, out.width, p, *aovs);
     if (f.one_sample())
-        render_centres(f, block, p, out);
+        render_middles(f, block, p, out);
     else
         render_samples(f, block, p, out, aovs);
     if (f.tiny.any()) add_tiny_bodies(f, block, out, aovs != nullptr ? &aovs->variance : nullptr);

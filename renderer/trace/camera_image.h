@@ -3,8 +3,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "renderer/trace/frame_budget.h"
 #include "renderer/trace/tracer.h"
 
 namespace narpa {
@@ -37,6 +39,8 @@ struct FrameSettings {
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;                                ///< of method path
     std::atomic<std::size_t>* pixels_done = nullptr;  ///< counted up while the frame is made; null: nobody looks
+    FrameBudget budget{};                             ///< kind samples: spp
+    bool times = false;                               ///< tell where the time goes
 };
 
 /// The light that reaches the camera.
@@ -57,6 +61,22 @@ struct FrameSettings {
 /// same sizes it allocates nothing. `aovs` may be null; they show a pinhole's view, tiny bodies among the rest.
 void render_radiance(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
                      const FrameSettings& settings, RadianceImage& out, Aovs* aovs = nullptr);
+
+/// The same, for a camera's frames one after another: keeps memory and measures from frame to frame, and knows
+/// budgets. What a frame looks like depends on neither.
+class CameraRenderer {
+public:
+    /// Both outlive it. All memory is taken here and in the first frame.
+    CameraRenderer(const Tracer& tracer, const Camera& camera);
+    ~CameraRenderer();
+
+    FrameAccount render(const Placement& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+                        RadianceImage& out, Aovs* aovs = nullptr);
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
 
 /// Shot and return of a LiDAR or any other range finder.
 struct LidarReturn {

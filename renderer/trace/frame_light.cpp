@@ -1,5 +1,6 @@
 #include "renderer/trace/frame_light.h"
 
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -10,17 +11,18 @@ namespace narpa {
 namespace {
 
 /// Only light that comes straight from its source counts.
-void direct_light(const Frame& f, const Packet& p, Lanes<Rgb>& radiance) {
+void direct_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
     const Scene& scene = f.tracer.scene();
     Lanes<Rgb> sunlit;
     std::uint32_t towards_sun = 0;
-    for (std::size_t i = 0; i < p.n; ++i) {
-        radiance[i] = {};
-        const Hit& hit = p.hits[i];
+    radiance.fill({});
+    p.lit = 0;
+    for (std::size_t i = 0; i < p.rays.n; ++i) {
+        const Hit hit = p.hits[i];
         if (hit.body < 0) continue;
-        const Vec3& direction = p.rays[i].direction;
+        const Vec3 direction = p.rays.direction[i];
         const Surface surface = surface_at(f.tracer, f.at, hit, direction, hit.range_m * f.path.pixel_angle_rad);
-        radiance[i] = surface.emission + scene.ambient * ambient_reflectance(surface);
+        radiance.put(i, surface.emission + scene.ambient * ambient_reflectance(surface));
         if (!f.sun) continue;
         const double cosine = dot(surface.normal, p.to_sun[i]);
         if (cosine <= 0) continue;
@@ -32,10 +34,10 @@ void direct_light(const Frame& f, const Packet& p, Lanes<Rgb>& radiance) {
         towards_sun |= 1u << i;
     }
     if (towards_sun == 0) return;
-    const std::uint32_t lit =
-        towards_sun & ~f.tracer.occluded(f.at, std::span(p.hits).first(p.n), p.to_sun, towards_sun);
-    for (std::size_t i = 0; i < p.n; ++i)
-        if ((lit >> i & 1u) != 0) radiance[i] += sunlit[i];
+    p.lit = towards_sun & ~f.tracer.occluded(f.at, p.hits, p.to_sun, towards_sun);
+    p.rays_traced += static_cast<std::uint64_t>(std::popcount(towards_sun));
+    for (std::size_t i = 0; i < p.rays.n; ++i)
+        if (is_set(p.lit, i)) radiance.put(i, radiance[i] + sunlit[i]);
 }
 
 template <std::size_t... I>
@@ -64,12 +66,18 @@ Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera
             TinyBodies(tracer, at, camera, T_world_camera, lens)};
 }
 
-void light_along(const Frame& f, const Packet& p, Lanes<Rgb>& radiance) {
-    if (f.quick)
+void light_along(const Frame& f, Packet& p, RgbPerRay& radiance) {
+    if (f.quick) {
         direct_light(f, p, radiance);
-    else
-        path_radiance(f.tracer, f.at, f.path, std::span(p.rays).first(p.n), std::span(p.hits).first(p.n),
-                      samplers_of(f, p, std::make_index_sequence<kPacket>()), p.sample, radiance);
+        return;
+    }
+    Lanes<Ray> rays;
+    Lanes<Hit> hits;
+    Lanes<Rgb> light;
+    for (std::size_t i = 0; i < p.rays.n; ++i) rays[i] = p.rays[i], hits[i] = p.hits[i];
+    path_radiance(f.tracer, f.at, f.path, std::span(rays).first(p.rays.n), std::span(hits).first(p.rays.n),
+                  samplers_of(f, p, std::make_index_sequence<kPacket>()), p.sample, light);
+    for (std::size_t i = 0; i < p.rays.n; ++i) radiance.put(i, light[i]);
 }
 
 }  // namespace narpa

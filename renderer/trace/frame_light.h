@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "renderer/trace/camera_image.h"
+#include "renderer/trace/frame_budget.h"
 #include "renderer/trace/path.h"
 #include "renderer/trace/sun_disc.h"
 #include "renderer/trace/tiny_bodies.h"
@@ -34,17 +35,20 @@ struct Frame {
 
 /// Rays that are traced together, and what they meet first.
 struct Packet {
-    std::size_t n = 0;
-    Lanes<Ray> rays;
-    Lanes<Hit> hits;
+    RayPacket rays;
+    HitPacket hits;
     // Where the frame is quick:
-    Lanes<Vec3> to_sun;  ///< a point of the Sun for each, if there is one
+    VecPerRay to_sun;       ///< a point of the Sun for each, if there is one
+    std::uint32_t lit = 0;  ///< out: those that the Sun lights
     // Where it is not: which random numbers each takes.
     Lanes<std::uint32_t> number{};  ///< its PixelSampler's "pixel"
-    std::uint32_t sample = 0;
+    Lanes<std::uint32_t> sample{};
+    // Counted on from packet to packet:
+    std::uint64_t rays_traced = 0;  ///< of all kinds
+    PhaseTimes* times = nullptr;    ///< null: nobody looks
 };
 
 /// Radiance that comes back along each ray.
-void light_along(const Frame& f, const Packet& packet, Lanes<Rgb>& radiance);
+void light_along(const Frame& f, Packet& packet, RgbPerRay& radiance);
 
 }  // namespace narpa

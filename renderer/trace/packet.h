@@ -1,19 +1,27 @@
-/// renderer/trace/packet.h - sixteen rays side by side, in double, laid out so that the compiler works on several
-/// of them with each instruction.
+/// renderer/trace/packet.h - sixteen rays side by side, laid out so that the compiler works on several of them with
+/// each instruction.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include "base/pose.h"
-#include "renderer/trace/tracer.h"
 
 namespace narpa {
 
+inline constexpr std::size_t kPacket = 16;  ///< rays that are traced together
+template <class T>
+using Lanes = std::array<T, kPacket>;
+
 inline bool is_set(std::uint32_t bits, std::size_t i) noexcept {
     return (bits >> i & 1u) != 0;
+}
+/// The first n lanes.
+inline std::uint32_t lanes_below(std::size_t n) noexcept {
+    return (1u << n) - 1;
 }
 
 /// A vector for each ray.
@@ -22,6 +30,16 @@ struct alignas(64) VecPerRay {
 
     [[nodiscard]] Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
     void put(std::size_t i, const Vec3& v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
+    void fill(const Vec3& v) { x.fill(v.x), y.fill(v.y), z.fill(v.z); }
+};
+
+/// Three bands for each ray.
+struct alignas(64) RgbPerRay {
+    Lanes<float> r, g, b;
+
+    [[nodiscard]] Rgb operator[](std::size_t i) const { return {r[i], g[i], b[i]}; }
+    void put(std::size_t i, const Rgb& c) { r[i] = c.x, g[i] = c.y, b[i] = c.z; }
+    void fill(const Rgb& c) { r.fill(c.x), g.fill(c.y), b.fill(c.z); }
 };
 
 [[nodiscard]] inline VecPerRay operator-(const VecPerRay& a, const Vec3& b) noexcept {

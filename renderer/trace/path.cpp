@@ -45,7 +45,7 @@ std::uint32_t bit(std::size_t lane) {
 class Walk {
 public:
     Walk(const Tracer& tracer, const Placement& at, const PathSettings& settings,
-         std::span<const PixelSampler> samplers, std::uint32_t sample, std::span<Rgb> radiance)
+         std::span<const PixelSampler> samplers, std::span<const std::uint32_t> sample, std::span<Rgb> radiance)
         : tracer_(tracer),
           scene_(tracer.scene()),
           lights_(tracer.lights()),
@@ -143,8 +143,8 @@ private:
         const auto group = static_cast<std::uint32_t>(1 + 2 * met);
         for (const std::size_t i : EachLane(going_)) {
             Lane& lane = lanes_[i];
-            lane.choose_direction = samplers_[i].point(sample_, group);
-            lane.choose_light = samplers_[i].point(sample_, group + 1);
+            lane.choose_direction = samplers_[i].point(sample_[i], group);
+            lane.choose_light = samplers_[i].point(sample_[i], group + 1);
             const bool guided = lit_surfaces_count && lights_.sun() && !is_specular(*lane.point.surface().material);
             lane.guide = guided ? Guide(tracer_, at_, lane.start) : Guide();
         }
@@ -276,7 +276,8 @@ private:
         if (brings >= kFaint) return true;
         const float chance = brings / kFaint;
         const auto k = static_cast<std::uint32_t>(met + 1 - kSurfacesBeforeRoulette);
-        if (samplers_[i].point(sample_, kRouletteGroup + k / 4)[k % 4] >= static_cast<double>(chance)) return false;
+        if (samplers_[i].point(sample_[i], kRouletteGroup + k / 4)[k % 4] >= static_cast<double>(chance))
+            return false;
         throughput = throughput / chance;
         return true;
     }
@@ -290,7 +291,7 @@ private:
     const PathSettings& settings_;
     const Lights::Group group_;
     const std::span<const PixelSampler> samplers_;
-    const std::uint32_t sample_;
+    const std::span<const std::uint32_t> sample_;
     const std::span<Rgb> radiance_;
 
     std::uint32_t going_ = 0;  ///< lanes whose paths have not ended
@@ -303,7 +304,7 @@ private:
 
 void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                    std::span<const Ray> rays, std::span<const Hit> first, std::span<const PixelSampler> samplers,
-                   std::uint32_t sample, std::span<Rgb> radiance) noexcept {
+                   std::span<const std::uint32_t> sample, std::span<Rgb> radiance) noexcept {
     Walk(tracer, at, settings, samplers, sample, radiance).run(rays, first);
 }
 

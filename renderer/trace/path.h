@@ -29,6 +29,6 @@ struct PathSettings {
 /// whatever stands in the other lanes. Thread-safe, allocates nothing.
 void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                    std::span<const Ray> rays, std::span<const Hit> first, std::span<const PixelSampler> samplers,
-                   std::uint32_t sample, std::span<Rgb> radiance) noexcept;
+                   std::span<const std::uint32_t> sample, std::span<Rgb> radiance) noexcept;
 
 }  // namespace narpa

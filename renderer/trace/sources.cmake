@@ -4,7 +4,7 @@ if(NOT embree_FOUND)
   find_package(embree 3 REQUIRED)
 endif()
 find_package(TBB REQUIRED)
-target_sources(narpa_renderer PRIVATE trace/body_bounds.cpp trace/camera_image.cpp trace/first_hit.cpp
+target_sources(narpa_renderer PRIVATE trace/body_bounds.cpp trace/camera_image.cpp trace/camera_packet.cpp trace/first_hit.cpp
                                       trace/frame_light.cpp trace/guide.cpp trace/lidar_shot.cpp trace/lights.cpp trace/mesh_scene.cpp
                                       trace/mesh_topology.cpp trace/path.cpp
                                       trace/shading.cpp trace/surface_hit.cpp trace/tiny_bodies.cpp

@@ -73,9 +73,9 @@ void Collector::sample(const TinyDisc& disc) {
     const std::uint32_t samples = samples_of(disc, f_.settings.spp);
     for (std::uint32_t s = 0; s < samples; ++s) {
         add(disc, s, samples);
-        if (packet_.n == kPacket) trace(disc.body);
+        if (packet_.rays.n == kPacket) trace(disc.body);
     }
-    if (packet_.n > 0) trace(disc.body);
+    if (packet_.rays.n > 0) trace(disc.body);
     for (std::size_t i = 0; i < block_.n; ++i)
         variance_[i] += body_squares_[i] - body_sum_[i] * body_sum_[i] / samples;
 }
@@ -97,25 +97,25 @@ void Collector::add(const TinyDisc& disc, std::uint32_t s, std::uint32_t samples
     const std::size_t pixel = block_.holding(x, y);
     if (pixel == block_.n) return;
 
-    const std::size_t i = packet_.n++;
+    const std::size_t i = packet_.rays.n++;
     const double solid_angle = at.area * std::abs(dot(cross(disc.right, disc.up), direction)) / (range * range);
     pixel_[i] = pixel;
     area_px2_[i] = solid_angle * c.fx * c.fy / (seen.z * seen.z * seen.z);
-    packet_.rays[i] = {f_.T_world_camera.t + start, direction};
+    packet_.rays.put(i, {f_.T_world_camera.t + start, direction});
     packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kTinySamplesMost + s;
     if (!f_.sun) return;
     const SamplePoint u = numbers.point(s, 1);
-    packet_.to_sun[i] = f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]);
+    packet_.to_sun.put(i, f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]));
 }
 
 void Collector::trace(std::size_t body) {
-    f_.tracer.intersect(f_.at, std::span(packet_.rays).first(packet_.n), packet_.hits);
-    for (std::size_t i = 0; i < packet_.n; ++i)
-        if (packet_.hits[i].body != static_cast<int>(body)) packet_.hits[i].body = -1;
-    Lanes<Rgb> radiance;
+    f_.tracer.intersect(f_.at, packet_.rays, f_.tracer.all_bodies(), packet_.hits);
+    for (std::size_t i = 0; i < packet_.rays.n; ++i)
+        if (packet_.hits.body[i] != static_cast<int>(body)) packet_.hits.put(i, {});
+    RgbPerRay radiance;
     light_along(f_, packet_, radiance);
-    for (std::size_t i = 0; i < packet_.n; ++i) {
-        if (packet_.hits[i].body < 0) continue;
+    for (std::size_t i = 0; i < packet_.rays.n; ++i) {
+        if (packet_.hits.body[i] < 0) continue;
         const std::size_t pixel = pixel_[i];
         const Vec3 share = area_px2_[i] * vec_cast<double>(radiance[i]);
         covered_[pixel] += area_px2_[i];
@@ -123,7 +123,7 @@ void Collector::trace(std::size_t body) {
         body_sum_[pixel] += mean_band(share);
         body_squares_[pixel] += mean_band(share) * mean_band(share);
     }
-    packet_.n = 0;
+    packet_.rays.n = 0;
 }
 
 void Collector::put_into(RadianceImage& out, std::vector<float>* variance) const {

@@ -64,6 +64,7 @@ Status Tracer::Impl::build(const Scene& s, int threads) {
         if (!shape) return shape.error();
         shapes.push_back(*shape);
         bounds.push_back(bounds_of(s, b));
+        all_bodies.push_back(static_cast<std::uint32_t>(all_bodies.size()));
     }
     for (const Material& m : s.materials) {
         if (const Status good = check_textures(s, m); !good) return good.error();
@@ -203,6 +204,10 @@ const BodyBounds& Tracer::bounds(std::size_t body) const noexcept {
 
 double Tracer::bounding_radius_m(std::size_t body) const noexcept {
     return impl_->shapes[body].radius_m;
+}
+
+std::span<const std::uint32_t> Tracer::all_bodies() const noexcept {
+    return impl_->all_bodies;
 }
 
 std::size_t Tracer::triangle_count() const noexcept {

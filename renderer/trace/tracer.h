@@ -15,14 +15,11 @@
 #include "base/result.h"
 #include "renderer/scene/scene.h"
 #include "renderer/trace/body_bounds.h"
+#include "renderer/trace/packet.h"
 
 namespace narpa {
 
 class Lights;
-
-inline constexpr std::size_t kPacket = 16;  ///< rays that are traced together
-template <class T>
-using Lanes = std::array<T, kPacket>;
 
 struct Ray {
     Vec3 origin{};
@@ -43,6 +40,31 @@ struct Hit {
     Vec3 departure_body{};    ///< body frame: where rays that leave start, before the offset for rounding: the
                               ///< position, or above it on the smooth surface that vertex normals describe
     Vec3 beyond_body{};       ///< the same for rays that leave on the other side
+};
+
+/// Up to kPacket rays side by side. Lanes from `n` on are not looked at.
+struct RayPacket {
+    std::size_t n = 0;
+    VecPerRay origin, direction;  ///< direction: unit
+
+    [[nodiscard]] Ray operator[](std::size_t i) const { return {origin[i], direction[i]}; }
+    void put(std::size_t i, const Ray& ray) { origin.put(i, ray.origin), direction.put(i, ray.direction); }
+};
+
+/// What each ray of a packet meets: the members of Hit, lane by lane. Where the lane's bit in `met` is not set,
+/// `body` is -1 and the rest is undefined.
+struct HitPacket {
+    std::uint32_t met = 0, outside = 0;
+    Lanes<int> body;
+    Lanes<std::uint32_t> face;
+    Lanes<double> range_m;
+    VecPerRay position, geometric_normal, shading_normal;
+    Lanes<float> u, v;
+    Lanes<int> material;
+    VecPerRay departure_body, beyond_body;
+
+    [[nodiscard]] Hit operator[](std::size_t i) const;
+    void put(std::size_t i, const Hit& hit);
 };
 
 /// The same point, left on its other side: for light that goes through.
@@ -85,6 +107,12 @@ public:
     /// Up to kPacket rays that run close together, as those of neighbouring pixels do: each as above with no end,
     /// several times faster.
     void intersect(const Placement& at, std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+    /// The same, side by side. Only these `bodies` are looked at: those that the rays may meet.
+    void intersect(const Placement& at, const RayPacket& rays, std::span<const std::uint32_t> bodies,
+                   HitPacket& hits) const noexcept;
+    /// Which of the hits of `wanted` cannot see their light, each in a direction of its own without an end.
+    [[nodiscard]] std::uint32_t occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
+                                         std::uint32_t wanted) const noexcept;
     /// Which of up to kPacket hits cannot see their light, each in a direction of its own without an end: a bit
     /// each. Only those whose bit is set in `wanted` are asked.
     [[nodiscard]] std::uint32_t occluded(const Placement& at, std::span<const Hit> from,
@@ -111,6 +139,8 @@ public:
     [[nodiscard]] const BodyBounds& bounds(std::size_t body) const noexcept;
     /// Radius of the body's bounding sphere about its own origin, metres.
     [[nodiscard]] double bounding_radius_m(std::size_t body) const noexcept;
+    /// 0, 1, 2 ...: for rays that may meet any body.
+    [[nodiscard]] std::span<const std::uint32_t> all_bodies() const noexcept;
     [[nodiscard]] std::size_t triangle_count() const noexcept;
     [[nodiscard]] const Scene& scene() const noexcept;
 

@@ -25,8 +25,9 @@ struct Tracer::Impl {
     const Scene* scene = nullptr;
     embree::Owned<RTCDevice> device;  // outlives the scenes below
     std::vector<MeshScene> meshes;
-    std::vector<Shape> shapes;           ///< one for each body
-    std::vector<BodyBounds> bounds;      ///< one for each body
+    std::vector<Shape> shapes;       ///< one for each body
+    std::vector<BodyBounds> bounds;  ///< one for each body
+    std::vector<std::uint32_t> all_bodies;
     std::vector<std::uint8_t> textured;  ///< per material: does it look at texture coordinates?
     std::optional<Lights> lights;
 

@@ -10,10 +10,6 @@ namespace {
 constexpr std::size_t kBatch = 32;  ///< bodies that are sorted at a time
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::uint32_t rays_below(std::size_t n) {
-    return (1u << n) - 1;
-}
-
 /// Rays through neighbouring pixels. Lanes beyond the last repeat the first.
 class CameraRays {
 public:
@@ -199,14 +195,57 @@ void Tracer::Impl::nearest_hits(const Placement& at, const Rays& rays, std::uint
 void Tracer::intersect(const Placement& at, std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
     const std::size_t n = std::min({rays.size(), hits.size(), kPacket});
     if (n == 0) return;
-    impl_->nearest_hits(at, CameraRays(at, rays.first(n)), rays_below(n), hits);
+    impl_->nearest_hits(at, CameraRays(at, rays.first(n)), lanes_below(n), hits);
 }
 
 void Tracer::intersect(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
                        std::uint32_t wanted, std::span<Hit> hits) const noexcept {
     const std::size_t n = std::min({from.size(), directions.size(), hits.size(), kPacket});
-    wanted &= rays_below(n);
+    wanted &= lanes_below(n);
     impl_->nearest_hits(at, Impl::LeavingRays(*impl_, at, from, directions, wanted), wanted, hits);
+}
+
+Hit HitPacket::operator[](std::size_t i) const {
+    if (body[i] < 0) return {};
+    return {body[i], face[i], range_m[i],  position[i],        geometric_normal[i], shading_normal[i],
+            u[i],    v[i],    material[i], is_set(outside, i), departure_body[i],   beyond_body[i]};
+}
+
+void HitPacket::put(std::size_t i, const Hit& hit) {
+    const std::uint32_t bit = 1u << i;
+    met = hit.body < 0 ? met & ~bit : met | bit;
+    outside = hit.outside ? outside | bit : outside & ~bit;
+    body[i] = hit.body;
+    face[i] = hit.face;
+    range_m[i] = hit.range_m;
+    position.put(i, hit.position);
+    geometric_normal.put(i, hit.geometric_normal);
+    shading_normal.put(i, hit.shading_normal);
+    u[i] = hit.u, v[i] = hit.v;
+    material[i] = hit.material;
+    departure_body.put(i, hit.departure_body);
+    beyond_body.put(i, hit.beyond_body);
+}
+
+void Tracer::intersect(const Placement& at, const RayPacket& rays, std::span<const std::uint32_t> bodies,
+                       HitPacket& hits) const noexcept {
+    hits.met = 0;
+    hits.body.fill(-1);
+    if (bodies.empty()) return;
+    Lanes<Ray> each;
+    Lanes<Hit> found;
+    for (std::size_t i = 0; i < rays.n; ++i) each[i] = rays[i];
+    intersect(at, std::span(each).first(rays.n), found);
+    for (std::size_t i = 0; i < rays.n; ++i) hits.put(i, found[i]);
+}
+
+std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
+                               std::uint32_t wanted) const noexcept {
+    Lanes<Hit> hits;
+    Lanes<Vec3> each;
+    for (std::size_t i = 0; i < kPacket; ++i)
+        if (is_set(wanted, i)) hits[i] = from[i], each[i] = directions[i];
+    return occluded(at, hits, each, wanted);
 }
 
 template <class End>
@@ -240,13 +279,13 @@ std::uint32_t Tracer::Impl::hidden(const Placement& at, std::span<const Hit> fro
 
 std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
                                std::uint32_t wanted) const noexcept {
-    wanted &= rays_below(std::min({from.size(), directions.size(), kPacket}));
+    wanted &= lanes_below(std::min({from.size(), directions.size(), kPacket}));
     return impl_->hidden(at, from, directions, wanted, [](std::size_t) { return kInfinity; });
 }
 
 std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
                                std::span<const double> t_max, std::uint32_t wanted) const noexcept {
-    wanted &= rays_below(std::min({from.size(), directions.size(), t_max.size(), kPacket}));
+    wanted &= lanes_below(std::min({from.size(), directions.size(), t_max.size(), kPacket}));
     return impl_->hidden(at, from, directions, wanted,
                          [&](std::size_t i) { return is_set(wanted, i) ? t_max[i] : 0; });
 }

@@ -90,7 +90,7 @@ TEST(SunDisc, GlossySurfacesHaveNoFireflies) {
                 const PixelSampler sampler(7, 0, static_cast<std::uint32_t>(k));
                 Rgb radiance;
                 path_radiance(*tracer, at, kDirectLight, std::span(&ray, 1), std::span(&first, 1),
-                              std::span(&sampler, 1), 0, std::span(&radiance, 1));
+                              std::span(&sampler, 1), the_same(0), std::span(&radiance, 1));
                 sum += static_cast<double>(radiance.x);
                 squares += std::pow(static_cast<double>(radiance.x), 2);
             }
@@ -206,8 +206,8 @@ std::vector<Rgb> picture(const Tracer& tracer, const Placement& at, const Vec3& 
         }
         for (std::uint32_t s = 0; s < 8; ++s) {
             std::array<Rgb, kPacket> radiance;
-            path_radiance(tracer, at, settings, std::span(rays).first(n), std::span(first).first(n), samplers, s,
-                          radiance);
+            path_radiance(tracer, at, settings, std::span(rays).first(n), std::span(first).first(n), samplers,
+                          the_same(s), radiance);
             for (std::size_t i = 0; i < n; ++i) pixels[from + i] += radiance[i];
         }
     });
@@ -245,8 +245,8 @@ TEST(PathRadiance, AllocatesNothing) {
     const PixelSampler sampler(1, 0, 0);
     Rgb radiance;
     const auto trace = [&](std::uint32_t sample) {
-        path_radiance(*tracer, at, {}, std::span(&ray, 1), std::span(&first, 1), std::span(&sampler, 1), sample,
-                      std::span(&radiance, 1));
+        path_radiance(*tracer, at, {}, std::span(&ray, 1), std::span(&first, 1), std::span(&sampler, 1),
+                      the_same(sample), std::span(&radiance, 1));
     };
     trace(0);
     const AllocationCounter counter;

@@ -12,6 +12,13 @@
 
 namespace narpa::test {
 
+/// This sample for every lane.
+inline Lanes<std::uint32_t> the_same(std::uint32_t sample) {
+    Lanes<std::uint32_t> all;
+    all.fill(sample);
+    return all;
+}
+
 inline Ray ray_to(const Vec3& origin, const Vec3& target) {
     return {origin, normalized(target - origin)};
 }
@@ -37,7 +44,7 @@ inline Estimate light_along(const Tracer& tracer, const Placement& at, const Ray
     std::array<Vec3, kPacket> sum{};
     for (std::uint32_t s = 0; s < samples; ++s) {
         std::array<Rgb, kPacket> radiance;
-        path_radiance(tracer, at, settings, rays, first, samplers, s, radiance);
+        path_radiance(tracer, at, settings, rays, first, samplers, the_same(s), radiance);
         for (std::size_t i = 0; i < kPacket; ++i) sum[i] += vec_cast<double>(radiance[i]);
     }
     Estimate e;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
+#include <span>
 
 #include "emulator/trajectory.h"
 
@@ -11,7 +13,18 @@ namespace {
 
 constexpr std::string_view kLedgerHeader =
     "frame,pose_counter,t_pose_ns,stale,t_exposure_start_ns,t_exposure_mid_ns,t_exposure_end_ns,t_render_start_ns,"
-    "t_render_end_ns,t_hand_over_ns,t_deadline_ns,deadline_met,samples_per_pixel,expected_error\n";
+    "t_render_end_ns,t_hand_over_ns,t_deadline_ns,deadline_met,delivery,step,samples,samples_per_pixel,rays,passes,"
+    "budget_kind,budget,expected_error\n";
+
+/// "307200;614400": the passes after the first, as a replay needs them.
+std::size_t format_passes(std::span<char> out, const FrameLedger& ledger) noexcept {
+    std::size_t size = 0;
+    for (const std::uint32_t samples : ledger.passes) {
+        if (samples == 0) break;
+        size += fmt::format_to_n(out.data() + size, out.size() - size, "{}{}", size > 0 ? ";" : "", samples).size;
+    }
+    return size;
+}
 
 }  // namespace
 
@@ -39,16 +52,30 @@ void CameraFeed::start_at(std::int64_t t_ns) noexcept {
     next_ = static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period - 1) / period));
 }
 
+void CameraFeed::warm_up() {
+    const std::int64_t budget = world_.scene().render.budget_ns;
+    for (int i = 0; i < 2; ++i) {
+        const FrameLedger ledger = unit_.expose(next_, next_mid_ns(), monotonic_ns() + budget);
+        unit_.embed(ledger);
+        unit_.handed_over(monotonic_ns());
+    }
+}
+
+std::int64_t CameraFeed::deadline_ns(std::uint32_t frame) const noexcept {
+    const std::int64_t budget = world_.scene().render.budget_ns;
+    return budget > 0 ? unit_.t_mid_ns(frame) + unit_.exposure_ns() / 2 + budget : unit_.t_mid_ns(frame + 1);
+}
+
 void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
     const std::uint32_t frame = next_;
-    const std::int64_t due = due_ns();
+    const std::int64_t due = due_ns(), deadline = deadline_ns(frame);
     const std::int64_t started = clock ? clock->now_ns() : due;
     const std::int64_t wall_start = monotonic_ns();
 
-    FrameLedger ledger = unit_.expose(frame, unit_.t_mid_ns(frame));
+    FrameLedger ledger = unit_.expose(frame, unit_.t_mid_ns(frame), clock ? clock->to_monotonic(deadline) : 0);
     ledger.t_render_start_ns = started;
     ledger.t_render_end_ns = clock ? clock->now_ns() : due;
-    ledger.t_deadline_ns = unit_.t_mid_ns(frame + 1);
+    ledger.t_deadline_ns = deadline;
     stats_.render.add(monotonic_ns() - wall_start);
     stats_.wake_late.add(started - due);
 
@@ -60,17 +87,29 @@ void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
 }
 
 void CameraFeed::hand_over(FrameLedger& ledger, const Clock* clock) noexcept {
-    const std::int64_t now = clock ? clock->now_ns() : ledger.t_render_end_ns;
-    ledger.deadline_met = now <= ledger.t_deadline_ns;
+    const std::int64_t ready = clock ? clock->now_ns() : ledger.t_render_end_ns;
+    ledger.deadline_met = ready <= ledger.t_deadline_ns;
     unit_.embed(ledger);
+    ledger.delivery = deliver(ledger.deadline_met);
+    const std::int64_t out = clock ? clock->now_ns() : ready;
+    if (clock) unit_.handed_over(clock->to_monotonic(out));
+    if (ledger.delivery != Delivery::nothing) ledger.t_hand_over_ns = out;
+    ledger.deadline_met = out <= ledger.t_deadline_ns;
+    stats_.late.add(out - ledger.t_deadline_ns);
+    stats_.hand_over.add(out - ledger.t_exposure_mid_ns);
+    if (ledger.deadline_met && unit_.camera().late == LatePolicy::repeat)
+        std::copy(unit_.bytes().begin(), unit_.bytes().end(), spare_.begin());
+}
+
+Delivery CameraFeed::deliver(bool in_time) noexcept {
     const LatePolicy late = unit_.camera().late;
-    if (ledger.deadline_met || late == LatePolicy::late) {
+    if (in_time || late == LatePolicy::late) {
         send(unit_.bytes());
-        if (late == LatePolicy::repeat) std::copy(unit_.bytes().begin(), unit_.bytes().end(), spare_.begin());
-    } else if (late != LatePolicy::drop) {
-        send(spare_);  // the last frame that was in time, or black
+        return Delivery::frame;
     }
-    ledger.t_hand_over_ns = clock ? clock->now_ns() : now;
+    if (late == LatePolicy::drop) return Delivery::nothing;
+    send(spare_);
+    return late == LatePolicy::repeat ? Delivery::repeated : Delivery::blank;
 }
 
 void CameraFeed::send(std::span<const std::uint8_t> bytes) noexcept {
@@ -82,7 +121,12 @@ void CameraFeed::account(const FrameLedger& ledger) noexcept {
     ++stats_.frames;
     stats_.deadline_missed += !ledger.deadline_met;
     stats_.stale += ledger.pose_stale;
-    stats_.hand_over.add(ledger.t_hand_over_ns - ledger.t_exposure_mid_ns);
+    stats_.repeated += ledger.delivery == Delivery::repeated;
+    stats_.blanked += ledger.delivery == Delivery::blank;
+    ++stats_.steps[ledger.step];
+    stats_.samples_1e3.add(std::llround(1e3 * static_cast<double>(ledger.samples_per_pixel)));
+    if (ledger.expected_error >= 0)
+        stats_.error_1e9.add(std::llround(1e9 * std::min(1.0, static_cast<double>(ledger.expected_error))));
     if (keeps_ledgers_) stats_.ledgers_lost += !ledgers_.push(ledger);
 }
 
@@ -100,11 +144,14 @@ void CameraFeed::log(const FrameLedger& l) noexcept {
         truth_log_->append(
             {row.data(), format_trajectory_row(row, l.t_exposure_mid_ns, world_.scene().bodies[i].name, m)});
     }
-    const auto end =
-        fmt::format_to_n(row.data(), row.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{}\n", l.frame,
-                         l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns, l.t_exposure_mid_ns,
-                         l.t_exposure_end_ns, l.t_render_start_ns, l.t_render_end_ns, l.t_hand_over_ns,
-                         l.t_deadline_ns, l.deadline_met, l.samples_per_pixel, l.expected_error);
+    std::array<char, 11 * FrameLedger::kPasses> text;
+    const std::string_view passes(text.data(), format_passes(text, l));
+    const auto end = fmt::format_to_n(
+        row.data(), row.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{},{},{},{},{},{},{},{}\n", l.frame,
+        l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns, l.t_exposure_mid_ns, l.t_exposure_end_ns,
+        l.t_render_start_ns, l.t_render_end_ns, l.t_hand_over_ns, l.t_deadline_ns, l.deadline_met,
+        kDeliveries[static_cast<std::size_t>(l.delivery)], l.step, l.samples, l.samples_per_pixel, l.rays, passes,
+        kBudgetKinds[static_cast<std::size_t>(l.budget_kind)], l.budget, l.expected_error);
     ledger_log_->append({row.data(), end.size});
     sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
 }

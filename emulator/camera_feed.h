@@ -1,6 +1,7 @@
 /// emulator/camera_feed.h - a camera on its way out: unit -> sinks, log, ledger, with everything counted.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -21,9 +22,13 @@ struct CameraStats {
     std::uint64_t handed_over = 0;  ///< given to the sinks
     std::uint64_t skipped = 0;      ///< never exposed: the one before took too long
     std::uint64_t deadline_missed = 0;
-    std::uint64_t stale = 0;                 ///< frames that show a body without a fresh command
-    std::uint64_t ledgers_lost = 0;          ///< the CAN thread did not keep up
+    std::uint64_t stale = 0;                               ///< frames that show a body without a fresh command
+    std::uint64_t repeated = 0, blanked = 0;               ///< handed over in place of late frames
+    std::uint64_t ledgers_lost = 0;                        ///< the CAN thread did not keep up
+    std::array<std::uint64_t, kStepNames.size()> steps{};  ///< frames that got so far
     Histogram wake_late, render, hand_over;  ///< after it was due; duration; from mid-exposure to hand-over
+    SignedHistogram late;              ///< hand-over (of what is late and dropped: its end) after the deadline
+    Histogram error_1e9, samples_1e3;  ///< expected error, 1e-9 of full scale; samples per pixel, 1e-3
 };
 
 class CameraFeed {
@@ -39,8 +44,9 @@ public:
     /// When the next frame can be made: its exposure is over.
     [[nodiscard]] std::int64_t due_ns() const noexcept { return next_mid_ns() + unit_.exposure_ns() / 2; }
 
-    /// Exposes the next frame for nobody.
-    void warm_up() { unit_.expose(next_, next_mid_ns()); }
+    /// Makes the next frame for nobody, twice: the first pays for what is needed once, the second shows how fast
+    /// the renderer is and what its frames need on their way out.
+    void warm_up();
     /// Exposes the next frame and hands it to every sink. `clock`: null in lockstep, where no wall time enters.
     /// `end_ns`: frames from there on are not part of the run, so they cannot be skipped.
     void make_next(const Clock* clock, std::int64_t end_ns);
@@ -56,6 +62,9 @@ public:
 
 private:
     void hand_over(FrameLedger& ledger, const Clock* clock) noexcept;
+    /// For the hand-over: the end of the time budget, or the middle of the next exposure.
+    [[nodiscard]] std::int64_t deadline_ns(std::uint32_t frame) const noexcept;
+    [[nodiscard]] Delivery deliver(bool in_time) noexcept;
     void send(std::span<const std::uint8_t> bytes) noexcept;
     void account(const FrameLedger& ledger) noexcept;
     void let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept;

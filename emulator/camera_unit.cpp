@@ -1,15 +1,33 @@
 #include "emulator/camera_unit.h"
 
+#include <cmath>
+
+#include "emulator/clock.h"
 #include "protocols/video/embedded_line.h"
 #include "renderer/sensor/detector.h"
 
 namespace narpa {
 
+static_assert(FrameLedger::kPasses == kMaxPasses);
+static_assert(kStepNames.size() == static_cast<std::size_t>(FrameStep::nothing) + 1);
+
+double full_scale_radiance(const Camera& camera) noexcept {
+    if (!camera.detector) return camera.white_radiance;
+    const Detector& d = *camera.detector;
+    double electrons = 0;
+    for (int band = 0; band < 3; ++band) electrons += electrons_per_radiance(d, band);
+    const bool mono = camera.format == PixelFormat::grey || camera.format == PixelFormat::y16;
+    const double top_e = gain_e_per_dn(d) * (std::exp2(d.bits) - 1 - d.black_level_dn);
+    return std::min(d.full_well_e, top_e) / (mono ? electrons : electrons / 3);
+}
+
 CameraUnit::CameraUnit(const World& world, std::size_t index)
     : world_(world),
       camera_(world.scene().cameras[index]),
       index_(static_cast<std::uint8_t>(index)),
+      full_scale_(full_scale_radiance(camera_)),
       placement_(world.scene().bodies.size()),
+      renderer_(world.tracer(), camera_),
       radiance_(camera_.width, camera_.height),
       bytes_(frame_bytes(format())) {}
 
@@ -21,13 +39,37 @@ std::int64_t CameraUnit::exposure_ns() const noexcept {
     return camera_.detector ? static_cast<std::int64_t>(camera_.detector->exposure_s * 1e9) : 0;
 }
 
-FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs* aovs,
+FrameBudget CameraUnit::budget(std::int64_t deadline_ns) const noexcept {
+    const RenderSettings& render = world_.scene().render;
+    FrameBudget budget;
+    if (render.budget_rays > 0) {
+        budget.kind = FrameBudget::Kind::rays;
+        budget.rays = render.budget_rays;
+    } else if (render.budget_ns > 0) {
+        budget.kind = FrameBudget::Kind::time;
+        budget.deadline_ns = deadline_ns - std::min(allowance_.ns(), render.budget_ns / 2);
+    }
+    return budget;
+}
+
+FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns, Aovs* aovs,
                                std::atomic<std::size_t>* pixels_done) {
     const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_);
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
-    const FrameSettings settings{render.spp, render.seed, frame, render.method, render.max_depth, pixels_done};
-    render_radiance(world_.tracer(), placement_, camera_, T_world_camera, settings, radiance_, aovs);
+    FrameSettings settings;
+    settings.spp = render.spp;
+    settings.seed = render.seed;
+    settings.frame = frame;
+    settings.method = render.method;
+    settings.max_depth = render.max_depth;
+    settings.pixels_done = pixels_done;
+    settings.budget = budget(deadline_ns);
+    const FrameAccount account = renderer_.render(placement_, T_world_camera, settings, radiance_, aovs);
+    t_radiance_ns_ = monotonic_ns();
+    // A renderer that stopped late is allowed for as well.
+    if (settings.budget.kind == FrameBudget::Kind::time)
+        t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, render.seed, frame, bytes_);
 
     FrameLedger ledger;
@@ -36,11 +78,32 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs*
     ledger.pose_counter = source.counter;
     ledger.pose_stale = source.stale;
     ledger.t_pose_ns = source.t_pose_ns;
-    ledger.samples_per_pixel = static_cast<std::uint16_t>(render.spp);
+    tell_cost(account, ledger);
     ledger.t_exposure_mid_ns = t_mid_ns;
     ledger.t_exposure_start_ns = t_mid_ns - exposure_ns() / 2;
     ledger.t_exposure_end_ns = ledger.t_exposure_start_ns + exposure_ns();
     return ledger;
+}
+
+void CameraUnit::tell_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept {
+    const RenderSettings& render = world_.scene().render;
+    if (render.budget_rays > 0) {
+        ledger.budget_kind = BudgetKind::rays;
+        ledger.budget = render.budget_rays;
+    } else if (render.budget_ns > 0) {
+        ledger.budget_kind = BudgetKind::time;
+        ledger.budget = static_cast<std::uint64_t>(render.budget_ns);
+    } else {
+        ledger.budget = static_cast<std::uint64_t>(render.spp);
+    }
+    ledger.step = static_cast<std::uint8_t>(account.step);
+    ledger.samples = account.samples;
+    ledger.rays = account.rays;
+    ledger.passes = account.passes;
+    const auto pixels = static_cast<double>(radiance_.pixels.size());
+    ledger.samples_per_pixel = static_cast<float>(static_cast<double>(account.samples) / pixels);
+    if (account.standard_error >= 0)
+        ledger.expected_error = static_cast<float>(account.standard_error / full_scale_);
 }
 
 void CameraUnit::embed(const FrameLedger& ledger) noexcept {

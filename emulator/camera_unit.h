@@ -1,6 +1,8 @@
 /// emulator/camera_unit.h - one camera under emulation: frame number -> the bytes that the sensor would put out.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <span>
@@ -11,6 +13,22 @@
 #include "renderer/trace/camera_image.h"
 
 namespace narpa {
+
+/// The radiance in each band that takes the camera's digital numbers to the top of their scale, W m^-2 sr^-1: what
+/// a frame's expected error is a fraction of.
+[[nodiscard]] double full_scale_radiance(const Camera& camera) noexcept;
+
+/// What a frame's way from its radiance to the sinks took lately: so much of a time budget is kept for it.
+class Allowance {
+public:
+    void add(std::int64_t ns) noexcept { last_[next_++ % last_.size()] = ns; }
+    /// The longest of the last 16.
+    [[nodiscard]] std::int64_t ns() const noexcept { return *std::max_element(last_.begin(), last_.end()); }
+
+private:
+    std::array<std::int64_t, 16> last_{};
+    std::size_t next_ = 0;
+};
 
 class CameraUnit {
 public:
@@ -25,22 +43,32 @@ public:
 
     /// Renders frame `frame` as it is at t_mid. The same frame number, time and poses give the same bytes.
     /// Fills the ledger's identity, pose and exposure; the caller adds when it was made. `aovs` may be null.
+    /// `deadline_ns`: CLOCK_MONOTONIC, for the hand-over; read only where the scene has a time budget.
     /// `pixels_done` is counted up meanwhile, for who wants to watch; null: nobody does.
-    FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, Aovs* aovs = nullptr,
-                       std::atomic<std::size_t>* pixels_done = nullptr);
+    FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns = 0,
+                       Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);
     /// Writes the ledger into the last row, where the scene asks for it.
     void embed(const FrameLedger& ledger) noexcept;
+    /// The frame just exposed is out at this time, CLOCK_MONOTONIC: the next knows what to allow for.
+    void handed_over(std::int64_t t_ns) noexcept { allowance_.add(t_ns - t_radiance_ns_); }
 
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
     [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
 
 private:
+    [[nodiscard]] FrameBudget budget(std::int64_t deadline_ns) const noexcept;
+    void tell_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept;
+
     const World& world_;
     Camera camera_;
     std::uint8_t index_;
+    double full_scale_;
     Placement placement_;
+    CameraRenderer renderer_;
     RadianceImage radiance_;
+    Allowance allowance_;
+    std::int64_t t_radiance_ns_ = 0;  ///< of the last frame: when it was there, or ought to have been
     std::vector<std::uint8_t> bytes_;
 };
 

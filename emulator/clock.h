@@ -22,6 +22,7 @@ public:
     explicit Clock(std::int64_t lead_ns) : start_ns_(monotonic_ns() + lead_ns) {}
 
     [[nodiscard]] std::int64_t now_ns() const noexcept { return monotonic_ns() - start_ns_; }
+    [[nodiscard]] std::int64_t to_monotonic(std::int64_t t_ns) const noexcept { return t_ns + start_ns_; }
     [[nodiscard]] std::int64_t from_monotonic(std::int64_t t_ns) const noexcept { return t_ns - start_ns_; }
 
     /// Sleeps to the absolute time `t_ns`, looking at the flag ten times a second; false when stopped instead.

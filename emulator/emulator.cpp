@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 
+#include "emulator/run_record.h"
 #include "emulator/threads.h"
 
 namespace narpa {
@@ -28,6 +30,26 @@ Result<std::vector<std::unique_ptr<Sink>>> open_sinks(
     return sinks;
 }
 
+/// A time budget is for real time, and ends before the next frame of the same camera is due.
+Status check_budget(const Scene& scene, const RunOptions& options) {
+    const std::int64_t budget_ns = scene.render.budget_ns;
+    if (budget_ns <= 0) return Ok{};
+    if (options.lockstep)
+        return Error{
+            "a budget in milliseconds cannot be kept in lockstep, where no wall time enters any result; "
+            "expected --budget-rays or --spp (budget_rays or spp in [render])",
+            scene.file};
+    for (const Camera& c : scene.cameras) {
+        const bool wanted = std::ranges::any_of(options.video, [&](const auto& v) { return v.first == c.name; });
+        if (wanted && budget_ns > c.period_ns)
+            return Error{
+                fmt::format("a budget of {} ms, expected at most the period of camera \"{}\", {} ms",
+                            static_cast<double>(budget_ns) * 1e-6, c.name, static_cast<double>(c.period_ns) * 1e-6),
+                scene.file};
+    }
+    return Ok{};
+}
+
 }  // namespace
 
 Emulator::Emulator() = default;
@@ -38,6 +60,7 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
         return Error{"nothing to put out, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
     if (options.lockstep && options.bus.empty())
         return Error{"--lockstep needs --can BUS: the clock advances only with commands"};
+    if (auto good = check_budget(scene, options); !good) return good.error();
     auto world = World::create(std::move(scene));
     if (!world) return world.error();
     if (options.lockstep && !(*world)->has_commanded_bodies())
@@ -48,7 +71,7 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
     emulator->world_ = *std::move(world);
     emulator->end_ns_ =
         options.duration_s > 0 ? std::llround(options.duration_s * 1e9) : std::numeric_limits<std::int64_t>::max();
-    emulator->threads_ = std::make_unique<TracingThreads>(options.threads);
+    emulator->threads_ = std::make_unique<TracingThreads>(options.threads, options.cpus);
     if (auto opened = emulator->open_outputs(); !opened) return opened.error();
     return emulator;
 }
@@ -60,6 +83,7 @@ Status Emulator::open_outputs() {
         std::error_code error;
         std::filesystem::create_directories(options_.log_folder, error);
         if (error) return Error{"cannot be made a folder: " + error.message(), options_.log_folder};
+        if (auto recorded = write_run_record(options_.log_folder, scene); !recorded) return recorded.error();
     }
     if (!options_.bus.empty()) {
         auto bus = open_can_bus(options_.bus, CanRole::hub);
@@ -106,7 +130,8 @@ Status Emulator::run(const StopFlag& stop) {
         run_real_time(stop);
         t_ns_.store(std::min(clock_->now_ns(), end_ns_.load()), std::memory_order_relaxed);
     }
-    if (no_priority_) notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
+    if (no_priority_ || threads_->refused())
+        notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
     Status status = Ok{};
     for (const auto& feed : cameras_)
         if (auto done = feed->finish(); !done && status) status = done.error();

@@ -11,6 +11,7 @@
 #include "emulator/camera_feed.h"
 #include "emulator/can_node.h"
 #include "emulator/lidar_feed.h"
+#include "emulator/realtime.h"
 #include "emulator/stop.h"
 
 namespace narpa {
@@ -23,7 +24,8 @@ struct RunOptions {
     bool lockstep = false;
     double duration_s = 0;   ///< of simulation time; 0: until stopped, or the end of a log
     std::string log_folder;  ///< empty: no log
-    int threads = 0;         ///< that trace rays; 0: all cores
+    int threads = 0;         ///< that trace rays; 0: all cores, or as many as `cpus`
+    std::vector<int> cpus;   ///< that these are bound to, in real time; empty: none
 };
 
 class Emulator {
@@ -43,6 +45,8 @@ public:
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
     /// Simulation time reached.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
+    /// While frames were made in real time.
+    [[nodiscard]] PageFaults page_faults() const noexcept { return page_faults_; }
     /// What the kernel did not grant, in plain words; filled by `run`.
     [[nodiscard]] const std::vector<std::string>& notices() const noexcept { return notices_; }
 
@@ -75,7 +79,8 @@ private:
     std::unique_ptr<Clock> clock_;
     std::atomic<std::int64_t> t_ns_{0};
     std::atomic<bool> no_priority_{false};
-    Heartbeat faults_{};  ///< since the last heartbeat
+    PageFaults page_faults_{};  ///< from time 0 to the last frame
+    Heartbeat faults_{};        ///< since the last heartbeat
     std::uint64_t drops_told_ = 0;
     std::vector<std::string> notices_;
 };

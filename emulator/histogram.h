@@ -53,4 +53,25 @@ private:
     std::uint64_t total_ = 0, max_ = 0;
 };
 
+/// The same of times that may lie before or after a mark; before is negative.
+class SignedHistogram {
+public:
+    void add(std::int64_t ns) noexcept { ns < 0 ? before_.add(-ns) : after_.add(ns); }
+    [[nodiscard]] std::uint64_t count() const noexcept { return before_.count() + after_.count(); }
+    [[nodiscard]] double max_ns() const noexcept {
+        return after_.count() > 0 ? after_.max_ns() : -before_.percentile_ns(0);
+    }
+    [[nodiscard]] double percentile_ns(double p) const noexcept {
+        const auto before = static_cast<double>(before_.count());
+        const double wanted = std::max(1.0, std::ceil(p * static_cast<double>(count())));
+        if (count() == 0) return 0;
+        // The wanted-th smallest is the (before - wanted + 1)-th smallest of the times before, without their sign.
+        if (wanted <= before) return -before_.percentile_ns((before - wanted + 1) / before);
+        return after_.percentile_ns((wanted - before) / static_cast<double>(after_.count()));
+    }
+
+private:
+    Histogram before_, after_;
+};
+
 }  // namespace narpa

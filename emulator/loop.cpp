@@ -18,7 +18,7 @@ constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;
 constexpr std::int64_t kStartLeadNs = 200'000'000;  // for threads whose stacks are locked into memory
 constexpr std::int64_t kBusWaitNs = 2'000'000;      // how long a ledger may wait for the bus thread
 constexpr int kFramesPerTurn = 4096;                // bounds a turn of the bus thread on a saturated bus
-constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50;
+constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50, kTracingPriority = 49;
 
 }  // namespace
 
@@ -26,6 +26,7 @@ constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50;
 
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
+    threads_->make_real_time(kTracingPriority);
     warm_up();
     clock_ = std::make_unique<Clock>(kStartLeadNs);
     StopFlag sensors_done{false};
@@ -34,7 +35,11 @@ void Emulator::run_real_time(const StopFlag& stop) {
     std::vector<std::thread> sensors;
     for (const auto& feed : lidars_) sensors.emplace_back([&, f = feed.get()] { run_lidar(*f, stop); });
     for (const auto& feed : cameras_) sensors.emplace_back([&, f = feed.get()] { run_camera(*f, stop); });
+    (void)clock_->wait_until(0, stop);
+    const PageFaults before = narpa::page_faults();
     for (std::thread& t : sensors) t.join();
+    const PageFaults after = narpa::page_faults();
+    page_faults_ = {after.minor - before.minor, after.major - before.major};
     sensors_done = true;
     if (bus.joinable()) bus.join();
 }
@@ -47,6 +52,7 @@ void Emulator::warm_up() {
 
 void Emulator::run_camera(CameraFeed& feed, const StopFlag& stop) {
     name_thread("narpa-camera");
+    touch_stack();
     if (!take_fifo_priority(kCameraPriority)) no_priority_ = true;
     while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop)) {
         threads_->arena.execute([&] { feed.make_next(clock_.get(), end_ns_); });
@@ -56,12 +62,14 @@ void Emulator::run_camera(CameraFeed& feed, const StopFlag& stop) {
 
 void Emulator::run_lidar(LidarFeed& feed, const StopFlag& stop) {
     name_thread("narpa-lidar");
+    touch_stack();
     if (!take_fifo_priority(kLidarPriority)) no_priority_ = true;
     while (feed.due_ns() <= end_ns_ && clock_->wait_until(feed.due_ns(), stop)) feed.make_next(clock_.get());
 }
 
 void Emulator::run_bus(const StopFlag& stop) {
     name_thread("narpa-can");
+    touch_stack();
     if (!take_fifo_priority(kBusPriority)) no_priority_ = true;
     std::int64_t next_heartbeat = 0;
     while (!stop.load(std::memory_order_relaxed)) {

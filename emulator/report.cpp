@@ -14,6 +14,21 @@ json percentiles_ms(const Histogram& h) {
         {"p50", h.percentile_ns(0.5) * 1e-6}, {"p99", h.percentile_ns(0.99) * 1e-6}, {"max", h.max_ns() * 1e-6}};
 }
 
+template <class H>
+json percentiles(const H& h, double unit) {
+    return {{"p50", h.percentile_ns(0.5) * unit},
+            {"p99", h.percentile_ns(0.99) * unit},
+            {"p99.9", h.percentile_ns(0.999) * unit},
+            {"max", h.max_ns() * unit}};
+}
+
+/// Frames that got so far, by the names of the steps.
+json of_steps(const CameraStats& s) {
+    json steps = json::object();
+    for (std::size_t i = 0; i < kStepNames.size(); ++i) steps[std::string(kStepNames[i])] = s.steps[i];
+    return steps;
+}
+
 json of_camera(const CameraFeed& feed) {
     const CameraStats& s = feed.stats();
     json sinks = json::array();
@@ -33,6 +48,12 @@ json of_camera(const CameraFeed& feed) {
             {"deadlines_missed", s.deadline_missed},
             {"stale", s.stale},
             {"ledgers_lost", s.ledgers_lost},
+            {"repeated", s.repeated},
+            {"blanked", s.blanked},
+            {"steps", of_steps(s)},
+            {"samples_per_pixel", percentiles(s.samples_1e3, 1e-3)},
+            {"expected_error", s.error_1e9.count() > 0 ? percentiles(s.error_1e9, 1e-9) : json(nullptr)},
+            {"hand_over_after_deadline_ms", percentiles(s.late, 1e-6)},
             {"wake_late_ms", percentiles_ms(s.wake_late)},
             {"render_ms", percentiles_ms(s.render)},
             {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
@@ -113,6 +134,7 @@ json report(Emulator& emulator) {
             {"cameras", cameras},
             {"lidars", lidars},
             {"can", emulator.can() ? of_bus(*emulator.can()) : json(nullptr)},
+            {"page_faults", {{"minor", emulator.page_faults().minor}, {"major", emulator.page_faults().major}}},
             {"notices", emulator.notices()},
             {"log", emulator.options().log_folder}};
 }
@@ -127,6 +149,19 @@ std::string in_words(const json& r) {
         out += fmt::format("    p50 / p99 / max: render {}; mid-exposure to hand-over {}; woken late {}\n",
                            latency(c["render_ms"]), latency(c["mid_exposure_to_hand_over_ms"]),
                            latency(c["wake_late_ms"]));
+        const json& late = c["hand_over_after_deadline_ms"];
+        out += fmt::format(
+            "    hand-over after the deadline: p50 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
+            "repeated {}, blank {}\n",
+            late["p50"].get<double>(), late["p99"].get<double>(), late["p99.9"].get<double>(),
+            late["max"].get<double>(), number(c, "repeated"), number(c, "blanked"));
+        const json &spp = c["samples_per_pixel"], &error = c["expected_error"];
+        out += fmt::format("    steps: {}; samples per pixel p50 {:.2f}, max {:.2f}", non_zero(c["steps"]),
+                           spp["p50"].get<double>(), spp["max"].get<double>());
+        if (!error.is_null())
+            out += fmt::format("; expected error p50 {:.3g}, p99 {:.3g}, max {:.3g} of full scale",
+                               error["p50"].get<double>(), error["p99"].get<double>(), error["max"].get<double>());
+        out += "\n";
         for (const json& s : c["sinks"]) {
             const json drops = {{"ring full", s["dropped_ring_full"]},
                                 {"no reader", s["dropped_no_reader"]},
@@ -157,6 +192,9 @@ std::string in_words(const json& r) {
                            number(b, "frames_received"), number(b, "foreign_frames"), number(b, "frames_sent"),
                            number(b, "send_drops"), non_zero(trouble));
     }
+    if (const json& f = r["page_faults"]; r["mode"] == "real time")
+        out += fmt::format("  page faults while running: {} minor, {} major\n", f["minor"].get<std::int64_t>(),
+                           f["major"].get<std::int64_t>());
     for (const json& n : r["notices"]) out += "  note: " + n.get<std::string>() + "\n";
     if (!r["log"].get<std::string>().empty()) out += "  log: " + r["log"].get<std::string>() + "\n";
     return out;

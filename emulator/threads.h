@@ -3,18 +3,63 @@
 
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_scheduler_observer.h>
+
+#include <atomic>
+#include <vector>
+
+#include "emulator/realtime.h"
 
 namespace narpa {
 
 struct TracingThreads {
-    /// `count` threads in all, with the one that calls; 0: as many as the machine has.
-    explicit TracingThreads(int count)
+    /// `count` threads in all, with the one that calls; 0: one for each of `cpus`, or as many as the machine has.
+    /// `cpus`: processors that they are bound to, one each by turns; empty: wherever the kernel likes.
+    explicit TracingThreads(int count, std::vector<int> cpus = {})
         : limit(tbb::global_control::max_allowed_parallelism,
-                static_cast<std::size_t>(count > 0 ? count : tbb::info::default_concurrency())),
-          arena(count > 0 ? count : tbb::task_arena::automatic) {}
+                static_cast<std::size_t>(wanted(count, cpus) > 0 ? wanted(count, cpus)
+                                                                 : tbb::info::default_concurrency())),
+          arena(wanted(count, cpus) > 0 ? wanted(count, cpus) : tbb::task_arena::automatic),
+          real_time(arena, std::move(cpus)) {}
+
+    /// From now on, whoever enters the arena is bound to its processor, and workers get this SCHED_FIFO priority.
+    void make_real_time(int priority) {
+        real_time.priority = priority;
+        real_time.observe(true);
+    }
+    [[nodiscard]] bool refused() const noexcept { return real_time.refused; }
+
+    struct RealTime final : tbb::task_scheduler_observer {
+        RealTime(tbb::task_arena& a, std::vector<int> processors)
+            : tbb::task_scheduler_observer(a), cpus(std::move(processors)) {}
+        ~RealTime() override { observe(false); }
+        void on_scheduler_entry(bool is_worker) override {
+            static thread_local const RealTime* granted_by = nullptr;
+            static thread_local int cpu = -1;
+            if (!cpus.empty()) {
+                const int index = tbb::this_task_arena::current_thread_index();
+                const int mine = cpus[static_cast<std::size_t>(index) % cpus.size()];
+                if (mine != cpu && !run_on_cpu(mine)) refused = true;
+                cpu = mine;
+            }
+            if (granted_by == this) return;
+            granted_by = this;
+            touch_stack();
+            if (is_worker && !take_fifo_priority(priority)) refused = true;
+        }
+        std::vector<int> cpus;
+        int priority = 1;
+        std::atomic<bool> refused{false};
+    };
 
     tbb::global_control limit;
     tbb::task_arena arena;
+    RealTime real_time;
+
+private:
+    static int wanted(int count, const std::vector<int>& cpus) {
+        return count > 0 ? count : static_cast<int>(cpus.size());
+    }
 };
 
 }  // namespace narpa

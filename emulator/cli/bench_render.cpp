@@ -1,15 +1,15 @@
 // narpa bench render - how fast the error of a picture falls: RMSE, bias and time at several numbers of samples.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 
 #include "emulator/camera_unit.h"
 #include "emulator/cli/bench.h"
+#include "emulator/cli/bench_ladder.h"
+#include "emulator/cli/bench_scene.h"
 #include "emulator/clock.h"
 #include "emulator/convergence.h"
 #include "emulator/convergence_plot.h"
@@ -25,33 +25,12 @@ struct Options {
     std::string scene, camera, size, plot;
     std::vector<int> spp{4, 8, 16, 32};
     int reference_spp = 4096, seeds = 16, threads = 0;
+    LadderOptions ladder;
 };
-
-/// Where the scenes lie that narpa brings along: beside the folder of the program, in a build and when installed.
-Result<std::string> shipped_scene(const std::string& name) {
-    namespace fs = std::filesystem;
-    std::error_code error;
-    const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
-    for (const char* folder : {"../scenes", "../share/narpa/scenes"})
-        if (const fs::path file = (program / folder / name).lexically_normal(); fs::exists(file, error))
-            return file.string();
-    return Error{"is not beside the program, expected the name of a SCENE", name};
-}
-
-/// The same view with other pixels.
-void resize(Camera& c, int width, int height) {
-    const double x = static_cast<double>(width) / c.width, y = static_cast<double>(height) / c.height;
-    c.cx = (c.cx + 0.5) * x - 0.5;
-    c.cy = (c.cy + 0.5) * y - 0.5;
-    c.fx *= x, c.fy *= y;
-    c.width = width, c.height = height;
-}
 
 Status choose_size(const std::string& text, Camera& camera) {
     if (text.empty()) {
-        const double scale = static_cast<double>(kDefaultSize) / std::max(camera.width, camera.height);
-        resize(camera, std::max(1, static_cast<int>(camera.width * scale + 0.5)),
-               std::max(1, static_cast<int>(camera.height * scale + 0.5)));
+        resize_longer_side(camera, kDefaultSize);
         return Ok{};
     }
     int width = 0, height = 0, end = 0;
@@ -61,20 +40,6 @@ Status choose_size(const std::string& text, Camera& camera) {
     resize(camera, width, height);
     return Ok{};
 }
-
-/// A line on a terminal that replaces itself; nothing elsewhere.
-class Progress {
-public:
-    void tell(const std::string& text) {
-        if (terminal_) fmt::print(stderr, "\r{:<60}", text), std::fflush(stderr);
-    }
-    ~Progress() {
-        if (terminal_) fmt::print(stderr, "\r{:<60}\r", "");
-    }
-
-private:
-    bool terminal_ = ::isatty(STDERR_FILENO) == 1;
-};
 
 /// The camera's pictures at one number of samples, each with random numbers of its own: frame k has those of k.
 class Pictures {
@@ -191,6 +156,11 @@ void tell_table(const Measured& m, const Camera& c) {
 }
 
 Outcome bench(Options o) {
+    if (!o.ladder.scenes.empty()) {
+        o.ladder.threads = o.threads;
+        if (!o.plot.empty()) return Error{"-o is of the convergence of one SCENE, expected without --scenes"};
+        return bench_ladder(o.ladder);
+    }
     for (const int spp : o.spp)
         if (spp < 2 || spp > 65535)
             return Error{fmt::format(
@@ -270,9 +240,18 @@ Command add_bench_render(CLI::App& bench_command) {
         ->check(CLI::Range(2, 65535))
         ->capture_default_str();
     c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
+    c->add_option(
+         "--scenes", o->ladder.scenes,
+         "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, craft-paths, "
+         "docking, docking-contact, cornell")
+        ->delimiter(',')
+        ->check(CLI::IsMember(standing_scenes()));
+    c->add_flag("--quick", o->ladder.quick, "With --scenes: small pictures and few of them, to see that it works");
+    c->add_flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be");
     c->add_option("-o,--output", o->plot, "FILE.png: error over samples and over time");
     c->footer(
-        "Exit status 1 where a bias is beyond three standard errors, or an error falls more slowly than "
+        "Without --scenes, exit status 1 where a bias is beyond three standard errors, or an error falls more "
+        "slowly than "
         "spp^-0.47.");
     return [o] { return bench(*o); };
 }

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "emulator/camera_unit.h"
+#include "emulator/cli/budget_options.h"
 #include "emulator/cli/cli.h"
 #include "emulator/cli/pose_options.h"
 #include "emulator/clock.h"
@@ -29,14 +30,15 @@ struct Options {
     PoseOptions pose;
     std::optional<double> time_s;
     std::optional<std::uint32_t> frame;
-    std::optional<int> spp, max_depth;
+    BudgetOptions budget;
+    std::optional<int> max_depth;
     std::optional<std::uint64_t> seed;
     int threads = 0;
 };
 
 /// What the command line says differently from the scene.
 Status override_scene(const Options& o, Scene& scene, Camera& camera) {
-    if (o.spp) scene.render.spp = *o.spp;
+    o.budget.override_scene(scene.render);
     if (o.seed) scene.render.seed = *o.seed;
     if (o.max_depth && scene.render.method == Method::direct)
         return Error{"--max-depth belongs to --method path, and the method is \"direct\""};
@@ -140,10 +142,17 @@ Outcome render(const Options& o) {
     CameraUnit unit(**world, *index);
     Aovs values;
     Aovs* const aovs = outputs->empty() ? nullptr : &values;
+    const std::int64_t budget_ns = (*world)->scene().render.budget_ns;
+    // A run's frames have others before them, which show how fast the machine is.
+    if (budget_ns > 0) threads.arena.execute([&] { unit.expose(frame, t_ns, monotonic_ns() + budget_ns); });
     const std::int64_t start_ns = monotonic_ns();
+    FrameLedger ledger;
     {
         Progress progress(unit.radiance().pixels.size());
-        threads.arena.execute([&] { unit.embed(unit.expose(frame, t_ns, aovs, &progress.pixels_done)); });
+        threads.arena.execute([&] {
+            ledger = unit.expose(frame, t_ns, start_ns + budget_ns, aovs, &progress.pixels_done);
+            unit.embed(ledger);
+        });
     }
     const double seconds = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
     keep_only(*outputs, values);
@@ -151,9 +160,10 @@ Outcome render(const Options& o) {
     auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
     if (!written) return written.error();
     const RenderSettings& settings = (*world)->scene().render;
-    say(fmt::format("{}: {} x {}, {}, {} spp, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
-                    unit.camera().width, unit.camera().height, name(settings.method), settings.spp, frame,
-                    static_cast<double>(t_ns) * 1e-9, (*world)->tracer().triangle_count(), 1e3 * seconds));
+    say(fmt::format("{}: {} x {}, {}, {:.6g} spp, {}, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
+                    unit.camera().width, unit.camera().height, name(settings.method), ledger.samples_per_pixel,
+                    kStepNames[ledger.step], frame, static_cast<double>(t_ns) * 1e-9,
+                    (*world)->tracer().triangle_count(), 1e3 * seconds));
     nlohmann::json document{{"file", o.out},
                             {"camera", unit.camera().name},
                             {"frame", frame},
@@ -161,9 +171,14 @@ Outcome render(const Options& o) {
                             {"width", unit.camera().width},
                             {"height", unit.camera().height},
                             {"method", name(settings.method)},
-                            {"samples_per_pixel", settings.spp},
+                            {"samples_per_pixel", ledger.samples_per_pixel},
+                            {"samples", ledger.samples},
+                            {"rays", ledger.rays},
+                            {"passes", ledger.passes},
+                            {"step", kStepNames[ledger.step]},
                             {"triangles", (*world)->tracer().triangle_count()},
                             {"render_s", seconds}};
+    if (ledger.expected_error >= 0) document["expected_error"] = ledger.expected_error;
     if (settings.method == Method::path) document["max_depth"] = settings.max_depth;
     return document;
 }
@@ -181,7 +196,7 @@ Command add_render(CLI::App& app) {
     c->add_option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
     o->pose.add_to(*c);
     c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
-    c->add_option("--spp", o->spp, "Samples per pixel instead of the scene's")->check(CLI::Range(1, 65535));
+    o->budget.add_to(*c);
     c->add_option("--method", o->method, "direct: light straight from its sources; path: all light")
         ->check(CLI::IsMember({"direct", "path"}));
     c->add_option("--max-depth", o->max_depth, "With path: surfaces that light may meet on its way")

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "emulator/cli/budget_options.h"
 #include "emulator/cli/cli.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
@@ -15,6 +16,8 @@ namespace {
 struct Options {
     std::string scene;
     std::vector<std::string> video, lidar;
+    std::string cpus;
+    BudgetOptions budget;
     RunOptions run;
 };
 
@@ -44,8 +47,15 @@ Outcome run(const Options& options) {
         return good.error();
     if (auto good = split_outputs(options.lidar, "LIDAR=SINK, like top=udp:127.0.0.1:2368", o.lidar); !good)
         return good.error();
+    if (!options.cpus.empty()) {
+        auto cpus = parse_cpus(options.cpus);
+        if (!cpus) return cpus.error();
+        o.cpus = *std::move(cpus);
+    }
+    if (!o.lockstep) keep_heap();
     auto scene = load_scene(options.scene);
     if (!scene) return scene.error();
+    options.budget.override_scene(scene->render);
     auto emulator = Emulator::create(*std::move(scene), o);
     if (!emulator) return emulator.error();
 
@@ -89,6 +99,8 @@ Command add_run(CLI::App& app) {
     c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         ->check(CLI::Range(0.0, 9e9));
     c->add_option("--log", o->run.log_folder, "Folder for truth, ledger, CAN log and contact sheet");
+    o->budget.add_to(*c);
+    c->add_option("--cpus", o->cpus, "Processors for these threads, as 0,1 or 2-3; each is bound to one");
     c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
         ->check(CLI::Range(0, 1024));
     return [o] { return run(*o); };

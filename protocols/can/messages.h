@@ -98,8 +98,9 @@ inline constexpr std::uint8_t kMaxTelemetryCameras = 16;
 
 using LedgerFrames = std::array<CanFrame, kLedgerFrames.size()>;
 
-/// Seven classic frames at ledger_base_id(camera) + 0 .. 6; counter = low 8 bits of the frame number. Times other
-/// than exposure mid and pose time travel as whole microseconds after exposure mid and saturate at 8.388607 s.
+/// Ten classic frames at ledger_base_id(camera) + 0 .. 9; counter = low 8 bits of the frame number. Times other
+/// than exposure mid and pose time travel as whole microseconds after exposure mid and saturate at 8.388607 s,
+/// counts saturate at 2^40 - 1. Of the passes their number travels, not what each took: that is in the log.
 [[nodiscard]] LedgerFrames encode_classic(const FrameLedger& ledger) noexcept;
 /// One CAN FD frame at ledger_base_id(camera) + 15 with the same quantities.
 [[nodiscard]] CanFrame encode_fd(const FrameLedger& ledger) noexcept;

@@ -31,7 +31,7 @@ inline constexpr std::size_t kDecodeStatusCount = 11;
 /// "bad_checksum" and so on.
 [[nodiscard]] std::string_view name(DecodeStatus status) noexcept;
 
-inline constexpr std::size_t kMaxSignals = 16;
+inline constexpr std::size_t kMaxSignals = 24;
 /// "Not available" among raw values, whatever the length of the field that it came from.
 inline constexpr std::int64_t kNotAvailable = std::numeric_limits<std::int64_t>::min();
 /// Raw values in the order of the layout's signals.

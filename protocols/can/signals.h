@@ -13,6 +13,8 @@
 #include <span>
 #include <string_view>
 
+#include "protocols/ledger.h"
+
 namespace narpa {
 
 /// A field of `length` bits whose least significant bit is bit `start_bit` of the payload (bit b is bit b % 8 of
@@ -28,6 +30,13 @@ struct Choice {
     std::int64_t raw = 0;
     std::string_view name{};
 };
+/// 0 is the first of the names, 1 the second ...
+template <std::size_t N>
+[[nodiscard]] constexpr std::array<Choice, N> numbered(const std::array<std::string_view, N>& names) {
+    std::array<Choice, N> choices{};
+    for (std::size_t i = 0; i < N; ++i) choices[i] = {static_cast<std::int64_t>(i), names[i]};
+    return choices;
+}
 
 /// physical value = raw / steps_per_unit, where the steps are whole numbers, so that the division rounds only once
 /// and decimal values come out as written. The most negative raw value of a signed signal means "not available".
@@ -119,19 +128,31 @@ enum LedgerSignal : std::size_t {
     kLedgerRenderEnd,
     kLedgerHandOver,
     kLedgerDeadline,
-    kLedgerSamples,
+    kLedgerSamplesPerPixel,
     kLedgerExpectedError,
     kLedgerPoseStale,
     kLedgerDeadlineMet,
     kLedgerPoseKnown,
+    kLedgerStep,
+    kLedgerBudgetKind,
+    kLedgerDelivery,
+    kLedgerPasses,
+    kLedgerSamples,
+    kLedgerRays,
+    kLedgerBudget,
     kLedgerSignalCount
 };
 
-inline constexpr double kExpectedErrorSteps = 1e7;  ///< of full scale
+inline constexpr double kExpectedErrorSteps = 5e6;    ///< of full scale
+inline constexpr double kSamplesPerPixelSteps = 256;  ///< of one sample
 
-inline constexpr std::array<std::string_view, 7> kLedgerFrames{
-    "LedgerFrame",  "LedgerExposureMid", "LedgerPoseTime", "LedgerExposure",
-    "LedgerRender", "LedgerHandOver",    "LedgerQuality"};
+inline constexpr auto kLedgerSteps = numbered(kStepNames);
+inline constexpr auto kLedgerBudgetKinds = numbered(kBudgetKinds);
+inline constexpr auto kLedgerDeliveries = numbered(kDeliveries);
+
+inline constexpr std::array<std::string_view, 10> kLedgerFrames{
+    "LedgerFrame",    "LedgerExposureMid", "LedgerPoseTime", "LedgerExposure", "LedgerRender",
+    "LedgerHandOver", "LedgerQuality",     "LedgerSamples",  "LedgerRays",     "LedgerBudget"};
 
 inline constexpr std::array<Signal, kLedgerSignalCount> kLedgerSignals{{
     {"Frame", "", "Frame number", 1, false, {0, 0, 32}, {0, 0, 32}},
@@ -150,22 +171,36 @@ inline constexpr std::array<Signal, kLedgerSignalCount> kLedgerSignals{{
     {"RenderStart", "us", "After ExposureMid", 1, true, {4, 0, 24}, {0, 192, 24}},
     {"RenderEnd", "us", "After ExposureMid", 1, true, {4, 24, 24}, {0, 216, 24}},
     {"HandOver", "us", "After ExposureMid; not available: not handed over", 1, true, {5, 0, 24}, {0, 240, 24}},
-    {"Deadline", "us", "After ExposureMid", 1, true, {5, 24, 24}, {0, 264, 24}},
-    {"SamplesPerPixel", "", "Samples per pixel", 1, false, {6, 0, 16}, {0, 288, 16}},
+    {"Deadline", "us", "Of the hand-over, after ExposureMid", 1, true, {5, 24, 24}, {0, 264, 24}},
+    {"SamplesPerPixel", "", "Mean over the image", kSamplesPerPixelSteps, false, {6, 24, 24}, {0, 288, 24}},
     {"ExpectedError",
      "",
-     "Standard error of the mean, fraction of full scale; 0: not estimated",
+     "Standard error of a pixel, RMS over the image, fraction of full scale; not available: not estimated",
      kExpectedErrorSteps,
+     true,
+     {6, 0, 24},
+     {0, 312, 24}},
+    {"PoseStale", "", "A commanded body had no command or an old one", 1, false, {8, 40, 1}, {0, 336, 1}},
+    {"DeadlineMet", "", "Handed over in time", 1, false, {8, 41, 1}, {0, 337, 1}},
+    {"PoseKnown", "", "PoseCounter and PoseTime hold a command", 1, false, {8, 42, 1}, {0, 338, 1}},
+    {"Step", "", "How far the frame got", 1, false, {7, 40, 3}, {0, 339, 3}, kLedgerSteps},
+    {"BudgetKind", "", "What limited the frame", 1, false, {9, 40, 2}, {0, 342, 2}, kLedgerBudgetKinds},
+    {"Delivery",
+     "",
+     "What was handed over in the frame's place",
+     1,
      false,
-     {6, 16, 24},
-     {0, 304, 24}},
-    {"PoseStale", "", "A commanded body had no command or an old one", 1, false, {6, 40, 1}, {0, 328, 1}},
-    {"DeadlineMet", "", "Handed over in time", 1, false, {6, 41, 1}, {0, 329, 1}},
-    {"PoseKnown", "", "PoseCounter and PoseTime hold a command", 1, false, {6, 42, 1}, {0, 330, 1}},
+     {9, 42, 2},
+     {0, 344, 2},
+     kLedgerDeliveries},
+    {"Passes", "", "Passes after the first that count", 1, false, {7, 43, 4}, {0, 346, 4}},
+    {"Samples", "", "Samples through the camera", 1, false, {7, 0, 40}, {0, 352, 40}},
+    {"Rays", "", "Rays of all kinds", 1, false, {8, 0, 40}, {0, 392, 40}},
+    {"Budget", "", "Samples a pixel, rays, or nanoseconds: see BudgetKind", 1, false, {9, 0, 40}, {0, 432, 40}},
 }};
 
 inline constexpr SetLayout kLedgerLayout{"Ledger", "Time ledger of one camera frame", kLedgerFrames, kLedgerSignals,
-                                         336};
+                                         472};
 
 enum HeartbeatSignal : std::size_t {
     kHeartbeatTime,

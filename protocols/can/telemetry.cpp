@@ -7,7 +7,7 @@
 namespace narpa {
 namespace {
 
-constexpr int kLedgerTimeBits = 48, kHeartbeatTimeBits = 40, kOffsetBits = 24;
+constexpr int kLedgerTimeBits = 48, kHeartbeatTimeBits = 40, kOffsetBits = 24, kCountBits = 40;
 
 std::int64_t low_bits(std::int64_t value, int bits) noexcept {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(value) & ((std::uint64_t{1} << bits) - 1));
@@ -24,6 +24,18 @@ std::int64_t offset_us(std::int64_t t_ns, std::int64_t t_mid_ns) noexcept {
     return std::clamp(to_us(t_ns - t_mid_ns), -limit, limit);
 }
 
+/// Not a number is 0.
+std::int64_t steps(float value, double steps_per_unit, std::int64_t limit) noexcept {
+    const double wanted = static_cast<double>(value) * steps_per_unit;
+    if (!(wanted > 0)) return 0;
+    return wanted < static_cast<double>(limit) ? std::llround(wanted) : limit;
+}
+
+std::int64_t saturated(std::uint64_t count) noexcept {
+    constexpr auto limit = static_cast<std::uint64_t>(raw_max(false, kCountBits));
+    return static_cast<std::int64_t>(std::min(count, limit));
+}
+
 RawSignals raw_of(const FrameLedger& l) noexcept {
     RawSignals raw{};
     raw[kLedgerFrame] = l.frame;
@@ -37,17 +49,26 @@ RawSignals raw_of(const FrameLedger& l) noexcept {
     raw[kLedgerRenderEnd] = offset_us(l.t_render_end_ns, l.t_exposure_mid_ns);
     raw[kLedgerHandOver] = l.t_hand_over_ns == 0 ? kNotAvailable : offset_us(l.t_hand_over_ns, l.t_exposure_mid_ns);
     raw[kLedgerDeadline] = offset_us(l.t_deadline_ns, l.t_exposure_mid_ns);
-    raw[kLedgerSamples] = l.samples_per_pixel;
-    const double error = std::isfinite(l.expected_error) ? static_cast<double>(l.expected_error) : 0.0;
-    raw[kLedgerExpectedError] = std::llround(std::clamp(error, 0.0, 1.0) * kExpectedErrorSteps);
+    raw[kLedgerSamplesPerPixel] = steps(l.samples_per_pixel, kSamplesPerPixelSteps, raw_max(false, 24));
+    raw[kLedgerExpectedError] =
+        l.expected_error >= 0 ? steps(l.expected_error, kExpectedErrorSteps, raw_max(true, 24)) : kNotAvailable;
     raw[kLedgerPoseStale] = l.pose_stale;
     raw[kLedgerDeadlineMet] = l.deadline_met;
     raw[kLedgerPoseKnown] = l.t_pose_ns != 0;
+    raw[kLedgerStep] = l.step;
+    raw[kLedgerBudgetKind] = static_cast<std::int64_t>(l.budget_kind);
+    raw[kLedgerDelivery] = static_cast<std::int64_t>(l.delivery);
+    raw[kLedgerPasses] = std::ranges::count_if(l.passes, [](std::uint32_t samples) { return samples > 0; });
+    raw[kLedgerSamples] = saturated(l.samples);
+    raw[kLedgerRays] = saturated(l.rays);
+    raw[kLedgerBudget] = saturated(l.budget);
     return raw;
 }
 
-DecodeStatus any_values(const RawSignals&) noexcept {
-    return DecodeStatus::complete;
+DecodeStatus known_choices(const RawSignals& raw) noexcept {
+    const bool known = raw[kLedgerStep] < static_cast<std::int64_t>(kLedgerSteps.size()) &&
+                       raw[kLedgerBudgetKind] < static_cast<std::int64_t>(kLedgerBudgetKinds.size());
+    return known ? DecodeStatus::complete : DecodeStatus::not_a_number;
 }
 
 }  // namespace
@@ -98,7 +119,7 @@ CanFrame encode_fd(const FrameLedger& ledger) noexcept {
 }
 
 LedgerDecoder::LedgerDecoder(std::uint8_t camera) noexcept
-    : set_(kLedgerLayout, ledger_base_id(camera), any_values) {}
+    : set_(kLedgerLayout, ledger_base_id(camera), known_choices) {}
 
 DecodeStatus LedgerDecoder::accept(const CanFrame& frame, std::int64_t t_reference_ns, FrameLedger& out) noexcept {
     const DecodeStatus status = set_.accept(frame);
@@ -114,8 +135,19 @@ DecodeStatus LedgerDecoder::accept(const CanFrame& frame, std::int64_t t_referen
     out.pose_counter = static_cast<std::uint8_t>(raw[kLedgerPoseCounter]);
     out.pose_stale = raw[kLedgerPoseStale] != 0;
     out.deadline_met = raw[kLedgerDeadlineMet] != 0;
-    out.samples_per_pixel = static_cast<std::uint16_t>(raw[kLedgerSamples]);
-    out.expected_error = static_cast<float>(static_cast<double>(raw[kLedgerExpectedError]) / kExpectedErrorSteps);
+    out.delivery = static_cast<Delivery>(raw[kLedgerDelivery]);
+    out.step = static_cast<std::uint8_t>(raw[kLedgerStep]);
+    out.budget_kind = static_cast<BudgetKind>(raw[kLedgerBudgetKind]);
+    out.budget = static_cast<std::uint64_t>(raw[kLedgerBudget]);
+    out.samples = static_cast<std::uint64_t>(raw[kLedgerSamples]);
+    out.rays = static_cast<std::uint64_t>(raw[kLedgerRays]);
+    out.passes = {};
+    out.samples_per_pixel =
+        static_cast<float>(static_cast<double>(raw[kLedgerSamplesPerPixel]) / kSamplesPerPixelSteps);
+    out.expected_error =
+        raw[kLedgerExpectedError] == kNotAvailable
+            ? -1.0f
+            : static_cast<float>(static_cast<double>(raw[kLedgerExpectedError]) / kExpectedErrorSteps);
     out.t_pose_ns = raw[kLedgerPoseKnown] != 0 ? clock(kLedgerPoseTime) : 0;
     out.t_exposure_start_ns = after_mid(kLedgerExposureStart);
     out.t_exposure_mid_ns = mid;

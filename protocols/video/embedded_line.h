@@ -14,14 +14,17 @@
 
 namespace narpa {
 
-/// magic, version, size, camera, pose counter, flags, reserved, samples, frame, error, eight times, CRC
-inline constexpr std::size_t kEmbeddedLineBytes = 4 + 1 + 1 + 1 + 1 + 1 + 1 + 2 + 4 + 4 + 8 * 8 + 4;  ///< 88
-inline constexpr std::uint8_t kEmbeddedLineVersion = 1;
+/// magic, version, size, camera, pose counter, flags, step, budget's kind, reserved | frame, samples per pixel,
+/// error | samples, rays, budget | passes | eight times | CRC
+inline constexpr std::size_t kEmbeddedLineBytes =
+    4 + 8 * 1 + 3 * 4 + 3 * 8 + 4 * FrameLedger::kPasses + 8 * 8 + 4;  ///< 148
+inline constexpr std::uint8_t kEmbeddedLineVersion = 2;
 
 /// Writes the ledger into the first kEmbeddedLineBytes of `row`, the bytes of the last row. False, and nothing
 /// written: the row is too narrow.
 [[nodiscard]] bool encode_embedded_line(const FrameLedger& ledger, std::span<std::uint8_t> row) noexcept;
 
+/// What the ledger says of the delivery is not in the line: a repeated frame still carries its own.
 /// Nothing: too narrow, no magic, another version, or a wrong CRC.
 [[nodiscard]] std::optional<FrameLedger> decode_embedded_line(std::span<const std::uint8_t> row) noexcept;
 

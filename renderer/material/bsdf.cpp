@@ -1,6 +1,6 @@
 #include "renderer/material/bsdf.h"
 
-#include <cmath>
+#include <algorithm>
 
 #include "renderer/material/directions.h"
 #include "renderer/material/lobes.h"
@@ -15,7 +15,7 @@ using Kind = Material::Kind;
 
 [[gnu::noinline]] Rgb phong_bsdf(const Surface& s, double r_v) noexcept {
     if (r_v <= 0) return s.diffuse * kInvPi;
-    const float power = std::pow(static_cast<float>(r_v), s.exponent);
+    const auto power = static_cast<float>(unit_power(std::min(r_v, 1.0), static_cast<double>(s.exponent)));
     const float lobe = (s.exponent + 2) * 0.5f * kInvPi * power;
     return s.diffuse * kInvPi + s.specular * lobe;
 }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/vec3.h"
+#include "renderer/material/fast_math.h"
 
 namespace narpa {
 
@@ -29,8 +30,8 @@ struct Basis {
 
 /// At an angle from the z axis that is given by both, at the azimuth 2 pi u.
 [[nodiscard]] inline Vec3 direction_at(double sine, double cosine, double u) noexcept {
-    const double phi = 2 * std::numbers::pi * u;
-    return {sine * std::cos(phi), sine * std::sin(phi), cosine};
+    const auto [sin, cos] = sincos_of_turns(u);
+    return {sine * cos, sine * sin, cosine};
 }
 [[nodiscard]] inline Vec3 direction_at(double cosine, double u) noexcept {
     return direction_at(std::sqrt(std::max(0.0, 1 - cosine * cosine)), cosine, u);

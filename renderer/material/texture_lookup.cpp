@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 namespace narpa {
@@ -52,18 +53,39 @@ inline Between between(double place, int n, bool repeat) {
     return {first, second, part};
 }
 
+/// Three bands and a fourth number that nobody looks at: what one instruction works on.
+using Bands [[gnu::vector_size(16)]] = float;
+using Codes [[gnu::vector_size(16)]] = std::int32_t;
+using Halves [[gnu::vector_size(16)]] = std::uint16_t;
+
+/// The lowest three 16-bit codes of the eight bytes.
+inline Bands bands_of(std::uint64_t texel) {
+    using Words [[gnu::vector_size(16)]] = std::uint64_t;
+    const auto codes = std::bit_cast<Halves>(Words{texel, 0});
+    const auto wide = std::bit_cast<Codes>(__builtin_shufflevector(codes, Halves{}, 0, 8, 1, 9, 2, 10, 3, 11));
+    return __builtin_convertvector(wide, Bands);
+}
+
+inline std::uint64_t eight_bytes(const std::uint16_t* from) {
+    std::uint64_t bytes;
+    std::memcpy(&bytes, from, sizeof bytes);
+    return bytes;
+}
+
 /// Adds two neighbours in a row of texels; 65535 = 1.
-inline void add_pair(const Image& t, const Between& x, int y, float weight, Rgb& sum) {
+inline void add_pair(const Image& t, const Between& x, int y, float weight, Bands& sum) {
     const std::uint16_t* row = t.rgb + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(t.width);
     const std::uint16_t *const a = row + 3 * x.first, *const b = row + 3 * x.second;
     const float of_b = weight * x.part, of_a = weight - of_b;
-    sum.x += of_a * static_cast<float>(a[0]) + of_b * static_cast<float>(b[0]);
-    sum.y += of_a * static_cast<float>(a[1]) + of_b * static_cast<float>(b[1]);
-    sum.z += of_a * static_cast<float>(a[2]) + of_b * static_cast<float>(b[2]);
+    if (b == a + 3)  // twelve bytes, read without those before or behind them
+        sum += of_a * bands_of(eight_bytes(a)) + of_b * bands_of(eight_bytes(b - 1) >> 16);
+    else
+        sum += of_a * Bands{static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2]), 0} +
+               of_b * Bands{static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2]), 0};
 }
 
 /// `u` and `v` in [0, 1].
-inline void add_bilinear(const Image& t, const Edges& edges, double u, double v, float weight, Rgb& sum) {
+inline void add_bilinear(const Image& t, const Edges& edges, double u, double v, float weight, Bands& sum) {
     const Between x = between(u, t.width, edges.repeat_u), y = between(1 - v, t.height, edges.repeat_v);
     const float of_lower = weight * y.part, of_upper = weight - of_lower;
     if (edges.poles && y.first == y.second) {  // beyond the outermost row lies the same row, half a turn on
@@ -150,30 +172,54 @@ Filter filter_for(const Texture& t, const TextureFootprint& footprint, float v, 
     return f;
 }
 
-void add_from_levels(const Texture& t, const Edges& edges, const Filter& f, double u, double v, float weight,
-                     Rgb& sum) {
+/// A lookup at any place.
+void add_wrapped(const Image& t, const Edges& edges, double u, double v, float weight, Bands& sum) {
     if (edges.poles && !(v >= 0 && v <= 1)) {
         v -= 2 * std::floor(0.5 * v);  // once around over both poles is 2
         if (v > 1) v = 2 - v, u += 0.5;
     }
-    u = into_unit(u, edges.repeat_u), v = into_unit(v, edges.repeat_v);
-    const float of_coarser = weight * f.towards_coarser;
-    add_bilinear(image_of(t, f.level), edges, u, v, weight - of_coarser, sum);
-    if (of_coarser > 0) add_bilinear(image_of(t, f.level + 1), edges, u, v, of_coarser, sum);
+    add_bilinear(t, edges, into_unit(u, edges.repeat_u), into_unit(v, edges.repeat_v), weight, sum);
+}
+
+/// A lookup whose four texels lie in the image; x, y: texels from the middle of the first, y down.
+inline void add_inner(const Image& t, double x, double y, float weight, Bands& sum) {
+    const int column = static_cast<int>(x), row = static_cast<int>(y);
+    const float of_right = static_cast<float>(x - column), of_lower = weight * static_cast<float>(y - row);
+    const std::size_t stride = 3 * static_cast<std::size_t>(t.width);
+    const std::uint16_t *const upper = t.rgb + static_cast<std::size_t>(row) * stride + 3 * column, *const lower =
+                                                                                                        upper +
+                                                                                                        stride;
+    // Each row's twelve bytes, read without those before or behind them.
+    const Bands left = (weight - of_lower) * bands_of(eight_bytes(upper)) + of_lower * bands_of(eight_bytes(lower));
+    const Bands right = (weight - of_lower) * bands_of(eight_bytes(upper + 2) >> 16) +
+                        of_lower * bands_of(eight_bytes(lower + 2) >> 16);
+    sum += left + of_right * (right - left);
+}
+
+/// All of a filter's lookups in one level.
+void add_level(const Image& t, const Edges& edges, const Filter& f, double u, double v, float weight, Bands& sum) {
+    const double x = u * t.width - 0.5, dx = f.du * t.width, reach_x = std::abs(f.beside * dx);
+    const double y = (1 - v) * t.height - 0.5, dy = -f.dv * t.height, reach_y = std::abs(f.beside * dy);
+    const bool inner =
+        x - reach_x >= 0 && x + reach_x < t.width - 1 && y - reach_y >= 0 && y + reach_y < t.height - 1;
+    for (int i = -f.beside; i <= f.beside; ++i) {
+        const float part = f.beside > 0 && std::abs(i) == f.beside ? weight * f.last_weight : weight;
+        if (inner)
+            add_inner(t, x + i * dx, y + i * dy, part, sum);
+        else
+            add_wrapped(t, edges, u + i * f.du, v + i * f.dv, part, sum);
+    }
 }
 
 Rgb filtered(const Texture& t, const Edges& edges, const Filter& f, double u, double v) {
-    Rgb sum{};
-    add_from_levels(t, edges, f, u, v, 1, sum);
-    float weights = 1;
-    for (int i = 1; i <= f.beside; ++i) {
-        const float weight = i == f.beside ? f.last_weight : 1;
-        add_from_levels(t, edges, f, u + i * f.du, v + i * f.dv, weight, sum);
-        add_from_levels(t, edges, f, u - i * f.du, v - i * f.dv, weight, sum);
-        weights += 2 * weight;
-    }
+    if (edges.repeat_u) u = into_unit(u, true);
+    if (edges.repeat_v) v = into_unit(v, true);
+    Bands sum{};
+    add_level(image_of(t, f.level), edges, f, u, v, 1 - f.towards_coarser, sum);
+    if (f.towards_coarser > 0) add_level(image_of(t, f.level + 1), edges, f, u, v, f.towards_coarser, sum);
+    const float weights = f.beside > 0 ? static_cast<float>(2 * f.beside - 1) + 2 * f.last_weight : 1;
     const float scale = kFullScale / weights;  // and rounding makes nothing whiter than white
-    return {std::min(sum.x * scale, 1.0f), std::min(sum.y * scale, 1.0f), std::min(sum.z * scale, 1.0f)};
+    return {std::min(sum[0] * scale, 1.0f), std::min(sum[1] * scale, 1.0f), std::min(sum[2] * scale, 1.0f)};
 }
 
 bool can_look_up(const Texture& t, float u, float v) {

@@ -83,14 +83,21 @@ public:
         : soup_(soup),
           points_(soup.positions.size()),
           triangles_(soup.triangles.size()),
-          vertices_(soup.positions.size()) {
+          vertices_(soup.positions.size()),
+          last_(soup.positions.size()) {
         scaled_.reserve(soup.positions.size());
         for (const Vec3& p : soup.positions) scaled_.push_back(vec_cast<float>(scale * p));
+        out_.mesh.faces.reserve(soup.triangles.size());
+        out_.mesh.face_material.reserve(soup.triangles.size());
     }
 
     MeshFile build() {
         for (const TriangleSoup::Triangle& t : soup_.triangles) sift(t);
         const bool with_normals = !soup_.normals.empty(), with_uvs = !soup_.uvs.empty();
+        const std::size_t n = vertices_.keys().size();
+        out_.mesh.positions.reserve(n);
+        if (with_normals) out_.mesh.normals.reserve(n);
+        if (with_uvs) out_.mesh.uvs.reserve(n);
         for (const VertexKey& v : vertices_.keys()) {
             const auto& p = points_.keys()[v[0]];
             out_.mesh.positions.push_back({from_bits(p[0]), from_bits(p[1]), from_bits(p[2])});
@@ -111,7 +118,9 @@ private:
         for (std::size_t i = 0; i < 3; ++i) {
             p[i] = scaled_[t.corners[i].position];
             if (!is_finite(p[i])) return void(++out_.non_finite);
-            point[i] = points_.number({bits(p[i].x), bits(p[i].y), bits(p[i].z)});
+            std::uint32_t& known = last_[t.corners[i].position].point;
+            if (known == kUnknown) known = points_.number({bits(p[i].x), bits(p[i].y), bits(p[i].z)});
+            point[i] = known;
         }
         if (is_degenerate(p)) return void(++out_.degenerate);
         std::array<std::uint32_t, 3> sorted = point;
@@ -126,20 +135,33 @@ private:
         const Vec3f flat = soup_.normals.empty() ? Vec3f{} : vec_cast<float>(normalized(area_vector(p)));
         std::array<std::uint32_t, 3> face{};
         for (std::size_t i = 0; i < 3; ++i) {
-            const Vec3f n = normal_of(t.corners[i], flat);
-            const std::array<float, 2> uv = uv_of(t.corners[i]);
-            face[i] = vertices_.number({point[i], bits(n.x), bits(n.y), bits(n.z), bits(uv[0]), bits(uv[1])});
+            const TriangleSoup::Corner& c = t.corners[i];
+            Last& last = last_[c.position];
+            if (last.vertex == kUnknown || last.uv != c.uv || last.normal != c.normal) {
+                const auto [n, is_flat] = normal_of(c, flat);
+                const std::array<float, 2> uv = uv_of(c);
+                face[i] = vertices_.number({point[i], bits(n.x), bits(n.y), bits(n.z), bits(uv[0]), bits(uv[1])});
+                last = {point[i], c.uv, c.normal, is_flat ? kUnknown : face[i]};
+            } else {
+                face[i] = last.vertex;
+            }
         }
         out_.mesh.faces.push_back(face);
         out_.mesh.face_material.push_back(t.material);
     }
 
+    struct Normal {
+        Vec3f n;
+        bool is_flat;  ///< the triangle's own
+    };
     /// Where the file gives none (or none that can be used), the triangle's own.
-    [[nodiscard]] Vec3f normal_of(const TriangleSoup::Corner& c, const Vec3f& flat) const {
-        if (c.normal == TriangleSoup::kNone) return flat;
+    [[nodiscard]] Normal normal_of(const TriangleSoup::Corner& c, const Vec3f& flat) const {
+        if (soup_.normals.empty()) return {{}, false};
+        if (c.normal == TriangleSoup::kNone) return {flat, true};
         const Vec3 n = vec_cast<double>(soup_.normals[c.normal]);
         const double length = norm(n);
-        return length > 0 && std::isfinite(length) ? vec_cast<float>(n / length) : flat;
+        if (!(length > 0) || !std::isfinite(length)) return {flat, true};
+        return {vec_cast<float>(n / length), false};
     }
 
     [[nodiscard]] std::array<float, 2> uv_of(const TriangleSoup::Corner& c) const {
@@ -148,10 +170,17 @@ private:
         return std::isfinite(uv[0]) && std::isfinite(uv[1]) ? uv : std::array<float, 2>{0, 0};
     }
 
+    static constexpr std::uint32_t kUnknown = 0xffff'ffffu;
+    /// What the last triangle made of a position: most others of the same position want the same.
+    struct Last {
+        std::uint32_t point = kUnknown, uv = 0, normal = 0, vertex = kUnknown;
+    };
+
     TriangleSoup& soup_;
     std::vector<Vec3f> scaled_;
     Numbering<3> points_, triangles_;
     Numbering<6> vertices_;
+    std::vector<Last> last_;
     MeshFile out_;
 };
 

@@ -13,6 +13,8 @@ namespace narpa {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kMaxBudgetMs = 1e6;
+constexpr std::int64_t kMaxBudgetRays = 1'000'000'000'000;
 constexpr int kFirstYear = 1900, kLastYear = 2100;  // where ERFA's Earth is good, and int64 nanoseconds hold
 
 std::int64_t unix_ns_from(const toml::date_time& t) {
@@ -101,6 +103,21 @@ void read_ambient(TableReader& root, Scene& scene) {
     table->finish();
 }
 
+/// One of spp, budget_ms and budget_rays.
+void read_budget(TableReader& table, RenderSettings& render) {
+    if (table.has("spp")) {
+        for (const std::string_view budget : {"budget_ms", "budget_rays"})
+            table.refuse(budget, "spp is given too, expected one of spp, budget_ms, budget_rays");
+    } else if (table.has("budget_ms")) {
+        table.refuse("budget_rays", "budget_ms is given too, expected one of spp, budget_ms, budget_rays");
+    }
+    render.spp = static_cast<int>(table.integer("spp", 1, 65535).value_or(render.spp));
+    if (const auto ms = table.number("budget_ms", {.low = 0.001, .high = kMaxBudgetMs}))
+        render.budget_ns = std::llround(*ms * 1e6);
+    if (const auto rays = table.integer("budget_rays", 1, kMaxBudgetRays))
+        render.budget_rays = static_cast<std::uint64_t>(*rays);
+}
+
 void read_render(TableReader& root, Scene& scene) {
     auto table = root.table("render");
     if (!table) return;
@@ -109,9 +126,7 @@ void read_render(TableReader& root, Scene& scene) {
     if (render.method == RenderSettings::Method::direct)
         table->refuse("max_depth", "belongs to method = \"path\", and this is \"direct\"");
     render.max_depth = static_cast<int>(table->integer("max_depth", 1, 40).value_or(render.max_depth));
-    table->not_in_this_version("budget_ms", "give spp");
-    table->not_in_this_version("budget_rays", "give spp");
-    render.spp = static_cast<int>(table->integer("spp", 1, 65535).value_or(render.spp));
+    read_budget(*table, render);
     render.seed = static_cast<std::uint64_t>(table->integer("seed", 0, INT64_MAX).value_or(0));
     render.stale_after_s = table->number("stale_after_s", kPositive).value_or(render.stale_after_s);
     table->finish();

@@ -5,7 +5,8 @@
 /// corners). A monochrome format (GREY, Y16) sums the bands in one pixel; a colour format (YUYV, RGB24) gives each
 /// band an ideal pixel of its own. Electrons = photons * quantum efficiency, with Poisson noise, clipped at the
 /// full well; read noise is added; DN = black level + electrons / gain, rounded and clamped to 0 .. 2^bits - 1. All
-/// noise comes before the rounding.
+/// noise comes before the rounding. Light and levels are double, what noise adds to them is single precision
+/// (noise.h).
 ///
 /// DN to bytes: GREY the top 8 bits; Y16 little-endian, left-justified; RGB24 the top 8 bits of each band; YUYV
 /// from these by BT.601, limited range, chroma averaged over each pair. Values stay linear: no gamma.
@@ -20,9 +21,9 @@
 namespace narpa {
 
 /// Exposes the radiance image and writes the frame's bytes in `camera.format`. Noise depends on (seed, frame,
-/// pixel) and nothing else. Without a detector: DN = full scale * radiance / white_radiance, clamped; monochrome
-/// takes the mean of the bands. `out` holds frame_bytes(format) bytes; a YUYV width is even. Allocates nothing;
-/// runs on the calling thread's TBB arena.
+/// pixel) and nothing else: same bytes on any number of threads and on each instruction set. Without a detector: DN
+/// = full scale * radiance / white_radiance, clamped; monochrome takes the mean of the bands. `out` holds
+/// frame_bytes(format) bytes; a YUYV width is even. Allocates nothing; runs on the calling thread's TBB arena.
 void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
             std::span<std::uint8_t> out) noexcept;
 

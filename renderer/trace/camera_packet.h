@@ -11,7 +11,8 @@ namespace narpa {
 /// Which samples are traced together: some of one tile of the image.
 struct CameraSamples {
     std::size_t n = 0;
-    bool middle = false;          ///< all of them through the middle of pixel and lens, and to that of the Sun
+    bool middle = false;          ///< all of them through the middle of the pixel; in a frame of one sample a
+                                  ///< pixel through that of the lens too, and to that of the Sun
     Lanes<int> x, y;              ///< pixels
     Lanes<std::uint32_t> number;  ///< of the pixel, row by row
     Lanes<std::uint32_t> sample;  ///< place in the pixel's own sequence; of middles 0

@@ -3,7 +3,8 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "renderer/material/fast_math.h"
 
 namespace narpa {
 
@@ -11,11 +12,10 @@ namespace narpa {
 /// Square", J. Graphics Tools 2(3), 1997.
 [[nodiscard]] inline std::array<double, 2> concentric_disc(double u, double v) noexcept {
     const double a = 2 * u - 1, b = 2 * v - 1;
-    if (a == 0 && b == 0) return {0, 0};
-    constexpr double kQuarterPi = std::numbers::pi / 4;
     const bool wide = std::abs(a) > std::abs(b);
-    const double r = wide ? a : b, phi = wide ? kQuarterPi * (b / a) : 2 * kQuarterPi - kQuarterPi * (a / b);
-    return {r * std::cos(phi), r * std::sin(phi)};
+    const double r = wide ? a : b, ratio = (wide ? b : a) / (r == 0 ? 1 : r);
+    const auto [sin, cos] = sincos_of_turns(0.125 * ratio);  // of the angle from the nearer axis
+    return {r * (wide ? cos : sin), r * (wide ? sin : cos)};
 }
 
 }  // namespace narpa

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <optional>
 
 #include "renderer/trace/sphere_roots.h"
 
@@ -17,8 +17,8 @@ namespace narpa {
 
 /// Where a ray meets the surface.
 struct Crossing {
-    double range = 0;     ///< multiples of the direction
-    bool outside = true;  ///< met from the outer side
+    double range = std::numeric_limits<double>::infinity();  ///< multiples of the direction; infinity: it does not
+    bool outside = true;                                     ///< met from the outer side
 };
 
 class EllipsoidShape {
@@ -31,23 +31,23 @@ public:
     /// Largest semi-axis, metres.
     [[nodiscard]] double radius_m() const noexcept { return radius_m_; }
 
-    /// The nearest crossing that is not behind the ray.
-    [[nodiscard]] std::optional<Crossing> first_crossing(const Vec3& o, const Vec3& d) const noexcept {
-        const auto roots = sphere_roots(o * squeeze_, d * squeeze_, radius_m_);
-        if (!roots || roots->far < 0) return std::nullopt;
-        return roots->near >= 0 ? Crossing{roots->near, true} : Crossing{roots->far, false};
+    /// The nearest crossing that is not behind the ray. Without a branch, as all that follows, for loops over many
+    /// rays.
+    [[nodiscard]] Crossing first_crossing(const Vec3& o, const Vec3& d) const noexcept {
+        const SphereRoots roots = sphere_roots(o * squeeze_, d * squeeze_, radius_m_);
+        const bool outside = roots.near >= 0;
+        const double ahead = roots.far >= 0 ? roots.far : kInfinity;
+        return {outside ? roots.near : ahead, outside};
     }
 
     /// As above for a ray that leaves the surface at `start`. The shape is convex: from its outer side the ray
     /// meets it only by starting into it, from its inner side it meets the other end of the chord. Both starts are
     /// at range 0.
-    [[nodiscard]] std::optional<Crossing> own_crossing(const Vec3& start, const Vec3& d,
-                                                       bool outside) const noexcept {
+    [[nodiscard]] Crossing own_crossing(const Vec3& start, const Vec3& d, bool outside) const noexcept {
         const Vec3 o = start * squeeze_, e = d * squeeze_;
-        const double up = dot(o, e);
-        if (!outside) return Crossing{std::max(0.0, -2 * up / dot(e, e)), false};
-        if (up < 0) return Crossing{0, true};
-        return std::nullopt;
+        const double up = dot(o, e), chord = std::max(0.0, -2 * up / dot(e, e));
+        const double inwards = up < 0 ? 0 : kInfinity;
+        return {outside ? inwards : chord, outside};
     }
 
     /// Outward, unit.
@@ -82,6 +82,8 @@ public:
     }
 
 private:
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
     Vec3 semi_axes_m_;
     double radius_m_;
     Vec3 squeeze_;  ///< radius over semi-axes

@@ -1,6 +1,7 @@
 /// renderer/trace/embree.h - the few Embree calls that differ between its versions 3 and 4.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <type_traits>
 
@@ -50,7 +51,9 @@ inline void intersect(RTCScene scene, const int* valid, RTCRayHit16& rays, Run r
 #endif
 }
 
-/// Sets ray.tfar to -infinity when anything is hit.
+/// What becomes of ray.tfar when anything is hit.
+inline constexpr float kOccluded = -std::numeric_limits<float>::infinity();
+
 inline void occluded(RTCScene scene, RTCRay& ray) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
     rtcOccluded1(scene, &ray);

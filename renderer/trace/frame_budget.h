@@ -17,6 +17,16 @@ namespace narpa {
 
 inline constexpr std::size_t kMaxPasses = 8;  ///< after the first
 
+/// How far a frame got, best first. Stated in its ledger.
+enum class FrameStep : std::uint8_t {
+    refined,      ///< samples where the error is, or spp of them
+    one_sample,   ///< the middle of each pixel
+    no_indirect,  ///< the same, by direct light alone where the scene asks for paths
+    coarse_2,     ///< one pixel in 2 x 2, by direct light
+    coarse_4,     ///< one pixel in 4 x 4
+    nothing,      ///< not even that: the image is as it was before
+};
+
 struct FrameBudget {
     enum class Kind : std::uint8_t {
         samples,  ///< FrameSettings::spp for each pixel, in one pass
@@ -29,16 +39,6 @@ struct FrameBudget {
     std::int64_t deadline_ns = 0;                    ///< CLOCK_MONOTONIC
     std::array<std::uint32_t, kMaxPasses> passes{};  ///< camera samples of each pass after the first
     std::uint8_t step = 0;                           ///< of kind passes: FrameStep at which the frame stopped
-};
-
-/// How far a frame got, best first. Stated in its ledger.
-enum class FrameStep : std::uint8_t {
-    refined,      ///< samples where the error is, or spp of them
-    one_sample,   ///< the middle of each pixel
-    no_indirect,  ///< the same, by direct light alone where the scene asks for paths
-    coarse_2,     ///< one pixel in 2 x 2, by direct light
-    coarse_4,     ///< one pixel in 4 x 4
-    nothing,      ///< not even that: the image is as it was before
 };
 
 /// Where the time goes, ns, summed over the threads.

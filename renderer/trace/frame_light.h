@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
@@ -46,6 +47,27 @@ struct Packet {
     // Counted on from packet to packet:
     std::uint64_t rays_traced = 0;  ///< of all kinds
     PhaseTimes* times = nullptr;    ///< null: nobody looks
+};
+
+/// Where a packet's time goes, if anybody looks.
+class PhaseClock {
+public:
+    explicit PhaseClock(PhaseTimes* times) noexcept : times_(times), last_ns_(times != nullptr ? now_ns() : 0) {}
+    /// The time since the last call, or since the start, was this phase's.
+    void ends(Phase phase) noexcept {
+        if (times_ == nullptr) return;
+        const std::int64_t now = now_ns();
+        (*times_)[static_cast<std::size_t>(phase)] += now - last_ns_;
+        last_ns_ = now;
+    }
+
+private:
+    static std::int64_t now_ns() noexcept {
+        return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+    }
+
+    PhaseTimes* times_;
+    std::int64_t last_ns_;
 };
 
 /// Radiance that comes back along each ray.

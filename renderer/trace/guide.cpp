@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <variant>
 
 namespace narpa {
 namespace {
@@ -12,6 +13,9 @@ namespace {
 constexpr double kWide = 0.25;
 /// Bodies that fill less of the sky than this send next to nothing: not worth many rays.
 constexpr double kNegligible = 1e-6;
+/// A mesh may fill so much of its own sky, and leaves so much of the guidance whatever it is: enough for its dark
+/// side, and little lost on the lit one.
+constexpr double kOwnMesh = 0.25, kLeastGuidance = 0.1;
 
 /// A body's bounding sphere in the sky of the receiver.
 struct Cone {
@@ -45,12 +49,29 @@ Cone cone_of(const Tracer& tracer, const Placement& at, const Receiver& to, std:
 }  // namespace
 
 Guide::Guide(const Tracer& tracer, const Placement& at, const Receiver& to) noexcept {
-    double wide = 0;
+    const bool own_mesh =
+        to.body >= 0 && std::holds_alternative<int>(tracer.scene().bodies[static_cast<std::size_t>(to.body)].shape);
+    double wide = own_mesh ? kOwnMesh : 0;
     for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
         const Cone c = cone_of(tracer, at, to, body);
         (c.is_guide() ? sum_ : wide) += c.importance;
     }
-    if (sum_ > 0) share_ = 0.5 * sum_ / (sum_ + wide) * std::min(1.0, sum_ / kNegligible);
+    if (!(sum_ > 0)) return;
+    const double guidance = std::max(sum_ / (sum_ + wide), own_mesh ? kLeastGuidance : 0);
+    share_ = 0.5 * guidance * std::min(1.0, sum_ / kNegligible);
+}
+
+bool Guide::may_help(const Tracer& tracer, const Placement& at) noexcept {
+    const std::size_t n = at.T_world_body.size();
+    for (std::size_t seen = 0; seen < n; ++seen)
+        for (std::size_t from = 0; from < n; ++from) {
+            if (from == seen) continue;
+            const double radius_m = tracer.bounding_radius_m(seen),
+                         farthest_m = norm(at.T_world_body[seen].t - at.T_world_body[from].t) +
+                                      tracer.bounding_radius_m(from);
+            if (radius_m * radius_m < kWide * farthest_m * farthest_m) return true;
+        }
+    return false;
 }
 
 Vec3 Guide::direction(const Tracer& tracer, const Placement& at, const Receiver& to, double choice, double u,

@@ -3,7 +3,7 @@
 /// The BSDF alone would send one ray of a thousand to the Earth in the Moon's sky. So in scenes with a Sun a part
 /// of the rays is sent, evenly, into the cones about the bounding spheres of other bodies; the density is that of
 /// the mixture, and nothing is biased. Where other bodies fill much of the sky they are likelier to send the light,
-/// and fewer rays are guided.
+/// and fewer rays are guided. So are those from a mesh, which may light itself.
 #pragma once
 
 #include "renderer/trace/lights.h"
@@ -13,6 +13,8 @@ namespace narpa {
 
 class Guide {
 public:
+    /// Does any body look small from anywhere on another?
+    [[nodiscard]] static bool may_help(const Tracer& tracer, const Placement& at) noexcept;
     /// No ray is guided.
     Guide() = default;
     Guide(const Tracer& tracer, const Placement& at, const Receiver& to) noexcept;

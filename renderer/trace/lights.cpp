@@ -182,6 +182,7 @@ double Lights::importance(const Placement& at, const Receiver& to, const Emitter
 }
 
 double Lights::chance(const Placement& at, const Receiver& to, Group group, const Emitter& chosen) const noexcept {
+    if (emitters(group).size() == 1) return importance(at, to, chosen) > 0 ? 1 : 0;
     double sum = 0;
     for (const Emitter& e : emitters(group)) sum += importance(at, to, e);
     return sum > 0 ? importance(at, to, chosen) / sum : 0;
@@ -195,7 +196,7 @@ std::optional<LightSample> Lights::sample(const Placement& at, const Receiver& t
     double left = choice * sum, share = 0;
     const Emitter* chosen = nullptr;
     for (const Emitter& e : emitters(group)) {
-        const double part = importance(at, to, e);
+        const double part = emitters(group).size() == 1 ? sum : importance(at, to, e);
         if (part == 0) continue;
         if (chosen != nullptr) left -= share;
         chosen = &e, share = part;

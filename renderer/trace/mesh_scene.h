@@ -7,16 +7,15 @@
 #include "renderer/scene/scene.h"
 #include "renderer/trace/embree.h"
 #include "renderer/trace/packet.h"
+#include "renderer/trace/triangle.h"
 
 namespace narpa {
 
-/// A point of a mesh that a ray meets.
+/// A point of a mesh that a ray meets, in the body's frame.
 struct MeshHit {
     std::uint32_t face = 0;
     double range_m = 0;     ///< from the ray's origin
-    Vec3 position{};        ///< body frame, on the triangle to rounding in double
-    double b1 = 0, b2 = 0;  ///< barycentric weights of the face's second and third vertex
-    bool inner = false;     ///< surely the inner side: the ray left this mesh's inner side before
+    TrianglePoint point{};  ///< on the triangle to rounding in double
 };
 
 /// Rays in the body's frame, as `MeshScene::intersect` takes one. All are finite, also those that are not asked.
@@ -24,6 +23,18 @@ struct MeshRays {
     VecPerRay origin, direction;
     Lanes<double> entry_m, t_max;
     std::uint32_t inside = 0;  ///< a bit for each that starts on the inner side of this mesh
+};
+
+/// The same for each ray, and what else is known by then.
+struct MeshHits {
+    std::uint32_t inner = 0;  ///< surely the inner side: the ray left this mesh's inner side before
+    Lanes<std::uint32_t> face;
+    Lanes<double> range_m;
+    VecPerRay direction, position;
+    Lanes<double> b1, b2;
+    TrianglePerRay triangle;
+
+    [[nodiscard]] TrianglePoint point(std::size_t i) const { return {position[i], b1[i], b2[i]}; }
 };
 
 class MeshScene {
@@ -38,18 +49,27 @@ public:
                    MeshHit& hit) const noexcept;
     bool occluded(const Vec3& origin, const Vec3& direction, double entry_m, double t_max) const noexcept;
 
-    /// The same for those of sixteen rays whose bit is set in `wanted`; returns the bits of those that hit.
+    /// The same for those of sixteen rays whose bit is set in `wanted`; returns the bits of those that hit. Others'
+    /// `hits` stay as they were.
     std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted, embree::Run run,
-                            std::span<MeshHit, kPacket> hits) const noexcept;
+                            MeshHits& hits) const noexcept;
     [[nodiscard]] std::uint32_t occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept;
 
     /// Where a ray starts that leaves this face at `position` (on it, or above it by a smooth surface's bulge) on
     /// its outer or inner side: lifted by as much as rounding in single precision can lower it, and as far from the
     /// face's edges that the lift does not take it through a neighbour at an angle of 7 degrees or more.
     [[nodiscard]] Vec3 departure(std::uint32_t face, const Vec3& position, bool outside) const noexcept;
+    /// The same for those of sixteen rays whose bit is set in `wanted`; other `starts` stay as they were.
+    void depart(const Lanes<std::uint32_t>& face, const VecPerRay& position, std::uint32_t outside,
+                std::uint32_t wanted, VecPerRay& starts) const noexcept;
 
     /// Three corners in the body's frame, as the hierarchy holds them.
-    [[nodiscard]] std::array<Vec3, 3> corners(std::uint32_t face) const noexcept;
+    [[nodiscard]] Triangle triangle(std::uint32_t face) const noexcept {
+        const auto& f = mesh_->faces[face];
+        return {vec_cast<double>(vertices_[f[0]]) + vertex_origin_,
+                vec_cast<double>(vertices_[f[1]]) + vertex_origin_,
+                vec_cast<double>(vertices_[f[2]]) + vertex_origin_};
+    }
     [[nodiscard]] const Mesh& mesh() const noexcept { return *mesh_; }
     /// Radius of a sphere about the body's origin that holds the mesh.
     [[nodiscard]] double reach_m() const noexcept { return reach_m_; }
@@ -59,14 +79,8 @@ private:
     /// where that is worth while. 0 from inside; none if the ray misses, or meets the sphere beyond t_max.
     [[nodiscard]] std::optional<double> advance(const Vec3& origin, const Vec3& direction, double entry_m,
                                                 double t_max) const noexcept;
-    /// Rays where Embree takes over.
-    struct Starts {
-        std::uint32_t asked = 0;       ///< those that Embree is to trace
-        alignas(64) Lanes<int> valid;  ///< the same, for Embree
-        Lanes<double> skipped_m;
-        VecPerRay at;
-    };
-    [[nodiscard]] Starts advance(const MeshRays& rays, std::uint32_t wanted, RTCRay16& query) const noexcept;
+    [[nodiscard]] RTCRay embree_ray(const Vec3& origin, const Vec3& direction, double length) const noexcept;
+
     /// What Embree says of a ray: which triangle, roughly where, from which side.
     struct Answer {
         std::uint32_t face = 0;
@@ -74,10 +88,42 @@ private:
         bool hit = false, back = false;
     };
     [[nodiscard]] Answer ask(const Vec3& start, const Vec3& direction, double length) const noexcept;
-    [[nodiscard]] RTCRay embree_ray(const Vec3& origin, const Vec3& direction, double length) const noexcept;
-    /// Asks once more where the answer is suspicious, and solves the hit in double.
-    bool settle(Answer answer, const Vec3& start, const Vec3& direction, double skipped_m, double t_max,
-                bool inside, MeshHit& hit) const noexcept;
+
+    // Even in robust mode Embree loses some rays that meet a vertex (its issues 181, 188 and 387): they pass
+    // through, and where the mesh is closed what they meet next shows them its wrong side, or from inside nothing.
+    // They are common where a camera's pixels line up with a model's grid. Another try, turned by a few roundings,
+    // finds what they lost; one that leaves the inner side close to an edge and runs along it needs to be turned by
+    // more.
+    static constexpr std::array kTurns{4e-7, -4e-7, 4e-3, -4e-3};  ///< radians
+    [[nodiscard]] static Vec3 turned(const Vec3& d, double angle) noexcept {
+        return d + angle * Vec3{d.y - d.z, d.z - d.x, d.x - d.y + 0.5};
+    }
+    /// Can this be all that the ray meets first? `inside`: it starts on the inner side of this closed mesh.
+    [[nodiscard]] bool plausible(const Answer& answer, bool inside) const noexcept {
+        return answer.hit ? answer.back == inside : closed_ && !inside;
+    }
+    /// Takes the answer to the turned ray where it is better.
+    void consider(Answer& answer, const Answer& again, const Vec3& start, const Vec3& direction,
+                  bool inside) const noexcept;
+
+    /// Sixteen rays where Embree takes over, and its answers.
+    struct Query {
+        RTCRayHit16 rays;
+        alignas(64) Lanes<int> valid;  ///< -1: to be traced
+        VecPerRay start;
+        Lanes<double> skipped_m;
+        std::uint32_t asked = 0;          ///< as `valid`
+        std::uint32_t hit = 0, back = 0;  ///< out
+
+        void clear_hits() noexcept;
+        void read_hits() noexcept;
+        [[nodiscard]] Answer operator[](std::size_t i) const noexcept;
+        void put(std::size_t i, const Answer& answer) noexcept;
+    };
+    void advance(const MeshRays& rays, std::uint32_t wanted, Query& query) const noexcept;
+    /// Asks once more where the answer is not plausible. `inside`: of this closed mesh.
+    void ask_again(const MeshRays& rays, std::uint32_t suspicious, std::uint32_t inside,
+                   Query& query) const noexcept;
 
     const Mesh* mesh_ = nullptr;
     embree::Owned<RTCScene> scene_;

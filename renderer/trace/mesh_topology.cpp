@@ -1,26 +1,31 @@
 #include "renderer/trace/mesh_topology.h"
 
-#include <tbb/parallel_sort.h>
-
+#include <algorithm>
+#include <array>
 #include <bit>
-#include <numeric>
+#include <vector>
 
 namespace narpa {
 namespace {
 
 /// The same number for vertices at the same place: readers split a vertex where its normal or texture jumps.
 std::vector<std::uint32_t> welded(const std::vector<Vec3f>& positions) {
-    const auto key = [&](std::uint32_t i) {
+    constexpr std::uint32_t kFree = 0xffff'ffffu;
+    const auto key = [&](std::size_t i) {
         const Vec3f& p = positions[i];
         return std::array{std::bit_cast<std::uint32_t>(p.x + 0.0f), std::bit_cast<std::uint32_t>(p.y + 0.0f),
                           std::bit_cast<std::uint32_t>(p.z + 0.0f)};  // + 0: -0 and 0 are one place
     };
-    std::vector<std::uint32_t> order(positions.size()), id(positions.size());
-    std::iota(order.begin(), order.end(), 0u);
-    tbb::parallel_sort(order.begin(), order.end(),
-                       [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
-    for (std::size_t i = 0; i < order.size(); ++i)
-        id[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? id[order[i - 1]] : order[i];
+    std::vector<std::uint32_t> slots(std::bit_ceil(2 * positions.size() + 16), kFree), id(positions.size());
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const auto k = key(i);
+        std::uint64_t hash = 0x9e37'79b9'7f4a'7c15ull;
+        for (const std::uint32_t word : k) hash = (hash ^ word) * 0xff51'afd7'ed55'8ccdull, hash ^= hash >> 32;
+        std::size_t slot = hash & (slots.size() - 1);
+        while (slots[slot] != kFree && key(slots[slot]) != k) slot = (slot + 1) & (slots.size() - 1);
+        if (slots[slot] == kFree) slots[slot] = static_cast<std::uint32_t>(i);
+        id[i] = slots[slot];
+    }
     return id;
 }
 
@@ -28,25 +33,32 @@ std::vector<std::uint32_t> welded(const std::vector<Vec3f>& positions) {
 
 bool is_closed(const Mesh& mesh) {
     const std::vector<std::uint32_t> id = welded(mesh.positions);
-    struct Edge {
-        std::uint64_t ends;  ///< the smaller vertex above, the larger below
-        int direction;
+    const auto for_each_edge = [&](const auto& f) {
+        for (const auto& face : mesh.faces)
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::uint32_t a = id[face[k]], b = id[face[(k + 1) % 3]];
+                a < b ? f(a, b, 0u) : f(b, a, 1u);
+            }
     };
-    std::vector<Edge> edges;
-    edges.reserve(3 * mesh.faces.size());
-    for (const auto& f : mesh.faces)
-        for (std::size_t k = 0; k < 3; ++k) {
-            const std::uint64_t a = id[f[k]], b = id[f[(k + 1) % 3]];
-            edges.push_back(a < b ? Edge{a << 32 | b, 1} : Edge{b << 32 | a, -1});
+    // Edges by their smaller vertex: each one's larger vertex, and in the last bit its direction.
+    std::vector<std::uint32_t> first(mesh.positions.size() + 2, 0);
+    for_each_edge([&](std::uint32_t smaller, std::uint32_t, std::uint32_t) { ++first[smaller + 2]; });
+    for (std::size_t v = 2; v < first.size(); ++v) first[v] += first[v - 1];
+    std::vector<std::uint64_t> ends(3 * mesh.faces.size());
+    for_each_edge([&](std::uint32_t smaller, std::uint32_t larger, std::uint32_t direction) {
+        ends[first[smaller + 1]++] = std::uint64_t{larger} << 1 | direction;
+    });
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        const auto begin = ends.begin() + first[v], end = ends.begin() + first[v + 1];
+        std::sort(begin, end);
+        for (auto e = begin; e != end;) {
+            int sum = 0;
+            const std::uint64_t larger = *e >> 1;
+            for (; e != end && *e >> 1 == larger; ++e) sum += (*e & 1) != 0 ? -1 : 1;
+            if (sum != 0) return false;
         }
-    tbb::parallel_sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.ends < b.ends; });
-    for (std::size_t i = 0; i < edges.size();) {
-        int sum = 0;
-        const std::uint64_t ends = edges[i].ends;
-        for (; i < edges.size() && edges[i].ends == ends; ++i) sum += edges[i].direction;
-        if (sum != 0) return false;
     }
-    return !edges.empty();
+    return !ends.empty();
 }
 
 }  // namespace narpa

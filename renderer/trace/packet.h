@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -24,6 +25,28 @@ inline std::uint32_t lanes_below(std::size_t n) noexcept {
     return (1u << n) - 1;
 }
 
+/// For each of the bits -1 where it is set, else 0: loops choose by these without a branch.
+[[nodiscard]] inline Lanes<int> masks_of(std::uint32_t bits) noexcept {
+    Lanes<int> masks;
+    for (std::size_t i = 0; i < kPacket; ++i) masks[i] = -static_cast<int>(bits >> i & 1u);
+    return masks;
+}
+[[nodiscard]] inline std::uint32_t bits_of(const Lanes<int>& masks) noexcept {
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < kPacket; ++i) bits |= static_cast<std::uint32_t>(masks[i]) & 1u << i;
+    return bits;
+}
+
+[[nodiscard]] inline std::uint32_t lanes_with(const Lanes<int>& values, int value) noexcept {
+    Lanes<int> same;
+    for (std::size_t i = 0; i < kPacket; ++i) same[i] = -static_cast<int>(values[i] == value);
+    return bits_of(same);
+}
+template <class F>
+void for_each_lane(std::uint32_t bits, const F& f) {
+    for (; bits != 0; bits &= bits - 1) f(static_cast<std::size_t>(std::countr_zero(bits)));
+}
+
 /// A vector for each ray.
 struct alignas(64) VecPerRay {
     Lanes<double> x, y, z;
@@ -42,38 +65,24 @@ struct alignas(64) RgbPerRay {
     void fill(const Rgb& c) { r.fill(c.x), g.fill(c.y), b.fill(c.z); }
 };
 
-[[nodiscard]] inline VecPerRay operator-(const VecPerRay& a, const Vec3& b) noexcept {
-    VecPerRay out;
-    for (std::size_t i = 0; i < kPacket; ++i) out.x[i] = a.x[i] - b.x;
-    for (std::size_t i = 0; i < kPacket; ++i) out.y[i] = a.y[i] - b.y;
-    for (std::size_t i = 0; i < kPacket; ++i) out.z[i] = a.z[i] - b.z;
-    return out;
-}
+/// A pose for each ray.
+struct alignas(64) PosePerRay {
+    Lanes<double> w, x, y, z;
+    VecPerRay t;
 
-/// The vectors, in the world's axes, in those of a body.
-[[nodiscard]] inline VecPerRay to_body(const Quat& q_world_body, const VecPerRay& v) noexcept {
-    const auto [bx, by, bz] = columns(q_world_body);  // the body's axes
-    VecPerRay out;
-    for (std::size_t i = 0; i < kPacket; ++i) out.x[i] = bx.x * v.x[i] + bx.y * v.y[i] + bx.z * v.z[i];
-    for (std::size_t i = 0; i < kPacket; ++i) out.y[i] = by.x * v.x[i] + by.y * v.y[i] + by.z * v.z[i];
-    for (std::size_t i = 0; i < kPacket; ++i) out.z[i] = bz.x * v.x[i] + bz.y * v.y[i] + bz.z * v.z[i];
-    return out;
-}
-
-/// Where each ray enters a bounding sphere about the origin, as `bounding_span` has it; infinity where it misses.
-[[nodiscard]] inline Lanes<double> bounding_entries(const VecPerRay& o, const VecPerRay& unit_d,
-                                                    double radius) noexcept {
-    Lanes<double> entry, exit;  // NaN where the line misses: no comparison holds
-    for (std::size_t i = 0; i < kPacket; ++i) {
-        const double b = -(o.x[i] * unit_d.x[i] + o.y[i] * unit_d.y[i] + o.z[i] * unit_d.z[i]);
-        const double cx = o.x[i] + b * unit_d.x[i], cy = o.y[i] + b * unit_d.y[i], cz = o.z[i] + b * unit_d.z[i];
-        const double half_chord = std::sqrt(radius * radius - (cx * cx + cy * cy + cz * cz));
-        entry[i] = b - half_chord;
-        exit[i] = b + half_chord;
+    [[nodiscard]] Rigid3 operator[](std::size_t i) const { return {{w[i], x[i], y[i], z[i]}, t[i]}; }
+    void put(std::size_t i, const Rigid3& T) {
+        w[i] = T.q.w, x[i] = T.q.x, y[i] = T.q.y, z[i] = T.q.z, t.put(i, T.t);
     }
-    for (std::size_t i = 0; i < kPacket; ++i)
-        if (!(exit[i] >= 0)) entry[i] = std::numeric_limits<double>::infinity();
-    return entry;
+    void fill(const Rigid3& T) { w.fill(T.q.w), x.fill(T.q.x), y.fill(T.q.y), z.fill(T.q.z), t.fill(T.t); }
+};
+
+/// `then` where the condition holds, without a branch.
+[[nodiscard]] inline double choose(bool condition, double then, double otherwise) noexcept {
+    return condition ? then : otherwise;
+}
+[[nodiscard]] inline Vec3 choose(bool condition, const Vec3& then, const Vec3& otherwise) noexcept {
+    return {condition ? then.x : otherwise.x, condition ? then.y : otherwise.y, condition ? then.z : otherwise.z};
 }
 
 }  // namespace narpa

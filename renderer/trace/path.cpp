@@ -2,310 +2,386 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <limits>
 #include <optional>
 
-#include "renderer/trace/guide.h"
+#include "base/each_isa.h"
 #include "renderer/trace/lights.h"
 #include "renderer/trace/path_point.h"
+#include "renderer/trace/path_state.h"
+#include "renderer/trace/wide_sampler.h"
 
 namespace narpa {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Behind so many surfaces a path that brings back less than this part of what it finds may end, at random.
-constexpr int kSurfacesBeforeRoulette = 4;
-constexpr float kFaint = 0.25f;
+/// A path that brings back less than this part of what it finds may end, at random: once it has brought some light,
+/// as the rest seldom adds much; without any, as on night sides, only behind so many surfaces.
+constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;
+constexpr int kSurfacesInTheDark = 4;
 /// Random numbers: two groups for each surface of the longest path, then the roulette's.
 constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40;
+/// Suns no wider than this are left to next-event estimation alone where the surface has no lobe: there a ray by
+/// the BSDF finds the disc so seldom that it is not worth the densities.
+constexpr double kNarrowSun_rad = 0.2;
 
-/// The lanes whose bit is set, lowest first.
-class EachLane {
-public:
-    explicit EachLane(std::uint32_t bits) : left_(bits) {}
-    [[nodiscard]] EachLane begin() const { return *this; }
-    [[nodiscard]] static EachLane end() { return EachLane(0); }
-    std::size_t operator*() const { return static_cast<std::size_t>(std::countr_zero(left_)); }
-    EachLane& operator++() {
-        left_ &= left_ - 1;
-        return *this;
-    }
-    friend bool operator==(const EachLane&, const EachLane&) = default;
-
-private:
-    std::uint32_t left_;
-};
-std::uint32_t bit(std::size_t lane) {
-    return 1u << lane;
+using Points = PacketSampler::Points;
+NARPA_EACH_ISA void next_points(const PathNumbers& from, std::size_t n, const Lanes<std::uint32_t>& pixel,
+                                const Lanes<std::uint32_t>& sample, std::uint32_t group, Points& u) noexcept {
+    PacketSampler(from.seed, from.frame, n, pixel, sample).points(group, u);
 }
 
-/// A packet of paths from the camera, surface by surface. What happens in a lane follows from its own ray and its
-/// own random numbers alone.
-class Walk {
+/// Paths from the camera, surface by surface; those that have ended make room for the rest. What happens to a path
+/// follows from its own ray and its own random numbers alone.
+class Stream {
 public:
-    Walk(const Tracer& tracer, const Placement& at, const PathSettings& settings,
-         std::span<const PixelSampler> samplers, std::span<const std::uint32_t> sample, std::span<Rgb> radiance)
+    Stream(const Tracer& tracer, const Placement& at, const PathSettings& settings, const PathNumbers& numbers)
         : tracer_(tracer),
           scene_(tracer.scene()),
           lights_(tracer.lights()),
           at_(at),
           settings_(settings),
+          numbers_(numbers),
           group_(settings.direct ? Lights::Group::lights : Lights::Group::all),
-          samplers_(samplers),
-          sample_(sample),
-          radiance_(radiance) {}
+          sun_(lights_.sun() ? &*lights_.sun() : nullptr),
+          sun_has_extent_(sun_ != nullptr && !sun_->is_point()),
+          narrow_sun_(sun_ != nullptr && scene_.sun->angular_diameter_rad < kNarrowSun_rad),
+          guided_(settings.guided && sun_ != nullptr && !settings.direct),
+          emitters_(lights_.any(group_)),
+          receivers_(emitters_ || lights_.any_with_extent() || guided_),
+          sun_alone_(!lights_.any(Lights::Group::all) && !lights_.any_with_extent() && scene_.ambient == Rgb{}) {}
 
-    void run(std::span<const Ray> rays, std::span<const Hit> first) {
+    void run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance) {
+        radiance_ = radiance;
         leave_camera(rays, first);
         const int depth = settings_.direct ? 1 : settings_.max_depth;
         for (int met = 0;; ++met) {
             gather(met);
-            if (met == depth || going_ == 0) return;
-            prepare(met, met + 1 < depth);
-            ask_sun();
-            ask_emitters();
+            if (met == depth || n_ == 0) return;
+            ask(met, met + 1 < depth);
             if (settings_.direct && !lights_.any_with_extent()) return;
-            scatter(met);
-            tracer_.intersect(at_, hits_, directions_, going_, hits_);
+            scatter(met, met + 1 == depth);
+            trace();
         }
     }
+    [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
 
 private:
-    /// What a lane knows of its path.
-    struct Lane {
-        PathPoint point{};
-        Receiver start{};                  ///< of the ray on its way, and of light asked for at the point
-        Guide guide{};                     ///< of the next ray
-        double direction_pdf = kInfinity;  ///< with which the ray's direction was chosen
-        Rgb throughput{1, 1, 1};           ///< radiance at the camera per radiance along the ray
-        float radiance_scale = 1;          ///< the part of it that leaving a dense medium undoes
-        double length_m = 0;               ///< of the way from the camera to the point
-        SamplePoint choose_light{}, choose_direction{};
-    };
-
     void leave_camera(std::span<const Ray> rays, std::span<const Hit> first) {
-        const std::size_t n = std::min({rays.size(), first.size(), radiance_.size(), kPacket});
-        going_ = (1u << n) - 1;
-        for (const std::size_t i : EachLane(going_)) {
+        n_ = rays.size();
+        for (std::size_t i = 0; i < n_; ++i) {
             radiance_[i] = {};
             hits_[i] = first[i];
             directions_[i] = rays[i].direction;
-            lanes_[i].start = receiver_at(rays[i].origin);
+            paths_[i] = Path{};
+            paths_[i].ray = static_cast<std::uint32_t>(i);
+            if (receivers_) paths_[i].start = receiver_at(rays[i].origin);
         }
     }
 
     /// Adds what the rays have found, and makes ready the surfaces where they go on.
     void gather(int met) {
-        for (const std::size_t i : EachLane(going_)) {
-            Lane& lane = lanes_[i];
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < n_; ++i) {
+            Path& path = paths_[i];
             const bool escaped = hits_[i].body < 0;
             if (lights_.any_with_extent())
-                add(i, lights_.met_before(escaped ? kInfinity : hits_[i].range_m, at_, lane.start, group_,
-                                          directions_[i], lane.direction_pdf));
-            if (escaped) {
-                if (!settings_.direct) add(i, sky(lane, directions_[i]));
-                going_ &= ~bit(i);
-            } else if (met == 0 || !settings_.direct) {
-                arrive(i);
-            }
+                add(path, lights_.met_before(escaped ? kInfinity : hits_[i].range_m, at_, path.start, group_,
+                                             directions_[i], path.direction_pdf));
+            if (escaped && !settings_.direct) add(path, sky(path, directions_[i]));
+            if (escaped || (met > 0 && settings_.direct)) continue;
+            keep(i, kept);
+            arrive(kept++);
         }
+        n_ = kept;
     }
 
-    [[nodiscard]] Rgb sky(const Lane& lane, const Vec3& direction) const {
-        const std::optional<SunDisc>& sun = lights_.sun();
-        if (!sun || sun->is_point()) return scene_.ambient;
-        const double sun_pdf = sun->pdf(direction);
+    void keep(std::size_t from, std::size_t to) {
+        if (from == to) return;
+        paths_[to] = paths_[from];
+        hits_[to] = hits_[from];
+        directions_[to] = directions_[from];
+    }
+
+    [[nodiscard]] Rgb sky(const Path& path, const Vec3& direction) const {
+        if (!sun_has_extent_ || path.sun_asked) return scene_.ambient;
+        const double sun_pdf = sun_->pdf(direction);
         if (sun_pdf == 0) return scene_.ambient;
-        const float sunlight = static_cast<float>(power_heuristic(lane.direction_pdf, sun_pdf)) * sun->radiance();
+        const float sunlight = static_cast<float>(power_heuristic(path.direction_pdf, sun_pdf)) * sun_->radiance();
         return scene_.ambient + Rgb{sunlight, sunlight, sunlight};
     }
 
     void arrive(std::size_t i) {
-        Lane& lane = lanes_[i];
+        Path& path = paths_[i];
         const Hit& hit = hits_[i];
-        lane.length_m += hit.range_m;
-        lane.point = PathPoint(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * lane.length_m,
+        path.length_m += hit.range_m;
+        points_[i] = PathPoint(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * path.length_m,
                                !settings_.direct);
-        const Surface& surface = lane.point.surface();
+        const Surface& surface = points_[i].surface();
         if (surface.emission != Rgb{}) {
             const double light_pdf =
-                lane.direction_pdf == kInfinity ? 0 : lights_.pdf(at_, lane.start, group_, directions_[i], hit);
-            add(i, surface.emission * static_cast<float>(power_heuristic(lane.direction_pdf, light_pdf)));
+                path.direction_pdf == kInfinity ? 0 : lights_.pdf(at_, path.start, group_, directions_[i], hit);
+            add(path, surface.emission * static_cast<float>(power_heuristic(path.direction_pdf, light_pdf)));
         }
-        if (settings_.direct) add(i, scene_.ambient * ambient_reflectance(surface));
-        lane.start = receiver_at(at_, hit, lane.point.plane());
+        if (settings_.direct) add(path, scene_.ambient * ambient_reflectance(surface));
+        if (receivers_) path.start = receiver_at(at_, hit, points_[i].plane());
     }
 
-    /// Random numbers, and where the next rays had better go: to be known before light is asked for, as both ways
-    /// to find it are weighed against each other.
-    void prepare(int met, bool lit_surfaces_count) {
-        const auto group = static_cast<std::uint32_t>(1 + 2 * met);
-        for (const std::size_t i : EachLane(going_)) {
-            Lane& lane = lanes_[i];
-            lane.choose_direction = samplers_[i].point(sample_[i], group);
-            lane.choose_light = samplers_[i].point(sample_[i], group + 1);
-            const bool guided = lit_surfaces_count && lights_.sun() && !is_specular(*lane.point.surface().material);
-            lane.guide = guided ? Guide(tracer_, at_, lane.start) : Guide();
+    /// Random numbers of the packet that begins with this path.
+    void draw(std::size_t first, std::uint32_t group, Points& u) const {
+        const std::size_t n = std::min(kPacket, n_ - first);
+        Lanes<std::uint32_t> pixel{}, sample{};
+        for (std::size_t k = 0; k < n; ++k) {
+            pixel[k] = numbers_.pixel[paths_[first + k].ray];
+            sample[k] = numbers_.sample[paths_[first + k].ray];
         }
+        next_points(numbers_, n, pixel, sample, group, u);
+    }
+    static std::uint32_t direction_group(int met) { return static_cast<std::uint32_t>(1 + 2 * met); }
+    static std::uint32_t light_group(int met) { return static_cast<std::uint32_t>(2 + 2 * met); }
+
+    /// Light that the Sun and other emitters send straight to the points.
+    void ask(int met, bool lit_surfaces_count) {
+        to_sun_ = to_lights_ = to_bodies_ = 0;
+        Points u;
+        for (std::size_t first = 0; first < n_; first += kPacket) {
+            if (emitters_ || sun_has_extent_) draw(first, light_group(met), u);
+            for (std::size_t k = 0; k < kPacket && first + k < n_; ++k) {
+                const std::size_t i = first + k;
+                Path& path = paths_[i];
+                path.sun_asked = false;
+                path.guide = Guide();
+                if (points_[i].specular()) continue;
+                // To be known before light is asked for, as both ways to find it are weighed against each other.
+                if (guided_ && lit_surfaces_count) path.guide = Guide(tracer_, at_, path.start);
+                if (sun_ != nullptr) ask_sun(i, u[2][k], u[3][k]);
+                if (emitters_) ask_emitters(i, u[2][k], u[0][k], u[1][k]);
+            }
+        }
+        hear_sun();
+        hear_lights();
+        hear_bodies();
     }
 
     /// Density per solid angle with which `scatter` finds a direction that the BSDF alone finds with `bsdf_pdf`.
-    [[nodiscard]] double scatter_pdf(const Lane& lane, const Vec3& direction, double bsdf_pdf) const {
-        const double share = lane.guide.share();
+    [[nodiscard]] double scatter_pdf(const Path& path, const Vec3& direction, double bsdf_pdf) const {
+        const double share = path.guide.share();
         if (share == 0) return bsdf_pdf;
-        return (1 - share) * bsdf_pdf + share * lane.guide.pdf(tracer_, at_, lane.start, direction);
+        return (1 - share) * bsdf_pdf + share * path.guide.pdf(tracer_, at_, path.start, direction);
     }
 
-    /// Light from a point of the Sun's disc for each lane.
-    void ask_sun() {
-        if (!lights_.sun()) return;
-        const SunDisc& sun = *lights_.sun();
-        Lanes<Vec3> to_sun;
-        Lanes<Rgb> sunlit;
-        std::uint32_t wanted = 0;
-        for (const std::size_t i : EachLane(going_)) {
-            const Lane& lane = lanes_[i];
-            if (is_specular(*lane.point.surface().material)) continue;
-            to_sun[i] = sun.sample(lane.choose_light[2], lane.choose_light[3]);
-            const PathPoint::Response r = lane.point.respond(to_sun[i]);
-            if (r.f_cos == Rgb{}) continue;
-            // Rays find the disc as well, unless it is a point, or nothing beyond the first surface counts.
-            const bool alone = sun.is_point() || settings_.direct;
-            const double weight =
-                alone ? 1 : power_heuristic(sun.pdf(to_sun[i]), scatter_pdf(lane, to_sun[i], r.pdf));
-            sunlit[i] = r.f_cos * static_cast<float>(weight * static_cast<double>(sun.irradiance()) /
-                                                     dot(to_sun[i], sun.centre()));
-            wanted |= bit(i);
-        }
-        if (wanted == 0) return;
-        for (const std::size_t i : EachLane(wanted & ~tracer_.occluded(at_, hits_, to_sun, wanted)))
-            add(i, sunlit[i]);
+    /// A point of the Sun's disc.
+    void ask_sun(std::size_t i, double u, double v) {
+        const Vec3 to_sun = sun_has_extent_ ? sun_->sample(u, v) : sun_->centre();
+        // Rays find the disc as well, unless it is a point, or nothing beyond the first surface counts.
+        const bool alone = !sun_has_extent_ || settings_.direct || (narrow_sun_ && points_[i].has_no_lobe());
+        paths_[i].sun_asked = alone;
+        const PathPoint::Response r = points_[i].respond(to_sun);
+        if (r.f_cos == Rgb{}) return;
+        const double weight = alone ? 1 : power_heuristic(sun_->pdf(to_sun), scatter_pdf(paths_[i], to_sun, r.pdf));
+        const double arriving = weight * static_cast<double>(sun_->irradiance()) / dot(to_sun, sun_->centre());
+        Question& q = asked_of_sun_[to_sun_++];
+        q.path = i;
+        q.towards = to_sun;
+        q.range_m = kInfinity;
+        q.light = paths_[i].throughput * (r.f_cos * static_cast<float>(arriving));
     }
 
-    /// Light from a point of one of the other emitters for each lane.
-    void ask_emitters() {
-        if (!lights_.any(group_)) return;
-        Lanes<LightSample> samples;
-        Lanes<PathPoint::Response> responses;
+    /// A point of one of the other emitters.
+    void ask_emitters(std::size_t i, double choice, double u, double v) {
+        const Path& path = paths_[i];
+        const std::optional<LightSample> light = lights_.sample(at_, path.start, group_, choice, u, v);
+        if (!light) return;
+        const PathPoint::Response r = points_[i].respond(light->direction);
+        if (r.f_cos == Rgb{}) return;
+        const double pdf = scatter_pdf(path, light->direction, r.pdf);
+        Question& q = light->body < 0 ? asked_of_lights_[to_lights_++] : asked_of_bodies_[to_bodies_++];
+        q.path = i;
+        q.towards = light->direction;
+        q.light = path.throughput * r.f_cos;
+        q.scatter_pdf = pdf;
+        q.body = light->body;
+        q.face = light->face;
+        q.range_m = light->body < 0 ? light->range_m : kInfinity;
+        if (light->body >= 0) return;
+        q.light = q.light * light->radiance_per_pdf * static_cast<float>(power_heuristic(light->pdf, pdf));
+    }
+
+    /// A packet of questions and where they start.
+    struct Asking {
+        Lanes<Hit> from;
         Lanes<Vec3> towards;
-        Lanes<double> range_m;
-        std::uint32_t to_lights = 0, to_bodies = 0;
-        for (const std::size_t i : EachLane(going_)) {
-            const Lane& lane = lanes_[i];
-            if (is_specular(*lane.point.surface().material)) continue;
-            const auto& [u, v, choice, unused] = lane.choose_light;
-            const std::optional<LightSample> light = lights_.sample(at_, lane.start, group_, choice, u, v);
-            if (!light) continue;
-            responses[i] = lane.point.respond(light->direction);
-            if (responses[i].f_cos == Rgb{}) continue;
-            responses[i].pdf = scatter_pdf(lane, light->direction, responses[i].pdf);
-            samples[i] = *light;
-            towards[i] = light->direction;
-            range_m[i] = light->range_m;
-            (light->body < 0 ? to_lights : to_bodies) |= bit(i);
+        Lanes<double> range_m{};
+        std::uint32_t wanted = 0;
+    };
+    void put_together(const Room<Question>& questions, std::size_t first, std::size_t end, Asking& a) {
+        const std::size_t n = std::min(kPacket, end - first);
+        a.wanted = lanes_below(n);
+        for (std::size_t k = 0; k < n; ++k) {
+            const Question& q = questions[first + k];
+            a.from[k] = hits_[q.path];
+            a.towards[k] = q.towards;
+            a.range_m[k] = q.range_m;
         }
-        if (to_lights != 0) {
-            const std::uint32_t dark = tracer_.occluded(at_, hits_, towards, range_m, to_lights);
-            for (const std::size_t i : EachLane(to_lights & ~dark)) {
-                const double weight = power_heuristic(samples[i].pdf, responses[i].pdf);
-                add(i, responses[i].f_cos * samples[i].radiance_per_pdf * static_cast<float>(weight));
-            }
+        rays_traced_ += n;
+    }
+
+    void hear_sun() {
+        Asking a;
+        for (std::size_t first = 0; first < to_sun_; first += kPacket) {
+            put_together(asked_of_sun_, first, to_sun_, a);
+            const std::uint32_t dark = tracer_.occluded(at_, a.from, a.towards, a.wanted);
+            hear(asked_of_sun_, first, a.wanted & ~dark);
         }
-        if (to_bodies != 0) {
+    }
+    void hear_lights() {
+        Asking a;
+        for (std::size_t first = 0; first < to_lights_; first += kPacket) {
+            put_together(asked_of_lights_, first, to_lights_, a);
+            const std::uint32_t dark = tracer_.occluded(at_, a.from, a.towards, a.range_m, a.wanted);
+            hear(asked_of_lights_, first, a.wanted & ~dark);
+        }
+    }
+    void hear(const Room<Question>& questions, std::size_t first, std::uint32_t lit) {
+        for (std::size_t k = 0; k < kPacket; ++k)
+            if (is_set(lit, k)) radiance_[paths_[questions[first + k].path].ray] += questions[first + k].light;
+    }
+    void hear_bodies() {
+        Asking a;
+        for (std::size_t first = 0; first < to_bodies_; first += kPacket) {
+            put_together(asked_of_bodies_, first, to_bodies_, a);
             Lanes<Hit> found;
-            tracer_.intersect(at_, hits_, towards, to_bodies, found);
-            for (const std::size_t i : EachLane(to_bodies)) {
-                if (found[i].body != samples[i].body || found[i].face != samples[i].face) continue;
-                const double pdf = lights_.pdf(at_, lanes_[i].start, group_, towards[i], found[i]);
+            tracer_.intersect(at_, a.from, a.towards, a.wanted, found);
+            for (std::size_t k = 0; first + k < to_bodies_ && k < kPacket; ++k) {
+                const Question& q = asked_of_bodies_[first + k];
+                if (found[k].body != q.body || found[k].face != q.face) continue;
+                const Path& path = paths_[q.path];
+                const double pdf = lights_.pdf(at_, path.start, group_, q.towards, found[k]);
                 if (!(pdf > 0)) continue;  // met where the ray starts
-                const double weight = power_heuristic(pdf, responses[i].pdf);
-                add(i, responses[i].f_cos * emission(lanes_[i], towards[i], found[i]) *
-                           static_cast<float>(weight / pdf));
+                const double weight = power_heuristic(pdf, q.scatter_pdf);
+                radiance_[path.ray] +=
+                    q.light * emission(path, q.towards, found[k]) * static_cast<float>(weight / pdf);
             }
         }
     }
 
-    [[nodiscard]] Rgb emission(const Lane& lane, const Vec3& direction, const Hit& hit) const {
+    [[nodiscard]] Rgb emission(const Path& path, const Vec3& direction, const Hit& hit) const {
         const Material& m = scene_.materials[static_cast<std::size_t>(hit.material)];
         if (m.emission_texture < 0) return m.emission;
-        const double width_m = settings_.pixel_angle_rad * (lane.length_m + hit.range_m);
+        const double width_m = settings_.pixel_angle_rad * (path.length_m + hit.range_m);
         return surface_at(tracer_, at_, hit, direction, width_m).emission;
     }
 
-    /// Chooses where the paths go on, and ends some that would bring little.
-    void scatter(int met) {
-        for (const std::size_t i : EachLane(going_)) {
-            Lane& lane = lanes_[i];
-            const BsdfSample s = next_direction(lane);
-            lane.throughput = lane.throughput * s.weight;
-            lane.radiance_scale *= s.radiance_scale;
-            // Out of many shells of dense glass, one in another, it may outgrow single precision.
-            if (lane.throughput == Rgb{} || !is_finite(lane.throughput) || !survives(i, met)) {
-                going_ &= ~bit(i);
-                continue;
+    /// Chooses where the paths go on, and ends those that would bring little, or nothing.
+    void scatter(int met, bool last) {
+        std::size_t kept = 0;
+        Points u, roulette;
+        for (std::size_t first = 0; first < n_; first += kPacket) {
+            bool drawn = false;
+            draw(first, direction_group(met), u);
+            for (std::size_t k = 0; k < kPacket && first + k < n_; ++k) {
+                const std::size_t i = first + k;
+                Path& path = paths_[i];
+                if (last && sun_alone_ && path.sun_asked) continue;
+                const BsdfSample s = next_direction(i, {u[0][k], u[1][k], u[2][k], u[3][k]});
+                path.throughput = path.throughput * s.weight;
+                path.radiance_scale *= s.radiance_scale;
+                // Out of many shells of dense glass, one in another, it may outgrow single precision.
+                if (path.throughput == Rgb{} || !is_finite(path.throughput)) continue;
+                if (const float goes_on = chance(path, met + 1); goes_on < 1) {
+                    if (!drawn) draw(first, kRouletteGroup + static_cast<std::uint32_t>(met) / 4, roulette);
+                    drawn = true;
+                    if (roulette[static_cast<std::size_t>(met % 4)][k] >= static_cast<double>(goes_on)) continue;
+                    path.throughput = path.throughput / goes_on;
+                }
+                path.direction_pdf = s.pdf;
+                directions_[i] = s.l;
+                if (s.transmitted) {
+                    hits_[i] = other_side(hits_[i]);
+                    if (receivers_) path.start = receiver_at(at_, hits_[i], -points_[i].plane());
+                }
+                keep(i, kept++);
             }
-            directions_[i] = s.l;
-            lane.direction_pdf = s.pdf;
-            if (!s.transmitted) continue;
-            hits_[i] = other_side(hits_[i]);
-            lane.start = receiver_at(at_, hits_[i], -lane.point.plane());
         }
+        n_ = kept;
     }
 
-    [[nodiscard]] BsdfSample next_direction(const Lane& lane) const {
-        const auto& [u, v, lobe, choice] = lane.choose_direction;
-        const double share = lane.guide.share();
-        if (share == 0) return lane.point.scatter({lobe, u, v});
+    [[nodiscard]] BsdfSample next_direction(std::size_t i, const SamplePoint& numbers) const {
+        const auto& [u, v, lobe, choice] = numbers;
+        const Path& path = paths_[i];
+        const double share = path.guide.share();
+        if (share == 0) return points_[i].scatter({lobe, u, v});
         BsdfSample s;
         if (choice < share)
-            s.l = lane.guide.direction(tracer_, at_, lane.start, choice / share, u, v);
+            s.l = path.guide.direction(tracer_, at_, path.start, choice / share, u, v);
         else
-            s = lane.point.scatter({lobe, u, v});
-        const PathPoint::Response r = lane.point.respond(s.l);
-        s.pdf = scatter_pdf(lane, s.l, r.pdf);
+            s = points_[i].scatter({lobe, u, v});
+        const PathPoint::Response r = points_[i].respond(s.l);
+        s.pdf = scatter_pdf(path, s.l, r.pdf);
         s.weight = r.f_cos == Rgb{} ? Rgb{} : r.f_cos * static_cast<float>(1 / s.pdf);
         return s;
     }
 
-    /// Russian roulette: who survives carries the others' share.
-    bool survives(std::size_t i, int met) {
-        if (met + 1 < kSurfacesBeforeRoulette) return true;
-        Rgb& throughput = lanes_[i].throughput;
-        const float brings = std::max({throughput.x, throughput.y, throughput.z}) / lanes_[i].radiance_scale;
-        if (brings >= kFaint) return true;
-        const float chance = brings / kFaint;
-        const auto k = static_cast<std::uint32_t>(met + 1 - kSurfacesBeforeRoulette);
-        if (samplers_[i].point(sample_[i], kRouletteGroup + k / 4)[k % 4] >= static_cast<double>(chance))
-            return false;
-        throughput = throughput / chance;
-        return true;
+    /// Probability with which a path goes on behind so many surfaces; it then carries the share of those that end.
+    [[nodiscard]] float chance(const Path& path, int surfaces) const {
+        // What a wide Sun sends comes by two ways that make up for each other: neither is left to chance.
+        const bool in_the_dark = radiance_[path.ray] == Rgb{} || (sun_has_extent_ && !narrow_sun_);
+        if (in_the_dark && surfaces < kSurfacesInTheDark) return 1;
+        const Rgb& t = path.throughput;
+        const float brings = std::max({t.x, t.y, t.z}) / path.radiance_scale;
+        return std::min(1.0f, brings / (in_the_dark ? kFaintInTheDark : kFaint));
     }
 
-    void add(std::size_t i, const Rgb& radiance) { radiance_[i] += lanes_[i].throughput * radiance; }
+    void trace() {
+        for (std::size_t first = 0; first < n_; first += kPacket) {
+            const std::size_t n = std::min(kPacket, n_ - first);
+            const std::span<Hit> hits = hits_.from(first, n);
+            tracer_.intersect(at_, hits, directions_.from(first, n), lanes_below(n), hits);
+            rays_traced_ += n;
+        }
+    }
+
+    void add(const Path& path, const Rgb& radiance) { radiance_[path.ray] += path.throughput * radiance; }
 
     const Tracer& tracer_;
     const Scene& scene_;
     const Lights& lights_;
     const Placement& at_;
     const PathSettings& settings_;
+    const PathNumbers numbers_;
     const Lights::Group group_;
-    const std::span<const PixelSampler> samplers_;
-    const std::span<const std::uint32_t> sample_;
-    const std::span<Rgb> radiance_;
+    const SunDisc* const sun_;
+    const bool sun_has_extent_, narrow_sun_;
+    const bool guided_;     ///< some body may look small from another
+    const bool emitters_;   ///< beside the Sun
+    const bool receivers_;  ///< somebody asks where the points are
+    const bool sun_alone_;  ///< nothing else shines
+    std::span<Rgb> radiance_;
+    std::uint64_t rays_traced_ = 0;
 
-    std::uint32_t going_ = 0;  ///< lanes whose paths have not ended
-    Lanes<Lane> lanes_;
-    Lanes<Vec3> directions_;  ///< of the rays on their way
-    Lanes<Hit> hits_;         ///< where they start, then where they end
+    std::size_t n_ = 0;  ///< paths that have not ended
+    std::size_t to_sun_ = 0, to_lights_ = 0, to_bodies_ = 0;
+    Room<Path> paths_;
+    Room<PathPoint> points_;
+    Room<Vec3> directions_;  ///< of the rays on their way
+    Room<Hit> hits_;         ///< where they start, then where they end
+    Room<Question> asked_of_sun_, asked_of_lights_, asked_of_bodies_;
 };
 
 }  // namespace
 
-void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
-                   std::span<const Ray> rays, std::span<const Hit> first, std::span<const PixelSampler> samplers,
-                   std::span<const std::uint32_t> sample, std::span<Rgb> radiance) noexcept {
-    Walk(tracer, at, settings, samplers, sample, radiance).run(rays, first);
+std::uint64_t path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
+                            std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
+                            std::span<Rgb> radiance) noexcept {
+    std::uint64_t traced = 0;
+    for (std::size_t k = 0; k < rays.size(); k += kStream) {
+        const std::size_t n = std::min(kStream, rays.size() - k);
+        Stream stream(tracer, at, settings,
+                      {numbers.seed, numbers.frame, numbers.pixel.subspan(k, n), numbers.sample.subspan(k, n)});
+        stream.run(rays.subspan(k, n), first.subspan(k, n), radiance.subspan(k, n));
+        traced += stream.rays_traced();
+    }
+    return traced;
 }
 
 }  // namespace narpa

@@ -2,14 +2,17 @@
 ///
 /// Kajiya 1986 with next-event estimation towards the Sun, the lights and emissive surfaces, importance sampling of
 /// the BSDF and of bodies that look small (guide.h), and multiple importance sampling between the two by the power
-/// heuristic (Veach 1997); Russian roulette after the first bounces, by the path's throughput. Unbiased but for
-/// paths longer than max_depth. Kept light is never clamped.
+/// heuristic (Veach 1997); a narrow Sun on a surface without a lobe is left to the former alone. Russian roulette
+/// by the path's throughput, from the first bounce on where some light has been found. Unbiased but for paths
+/// longer than max_depth. Kept light is never clamped.
 ///
 /// The sky is the scene's ambient radiance, the same in all directions. It and the Sun's disc are seen where
 /// nothing is in the way, by the camera too.
 #pragma once
 
-#include "renderer/trace/sampler.h"
+#include <cstdint>
+#include <span>
+
 #include "renderer/trace/tracer.h"
 
 namespace narpa {
@@ -22,13 +25,23 @@ struct PathSettings {
     /// shadows, ambient_reflectance(surface) times it; black where nothing is hit. Lights with extent are seen, in
     /// mirrors too. max_depth is not read.
     bool direct = false;
+    /// Guide::may_help at this placement; false where it may not: nobody asks further.
+    bool guided = true;
 };
 
-/// Radiance, W m^-2 sr^-1, that comes back along up to kPacket rays whose first hits are known. `samplers` and
-/// `sample` say which random numbers each takes (the first four dimensions belong to the caller). Same values
-/// whatever stands in the other lanes. Thread-safe, allocates nothing.
-void path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
-                   std::span<const Ray> rays, std::span<const Hit> first, std::span<const PixelSampler> samplers,
-                   std::span<const std::uint32_t> sample, std::span<Rgb> radiance) noexcept;
+/// Which random numbers each ray takes: PixelSampler(seed, frame, pixel), and the place in its sequence. The first
+/// four dimensions belong to the caller.
+struct PathNumbers {
+    std::uint64_t seed = 0;
+    std::uint32_t frame = 0;
+    std::span<const std::uint32_t> pixel, sample;
+};
+
+/// Radiance, W m^-2 sr^-1, that comes back along rays whose first hits are known. Any number of them: from a few
+/// dozen up, packets stay full while paths end. Same values whatever the other rays are. Thread-safe, allocates
+/// nothing; takes 100 kB of stack. Returns the number of rays that it traced.
+std::uint64_t path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
+                            std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
+                            std::span<Rgb> radiance) noexcept;
 
 }  // namespace narpa

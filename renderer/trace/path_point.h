@@ -2,7 +2,9 @@
 #pragma once
 
 #include <limits>
+#include <numbers>
 
+#include "renderer/material/directions.h"
 #include "renderer/trace/shading.h"
 
 namespace narpa {
@@ -28,16 +30,27 @@ public:
           plane_(surface_.normal),
           view_(-ray_direction) {
         if (!fold) return;
-        const Vec3 flat = at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body;
-        plane_ = flat == hit.position ? hit.geometric_normal : hit.shading_normal;
+        plane_ = hit.geometric_normal;
+        if (hit.shading_normal != hit.geometric_normal) {
+            const Vec3 flat = at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body;
+            if (flat != hit.position) plane_ = hit.shading_normal;
+        }
         // Vertex normals that face away from the viewer say nothing of what he sees.
         if (dot(surface_.normal, view_) <= 0) surface_.normal = hit.geometric_normal;
         bent_ = surface_.normal != plane_;
+        plain_ = !bent_ && surface_.material->kind == Material::Kind::lambert && dot(plane_, view_) > 0;
     }
 
     [[nodiscard]] const Surface& surface() const noexcept { return surface_; }
     /// Normal of the plane, unit, on the viewer's side but for silhouettes of smooth meshes.
     [[nodiscard]] const Vec3& plane() const noexcept { return plane_; }
+
+    /// Does light turn in single directions only (bsdf.h)?
+    [[nodiscard]] bool specular() const noexcept { return is_specular(*surface_.material); }
+    /// Lambert's law alone, about whatever normal?
+    [[nodiscard]] bool has_no_lobe() const noexcept {
+        return surface_.material->kind <= Material::Kind::phong && surface_.specular == Rgb{};
+    }
 
     struct Response {
         Rgb f_cos{};     ///< BSDF times the cosine of the incidence, 1/sr
@@ -45,7 +58,9 @@ public:
     };
     /// For light from the unit direction l.
     [[nodiscard]] Response respond(const Vec3& l) const noexcept {
-        if (dot(l, plane_) <= 0) return {};
+        const double cosine = dot(l, plane_);
+        if (cosine <= 0) return {};
+        if (plain_) return {surface_.diffuse * kInvPi * static_cast<float>(cosine), cosine * std::numbers::inv_pi};
         const Response straight = unfolded(l);
         if (!bent_) return straight;
         const Response image = unfolded(folded(l));
@@ -54,6 +69,13 @@ public:
 
     /// Chooses where a path goes on. The density is infinite where nothing else could find the direction.
     [[nodiscard]] BsdfSample scatter(const std::array<double, 3>& u) const noexcept {
+        if (plain_) {
+            BsdfSample s;
+            s.l = narpa::folded(cosine_direction(plane_, u[1], u[2]), plane_);
+            s.pdf = dot(s.l, plane_) * std::numbers::inv_pi;
+            s.weight = surface_.diffuse;
+            return s;
+        }
         BsdfSample s = sample_bsdf(surface_, surface_.normal, view_, u);
         const Vec3 image = folded(s.l);
         if (s.specular)
@@ -66,6 +88,8 @@ public:
     }
 
 private:
+    static constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
+
     [[nodiscard]] Vec3 folded(const Vec3& l) const noexcept { return l - 2 * dot(l, plane_) * plane_; }
     [[nodiscard]] Response unfolded(const Vec3& l) const noexcept {
         const double cosine = dot(surface_.normal, l);
@@ -76,7 +100,8 @@ private:
 
     Surface surface_{};
     Vec3 plane_{}, view_{};
-    bool bent_ = false;  ///< the surface's normal is not the plane's
+    bool bent_ = false;   ///< the surface's normal is not the plane's
+    bool plain_ = false;  ///< Lambert's law about the plane's normal: most of most scenes
 };
 
 }  // namespace narpa

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <span>
 
 #include "base/vec3.h"
@@ -29,6 +31,31 @@ private:
     Vec3 sum_{};
     double mean_ = 0, deviations_ = 0;
     int n_ = 0;
+};
+
+/// The mean alone, and by how much its mean band moved when the number of samples last reached a power of two: a
+/// low-discrepancy sequence is at its best there, and what its doublings change tells how fast it converges.
+class PixelMean {
+public:
+    void add(const Rgb& radiance) {
+        sum_ += vec_cast<double>(radiance);
+        if (!std::has_single_bit(++n_)) return;
+        const float now = static_cast<float>(mean_band(mean()));
+        step_before_ = step_;
+        step_ = now - at_power_;
+        at_power_ = now;
+    }
+    [[nodiscard]] std::uint32_t count() const { return n_; }
+    [[nodiscard]] Vec3 mean() const { return sum_ / static_cast<double>(n_); }
+    /// From half as many samples to the last power of two; there must have been two samples.
+    [[nodiscard]] float step() const { return step_; }
+    /// The one before; there must have been four.
+    [[nodiscard]] float step_before() const { return step_before_; }
+
+private:
+    Vec3 sum_{};
+    std::uint32_t n_ = 0;
+    float at_power_ = 0, step_ = 0, step_before_ = 0;
 };
 
 /// Samples that the neighbours' common variance counts for in a pixel's own.

@@ -6,6 +6,7 @@
 
 #include "renderer/trace/lens.h"
 #include "renderer/trace/pixel_samples.h"
+#include "renderer/trace/sampler.h"
 
 namespace narpa {
 namespace {

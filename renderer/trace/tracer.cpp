@@ -143,10 +143,10 @@ Hit Tracer::intersect(const Placement& at, const Ray& ray, double t_max, int ski
                 if (!shape.mesh->intersect(o, d, batch[k].entry_m, nearest, met.mesh)) continue;
                 nearest = met.mesh.range_m;
             } else {
-                const auto crossing = shape.exact.first_crossing(o, d);
-                if (!crossing || crossing->range >= nearest) continue;
-                nearest = crossing->range;
-                met.outside = crossing->outside;
+                const Crossing crossing = shape.exact.first_crossing(o, d);
+                if (!(crossing.range < nearest)) continue;
+                nearest = crossing.range;
+                met.outside = crossing.outside;
             }
             hit.body = static_cast<int>(body);
             met.origin = o, met.direction = d;
@@ -186,12 +186,12 @@ bool Tracer::Impl::exact_hides(const Placement& at, std::size_t body, const Hit&
     const std::size_t own = static_cast<std::size_t>(from.body);
     const Shape& shape = shapes[body];
     const Rigid3& T = at.T_world_body[body];
-    const auto crossing =
+    const Crossing crossing =
         body == own    ? shape.exact.own_crossing(start, to_body(T.q, direction), from.outside)
         : shape.turned ? shape.exact.first_crossing(to_body(T.q, start_turned + (at.T_world_body[own].t - T.t)),
                                                     to_body(T.q, direction))
                        : shape.exact.first_crossing(start_turned + (at.T_world_body[own].t - T.t), direction);
-    return crossing && crossing->range < t_max;
+    return crossing.range < t_max;
 }
 
 const Lights& Tracer::lights() const noexcept {

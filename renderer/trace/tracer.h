@@ -104,10 +104,9 @@ public:
     [[nodiscard]] bool occluded(const Placement& at, const Hit& from, const Vec3& direction,
                                 double t_max) const noexcept;
 
-    /// Up to kPacket rays that run close together, as those of neighbouring pixels do: each as above with no end,
-    /// several times faster.
-    void intersect(const Placement& at, std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
-    /// The same, side by side. Only these `bodies` are looked at: those that the rays may meet.
+    /// Rays that run close together, as those of neighbouring pixels do, or of a LiDAR's firing: the nearest hit of
+    /// each as above with no end, several times faster. They may start anywhere. Only these `bodies` are looked at:
+    /// those that the rays may meet.
     void intersect(const Placement& at, const RayPacket& rays, std::span<const std::uint32_t> bodies,
                    HitPacket& hits) const noexcept;
     /// Which of the hits of `wanted` cannot see their light, each in a direction of its own without an end.

@@ -1,6 +1,7 @@
 /// renderer/trace/tracer_impl.h - what a Tracer holds, for its own source files.
 #pragma once
 
+#include <bit>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -11,6 +12,29 @@
 #include "renderer/trace/tracer.h"
 
 namespace narpa {
+
+struct WorldRays;
+
+/// Rays by the body that they meet, or leave.
+class BodyGroups {
+public:
+    struct Group {
+        std::size_t body;
+        std::uint32_t rays;
+    };
+    BodyGroups(const Lanes<int>& body, std::uint32_t rays) noexcept {
+        for (std::uint32_t rest = rays; rest != 0; rest &= ~groups_[n_++].rays) {
+            const int first = body[static_cast<std::size_t>(std::countr_zero(rest))];
+            groups_[n_] = {static_cast<std::size_t>(first), lanes_with(body, first) & rest};
+        }
+    }
+    [[nodiscard]] const Group* begin() const { return groups_.data(); }
+    [[nodiscard]] const Group* end() const { return groups_.data() + n_; }
+
+private:
+    Lanes<Group> groups_;
+    std::size_t n_ = 0;
+};
 
 struct Tracer::Impl {
     struct Shape {
@@ -47,16 +71,27 @@ struct Tracer::Impl {
     void finish(const Placement& at, const Meeting& met, Hit& hit) const noexcept;
     void finish_mesh(const Rigid3& T_world_body, const Meeting& met, Hit& hit) const noexcept;
     void finish_exact(const Rigid3& T_world_body, const Meeting& met, Hit& hit) const noexcept;
-    /// Nearest hits of the packet's rays whose bit is set in `wanted`, and of no others.
-    template <class Rays>
-    void nearest_hits(const Placement& at, const Rays& rays, std::uint32_t wanted,
-                      std::span<Hit> hits) const noexcept;
-    /// Those of `wanted` that cannot see as far as t_max(i).
-    template <class End>
-    [[nodiscard]] std::uint32_t hidden(const Placement& at, std::span<const Hit> from,
-                                       std::span<const Vec3> directions, std::uint32_t wanted,
-                                       const End& t_max) const noexcept;
-    class LeavingRays;
+
+    /// The nearest surface that each ray of a packet has met so far.
+    struct Found {
+        std::uint32_t met = 0;
+        Lanes<int> body;  ///< -1: none
+        MeshHits at;  ///< of an exact shape: range, direction, position and `inner`; nothing met: infinite range
+    };
+    void finish(const Placement& at, const Found& found, HitPacket& hits) const noexcept;
+    void finish_on_meshes(const Placement& at, const Found& found, const BodyGroups& groups,
+                          HitPacket& hits) const noexcept;
+
+    class Leaving;
+    /// Nearest hits of the packet's rays whose bit is set in `wanted`, among these bodies.
+    void nearest_hits(const Placement& at, const WorldRays& rays, std::uint32_t wanted,
+                      std::span<const std::uint32_t> bodies, Found& found) const noexcept;
+    /// Asks one body.
+    void look_at(const Placement& at, const WorldRays& rays, std::uint32_t body, std::uint32_t asked,
+                 MeshRays& local, Found& found) const noexcept;
+    /// Those of `wanted` that cannot see as far as `t_max`.
+    [[nodiscard]] std::uint32_t hidden(const Placement& at, const WorldRays& rays, const Lanes<double>& t_max,
+                                       std::uint32_t wanted) const noexcept;
 
     /// Where a ray starts that leaves the hit, in the frame of its body.
     [[nodiscard]] Vec3 departure(const Hit& from) const noexcept;

@@ -2,207 +2,326 @@
 #include <algorithm>
 #include <array>
 
+#include "base/each_isa.h"
 #include "renderer/trace/tracer_impl.h"
 
 namespace narpa {
+
+/// Rays in the world's axes. Where they start is held in two parts, as their sum would be rounded. All are finite,
+/// also those that are not asked.
+struct WorldRays {
+    embree::Run run;
+    const VecPerRay& direction;
+    const VecPerRay& base;                 ///< world: the ray's origin, or that of the body that it leaves
+    const VecPerRay& offset;               ///< on from there
+    const Lanes<int>* own = nullptr;       ///< the bodies that they leave; null: none
+    const VecPerRay* own_start = nullptr;  ///< in the frame of that body
+    std::uint32_t inside = 0;              ///< those that leave an inner side
+
+    /// From a body at `t`. Differences of positions come before anything else: a common offset of the whole scene
+    /// cancels.
+    [[nodiscard]] Vec3 origin_from(const Vec3& t, std::size_t i) const { return offset[i] + (base[i] - t); }
+    [[nodiscard]] std::uint32_t that_leave(std::uint32_t body) const {
+        return own == nullptr ? 0 : lanes_with(*own, static_cast<int>(body));
+    }
+};
+
 namespace {
 
 constexpr std::size_t kBatch = 32;  ///< bodies that are sorted at a time
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Rays through neighbouring pixels. Lanes beyond the last repeat the first.
-class CameraRays {
-public:
-    static constexpr embree::Run run = embree::Run::together;
+Lanes<double> for_all(double value) {
+    Lanes<double> lanes;
+    lanes.fill(value);
+    return lanes;
+}
+const Lanes<double> kNoEnd = for_all(kInfinity);
+const VecPerRay kNothing{};
 
-    CameraRays(const Placement& at, std::span<const Ray> rays) : at_(at) {
-        for (std::size_t i = 0; i < kPacket; ++i) {
-            const Ray& ray = rays[i < rays.size() ? i : 0];
-            origin_.put(i, ray.origin);
-            direction_.put(i, ray.direction);
-        }
+/// Where each ray enters the bounds of a body at `t`; infinity where it misses them. The rays that `leave` the body
+/// start inside.
+NARPA_EACH_ISA void enter(const WorldRays& rays, std::uint32_t leave, const Vec3& t, double bound_m,
+                          Lanes<double>& __restrict entry_m) {
+    const Lanes<int> own = masks_of(leave);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const double entry = bounding_entry(rays.origin_from(t, i), rays.direction[i], bound_m);
+        entry_m[i] = choose(own[i] != 0, 0, entry);
     }
-    [[nodiscard]] const VecPerRay& directions() const { return direction_; }
-    /// From the origin of this body, in the world's axes. Differences of positions come before anything else: a
-    /// common offset of the whole scene cancels.
-    [[nodiscard]] VecPerRay origins_from(std::size_t body) const { return origin_ - at_.T_world_body[body].t; }
-    /// Those that start on this body, and what differs for them.
-    [[nodiscard]] std::uint32_t leave(std::size_t) const { return 0; }
-    [[nodiscard]] Vec3 start(std::size_t) const { return {}; }
-    [[nodiscard]] bool outside(std::size_t) const { return true; }
-
-private:
-    const Placement& at_;
-    VecPerRay origin_, direction_;
-};
-
-}  // namespace
-
-/// Rays that leave surfaces. Each starts in the frame of its own body, which knows no distances but its own. Lanes
-/// that are not wanted hold some finite ray.
-class Tracer::Impl::LeavingRays {
-public:
-    static constexpr embree::Run run = embree::Run::apart;
-
-    LeavingRays(const Impl& impl, const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                std::uint32_t wanted)
-        : at_(at), wanted_(wanted) {
-        for (std::size_t i = 0; i < kPacket; ++i) {
-            direction_.put(i, is_set(wanted, i) ? directions[i] : Vec3{0, 0, 1});
-            own_[i] = -1;
-            if (!is_set(wanted, i)) continue;
-            own_[i] = from[i].body;
-            outside_ |= static_cast<std::uint32_t>(from[i].outside) << i;
-            start_[i] = impl.departure(from[i]);
-            start_turned_[i] = at.T_world_body[static_cast<std::size_t>(own_[i])].q * start_[i];
-        }
-    }
-    [[nodiscard]] const VecPerRay& directions() const { return direction_; }
-    [[nodiscard]] VecPerRay origins_from(std::size_t body) const {
-        VecPerRay o{};
-        for (std::size_t i = 0; i < kPacket; ++i)
-            if (is_set(wanted_, i)) {
-                const Vec3& own_at = at_.T_world_body[static_cast<std::size_t>(own_[i])].t;
-                o.put(i, start_turned_[i] + (own_at - at_.T_world_body[body].t));
-            }
-        return o;
-    }
-    [[nodiscard]] std::uint32_t leave(std::size_t body) const {
-        std::uint32_t bits = 0;
-        for (std::size_t i = 0; i < kPacket; ++i)
-            bits |= static_cast<std::uint32_t>(own_[i] == static_cast<int>(body)) << i;
-        return bits;
-    }
-    [[nodiscard]] const Vec3& start(std::size_t i) const { return start_[i]; }
-    [[nodiscard]] bool outside(std::size_t i) const { return is_set(outside_, i); }
-
-private:
-    const Placement& at_;
-    std::uint32_t wanted_, outside_ = 0;
-    VecPerRay direction_;
-    Lanes<int> own_;                    ///< the body that it leaves; -1: not wanted
-    Lanes<Vec3> start_, start_turned_;  ///< in the frame of that body, and turned into the world's axes
-};
-
-namespace {
-
-/// Where each ray enters the bounds of a body; infinity where it misses them.
-template <class Rays>
-Lanes<double> entries_into(const Rays& rays, std::size_t body, const VecPerRay& origin, double bound_m) {
-    Lanes<double> entry_m = bounding_entries(origin, rays.directions(), bound_m);
-    if (const std::uint32_t leave = rays.leave(body); leave != 0)  // they start inside
-        for (std::size_t i = 0; i < kPacket; ++i)
-            if (is_set(leave, i)) entry_m[i] = 0;
-    return entry_m;
 }
 
-/// The rays in the frame of a body that is `origin` away.
-template <class Rays>
-MeshRays rays_in_body(const Rays& rays, std::size_t body, const Quat& q_world_body, const VecPerRay& origin) {
-    MeshRays local;
-    local.origin = to_body(q_world_body, origin);
-    local.direction = to_body(q_world_body, rays.directions());
-    if (const std::uint32_t leave = rays.leave(body); leave != 0)
+/// The rays in the frame of a body.
+NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid3& T_world_body,
+                         MeshRays& __restrict local) {
+    const auto [x, y, z] = columns(T_world_body.q);  // the body's axes
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const Vec3 o = rays.origin_from(T_world_body.t, i), d = rays.direction[i];
+        local.origin.put(i, {dot(x, o), dot(y, o), dot(z, o)});
+        local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
+    }
+    local.inside = rays.inside & leave;
+    if (leave == 0) return;
+    const Lanes<int> own = masks_of(leave);
+    for (std::size_t i = 0; i < kPacket; ++i)
+        local.origin.put(i, choose(own[i] != 0, (*rays.own_start)[i], local.origin[i]));
+}
+
+/// Those of `asked` that meet the shape before their end. `leave`: those that leave it.
+NARPA_EACH_ISA std::uint32_t meet(const EllipsoidShape& shape, const MeshRays& rays, std::uint32_t leave,
+                                  std::uint32_t asked, MeshHits& __restrict hits) {
+    Lanes<double> range;
+    Lanes<int> met = masks_of(asked), inner;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const Crossing c = shape.first_crossing(rays.origin[i], rays.direction[i]);
+        range[i] = c.range;
+        inner[i] = c.outside ? 0 : -1;
+    }
+    if (leave != 0) {
+        const Lanes<int> own = masks_of(leave), inside = masks_of(rays.inside);
         for (std::size_t i = 0; i < kPacket; ++i) {
-            if (!is_set(leave, i)) continue;
-            local.origin.put(i, rays.start(i));
-            if (!rays.outside(i)) local.inside |= 1u << i;
-        }
-    return local;
-}
-
-template <class Rays>
-std::optional<Crossing> exact_crossing(const EllipsoidShape& shape, const Rays& rays, std::size_t body,
-                                       const MeshRays& local, std::size_t i) {
-    const Vec3 o = local.origin[i], d = local.direction[i];
-    return is_set(rays.leave(body), i) ? shape.own_crossing(o, d, rays.outside(i)) : shape.first_crossing(o, d);
-}
-
-}  // namespace
-
-template <class Rays>
-void Tracer::Impl::nearest_hits(const Placement& at, const Rays& rays, std::uint32_t wanted,
-                                std::span<Hit> hits) const noexcept {
-    struct Entries {
-        std::size_t body;
-        double nearest_m;  ///< of the packet
-        Lanes<double> entry_m;
-    };
-    struct Found {
-        int body = -1;
-        bool outside = true;
-    };
-    Lanes<Found> found;
-    Lanes<double> nearest;
-    nearest.fill(kInfinity);
-    Lanes<MeshHit> mesh_hits;
-    Lanes<Vec3> o_met, d_met;
-
-    std::array<Entries, kBatch> batch;
-    std::array<std::size_t, kBatch> order;
-    for (std::size_t next = 0; next < shapes.size();) {
-        // As for one ray: bounds about the bodies' origins first, nearest body first.
-        std::size_t m = 0;
-        for (; next < shapes.size() && m < kBatch; ++next) {
-            Entries& e = batch[m];
-            e = {next, kInfinity, entries_into(rays, next, rays.origins_from(next), shapes[next].bound_m)};
-            for (std::size_t i = 0; i < kPacket; ++i)
-                if (is_set(wanted, i) && e.entry_m[i] < nearest[i])
-                    e.nearest_m = std::min(e.nearest_m, e.entry_m[i]);
-            if (e.nearest_m == kInfinity) continue;
-            std::size_t k = m;
-            for (; k > 0 && batch[order[k - 1]].nearest_m > e.nearest_m; --k) order[k] = order[k - 1];
-            order[k] = m++;
-        }
-        for (std::size_t k = 0; k < m; ++k) {
-            const Entries& e = batch[order[k]];
-            std::uint32_t asked = 0;
-            for (std::size_t i = 0; i < kPacket; ++i)
-                asked |= static_cast<std::uint32_t>(e.entry_m[i] < nearest[i]) << i;
-            asked &= wanted;
-            if (asked == 0) continue;
-            const Shape& shape = shapes[e.body];
-            MeshRays local = rays_in_body(rays, e.body, at.T_world_body[e.body].q, rays.origins_from(e.body));
-            local.entry_m = e.entry_m;
-            local.t_max = nearest;
-            const std::uint32_t met =
-                shape.mesh != nullptr ? shape.mesh->intersect(local, asked, Rays::run, mesh_hits) : 0;
-            for (std::size_t i = 0; i < kPacket; ++i) {
-                if (!is_set(shape.mesh != nullptr ? met : asked, i)) continue;
-                Crossing crossing;
-                if (shape.mesh != nullptr) {
-                    crossing.range = mesh_hits[i].range_m;
-                } else {
-                    const auto exact = exact_crossing(shape.exact, rays, e.body, local, i);
-                    if (!exact || exact->range >= nearest[i]) continue;
-                    crossing = *exact;
-                }
-                nearest[i] = crossing.range;
-                found[i] = {static_cast<int>(e.body), crossing.outside};
-                o_met[i] = local.origin[i], d_met[i] = local.direction[i];
-            }
+            const bool again = own[i] != 0, within = inside[i] != 0;
+            const Crossing c = shape.own_crossing(rays.origin[i], rays.direction[i], !within);
+            range[i] = choose(again, c.range, range[i]);
+            inner[i] = again ? inside[i] : inner[i];
         }
     }
     for (std::size_t i = 0; i < kPacket; ++i) {
-        if (!is_set(wanted, i)) continue;
-        hits[i].body = found[i].body;
-        if (found[i].body < 0) continue;
-        hits[i].range_m = nearest[i];
-        finish(at, {o_met[i], d_met[i], mesh_hits[i], found[i].outside}, hits[i]);
+        const bool here = (met[i] != 0) & (range[i] < rays.t_max[i]);
+        const Vec3 position = rays.origin[i] + range[i] * rays.direction[i];
+        met[i] = -static_cast<int>(here);
+        hits.range_m[i] = choose(here, range[i], hits.range_m[i]);
+        hits.position.put(i, choose(here, position, hits.position[i]));
+    }
+    const std::uint32_t taken = bits_of(met);
+    hits.inner = (hits.inner & ~taken) | (bits_of(inner) & taken);
+    return taken;
+}
+
+/// Starts in the world's axes; and directions, but for rays that are not wanted some that are surely finite.
+NARPA_EACH_ISA void set_out(const PosePerRay& T_world_body, const VecPerRay& start, const VecPerRay& directions,
+                            std::uint32_t wanted, VecPerRay& __restrict offset, VecPerRay& __restrict direction) {
+    const Lanes<int> mine = masks_of(wanted);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        offset.put(i, T_world_body[i].q * start[i]);
+        direction.put(i, choose(mine[i] != 0, directions[i], {0, 0, 1}));
     }
 }
 
-void Tracer::intersect(const Placement& at, std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
-    const std::size_t n = std::min({rays.size(), hits.size(), kPacket});
-    if (n == 0) return;
-    impl_->nearest_hits(at, CameraRays(at, rays.first(n)), lanes_below(n), hits);
+std::uint32_t lanes_before(const Lanes<double>& entry_m, const Lanes<double>& end_m) {
+    Lanes<int> before;
+    for (std::size_t i = 0; i < kPacket; ++i) before[i] = -static_cast<int>(entry_m[i] < end_m[i]);
+    return bits_of(before);
 }
+
+/// What of a hit tells where rays start that leave it.
+struct Origins {
+    const Lanes<int>& body;
+    const Lanes<std::uint32_t>& face;
+    const VecPerRay& departure_body;
+    std::uint32_t outside;
+};
+
+}  // namespace
+
+/// Rays that leave surfaces. Each starts in the frame of its own body, which knows no distances but its own.
+class Tracer::Impl::Leaving {
+public:
+    Leaving(const Impl& impl, const Placement& at, const Origins& from, const VecPerRay& directions,
+            std::uint32_t wanted) noexcept
+        : inside_(wanted & ~from.outside) {
+        own_.fill(-1);
+        for (const auto& [body, mine] : BodyGroups(from.body, wanted)) {
+            for_each_lane(mine, [&](std::size_t i) { own_[i] = from.body[i]; });
+            if (const MeshScene* mesh = impl.shapes[body].mesh)
+                mesh->depart(from.face, from.departure_body, from.outside, mine, start_);
+            else
+                for_each_lane(mine, [&](std::size_t i) { start_.put(i, from.departure_body[i]); });
+            const Rigid3& T = at.T_world_body[body];
+            if (mine == wanted)
+                own_at_.fill(T);
+            else
+                for_each_lane(mine, [&](std::size_t i) { own_at_.put(i, T); });
+        }
+        set_out(own_at_, start_, directions, wanted, offset_, direction_);
+    }
+    [[nodiscard]] WorldRays rays() const noexcept {
+        return {embree::Run::apart, direction_, own_at_.t, offset_, &own_, &start_, inside_};
+    }
+
+private:
+    std::uint32_t inside_;
+    Lanes<int> own_;
+    VecPerRay start_{};
+    PosePerRay own_at_{};
+    VecPerRay offset_, direction_;
+};
+
+void Tracer::Impl::look_at(const Placement& at, const WorldRays& rays, std::uint32_t body, std::uint32_t asked,
+                           MeshRays& local, Found& found) const noexcept {
+    const std::uint32_t leave = rays.that_leave(body);
+    const Shape& shape = shapes[body];
+    turn(rays, leave, at.T_world_body[body], local);
+    local.t_max = found.at.range_m;
+    const std::uint32_t met = shape.mesh != nullptr ? shape.mesh->intersect(local, asked, rays.run, found.at)
+                                                    : meet(shape.exact, local, leave, asked, found.at);
+    if (met == 0) return;
+    const Lanes<int> here = masks_of(met);
+    for (std::size_t i = 0; i < kPacket; ++i) found.body[i] = here[i] != 0 ? static_cast<int>(body) : found.body[i];
+    found.met |= met;
+}
+
+void Tracer::Impl::nearest_hits(const Placement& at, const WorldRays& rays, std::uint32_t wanted,
+                                std::span<const std::uint32_t> bodies, Found& found) const noexcept {
+    found.met = found.at.inner = 0;
+    found.body.fill(-1);
+    found.at.range_m = kNoEnd;
+    MeshRays local;
+    const auto enter_body = [&](std::uint32_t body, Lanes<double>& entry_m) {
+        enter(rays, rays.that_leave(body), at.T_world_body[body].t, shapes[body].bound_m, entry_m);
+        return lanes_before(entry_m, found.at.range_m) & wanted;
+    };
+    if (bodies.size() == 1) {
+        const std::uint32_t asked = enter_body(bodies[0], local.entry_m);
+        if (asked != 0) look_at(at, rays, bodies[0], asked, local, found);
+        return;
+    }
+    struct Candidate {
+        std::uint32_t body;
+        double nearest_m;  ///< of the packet
+        Lanes<double> entry_m;
+    };
+    std::array<Candidate, kBatch> batch;
+    std::array<std::size_t, kBatch> order;
+    while (!bodies.empty()) {
+        // Bounds about the bodies' origins first, nearest body first.
+        std::size_t m = 0;
+        for (; !bodies.empty() && m < kBatch; bodies = bodies.subspan(1)) {
+            Candidate& c = batch[m];
+            c.body = bodies.front();
+            c.nearest_m = kInfinity;
+            const std::uint32_t asked = enter_body(c.body, c.entry_m);
+            if (asked == 0) continue;
+            for_each_lane(asked, [&](std::size_t i) { c.nearest_m = std::min(c.nearest_m, c.entry_m[i]); });
+            std::size_t k = m;
+            for (; k > 0 && batch[order[k - 1]].nearest_m > c.nearest_m; --k) order[k] = order[k - 1];
+            order[k] = m++;
+        }
+        for (std::size_t k = 0; k < m; ++k) {
+            const Candidate& c = batch[order[k]];
+            const std::uint32_t asked = lanes_before(c.entry_m, found.at.range_m) & wanted;
+            if (asked == 0) continue;
+            local.entry_m = c.entry_m;
+            look_at(at, rays, c.body, asked, local, found);
+        }
+    }
+}
+
+std::uint32_t Tracer::Impl::hidden(const Placement& at, const WorldRays& rays, const Lanes<double>& t_max,
+                                   std::uint32_t wanted) const noexcept {
+    MeshRays local;
+    local.t_max = t_max;
+    std::uint32_t dark = 0;
+    for (const std::uint32_t body : all_bodies) {
+        if (dark == wanted) break;
+        const Shape& shape = shapes[body];
+        const std::uint32_t leave = rays.that_leave(body);
+        enter(rays, leave, at.T_world_body[body].t, shape.bound_m, local.entry_m);
+        const std::uint32_t asked = lanes_before(local.entry_m, t_max) & wanted & ~dark;
+        if (asked == 0) continue;
+        turn(rays, leave, at.T_world_body[body], local);
+        if (shape.mesh != nullptr) {
+            dark |= shape.mesh->occluded(local, asked);
+        } else {
+            MeshHits nobody_looks;
+            dark |= meet(shape.exact, local, leave, asked, nobody_looks);
+        }
+    }
+    return dark;
+}
+
+void Tracer::intersect(const Placement& at, const RayPacket& rays, std::span<const std::uint32_t> bodies,
+                       HitPacket& hits) const noexcept {
+    if (bodies.empty() || rays.n == 0) {
+        hits.met = hits.outside = 0;
+        hits.body.fill(-1);
+        return;
+    }
+    Impl::Found found;
+    if (rays.n == kPacket) {
+        impl_->nearest_hits(at, {embree::Run::together, rays.direction, rays.origin, kNothing},
+                            lanes_below(kPacket), bodies, found);
+    } else {
+        RayPacket filled = rays;
+        for (std::size_t i = rays.n; i < kPacket; ++i) filled.put(i, rays[0]);
+        impl_->nearest_hits(at, {embree::Run::together, filled.direction, filled.origin, kNothing},
+                            lanes_below(rays.n), bodies, found);
+    }
+    impl_->finish(at, found, hits);
+}
+
+std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
+                               std::uint32_t wanted) const noexcept {
+    if (wanted == 0) return 0;
+    const Impl::Leaving leaving(*impl_, at, {from.body, from.face, from.departure_body, from.outside}, directions,
+                                wanted);
+    return impl_->hidden(at, leaving.rays(), kNoEnd, wanted);
+}
+
+namespace {
+
+/// The same of hits that do not lie side by side, and their directions.
+struct SideBySide {
+    SideBySide(std::span<const Hit> from, std::span<const Vec3> directions, std::uint32_t wanted) noexcept {
+        for_each_lane(wanted, [&](std::size_t i) {
+            body[i] = from[i].body;
+            face[i] = from[i].face;
+            departure_body.put(i, from[i].departure_body);
+            outside |= static_cast<std::uint32_t>(from[i].outside) << i;
+            direction.put(i, directions[i]);
+        });
+    }
+    [[nodiscard]] Origins origins() const noexcept { return {body, face, departure_body, outside}; }
+
+    Lanes<int> body;
+    Lanes<std::uint32_t> face;
+    VecPerRay departure_body, direction;
+    std::uint32_t outside = 0;
+};
+
+}  // namespace
 
 void Tracer::intersect(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
                        std::uint32_t wanted, std::span<Hit> hits) const noexcept {
-    const std::size_t n = std::min({from.size(), directions.size(), hits.size(), kPacket});
-    wanted &= lanes_below(n);
-    impl_->nearest_hits(at, Impl::LeavingRays(*impl_, at, from, directions, wanted), wanted, hits);
+    wanted &= lanes_below(std::min({from.size(), directions.size(), hits.size(), kPacket}));
+    if (wanted == 0) return;
+    const SideBySide starts(from, directions, wanted);
+    const Impl::Leaving leaving(*impl_, at, starts.origins(), starts.direction, wanted);
+    Impl::Found found;
+    HitPacket packet;
+    impl_->nearest_hits(at, leaving.rays(), wanted, impl_->all_bodies, found);
+    impl_->finish(at, found, packet);
+    for_each_lane(wanted & found.met, [&](std::size_t i) { hits[i] = packet[i]; });
+    for_each_lane(wanted & ~found.met, [&](std::size_t i) { hits[i].body = -1; });
+}
+
+std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                               std::uint32_t wanted) const noexcept {
+    wanted &= lanes_below(std::min({from.size(), directions.size(), kPacket}));
+    if (wanted == 0) return 0;
+    const SideBySide starts(from, directions, wanted);
+    const Impl::Leaving leaving(*impl_, at, starts.origins(), starts.direction, wanted);
+    return impl_->hidden(at, leaving.rays(), kNoEnd, wanted);
+}
+
+std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                               std::span<const double> t_max, std::uint32_t wanted) const noexcept {
+    wanted &= lanes_below(std::min({from.size(), directions.size(), t_max.size(), kPacket}));
+    if (wanted == 0) return 0;
+    const SideBySide starts(from, directions, wanted);
+    const Impl::Leaving leaving(*impl_, at, starts.origins(), starts.direction, wanted);
+    Lanes<double> ends{};
+    for_each_lane(wanted, [&](std::size_t i) { ends[i] = t_max[i]; });
+    return impl_->hidden(at, leaving.rays(), ends, wanted);
 }
 
 Hit HitPacket::operator[](std::size_t i) const {
@@ -225,69 +344,6 @@ void HitPacket::put(std::size_t i, const Hit& hit) {
     material[i] = hit.material;
     departure_body.put(i, hit.departure_body);
     beyond_body.put(i, hit.beyond_body);
-}
-
-void Tracer::intersect(const Placement& at, const RayPacket& rays, std::span<const std::uint32_t> bodies,
-                       HitPacket& hits) const noexcept {
-    hits.met = 0;
-    hits.body.fill(-1);
-    if (bodies.empty()) return;
-    Lanes<Ray> each;
-    Lanes<Hit> found;
-    for (std::size_t i = 0; i < rays.n; ++i) each[i] = rays[i];
-    intersect(at, std::span(each).first(rays.n), found);
-    for (std::size_t i = 0; i < rays.n; ++i) hits.put(i, found[i]);
-}
-
-std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
-                               std::uint32_t wanted) const noexcept {
-    Lanes<Hit> hits;
-    Lanes<Vec3> each;
-    for (std::size_t i = 0; i < kPacket; ++i)
-        if (is_set(wanted, i)) hits[i] = from[i], each[i] = directions[i];
-    return occluded(at, hits, each, wanted);
-}
-
-template <class End>
-std::uint32_t Tracer::Impl::hidden(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                                   std::uint32_t wanted, const End& t_max) const noexcept {
-    const LeavingRays rays(*this, at, from, directions, wanted);
-    std::uint32_t dark = 0;
-    for (std::size_t body = 0; body < shapes.size() && dark != wanted; ++body) {
-        const Shape& shape = shapes[body];
-        const VecPerRay origin = rays.origins_from(body);
-        const Lanes<double> entry_m = entries_into(rays, body, origin, shape.bound_m);
-        std::uint32_t asked = 0;
-        for (std::size_t i = 0; i < kPacket; ++i) asked |= static_cast<std::uint32_t>(entry_m[i] < t_max(i)) << i;
-        asked &= wanted & ~dark;
-        if (asked == 0) continue;
-        MeshRays local = rays_in_body(rays, body, at.T_world_body[body].q, origin);
-        if (shape.mesh != nullptr) {
-            local.entry_m = entry_m;
-            for (std::size_t i = 0; i < kPacket; ++i) local.t_max[i] = t_max(i);
-            dark |= shape.mesh->occluded(local, asked);
-            continue;
-        }
-        for (std::size_t i = 0; i < kPacket; ++i) {
-            if (!is_set(asked, i)) continue;
-            const auto crossing = exact_crossing(shape.exact, rays, body, local, i);
-            if (crossing && crossing->range < t_max(i)) dark |= 1u << i;
-        }
-    }
-    return dark;
-}
-
-std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                               std::uint32_t wanted) const noexcept {
-    wanted &= lanes_below(std::min({from.size(), directions.size(), kPacket}));
-    return impl_->hidden(at, from, directions, wanted, [](std::size_t) { return kInfinity; });
-}
-
-std::uint32_t Tracer::occluded(const Placement& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                               std::span<const double> t_max, std::uint32_t wanted) const noexcept {
-    wanted &= lanes_below(std::min({from.size(), directions.size(), t_max.size(), kPacket}));
-    return impl_->hidden(at, from, directions, wanted,
-                         [&](std::size_t i) { return is_set(wanted, i) ? t_max[i] : 0; });
 }
 
 }  // namespace narpa

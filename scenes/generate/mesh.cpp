@@ -123,7 +123,7 @@ void Mesh::polygon(const std::vector<Vec3>& corners, const Vec3& inside, double 
     for (std::uint32_t i = 2; i < points.size(); ++i) add_face(first, first + i - 1, first + i);
 }
 
-void Mesh::write_obj(const std::string& path, const std::string& mtl_name) const {
+void Mesh::write_obj(const std::string& path, const std::string& mtl_name, ObjParts wanted) const {
     Lines positions("v", 5), uvs("vt", 4), normals("vn", 3);
     std::map<std::pair<std::uint16_t, std::uint16_t>, std::string> groups;  // by part, then material
     for (const Face& face : faces_) {
@@ -131,8 +131,9 @@ void Mesh::write_obj(const std::string& path, const std::string& mtl_name) const
         out += 'f';
         for (const std::uint32_t index : face.vertices) {
             const Vertex& v = vertices_[index];
-            out += ' ' + std::to_string(positions.number({v.position.x, v.position.y, v.position.z})) + '/' +
-                   std::to_string(uvs.number({v.uv[0], v.uv[1]})) + '/' +
+            out += ' ' + std::to_string(positions.number({v.position.x, v.position.y, v.position.z}));
+            if (wanted == ObjParts::positions) continue;
+            out += '/' + std::to_string(uvs.number({v.uv[0], v.uv[1]})) + '/' +
                    std::to_string(normals.number({v.normal.x, v.normal.y, v.normal.z}));
         }
         out += '\n';

@@ -27,6 +27,12 @@ struct MaterialSpec {
     Vec3 emission{};  ///< W m^-2 sr^-1
 };
 
+/// What a face of an OBJ file names of its corners.
+enum class ObjParts : std::uint8_t {
+    all,        ///< position, texture coordinates, normal
+    positions,  ///< nothing else: a third of the size, for flat faces without textures
+};
+
 class Mesh {
 public:
     /// What follows is of this material, in the OBJ object `part`.
@@ -43,7 +49,7 @@ public:
 
     [[nodiscard]] std::size_t triangle_count() const { return faces_.size(); }
     /// Writes `path` (OBJ), which names `mtl_name`. Throws std::runtime_error where it cannot.
-    void write_obj(const std::string& path, const std::string& mtl_name) const;
+    void write_obj(const std::string& path, const std::string& mtl_name, ObjParts wanted = ObjParts::all) const;
 
 private:
     struct Vertex {

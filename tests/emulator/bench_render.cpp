@@ -78,6 +78,29 @@ TEST(BenchRender, AFailedComparisonEndsWithStatusOneAndSaysSo) {
     EXPECT_NE(document["faults"][0].get<std::string>().find("no slope"), std::string::npos) << document["faults"];
 }
 
+TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {
+    const Done done = bench("--scenes craft --quick --json", " 2>/dev/null");
+    EXPECT_EQ(done.status, 0);  // without --gates, whatever the ratios of such small pictures
+    const auto document = nlohmann::json::parse(done.out);
+    SCOPED_TRACE(document.dump(2));
+    const auto& craft = document["craft"];
+    EXPECT_NEAR(craft["covered"].get<double>(), 0.27, 0.02);
+    for (const char* time :
+         {"frame_s", "radiance_s", "detector_s", "far_s", "filled_s", "still_s", "moved_s", "load_s"})
+        EXPECT_GT(craft[time].get<double>(), 0) << time;
+    ASSERT_EQ(document["scenes"].size(), 1u);
+    double before = INFINITY;  // the plain loop's error falls from rung to rung: 1, 4, 16, 64 spp
+    int loops = 0;
+    for (const auto& rung : document["scenes"][0]["rungs"]) {
+        EXPECT_GT(rung["rays"].get<double>(), 0) << rung;
+        if (!rung["loop"].get<bool>()) continue;
+        EXPECT_LT(rung["rmse"]["value"].get<double>(), before);
+        before = rung["rmse"]["value"].get<double>();
+        ++loops;
+    }
+    EXPECT_EQ(loops, 4);
+}
+
 struct Mistake {
     const char* arguments;
     const char* words;  ///< must be in the message
@@ -98,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(All, BenchRenderMistake,
                                            Mistake{"--size 64", "--size 64, expected WIDTHxHEIGHT"},
                                            Mistake{"--size 64x0", "expected WIDTHxHEIGHT"},
                                            Mistake{"--size 64x64x64", "expected WIDTHxHEIGHT"},
-                                           Mistake{"--seeds 1", "--seeds"},
+                                           Mistake{"--seeds 1", "--seeds"}, Mistake{"--scenes moon", "--scenes"},
                                            Mistake{"--reference-spp 100", "multiple of 16"},
                                            Mistake{"--camera nadir", "no camera named \"nadir\""},
                                            Mistake{"nowhere.toml", "nowhere.toml"}));

@@ -27,6 +27,27 @@ TEST(Histogram, PercentilesAreWithinThreePercentOfTheSamples) {
     EXPECT_EQ(h.percentile_ns(1), h.max_ns());
 }
 
+TEST(Histogram, SignedPercentilesLieOnBothSidesOfTheMark) {
+    SignedHistogram h;
+    EXPECT_EQ(h.percentile_ns(0.5), 0);
+    std::vector<std::int64_t> all;
+    for (std::int64_t t = -9'000; t < 1'000; ++t) {
+        all.push_back(1000 * t);
+        h.add(all.back());
+    }
+    EXPECT_EQ(h.count(), all.size());
+    for (const double p : {0.001, 0.25, 0.5, 0.899, 0.91, 0.95, 0.999, 1.0}) {
+        const auto truth =
+            static_cast<double>(all[static_cast<std::size_t>(std::ceil(p * static_cast<double>(all.size()))) - 1]);
+        EXPECT_NEAR(h.percentile_ns(p), truth, 0.032 * std::abs(truth) + 1) << p;
+    }
+    EXPECT_EQ(h.max_ns(), static_cast<double>(all.back()));
+    SignedHistogram early;
+    early.add(-2'000);
+    early.add(-20);
+    EXPECT_EQ(early.max_ns(), -20);
+}
+
 TEST(Histogram, ExtremesHaveAPlace) {
     Histogram h;
     EXPECT_EQ(h.percentile_ns(0.5), 0);

@@ -43,7 +43,7 @@ TEST_P(RealBodies, AreSeenByCameraAndLidar) {
 
     CameraUnit camera(**world, 0);
     Aovs aovs;
-    camera.expose(0, 0, &aovs);
+    camera.expose(0, 0, 0, &aovs);
     std::size_t covered = 0, lit = 0;
     for (std::size_t i = 0; i < aovs.body.size(); ++i) {
         if (aovs.body[i] < 0) continue;

@@ -1,4 +1,9 @@
 // The real-time loop: it keeps step, takes no memory after its start, and does with late frames what it was told.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <thread>
 
 #include "tests/emulator/loop_support.h"
@@ -60,6 +65,74 @@ TEST_F(RealTime, AllocatesNothingAfterItsStart) {
     EXPECT_GT(emulator->lidars().front()->stats().packets, 100U);
 }
 
+TEST_F(RealTime, TouchesNoNewPageAfterItsStart) {
+    if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer's shadow memory faults";
+    RunOptions o;
+    o.duration_s = 1;
+    o.video = {{"nav", "none"}};
+    const auto emulator = start(small_scene("rate_hz = 50\ndetector = {exposure_s = 0.002, shot_noise = true}"), o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    const CameraStats& c = emulator->cameras().front()->stats();
+    EXPECT_EQ(c.frames + c.skipped, 50U);
+    EXPECT_EQ(emulator->page_faults().major, 0);
+    const auto refused = [](const std::string& note) { return note.find("not locked") != std::string::npos; };
+    if (std::ranges::none_of(emulator->notices(), refused)) {
+        EXPECT_LE(emulator->page_faults().minor, 8);  // of the C library, on first use
+    }
+}
+
+TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
+    const std::string fifo = folder_ / "nav.fifo";
+    ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+    const int reader = ::open(fifo.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    ASSERT_GE(reader, 0);
+    RunOptions o;
+    o.duration_s = 1;
+    o.video = {{"nav", fifo}};
+    // Twice as large as a pipe, so that it stands after the first frame.
+    std::string text = small_scene("rate_hz = 25");
+    text.replace(text.find("[64, 48]"), 8, "[512, 256]");
+    const auto emulator = start(text, o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    ::close(reader);
+    const CameraStats& c = emulator->cameras().front()->stats();
+    const VideoCounters sent = emulator->cameras().front()->sinks().front()->counters();
+    EXPECT_EQ(c.frames + c.skipped, 25U);
+    EXPECT_GT(c.handed_over, sent.written);  // the loop went on without the reader
+    EXPECT_EQ(sent.written + sent.ring_full + sent.no_reader + sent.failed, c.handed_over);
+}
+
+TEST_F(RealTime, ABudgetInTimeIsTheDeadlineOfTheHandOver) {
+    RunOptions o;
+    o.duration_s = 1;
+    o.video = {{"nav", "none"}};
+    o.log_folder = folder_ / "log";
+    std::string text = small_scene("rate_hz = 10");
+    text.replace(text.find("spp = 2"), 7, "budget_ms = 30");
+    const auto emulator = start(text, o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    const CameraStats& c = emulator->cameras().front()->stats();
+    EXPECT_EQ(c.frames + c.skipped, 10U);
+    EXPECT_EQ(c.late.count(), c.frames);
+    const std::string ledger = slurp(o.log_folder + "/nav.ledger.csv");
+    EXPECT_NE(ledger.find(",time,30000000,"), std::string::npos);
+    EXPECT_NE(ledger.find(",130000000,"), std::string::npos);  // frame 1: 100 ms and the budget
+}
+
+TEST_F(RealTime, ABudgetLongerThanAPeriodIsRefused) {
+    RunOptions o;
+    o.video = {{"nav", "none"}};
+    std::string text = small_scene("rate_hz = 10");
+    text.replace(text.find("spp = 2"), 7, "budget_ms = 101");
+    const auto emulator = Emulator::create(scene(text), o);
+    ASSERT_FALSE(emulator);
+    EXPECT_NE(emulator.error().text().find("at most the period of camera \"nav\", 100 ms"), std::string::npos)
+        << emulator.error().text();
+}
+
 TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
     RunOptions o;
     o.video = {{"nav", folder_ / "a.y4m"}};
@@ -86,12 +159,28 @@ TEST_P(LateFrames, AreTreatedAsTheSceneSays) {
     RunOptions o;
     o.duration_s = 0.2;
     o.video = {{"nav", folder_ / "late.y4m"}};
+    o.log_folder = folder_ / "log";
     const auto emulator = start(small_scene("rate_hz = 10000\nlate_policy = \"" + policy + "\""), o);
     ASSERT_TRUE(emulator);
     ASSERT_TRUE(emulator->run(stop_));
     const CameraStats& c = emulator->cameras().front()->stats();
     EXPECT_GT(c.frames, 0U);
     EXPECT_EQ(c.deadline_missed, c.frames);
+    EXPECT_EQ(c.late.count(), c.frames);
+    EXPECT_GT(c.late.percentile_ns(0.0), 0);
+    EXPECT_EQ(c.repeated, policy == "repeat" ? c.frames : 0U);
+    EXPECT_EQ(c.blanked, policy == "blank" ? c.frames : 0U);
+    // The ledger says what was handed over in each frame's place.
+    std::ifstream ledger(o.log_folder + "/nav.ledger.csv");
+    std::string line;
+    std::getline(ledger, line);
+    std::uint64_t lines = 0;
+    const std::string delivery = policy == "late"     ? ",0,frame,"
+                                 : policy == "drop"   ? ",0,nothing,"
+                                 : policy == "repeat" ? ",0,repeated,"
+                                                      : ",0,blank,";
+    for (; std::getline(ledger, line); ++lines) EXPECT_NE(line.find(delivery), std::string::npos) << line;
+    EXPECT_EQ(lines, c.frames);
     EXPECT_EQ(c.ledgers_lost, 0U);  // without a bus nobody waits for them
     EXPECT_EQ(c.frames + c.skipped, 2'000U);
     EXPECT_EQ(c.handed_over, policy == "drop" ? 0U : c.frames);

@@ -114,7 +114,14 @@ TEST(CanDbc, CanmatrixDecodesWhatWeEncode) {
     ledger.frame = 123456789;
     ledger.pose_counter = 200;
     ledger.pose_stale = true;
-    ledger.samples_per_pixel = 64;
+    ledger.delivery = Delivery::repeated;
+    ledger.step = 3;
+    ledger.budget_kind = BudgetKind::time;
+    ledger.budget = 60'000'000;
+    ledger.samples = 19'699'200;
+    ledger.rays = 41'234'567;
+    ledger.passes = {307'200, 19'392'000};
+    ledger.samples_per_pixel = 64.125f;
     ledger.expected_error = 0.0078125f;
     ledger.t_exposure_mid_ns = 5'000'000'000;
     ledger.t_pose_ns = 4'990'000'000;
@@ -148,9 +155,13 @@ TEST(CanDbc, CanmatrixDecodesWhatWeEncode) {
         {"PoseTime", "4990000000"},     {"ExposureStart", "-5000"},
         {"ExposureEnd", "5000"},        {"RenderStart", "5100"},
         {"RenderEnd", "55000"},         {"HandOver", "56000"},
-        {"Deadline", "100000"},         {"SamplesPerPixel", "64"},
-        {"ExpectedError", "0.0078125"}, {"PoseStale", "1"},
-        {"DeadlineMet", "1"},           {"PoseKnown", "1"}};
+        {"Deadline", "100000"},         {"SamplesPerPixel", "64.125"},
+        {"ExpectedError", "0.0078126"}, {"PoseStale", "1"},
+        {"DeadlineMet", "1"},           {"PoseKnown", "1"},
+        {"Step", "coarse_2"},           {"BudgetKind", "time"},
+        {"Delivery", "repeated"},       {"Passes", "2"},
+        {"Samples", "19699200"},        {"Rays", "41234567"},
+        {"Budget", "60000000"}};
     for (const Signal& s : kLedgerSignals) {
         const std::string signal(s.name), classic(kLedgerFrames[s.classic.frame]);
         EXPECT_EQ(got["Camera0_Ledger." + signal], quantities.at(signal));

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "protocols/can/messages.h"
@@ -17,8 +18,15 @@ FrameLedger random_ledger(std::mt19937_64& rng) {
     l.pose_counter = static_cast<std::uint8_t>(rng());
     l.pose_stale = rng() % 2 == 0;
     l.deadline_met = rng() % 2 == 0;
-    l.samples_per_pixel = static_cast<std::uint16_t>(rng());
-    l.expected_error = static_cast<float>(static_cast<double>(up_to(1'000'000)) / 1e7);
+    l.delivery = static_cast<Delivery>(up_to(4));
+    l.step = static_cast<std::uint8_t>(up_to(6));
+    l.budget_kind = static_cast<BudgetKind>(up_to(3));
+    l.budget = static_cast<std::uint64_t>(up_to(std::int64_t{1} << 40));
+    l.samples = static_cast<std::uint64_t>(up_to(std::int64_t{1} << 40));
+    l.rays = static_cast<std::uint64_t>(up_to(std::int64_t{1} << 40));
+    l.samples_per_pixel = static_cast<float>(up_to(1 << 24)) / 256;
+    l.expected_error =
+        up_to(4) == 0 ? -1.0F : static_cast<float>(static_cast<double>(up_to(1'000'000)) / kExpectedErrorSteps);
     l.t_exposure_mid_ns = 1'000'000'000 + up_to(std::int64_t{1} << 50);
     l.t_pose_ns = l.t_exposure_mid_ns - up_to(100'000'000);
     for (std::int64_t* t : {&l.t_exposure_start_ns, &l.t_exposure_end_ns, &l.t_render_start_ns, &l.t_render_end_ns,
@@ -72,6 +80,39 @@ TEST(CanLedger, OffsetsRoundAndSaturate) {
     EXPECT_EQ(out.t_exposure_end_ns, sent.t_exposure_mid_ns + 2'000);
     EXPECT_EQ(out.t_render_start_ns, sent.t_exposure_mid_ns - 8'388'607'000);
     EXPECT_EQ(out.t_render_end_ns, sent.t_exposure_mid_ns + 8'388'607'000);
+}
+
+TEST(CanLedger, CountsAndErrorsSaturate) {
+    FrameLedger sent, out;
+    sent.samples = UINT64_MAX;
+    sent.rays = std::uint64_t{1} << 40;
+    sent.budget = (std::uint64_t{1} << 40) - 1;
+    sent.samples_per_pixel = 1e9F;
+    sent.expected_error = INFINITY;
+    sent.passes = {1000, 2000, 3000};
+    LedgerDecoder decoder;
+    ASSERT_EQ(decoder.accept(encode_fd(sent), 0, out), DecodeStatus::complete);
+    EXPECT_EQ(out.samples, (std::uint64_t{1} << 40) - 1);
+    EXPECT_EQ(out.rays, (std::uint64_t{1} << 40) - 1);
+    EXPECT_EQ(out.budget, (std::uint64_t{1} << 40) - 1);
+    EXPECT_FLOAT_EQ(out.samples_per_pixel, 65536.0F - 1.0F / 256);
+    EXPECT_FLOAT_EQ(out.expected_error, 8'388'607 / 5e6F);
+    sent.expected_error = NAN;  // no number is no estimate
+    sent.samples_per_pixel = NAN;
+    sent.frame = 1;
+    ASSERT_EQ(decoder.accept(encode_fd(sent), 0, out), DecodeStatus::complete);
+    EXPECT_LT(out.expected_error, 0);
+    EXPECT_EQ(out.samples_per_pixel, 0);
+}
+
+TEST(CanLedger, RefusesChoicesThatNobodyKnows) {
+    FrameLedger sent, out;
+    sent.step = 6;
+    LedgerDecoder decoder;
+    EXPECT_EQ(decoder.accept(encode_fd(sent), 0, out), DecodeStatus::not_a_number);
+    sent.step = 5;
+    sent.budget_kind = static_cast<BudgetKind>(3);
+    EXPECT_EQ(decoder.accept(encode_fd(sent), 0, out), DecodeStatus::not_a_number);
 }
 
 TEST(CanLedger, EachCameraHasItsOwnIdentifiers) {

@@ -10,7 +10,7 @@
 namespace narpa {
 namespace {
 
-using Row = std::array<std::uint8_t, 100>;
+using Row = std::array<std::uint8_t, 160>;
 
 FrameLedger random_ledger(std::mt19937_64& random) {
     const auto any_time = [&] { return static_cast<std::int64_t>(random()); };
@@ -20,7 +20,13 @@ FrameLedger random_ledger(std::mt19937_64& random) {
     l.pose_counter = static_cast<std::uint8_t>(random());
     l.pose_stale = random() % 2 == 0;
     l.deadline_met = random() % 2 == 0;
-    l.samples_per_pixel = static_cast<std::uint16_t>(random());
+    l.step = static_cast<std::uint8_t>(random() % kStepNames.size());
+    l.budget_kind = static_cast<BudgetKind>(random() % kBudgetKinds.size());
+    l.budget = random();
+    l.samples = random();
+    l.rays = random();
+    for (std::uint32_t& samples : l.passes) samples = static_cast<std::uint32_t>(random());
+    l.samples_per_pixel = static_cast<float>(random() % 1'000'000) / 1000.0F;
     l.expected_error = static_cast<float>(random() % 1000) / 1000.0F;
     l.t_pose_ns = any_time();
     l.t_exposure_start_ns = any_time();
@@ -33,7 +39,8 @@ FrameLedger random_ledger(std::mt19937_64& random) {
     return l;
 }
 
-// The table of protocols/video/README.md; the CRC is Python's zlib.crc32 of the first 84 bytes.
+// The table of protocols/video/README.md; the bytes are Python's struct.pack, the CRC its zlib.crc32 of the first
+// 144.
 TEST(EmbeddedLine, HasTheDocumentedBytes) {
     FrameLedger l;
     l.frame = 0x01020304;
@@ -41,7 +48,13 @@ TEST(EmbeddedLine, HasTheDocumentedBytes) {
     l.pose_counter = 6;
     l.pose_stale = true;
     l.deadline_met = true;
-    l.samples_per_pixel = 0x0708;
+    l.step = 4;
+    l.budget_kind = BudgetKind::time;
+    l.samples_per_pixel = 2.25F;
+    l.samples = 0x1112131415161718;
+    l.rays = 0x2122;
+    l.budget = 0x3132;
+    l.passes = {0x41424344, 2, 3, 4, 5, 6, 7, 0x51525354};
     l.expected_error = 1.5F;
     l.t_pose_ns = -2;
     l.t_exposure_start_ns = 1;
@@ -54,15 +67,17 @@ TEST(EmbeddedLine, HasTheDocumentedBytes) {
     Row row;
     row.fill(0xEE);
     ASSERT_TRUE(encode_embedded_line(l, row));
-    const std::array<std::uint8_t, 100> expected{
-        'N',  'R',  'P',  'A',  1,    88,   5,    6,    3,    0,    0x08, 0x07, 0x04, 0x03,
-        0x02, 0x01, 0,    0,    0xC0, 0x3F, 0xFE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,  //
-        1,    0,    0,    0,    0,    0,    0,    0,    2,    0,    0,    0,    0,    0,
-        0,    0,    3,    0,    0,    0,    0,    0,    0,    0,  //
-        4,    0,    0,    0,    0,    0,    0,    0,    5,    0,    0,    0,    0,    0,
-        0,    0,    0,    0,    0,    0,    0,    0,    0,    0,                  //
-        0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11, 0xB4, 0x39, 0x6F, 0xC7,   //
-        0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE};  // still image
+    Row expected{0x4E, 0x52, 0x50, 0x41, 0x02, 0x94, 0x05, 0x06, 0x03, 0x04, 0x02, 0x00, 0x04, 0x03, 0x02,
+                 0x01, 0x00, 0x00, 0x10, 0x40, 0x00, 0x00, 0xC0, 0x3F, 0x18, 0x17, 0x16, 0x15, 0x14, 0x13,
+                 0x12, 0x11, 0x22, 0x21, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x32, 0x31, 0x00, 0x00, 0x00,
+                 0x00, 0x00, 0x00, 0x44, 0x43, 0x42, 0x41, 0x02, 0x00, 0x00, 0x00, 0x03, 0x00, 0x00, 0x00,
+                 0x04, 0x00, 0x00, 0x00, 0x05, 0x00, 0x00, 0x00, 0x06, 0x00, 0x00, 0x00, 0x07, 0x00, 0x00,
+                 0x00, 0x54, 0x53, 0x52, 0x51, 0xFE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x01, 0x00,
+                 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x03,
+                 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+                 0x05, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+                 0x00, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11, 0xDD, 0x02, 0xA5, 0x8A};
+    std::fill(expected.begin() + kEmbeddedLineBytes, expected.end(), 0xEE);  // still image
     EXPECT_EQ(row, expected);
 }
 
@@ -100,6 +115,18 @@ TEST(EmbeddedLine, AnyOneWrongBitIsFound) {
     }
     row[kEmbeddedLineBytes] ^= 1;  // the image beside it is nobody's business
     EXPECT_TRUE(decode_embedded_line(row));
+}
+
+TEST(EmbeddedLine, ChoicesThatNobodyKnowsAreRefused) {
+    Row row{};
+    FrameLedger ledger;
+    ledger.step = 6;
+    ASSERT_TRUE(encode_embedded_line(ledger, row));
+    EXPECT_FALSE(decode_embedded_line(row));
+    ledger.step = 5;
+    ledger.budget_kind = static_cast<BudgetKind>(3);
+    ASSERT_TRUE(encode_embedded_line(ledger, row));
+    EXPECT_FALSE(decode_embedded_line(row));
 }
 
 }  // namespace

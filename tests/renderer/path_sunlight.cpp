@@ -87,10 +87,8 @@ TEST(SunDisc, GlossySurfacesHaveNoFireflies) {
             double sum = 0, squares = 0;
             const int samples = 4096;
             for (int k = 0; k < samples; ++k) {
-                const PixelSampler sampler(7, 0, static_cast<std::uint32_t>(k));
-                Rgb radiance;
-                path_radiance(*tracer, at, kDirectLight, std::span(&ray, 1), std::span(&first, 1),
-                              std::span(&sampler, 1), the_same(0), std::span(&radiance, 1));
+                const Rgb radiance =
+                    light_along(*tracer, at, ray, first, kDirectLight, 7, static_cast<std::uint32_t>(k), 0);
                 sum += static_cast<double>(radiance.x);
                 squares += std::pow(static_cast<double>(radiance.x), 2);
             }
@@ -186,15 +184,16 @@ Scene workshop() {
 }
 
 constexpr int kSide = 12;
-/// An image of the workshop, its pixels `lanes` at a time.
-std::vector<Rgb> picture(const Tracer& tracer, const Placement& at, const Vec3& offset, std::size_t lanes,
+/// An image of the workshop, its pixels `together` at a time.
+std::vector<Rgb> picture(const Tracer& tracer, const Placement& at, const Vec3& offset, std::size_t together,
                          const PathSettings& settings = {}) {
     std::vector<Rgb> pixels(kSide * kSide);
-    tbb::parallel_for(std::size_t{0}, (pixels.size() + lanes - 1) / lanes, [&](std::size_t block) {
-        const std::size_t from = block * lanes, n = std::min(lanes, pixels.size() - from);
-        std::array<Ray, kPacket> rays;
-        std::array<Hit, kPacket> first;
-        std::vector<PixelSampler> samplers;
+    tbb::parallel_for(std::size_t{0}, (pixels.size() + together - 1) / together, [&](std::size_t block) {
+        const std::size_t from = block * together, n = std::min(together, pixels.size() - from);
+        std::vector<Ray> rays(n);
+        std::vector<Hit> first(n);
+        std::vector<Rgb> radiance(n);
+        std::vector<std::uint32_t> number(n), sample(n);
         for (std::size_t i = 0; i < n; ++i) {
             const std::size_t pixel = from + i;
             const double x = static_cast<double>(pixel % kSide) / kSide - 0.5,
@@ -202,19 +201,18 @@ std::vector<Rgb> picture(const Tracer& tracer, const Placement& at, const Vec3& 
             rays[i] = ray_to({3, -3, 3}, {3 * (x + y), 3 * (x - y), 0.5});
             rays[i].origin += offset;
             first[i] = tracer.intersect(at, rays[i], kInfinity);
-            samplers.emplace_back(3, 0, static_cast<std::uint32_t>(pixel));
+            number[i] = static_cast<std::uint32_t>(pixel);
         }
         for (std::uint32_t s = 0; s < 8; ++s) {
-            std::array<Rgb, kPacket> radiance;
-            path_radiance(tracer, at, settings, std::span(rays).first(n), std::span(first).first(n), samplers,
-                          the_same(s), radiance);
+            sample.assign(n, s);
+            path_radiance(tracer, at, settings, rays, first, {3, 0, number, sample}, radiance);
             for (std::size_t i = 0; i < n; ++i) pixels[from + i] += radiance[i];
         }
     });
     return pixels;
 }
 
-TEST(PathRadiance, OfALaneDoesNotDependOnItsNeighboursNorOnThreads) {
+TEST(PathRadiance, OfARayDoesNotDependOnItsNeighboursNorOnThreads) {
     const Scene s = workshop();
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
@@ -226,8 +224,9 @@ TEST(PathRadiance, OfALaneDoesNotDependOnItsNeighboursNorOnThreads) {
         lit += p != Rgb{};
     }
     EXPECT_GT(lit, 100);
-    for (const std::size_t lanes : {std::size_t{1}, std::size_t{3}, std::size_t{8}})
-        EXPECT_EQ(picture(*tracer, at, {}, lanes), expected) << lanes;
+    // Within a packet, within what travels together, and beyond.
+    for (const std::size_t together : {1UL, 3UL, 8UL, 40UL, 128UL, 144UL})
+        EXPECT_EQ(picture(*tracer, at, {}, together), expected) << together;
     for (const int threads : {1, 2, 7}) {
         tbb::task_arena arena(threads);
         arena.execute([&] { EXPECT_EQ(picture(*tracer, at, {}, kPacket), expected) << threads; });
@@ -242,12 +241,7 @@ TEST(PathRadiance, AllocatesNothing) {
     const Placement at = placed(s);
     const Ray ray = ray_to({3, -3, 3}, {0.5, -0.75, 0.5});
     const Hit first = tracer->intersect(at, ray, kInfinity);
-    const PixelSampler sampler(1, 0, 0);
-    Rgb radiance;
-    const auto trace = [&](std::uint32_t sample) {
-        path_radiance(*tracer, at, {}, std::span(&ray, 1), std::span(&first, 1), std::span(&sampler, 1),
-                      the_same(sample), std::span(&radiance, 1));
-    };
+    const auto trace = [&](std::uint32_t sample) { light_along(*tracer, at, ray, first, {}, 1, 0, sample); };
     trace(0);
     const AllocationCounter counter;
     for (std::uint32_t k = 1; k < 64; ++k) trace(k);

@@ -18,6 +18,22 @@ inline Lanes<std::uint32_t> the_same(std::uint32_t sample) {
     all.fill(sample);
     return all;
 }
+/// 0, 1, 2 ...: a pixel of its own for each lane.
+inline const Lanes<std::uint32_t> kOwnPixels = [] {
+    Lanes<std::uint32_t> all;
+    for (std::uint32_t i = 0; i < kPacket; ++i) all[i] = i;
+    return all;
+}();
+
+/// Radiance along one ray by one sample.
+inline Rgb light_along(const Tracer& tracer, const Placement& at, const Ray& ray, const Hit& first,
+                       const PathSettings& settings, std::uint64_t seed, std::uint32_t pixel,
+                       std::uint32_t sample) {
+    Rgb radiance;
+    path_radiance(tracer, at, settings, std::span(&ray, 1), std::span(&first, 1),
+                  {seed, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&radiance, 1));
+    return radiance;
+}
 
 inline Ray ray_to(const Vec3& origin, const Vec3& target) {
     return {origin, normalized(target - origin)};
@@ -39,12 +55,11 @@ inline Estimate light_along(const Tracer& tracer, const Placement& at, const Ray
     rays.fill(ray);
     std::array<Hit, kPacket> first;
     first.fill(tracer.intersect(at, ray, kInfinity));
-    std::vector<PixelSampler> samplers;
-    for (std::uint32_t i = 0; i < kPacket; ++i) samplers.emplace_back(seed, 0, i);
     std::array<Vec3, kPacket> sum{};
     for (std::uint32_t s = 0; s < samples; ++s) {
         std::array<Rgb, kPacket> radiance;
-        path_radiance(tracer, at, settings, rays, first, samplers, the_same(s), radiance);
+        const Lanes<std::uint32_t> sample = the_same(s);
+        path_radiance(tracer, at, settings, rays, first, {seed, 0, kOwnPixels, sample}, radiance);
         for (std::size_t i = 0; i < kPacket; ++i) sum[i] += vec_cast<double>(radiance[i]);
     }
     Estimate e;

@@ -403,10 +403,10 @@ TEST(TinyBody, FramesWithThemAllocateNothing) {
     RadianceImage image(c.width, c.height);
     Aovs aovs;
     tbb::task_arena arena(2);
+    CameraRenderer renderer(*tracer, c);
     const auto frames = [&](std::uint32_t n) {
         arena.execute([&] {
-            for (std::uint32_t i = 0; i < n; ++i)
-                render_radiance(*tracer, at, c, {}, {.spp = 2, .frame = i}, image, &aovs);
+            for (std::uint32_t i = 0; i < n; ++i) renderer.render(at, {}, {.spp = 2, .frame = i}, image, &aovs);
         });
     };
     frames(30);  // the thread pool and Embree settle

@@ -378,11 +378,14 @@ TEST(TraceWatertight, NoneOfTenMillionRandomRaysInPacketsIsLost) {
     int rays = 0, lost = 0;
     while (rays < 10'000'000 / kFewer) {
         const Vec3 towards = random_direction(random), eye = 12.0 * towards, beside = cross(towards, {0.6, 0.8, 0});
-        std::array<Ray, kPacket> packet;
-        std::array<Hit, kPacket> hits;
-        for (Ray& r : packet) r = {eye, normalized(within(random) * 7.0 * beside - eye)};
-        tracer->intersect(at, packet, hits);
-        for (const Hit& hit : hits) lost += hit.body < 0 || !hit.outside || hit.range_m > 12;
+        RayPacket packet;
+        packet.n = kPacket;
+        for (std::size_t i = 0; i < kPacket; ++i)
+            packet.put(i, {eye, normalized(within(random) * 7.0 * beside - eye)});
+        HitPacket hits;
+        tracer->intersect(at, packet, tracer->all_bodies(), hits);
+        for (std::size_t i = 0; i < kPacket; ++i)
+            lost += hits.body[i] < 0 || !is_set(hits.outside, i) || hits.range_m[i] > 12;
         rays += static_cast<int>(kPacket);
     }
     EXPECT_EQ(lost, 0) << "of " << rays;

@@ -34,6 +34,16 @@ Scene crowd(std::mt19937_64& rng) {
     return scene;
 }
 
+HitPacket traced(const Tracer& tracer, const Placement& at, std::span<const Ray> rays,
+                 std::span<const std::uint32_t> bodies) {
+    RayPacket packet;
+    packet.n = rays.size();
+    for (std::size_t i = 0; i < rays.size(); ++i) packet.put(i, rays[i]);
+    HitPacket hits;
+    tracer.intersect(at, packet, bodies, hits);
+    return hits;
+}
+
 TEST(Packets, MeetWhatEachRayMeetsAlone) {
     std::mt19937_64 rng(11);
     std::normal_distribution<double> n(0, 1);
@@ -50,8 +60,9 @@ TEST(Packets, MeetWhatEachRayMeetsAlone) {
             const std::size_t count = 1 + static_cast<std::size_t>(k) % kPacket;
             std::array<Ray, kPacket> rays;
             for (Ray& r : rays) r = {eye, normalized(axis + 0.02 * Vec3{n(rng), n(rng), n(rng)})};
+            const HitPacket packet = traced(*tracer, at, std::span(rays).first(count), tracer->all_bodies());
             std::array<Hit, kPacket> hits;
-            tracer->intersect(at, std::span(rays).first(count), hits);
+            for (std::size_t i = 0; i < count; ++i) hits[i] = packet[i];
             std::array<Vec3, kPacket> to_sun;
             to_sun.fill(scene.sun->direction);
             std::uint32_t wanted = 0;
@@ -185,7 +196,12 @@ TEST(Packets, OfNothingAskNothing) {
     const auto tracer = Tracer::create(scene, 1);
     ASSERT_TRUE(tracer);
     const Placement nowhere(0);
-    tracer->intersect(nowhere, std::span<const Ray>{}, std::span<Hit>{});
+    HitPacket none;
+    none.met = 1, none.body[0] = 7;
+    tracer->intersect(nowhere, RayPacket{}, {}, none);
+    EXPECT_EQ(none.met, 0U);
+    EXPECT_EQ(none.body[0], -1);
+    EXPECT_EQ(tracer->occluded(nowhere, none, VecPerRay{}, 0), 0U);
     EXPECT_EQ(tracer->occluded(nowhere, std::span<const Hit>{}, std::span<const Vec3>{}, std::uint32_t{0}), 0U);
     tracer->intersect(nowhere, std::span<const Hit>{}, std::span<const Vec3>{}, 0, std::span<Hit>{});
 }

@@ -1,0 +1,61 @@
+/// emulator/budget_ladder.h - what a budget buys: time and error of one camera's frames at several budgets, beside
+/// those of the plain loop of reference_loop.h, in one run.
+///
+/// Errors are those of the mean of the three bands, W m^-2 sr^-1, against a reference of many samples whose own
+/// noise is taken out (convergence.h). Budgets and loop take turns, so that whatever else the machine does hits all
+/// alike.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "emulator/convergence.h"
+#include "emulator/reference_loop.h"
+#include "emulator/threads.h"
+#include "emulator/world.h"
+#include "renderer/trace/camera_image.h"
+
+namespace narpa {
+
+struct LadderSettings {
+    std::vector<int> spp{1, 4, 16};
+    std::vector<double> rays_per_pixel{2, 4, 8, 16};  ///< as FrameBudget::rays
+    std::vector<int> loop_spp{1, 4, 16, 64};          ///< of the plain loop, where there is one
+    int frames = 7;                                   ///< at each budget, each with random numbers of its own; >= 2
+    int reference_spp = 4096;                         ///< in sixteen pictures
+    std::int64_t t_ns = 0;                            ///< what the scene shows
+};
+
+struct Rung {
+    std::string name;
+    bool loop = false, adaptive = false;
+    std::vector<double> seconds;   ///< of each frame's radiance
+    double rays = 0, samples = 0;  ///< a frame, mean
+    Estimate rmse, bias;
+    double predicted = -1;  ///< the frames' own standard error, RMS; negative: not estimated
+    PhaseTimes phase_ns{};  ///< a frame, mean, of all threads
+
+    [[nodiscard]] double median_s() const;
+    /// What the frames say of their error, in parts of what it is.
+    [[nodiscard]] double honesty() const { return rmse.value > 0 ? predicted / rmse.value : 0; }
+};
+
+struct Ladder {
+    double level = 0, reference_noise = 0;  ///< of the reference, W m^-2 sr^-1
+    std::vector<Rung> rungs;
+};
+
+double median(std::vector<double> values);
+
+/// `loop`: null where the scene is beyond it. `tell` hears how far it is.
+[[nodiscard]] Ladder climb(const World& world, std::size_t camera, const LadderSettings& settings,
+                           const ReferenceLoop* loop, TracingThreads& threads,
+                           const std::function<void(const std::string&)>& tell);
+
+/// How long the plain loop takes to the error of this rung, in parts of what the rung takes: along straight lines
+/// between the loop's rungs in the logarithms of time and error. None where its errors do not enclose it.
+[[nodiscard]] std::optional<double> speed_up(const Ladder& ladder, const Rung& rung);
+
+}  // namespace narpa

@@ -1,0 +1,155 @@
+// narpa bench render --scenes - the standing scenes, one after another.
+#include "emulator/cli/bench_ladder.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "emulator/cli/bench_scene.h"
+#include "emulator/trajectory.h"
+
+namespace narpa::cli {
+namespace {
+
+struct Standing {
+    const char *name, *file, *camera;
+    RenderSettings::Method method;
+    int max_depth;          ///< of paths
+    double at_s;            ///< on the approach; negative: no approach
+    double speed_up_least;  ///< over the plain loop at equal error; 0: no loop
+    int size;               ///< px, the longer side
+    int reference_spp;
+};
+using Method = RenderSettings::Method;
+constexpr std::array<Standing, 5> kStanding{{
+    {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, 2, 512, 4096},
+    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, 3, 256, 4096},  // four bounces
+    {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, 0, 320, 4096},
+    {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, 0, 320, 4096},
+    {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, 0, 128, 8192},
+}};
+
+/// The scene as the ladder looks at it; a monochrome ideal sensor, as radiance is what counts.
+Result<std::unique_ptr<World>> world_of(const Standing& s, int size, std::size_t& camera) {
+    auto file = shipped_scene(s.file);
+    if (!file) return file.error();
+    auto scene = load_scene(*file, s.method);
+    if (!scene) return scene.error();
+    scene->render.max_depth = s.max_depth;
+    auto index = sensor_named(scene->cameras, s.camera, "camera", scene->file);
+    if (!index) return index.error();
+    camera = *index;
+    resize_longer_side(scene->cameras[camera], size);
+    auto world = World::create(*std::move(scene));
+    if (!world || s.at_s < 0) return world;
+    auto rows = read_trajectory((*file).substr(0, file->rfind('/')) + "/approach.csv");
+    if (!rows) return rows.error();
+    const auto t_ns = static_cast<std::int64_t>(s.at_s * 1e9);
+    if (auto loaded = (*world)->load(*rows, t_ns, t_ns); !loaded) return loaded.error();
+    return world;
+}
+
+Result<LadderOf> measure(const Standing& s, const LadderOptions& o, TracingThreads& threads) {
+    LadderOf l;
+    l.scene = s.name;
+    l.speed_up_least = s.speed_up_least;
+    l.reference_spp = o.quick ? 256 : s.reference_spp;
+    std::size_t camera = 0;
+    auto world = world_of(s, o.quick ? 48 : s.size, camera);
+    if (!world) return world.error();
+    l.width = (*world)->scene().cameras[camera].width;
+    l.height = (*world)->scene().cameras[camera].height;
+
+    LadderSettings settings;
+    settings.reference_spp = l.reference_spp;
+    settings.t_ns = static_cast<std::int64_t>(std::max(0.0, s.at_s) * 1e9);
+    settings.frames = o.quick ? 2 : 9;
+    std::optional<ReferenceLoop> loop;
+    if (s.speed_up_least > 0) {
+        Placement at((*world)->scene().bodies.size());
+        (*world)->place(settings.t_ns, -1, at);
+        auto made = ReferenceLoop::create((*world)->scene(), at);
+        if (!made) return made.error();
+        loop.emplace(*std::move(made));
+    }
+    const Progress progress;
+    l.ladder = climb(**world, camera, settings, loop ? &*loop : nullptr, threads,
+                     [&](const std::string& step) { progress.tell(std::string(s.name) + ": " + step); });
+    return l;
+}
+
+Result<CraftRatios> measure_ratios(const LadderOptions& o, TracingThreads& threads) {
+    auto file = shipped_scene("craft/craft.toml");
+    if (!file) return file.error();
+    const auto load = [&] {
+        auto scene = load_scene(*file);
+        if (scene && o.quick)
+            for (Camera& c : scene->cameras) resize_longer_side(c, 128);
+        return scene;
+    };
+    auto scene = load();
+    if (!scene) return scene.error();
+    std::array<std::size_t, 3> cameras{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        auto index = sensor_named(scene->cameras, std::array{"near", "far", "filled"}[k], "camera", scene->file);
+        if (!index) return index.error();
+        cameras[k] = *index;
+    }
+    auto world = World::create(*std::move(scene));
+    if (!world) return world.error();
+    const int rounds = o.quick ? 2 : 15;
+    const Progress progress;
+    progress.tell("craft: a frame beside Embree's calls");
+    auto cost = frame_against_raw(**world, cameras[0], rounds, threads);
+    if (!cost) return cost.error();
+    progress.tell("craft: empty space, moved bodies, first frames");
+    CraftRatios r{*cost, frames_of(**world, cameras[1], cameras[2], rounds, threads),
+                  still_and_moved(**world, cameras[0], rounds, threads), 0};
+    auto load_s = load_to_first_frame(load, cameras[0], o.quick ? 1 : 7, threads);
+    if (!load_s) return load_s.error();
+    r.load_s = *load_s;
+    return r;
+}
+
+}  // namespace
+
+std::vector<std::string> standing_scenes() {
+    std::vector<std::string> names{"all"};
+    for (const Standing& s : kStanding) names.emplace_back(s.name);
+    return names;
+}
+
+Outcome bench_ladder(const LadderOptions& o) {
+    const auto wanted = [&](const char* name) {
+        return std::any_of(o.scenes.begin(), o.scenes.end(),
+                           [&](const std::string& s) { return s == "all" || s == name; });
+    };
+    TracingThreads threads(o.threads);
+    std::optional<CraftRatios> ratios;
+    if (wanted("craft")) {
+        auto measured = measure_ratios(o, threads);
+        if (!measured) return measured.error();
+        ratios = *measured;
+        tell_ratios(*ratios);
+    }
+    std::vector<LadderOf> ladders;
+    for (const Standing& s : kStanding) {
+        if (!wanted(s.name)) continue;
+        auto measured = measure(s, o, threads);
+        if (!measured) return measured.error();
+        tell_ladder(*measured);
+        ladders.push_back(*std::move(measured));
+    }
+    const std::vector<std::string> faults = ladder_faults(ladders, ratios);
+    for (const std::string& fault : faults) say((o.gates ? "failed: " : "not reached: ") + fault);
+
+    nlohmann::json document{{"passed", !o.gates || faults.empty()},
+                            {"faults", faults},
+                            {"threads", threads.arena.max_concurrency()},
+                            {"scenes", nlohmann::json::array()}};
+    if (ratios) document["craft"] = describe(*ratios);
+    for (const LadderOf& l : ladders) document["scenes"].push_back(describe(l));
+    return document;
+}
+
+}  // namespace narpa::cli

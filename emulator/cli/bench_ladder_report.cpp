@@ -1,0 +1,167 @@
+// What the ladder of budgets found, in words and as JSON.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "emulator/cli/bench_ladder.h"
+
+namespace narpa::cli {
+namespace {
+
+constexpr std::array<const char*, kPhases> kPhaseNames{"aim",         "rays",     "shading",
+                                                       "shadow_rays", "indirect", "passes"};
+
+nlohmann::json describe(const PhaseTimes& times) {
+    nlohmann::json out = nlohmann::json::object();
+    for (std::size_t k = 0; k < kPhases; ++k) out[kPhaseNames[k]] = static_cast<double>(times[k]) * 1e-9;
+    return out;
+}
+
+/// "rays 41 %, shading 20 %", the largest of all that was timed first to last as they come.
+std::string shares(const PhaseTimes& times) {
+    double sum = 0;
+    for (const std::int64_t t : times) sum += static_cast<double>(t);
+    std::string text;
+    for (std::size_t k = 0; k < kPhases && sum > 0; ++k)
+        if (times[k] > 0)
+            text += fmt::format("{}{} {:.0f} %", text.empty() ? "" : ", ", kPhaseNames[k],
+                                100 * static_cast<double>(times[k]) / sum);
+    return text;
+}
+
+nlohmann::json to_json(const Estimate& e) {
+    return {{"value", e.value}, {"standard_error", e.standard_error}};
+}
+
+}  // namespace
+
+std::optional<double> typical_speed_up(const Ladder& ladder) {
+    for (const bool adaptive : {true, false}) {
+        std::vector<double> all;
+        for (const Rung& r : ladder.rungs)
+            if (!r.loop && r.adaptive == adaptive)
+                if (const auto s = speed_up(ladder, r)) all.push_back(*s);
+        if (!all.empty()) return median(all);
+    }
+    return {};
+}
+
+std::vector<std::string> ladder_faults(const std::vector<LadderOf>& ladders, const std::optional<CraftRatios>& r) {
+    std::vector<std::string> faults;
+    const auto at_most = [&](const char* what, double value, double bound, const char* unit) {
+        if (!(value <= bound))
+            faults.push_back(fmt::format("{}: {:.4g}{}, expected at most {:g}{}", what, value, unit, bound, unit));
+    };
+    if (r) {
+        at_most("a frame to Embree's calls on its rays", r->cost.to_raw(), kToRawMost, "");
+        at_most("1 % cover to full cover", r->far_and_filled.first_s / r->far_and_filled.second_s, kFarMost, "");
+        at_most("what a moved body costs", 1e3 * (r->still_and_moved.second_s - r->still_and_moved.first_s),
+                1e3 * kMovedMost_s, " ms");
+        at_most("load to first frame", r->load_s, kLoadMost_s, " s");
+    }
+    for (const LadderOf& l : ladders) {
+        for (const Rung& rung : l.ladder.rungs)
+            if (rung.predicted >= 0 && rung.rmse.value > 0 &&
+                !(rung.honesty() >= kHonestyLeast && rung.honesty() <= kHonestyMost))
+                faults.push_back(
+                    fmt::format("{}, {}: the predicted error is {:.2f} of the measured, expected {} to {}", l.scene,
+                                rung.name, rung.honesty(), kHonestyLeast, kHonestyMost));
+        if (l.speed_up_least <= 0) continue;
+        const auto s = typical_speed_up(l.ladder);
+        if (!s)
+            faults.push_back(l.scene + ": no error lies between those of the plain loop");
+        else if (*s < l.speed_up_least)
+            faults.push_back(fmt::format("{}: {:.2f} times as fast as the plain loop, expected {:g} or more",
+                                         l.scene, *s, l.speed_up_least));
+    }
+    return faults;
+}
+
+void tell_ratios(const CraftRatios& r) {
+    const FrameCost& c = r.cost;
+    const auto ms = [](double s) { return 1e3 * s; };
+    say(fmt::format("craft, {} px, {:.1f} % of them covered, direct, 1 spp", c.raw.primaries,
+                    100 * static_cast<double>(c.raw.hits) / static_cast<double>(c.raw.primaries)));
+    say(fmt::format("  Embree's calls alone  {:>9.3f} ms   primary {:.3f}, shadow {:.3f} ({} rays)",
+                    ms(c.raw.seconds()), ms(c.raw.primary_s), ms(c.raw.shadow_s), c.raw.shadow_rays));
+    say(fmt::format(
+        "  whole frame           {:>9.3f} ms   radiance {:.3f}, detector and conversion {:.3f}; copy {:.3f}",
+        ms(c.frame_s), ms(c.radiance_s), ms(c.detector_s), ms(c.hand_over_s)));
+    if (const std::string text = shares(c.phase_ns); !text.empty()) say("  radiance goes to      " + text);
+    say(fmt::format("  frame / Embree        {:>9.3f}", c.to_raw()));
+    say(fmt::format("  1 % / full cover      {:>9.4f}      {:.3f} / {:.3f} ms",
+                    r.far_and_filled.first_s / r.far_and_filled.second_s, ms(r.far_and_filled.first_s),
+                    ms(r.far_and_filled.second_s)));
+    say(fmt::format("  a moved body costs    {:>9.3f} ms",
+                    ms(r.still_and_moved.second_s - r.still_and_moved.first_s)));
+    say(fmt::format("  load to first frame   {:>9.3f} s", r.load_s));
+}
+
+void tell_ladder(const LadderOf& l) {
+    say(fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (taken out)", l.scene,
+                    l.width, l.height, l.reference_spp, l.ladder.level, l.ladder.reference_noise));
+    say(fmt::format("  {:<14} {:>10} {:>12} {:>20} {:>9} {:>10} {:>9}", "budget", "ms", "rays", "RMSE", "bias, %",
+                    "predicted", "to loop"));
+    for (const Rung& r : l.ladder.rungs) {
+        const auto s = r.loop ? std::nullopt : speed_up(l.ladder, r);
+        say(fmt::format("  {:<14} {:>10.3f} {:>12.0f} {:>10.4g} +- {:<6.1g} {:>+9.3f} {:>10} {:>9}  {}", r.name,
+                        1e3 * r.median_s(), r.rays, r.rmse.value, r.rmse.standard_error,
+                        100 * r.bias.value / l.ladder.level,
+                        r.predicted >= 0 ? fmt::format("x {:.2f}", r.honesty()) : "-",
+                        s ? fmt::format("x {:.2f}", *s) : "-", shares(r.phase_ns)));
+    }
+    if (const auto s = typical_speed_up(l.ladder))
+        say(fmt::format("  {:.2f} times as fast as the plain loop at equal error (median)", *s));
+}
+
+nlohmann::json describe(const CraftRatios& r) {
+    return {{"pixels", r.cost.raw.primaries},
+            {"covered", static_cast<double>(r.cost.raw.hits) / static_cast<double>(r.cost.raw.primaries)},
+            {"raw",
+             {{"primary_s", r.cost.raw.primary_s},
+              {"shadow_s", r.cost.raw.shadow_s},
+              {"shadow_rays", r.cost.raw.shadow_rays},
+              {"shadowed", r.cost.raw.shadowed}}},
+            {"frame_s", r.cost.frame_s},
+            {"radiance_s", r.cost.radiance_s},
+            {"detector_s", r.cost.detector_s},
+            {"hand_over_s", r.cost.hand_over_s},
+            {"phase_s", describe(r.cost.phase_ns)},
+            {"frame_to_raw", r.cost.to_raw()},
+            {"far_s", r.far_and_filled.first_s},
+            {"filled_s", r.far_and_filled.second_s},
+            {"far_to_filled", r.far_and_filled.first_s / r.far_and_filled.second_s},
+            {"still_s", r.still_and_moved.first_s},
+            {"moved_s", r.still_and_moved.second_s},
+            {"load_s", r.load_s}};
+}
+
+nlohmann::json describe(const LadderOf& l) {
+    nlohmann::json rungs = nlohmann::json::array();
+    for (const Rung& r : l.ladder.rungs) {
+        nlohmann::json rung{{"name", r.name},
+                            {"loop", r.loop},
+                            {"median_s", r.median_s()},
+                            {"frames", r.seconds.size()},
+                            {"rays", r.rays},
+                            {"samples", r.samples},
+                            {"rmse", to_json(r.rmse)},
+                            {"bias", to_json(r.bias)},
+                            {"phase_s", describe(r.phase_ns)}};
+        if (r.predicted >= 0) rung["predicted"] = r.predicted;
+        if (const auto s = r.loop ? std::nullopt : speed_up(l.ladder, r)) rung["speed_up"] = *s;
+        rungs.push_back(std::move(rung));
+    }
+    nlohmann::json out{
+        {"scene", l.scene},
+        {"width", l.width},
+        {"height", l.height},
+        {"reference",
+         {{"spp", l.reference_spp}, {"mean", l.ladder.level}, {"noise_rms", l.ladder.reference_noise}}},
+        {"rungs", std::move(rungs)}};
+    if (const auto s = typical_speed_up(l.ladder)) out["speed_up"] = *s;
+    return out;
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,284 @@
+#include "renderer/trace/budget_frame.h"
+
+#include <algorithm>
+
+namespace narpa {
+namespace {
+
+using Kind = FrameBudget::Kind;
+using Of = PassCosts::Of;
+
+/// Textures are averaged over the beam that a sample has where a pixel gets so many. Middles are a frame of two, so
+/// that each takes a point of its own of the lens and of the Sun and shows what these blur.
+constexpr int kMiddleBeam = 2, kBeamSamples = 4;
+/// What waking the threads and a preempted one may take.
+constexpr std::int64_t kSlack_ns = 300'000;
+/// Passes of fewer samples tell of their start and end alone.
+constexpr std::uint64_t kLeastPieces = 1000;
+/// Parts of what is left that go to the first pass after the middles, so that there soon is something to show, and
+/// to each of the next.
+constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
+/// Of rays, whose number follows from that of the samples nearly to the last.
+constexpr double kFirstRays = 0.6, kNextRays = 0.96;
+/// Less than this part of the budget is not worth another pass.
+constexpr double kRest = 0.05;
+
+class BudgetFrame {
+public:
+    BudgetFrame(FramePasses& passes, PassCosts& costs, const Tracer& tracer, const Camera& camera,
+                const Placement& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+                RadianceImage& out, std::vector<float>* variance)
+        : passes_(passes),
+          costs_(costs),
+          budget_(settings.budget),
+          begun_ns_(now_ns()),
+          middle_settings_(with_spp(settings, kMiddleBeam)),
+          direct_settings_(by_direct_light(middle_settings_)),
+          sample_settings_(with_spp(settings, kBeamSamples)),
+          middle_(make_frame(tracer, at, camera, T_world_camera, middle_settings_)),
+          direct_(make_frame(tracer, at, camera, T_world_camera, direct_settings_)),
+          sample_(make_frame(tracer, at, camera, T_world_camera, sample_settings_)),
+          has_indirect_(settings.method == RenderSettings::Method::path),
+          out_(out),
+          variance_(variance) {}
+
+    FrameAccount make() {
+        account_.step = FrameStep::nothing;
+        begin(middle_);
+        take_middles();
+        if (account_.step == FrameStep::one_sample && worth_planning()) refine();
+        show();
+        account_.phase_ns = passes_.times();
+        return account_;
+    }
+
+private:
+    enum class ToShow : std::uint8_t { nothing, middles, means };
+
+    static FrameSettings with_spp(FrameSettings s, int spp) {
+        s.spp = spp;
+        return s;
+    }
+    static FrameSettings by_direct_light(FrameSettings s) {
+        s.method = RenderSettings::Method::direct;
+        return s;
+    }
+
+    void begin(const Frame& f) {
+        frame_ = &f;
+        passes_.begin(f, sample_.lens);
+    }
+
+    // What is left.
+    [[nodiscard]] std::uint64_t rays_left() const { return budget_.rays - std::min(budget_.rays, rays_); }
+    [[nodiscard]] std::int64_t ns_left() const {
+        return budget_.deadline_ns - kSlack_ns - costs_.expected_ns(Of::show, out_.pixels.size()) - now_ns();
+    }
+    [[nodiscard]] PassLimit limit() const {
+        PassLimit l;
+        if (budget_.kind == Kind::rays) l.rays = rays_left();
+        if (budget_.kind == Kind::time) l.until_ns = now_ns() + ns_left();
+        return l;
+    }
+
+    /// Books a pass, and whether it counts. `instead`: what came before serves no more.
+    bool book(const PassCount& pass, const PassLimit& l, bool instead) {
+        if (!pass.complete) {
+            // Where the threads were when they gave up must not decide what comes next.
+            const std::uint64_t lost = budget_.kind == Kind::rays ? l.rays : pass.rays;
+            rays_ += lost;
+            account_.rays_discarded += lost;
+            return false;
+        }
+        if (instead) {
+            account_.rays_discarded += account_.rays;
+            account_.rays = account_.samples = 0;
+        }
+        rays_ += pass.rays;
+        account_.rays += pass.rays;
+        account_.samples += pass.samples;
+        return true;
+    }
+
+    bool take(const Frame& f, int stride, int made, FrameStep step, const PassLimit& l) {
+        if (frame_ != &f) {
+            show();  // other tiles, other looks
+            begin(f);
+        }
+        const PassCount pass = passes_.middles(f, stride, made, l);
+        if (pass.complete) costs_.note(cost_of(f), pass.samples, pass.wall_ns);
+        if (!book(pass, l, made == 0)) return false;
+        account_.step = step;
+        to_show_ = ToShow::middles;
+        stride_ = stride;
+        return true;
+    }
+    bool take(const Frame& f, int stride, int made, FrameStep step) { return take(f, stride, made, step, limit()); }
+    [[nodiscard]] Of cost_of(const Frame& f) const {
+        return f.settings.method == RenderSettings::Method::direct ? Of::direct_middles : Of::middles;
+    }
+
+    void take_middles() {
+        switch (budget_.kind) {
+            case Kind::samples: break;
+            case Kind::passes: take_as_told(); break;
+            case Kind::time:
+                if (costs_.known(cost_of(middle_)) && expected_ns(middle_) <= ns_left() / 2)
+                    take(middle_, 1, 0, FrameStep::one_sample);
+                else
+                    from_coarse_to_fine();
+                break;
+            case Kind::rays:
+                if (middle_.quick && 2 * passes_.pixels() <= rays_left())  // the camera's and the Sun's
+                    take(middle_, 1, 0, FrameStep::one_sample);
+                else if (middle_.quick || !begin_with_a_sixteenth())
+                    from_coarse_to_fine();
+                break;
+        }
+    }
+    [[nodiscard]] std::int64_t expected_ns(const Frame& f) const {
+        return costs_.expected_ns(cost_of(f), passes_.pixels());
+    }
+
+    [[nodiscard]] FrameStep step_told() const { return static_cast<FrameStep>(budget_.step); }
+    void take_as_told() {
+        switch (step_told()) {
+            case FrameStep::refined:
+            case FrameStep::one_sample: take(middle_, 1, 0, FrameStep::one_sample); break;
+            case FrameStep::no_indirect: take(direct_, 1, 0, FrameStep::no_indirect); break;
+            case FrameStep::coarse_2: take(direct_, 2, 0, FrameStep::coarse_2); break;
+            case FrameStep::coarse_4: take(direct_, 4, 0, FrameStep::coarse_4); break;
+            case FrameStep::nothing: break;
+        }
+    }
+
+    /// How many rays a sample takes is not known before: the first of 4 x 4 pixels tells, and counts if the others
+    /// fit as well.
+    bool begin_with_a_sixteenth() {
+        PassLimit part = limit();
+        part.rays /= 4;
+        if (!take(middle_, 4, 0, FrameStep::nothing, part)) return false;
+        to_show_ = ToShow::nothing;
+        const double each = static_cast<double>(account_.rays) / static_cast<double>(account_.samples);
+        const double others = static_cast<double>(passes_.pixels() - account_.samples);
+        return each * others <= kNextRays * static_cast<double>(rays_left()) &&
+               take(middle_, 1, 4, FrameStep::one_sample);
+    }
+
+    void from_coarse_to_fine() {
+        const Frame& f = has_indirect_ ? direct_ : middle_;
+        const FrameStep full = has_indirect_ ? FrameStep::no_indirect : FrameStep::one_sample;
+        if (!take(f, 4, 0, FrameStep::coarse_4) || !take(f, 2, 4, FrameStep::coarse_2) || !take(f, 1, 2, full))
+            return;
+        if (!has_indirect_ || budget_.kind != Kind::time) return;
+        if (costs_.known(Of::middles) && expected_ns(middle_) > ns_left()) return;
+        take(middle_, 1, 0, FrameStep::one_sample);
+    }
+
+    /// Samples where the middles say so.
+    void refine() {
+        const std::int64_t start = now_ns();
+        passes_.make_plan(middle_);
+        costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
+        account_.standard_error = passes_.standard_error();
+        const SamplePlan& plan = passes_.plan();
+        SamplePlan::Stage stage;
+        // Middles that met nothing took one ray; samples go elsewhere.
+        const std::uint64_t met = std::min(std::max<std::uint64_t>(plan.met(), 1), account_.samples);
+        double rays_each = middle_.quick ? 2
+                                         : static_cast<double>(account_.rays - (account_.samples - met)) /
+                                               static_cast<double>(met);
+        for (std::size_t i = 0; i < kMaxPasses; ++i) {
+            const SamplePlan::Stage next = plan.reach(stage, whole_step(plan.missing(stage), wanted(i, rays_each)));
+            const std::uint64_t samples = plan.total(next) - plan.total(stage);
+            if (samples == 0) return;
+            if (i > 0) show();  // what the next pass adds to
+            const PassLimit l = limit();
+            const PassCount pass = passes_.refine(sample_, stage, next, l);
+            if (!book(pass, l, false)) return;
+            costs_.note(Of::samples, pass.samples, pass.wall_ns);
+            account_.step = FrameStep::refined;
+            account_.passes[i] = static_cast<std::uint32_t>(samples);
+            to_show_ = ToShow::means;
+            stage = next;
+            rays_each = static_cast<double>(pass.rays) / static_cast<double>(pass.samples);
+        }
+    }
+
+    /// Samples enough for all pixels that miss one leave as many for the edges, or go to these alone: the others'
+    /// middles are better than that. A pass made anew from its number of samples comes to the same.
+    [[nodiscard]] std::uint64_t whole_step(std::uint64_t missing, std::uint64_t samples) const {
+        const bool half = samples >= missing && samples < 2 * missing && budget_.kind != Kind::passes;
+        return half ? missing - 1 : samples;
+    }
+    /// How many samples the next pass shall have; 0: there is none.
+    [[nodiscard]] std::uint64_t wanted(std::size_t pass, double rays_each) const {
+        if (budget_.kind == Kind::passes) return step_told() == FrameStep::refined ? budget_.passes[pass] : 0;
+        if (budget_.kind == Kind::rays) {
+            const auto left = static_cast<double>(rays_left());
+            if (left < kRest * static_cast<double>(budget_.rays)) return 0;
+            return static_cast<std::uint64_t>((pass == 0 && !middle_.quick ? kFirstRays : kNextRays) * left /
+                                              rays_each);
+        }
+        const std::int64_t left = ns_left();
+        if (static_cast<double>(left) < kRest * static_cast<double>(budget_.deadline_ns - begun_ns_)) return 0;
+        return static_cast<std::uint64_t>((pass == 0 ? kFirstPart : kNextPart) *
+                                          static_cast<double>(costs_.fitting(Of::samples, left)));
+    }
+
+    [[nodiscard]] bool worth_planning() const {
+        if (budget_.kind == Kind::time) return costs_.expected_ns(Of::plan, passes_.pixels()) < ns_left();
+        return true;
+    }
+
+    void show() {
+        const std::int64_t start = now_ns();
+        if (to_show_ == ToShow::nothing) return;
+        if (to_show_ == ToShow::middles) passes_.show_middles(*frame_, stride_, out_);
+        if (to_show_ == ToShow::means) {
+            passes_.show_means(sample_, out_, variance_);
+            account_.standard_error = passes_.standard_error();
+        }
+        to_show_ = ToShow::nothing;
+        costs_.note(Of::show, out_.pixels.size(), now_ns() - start);
+    }
+
+    FramePasses& passes_;
+    PassCosts& costs_;
+    const FrameBudget budget_;
+    const std::int64_t begun_ns_;
+    const FrameSettings middle_settings_, direct_settings_, sample_settings_;
+    const Frame middle_, direct_, sample_;
+    const bool has_indirect_;
+    RadianceImage& out_;
+    std::vector<float>* const variance_;
+
+    FrameAccount account_;
+    const Frame* frame_ = nullptr;  ///< whose middles are taken
+    std::uint64_t rays_ = 0;        ///< that the budget is charged
+    ToShow to_show_ = ToShow::nothing;
+    int stride_ = 1;
+};
+
+}  // namespace
+
+void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept {
+    if (pieces < kLeastPieces) return;
+    double& ns = ns_[index(what)];
+    const double now = static_cast<double>(wall_ns) / static_cast<double>(pieces);
+    // A frame that something held up tells little of the next.
+    ns = known(what) ? ns + 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns) : now;
+    known_[index(what)] = true;
+}
+
+std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {
+    return static_cast<std::uint64_t>(static_cast<double>(std::max<std::int64_t>(wall_ns, 0)) / ns_[index(what)]);
+}
+
+FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const Tracer& tracer, const Camera& camera,
+                                  const Placement& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+                                  RadianceImage& out, std::vector<float>* variance) {
+    return BudgetFrame(passes, costs, tracer, camera, at, T_world_camera, settings, out, variance).make();
+}
+
+}  // namespace narpa

@@ -1,0 +1,94 @@
+#include "renderer/trace/frame_error.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace narpa {
+namespace {
+
+/// Ratios of the variances of twice as many samples that are believed: from that of smooth integrands to that of
+/// independent samples.
+constexpr double kLeastRatio = 0.25, kMostRatio = 0.5;
+/// Where only one doubling was seen: between edges and noise.
+constexpr double kRatioOfTwo = 0.42;
+
+double left_after(double step, double ratio) {
+    return step * ratio / (1 - ratio);
+}
+
+}  // namespace
+
+void FrameError::add_middles(const TileContrast& contrast) noexcept {
+    float sum = 0;
+    for (const float m : contrast.middle) sum += m;
+    middles_ += static_cast<double>(sum);
+}
+
+void FrameError::add(const PixelMean& mean) noexcept {
+    const auto level = static_cast<std::size_t>(std::bit_width(mean.count()) - 1);
+    const auto squared = [](float step) { return static_cast<double>(step) * static_cast<double>(step); };
+    steps_[level].last += squared(mean.step());
+    if (level > 1) steps_[level].before += squared(mean.step_before());
+    shares_[level] += static_cast<double>(std::bit_floor(mean.count())) / mean.count();
+    ++pixels_[level];
+}
+
+void FrameError::add_tile(const TileLooks& looks, const TileContrast& contrast,
+                          const PerPixel<PixelMean>& means) noexcept {
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+        if (means[i].count() == 0) {
+            middles_ += static_cast<double>(contrast.middle[i]);
+        } else if (means[i].count() == 1) {
+            edges_ += static_cast<double>(contrast.edge[i]);
+            ++singles_;
+        } else {
+            add(means[i]);
+        }
+    }
+    const auto single = [&](std::size_t a, std::size_t b, std::size_t c) {
+        return means[a].count() == 1 && means[b].count() == 1 && means[c].count() == 1 &&
+               looks.surface[a] == looks.surface[b] && looks.surface[b] == looks.surface[c];
+    };
+    const auto bend = [&](std::size_t a, std::size_t b, std::size_t c) {
+        if (!single(a, b, c)) return;
+        const double d = mean_band(means[a].mean()) - 2 * mean_band(means[b].mean()) + mean_band(means[c].mean());
+        bends_ += d * d;
+        ++bent_;
+    };
+    for (int y = 0; y < kTile; ++y)
+        for (int x = 1; x < kTile - 1; ++x) {
+            bend(place_in_tile(x - 1, y), place_in_tile(x, y), place_in_tile(x + 1, y));
+            bend(place_in_tile(y, x - 1), place_in_tile(y, x), place_in_tile(y, x + 1));
+        }
+}
+
+FrameError& FrameError::operator+=(const FrameError& b) noexcept {
+    middles_ += b.middles_;
+    edges_ += b.edges_;
+    bends_ += b.bends_;
+    bent_ += b.bent_;
+    singles_ += b.singles_;
+    for (std::size_t i = 0; i < kDoublings; ++i) {
+        steps_[i].last += b.steps_[i].last;
+        steps_[i].before += b.steps_[i].before;
+        shares_[i] += b.shares_[i];
+        pixels_[i] += b.pixels_[i];
+    }
+    return *this;
+}
+
+double FrameError::standard_error(std::size_t pixels) const noexcept {
+    double sum = middles_ + edges_;
+    if (bent_ > 0) sum += bends_ / (6 * static_cast<double>(bent_)) * static_cast<double>(singles_);
+    for (std::size_t level = 1; level < kDoublings; ++level) {
+        if (pixels_[level] == 0) continue;
+        const auto [last, before] = steps_[level];
+        const double ratio =
+            level == 1 || before == 0 ? kRatioOfTwo : std::clamp(last / before, kLeastRatio, kMostRatio);
+        sum += left_after(last, ratio) * shares_[level] / static_cast<double>(pixels_[level]);
+    }
+    return std::sqrt(sum / static_cast<double>(pixels));
+}
+
+}  // namespace narpa

@@ -1,0 +1,411 @@
+#include "renderer/trace/frame_passes.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "renderer/trace/camera_packet.h"
+#include "renderer/trace/camera_ray.h"
+#include "renderer/trace/flush_denormals.h"
+#include "renderer/trace/lights.h"
+#include "renderer/trace/tiny_light.h"
+
+namespace narpa {
+namespace {
+
+/// Tiles that a thread takes at a time. Sums are made chunk by chunk, so that the threads have no say in them.
+constexpr std::size_t kChunk = 8;
+/// Random numbers of middles that samples may follow: none that a pixel's samples take, as those would not be
+/// independent of their own number.
+constexpr std::uint32_t kFirstMiddle = 0x40000000u;
+constexpr int kBlock = 4;
+
+/// The first pixel but one stands for the others of a square of `stride`; at the image's edges the last one.
+bool stands_for(int x, int width, int stride) {
+    return stride == 1 || x % stride == 1 || (x % stride == 0 && x == width - 1);
+}
+int standing_for(int x, int width, int stride) {
+    return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
+}
+
+/// Where rays that meet no body may still find light: the Sun's disc, lamps.
+class EmittersInView {
+public:
+    EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
+        lamps_ = !f.quick && f.tracer.lights().any_with_extent();
+        if (f.quick || f.path.direct || !f.sun || f.sun->is_point()) return;
+        // Bounds, all of them generous: of half the disc, of half a tile and of the way from point to point of a
+        // lens.
+        const double disc_rad = f.tracer.scene().sun->angular_diameter_rad;
+        const double tile_rad = kTile / std::min(f.camera.fx, f.camera.fy);
+        const double lens_rad = lens != nullptr ? lens->aperture_diameter_m / lens->focus_distance_m : 0;
+        within_rad_ = disc_rad + tile_rad + lens_rad;
+        sun_ = true;
+    }
+    /// Through a tile that begins here.
+    [[nodiscard]] bool any(int x, int y) const {
+        if (lamps_ || !sun_) return lamps_;
+        const Vec3 to_tile = camera_ray(f_.camera, f_.T_world_camera, x + 0.5 * kTile, y + 0.5 * kTile).direction;
+        const Vec3& to_sun = f_.sun->centre();
+        return std::atan2(norm(cross(to_tile, to_sun)), dot(to_tile, to_sun)) < within_rad_;
+    }
+
+private:
+    const Frame& f_;
+    bool lamps_ = false, sun_ = false;
+    double within_rad_ = 0;
+};
+
+}  // namespace
+
+std::int64_t now_ns() noexcept {
+    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+struct FramePasses::Tile {
+    std::uint32_t index;
+    int x, y, width, height;  ///< pixels
+    std::span<const std::uint32_t> bodies;
+
+    template <class Do>
+    void each_pixel(Do&& act) const {
+        for (int block = 0; block < 4; ++block)
+            for (int row = 0; row < kBlock; ++row)
+                for (int column = 0; column < kBlock; ++column) {
+                    const int px = block % 2 * kBlock + column, py = block / 2 * kBlock + row;
+                    if (px < width && py < height) act(x + px, y + py, place_in_tile(px, py));
+                }
+    }
+};
+
+/// What a thread needs: large, so made once for several tiles.
+struct FramePasses::Worker {
+    explicit Worker(const Frame& frame) : f(frame) {}
+
+    const Frame& f;
+    Packet packet;
+    CameraSamples samples;
+    Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
+    std::uint64_t traced = 0;   ///< samples
+    FrameError error;
+
+    /// `sink(lane, place)` is told of each sample, in order.
+    template <class Sink>
+    void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
+             Sink&& sink) {
+        const std::size_t i = samples.n++;
+        samples.x[i] = x, samples.y[i] = y;
+        samples.number[i] = number, samples.sample[i] = sample;
+        place[i] = static_cast<std::uint8_t>(at);
+        if (samples.n == kPacket) trace(tile, sink);
+    }
+    template <class Sink>
+    void trace(const Tile& tile, Sink&& sink) {
+        if (samples.n == 0) return;
+        RgbPerRay radiance;
+        trace_samples(f, samples, tile.bodies, packet, radiance);
+        sink(radiance);
+        traced += samples.n;
+        samples.n = 0;
+    }
+    void middles(const Tile& tile, int width, int height, int stride, int made, TileLooks& looks) {
+        samples.middle = true;
+        const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstMiddle;
+        const auto store = [&](const RgbPerRay& radiance) { PixelLooks::store(f, packet, radiance, place, looks); };
+        tile.each_pixel([&](int x, int y, std::size_t at) {
+            if (!stands_for(x, width, stride) || !stands_for(y, height, stride)) return;
+            if (made > 0 && stands_for(x, width, made) && stands_for(y, height, made)) return;
+            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, store);
+        });
+        trace(tile, store);
+    }
+};
+
+FramePasses::FramePasses(const Tracer& tracer, const Camera& camera)
+    : tracer_(tracer),
+      camera_(camera),
+      cover_(tracer, camera),
+      looks_(camera.width, camera.height),
+      errors_(looks_.tiles() / kChunk + 1),
+      blank_(looks_.tiles(), 0) {
+    tiles_.reserve(looks_.tiles());
+}
+
+FramePasses::Tile FramePasses::tile(std::uint32_t index) const noexcept {
+    const int tx = static_cast<int>(index) % looks_.tiles_x(), ty = static_cast<int>(index) / looks_.tiles_x();
+    const int x = tx * kTile, y = ty * kTile;
+    return {index,
+            x,
+            y,
+            std::min(kTile, camera_.width - x),
+            std::min(kTile, camera_.height - y),
+            cover_.bodies(tx, ty)};
+}
+
+template <class Work>
+PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work) {
+    const std::int64_t start = now_ns();
+    const bool timed = limit.until_ns != std::numeric_limits<std::int64_t>::max();
+    std::atomic<bool> given_up{false};
+    std::atomic<std::uint64_t> samples{0}, rays{0};
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, (tiles_.size() + kChunk - 1) / kChunk, 1),
+        [&](const tbb::blocked_range<std::size_t>& chunk) {
+            if (given_up.load(std::memory_order_relaxed)) return;
+            const FlushDenormals flush;
+            const std::int64_t begun = f.settings.times ? now_ns() : 0;
+            PhaseTimes times{};
+            Worker w(f);
+            if (f.settings.times) w.packet.times = &times;
+            const std::size_t first = chunk.begin() * kChunk, end = std::min(first + kChunk, tiles_.size());
+            for (std::size_t i = first; i < end; ++i) {
+                if (timed && now_ns() >= limit.until_ns) given_up.store(true, std::memory_order_relaxed);
+                if (given_up.load(std::memory_order_relaxed)) break;
+                work(w, tile(tiles_[i]));
+            }
+            samples.fetch_add(w.traced, std::memory_order_relaxed);
+            if (rays.fetch_add(w.packet.rays_traced, std::memory_order_relaxed) + w.packet.rays_traced > limit.rays)
+                given_up.store(true, std::memory_order_relaxed);
+            if (sums == Sums::errors) errors_[chunk.begin()] = w.error;
+            if (!f.settings.times) return;
+            std::int64_t rest = now_ns() - begun;
+            for (std::size_t i = 0; i < kPhases; ++i) rest -= times[i];
+            times[static_cast<std::size_t>(Phase::passes)] += rest;
+            for (std::size_t i = 0; i < kPhases; ++i) phase_ns_[i].fetch_add(times[i], std::memory_order_relaxed);
+        },
+        tbb::simple_partitioner());
+    return {!given_up, samples, rays, now_ns() - start};
+}
+
+void FramePasses::begin(const Frame& f, const Lens* lens) {
+    find_background(f);
+    looks_.begin_frame(background_);
+    cover_.update(f.at, f.T_world_camera, lens);
+    const EmittersInView emitters(f, lens);
+    tiles_.clear();
+    pixels_ = 0;
+    for (std::uint32_t i = 0; i < looks_.tiles(); ++i) {
+        const Tile t = tile(i);
+        if (t.bodies.empty() && !emitters.any(t.x, t.y)) continue;
+        tiles_.push_back(i);
+        looks_.set_looked_at(i);
+        pixels_ += static_cast<std::uint64_t>(t.width * t.height);
+    }
+}
+
+/// What a ray sees that meets nothing, and that looks away from the Sun.
+void FramePasses::find_background(const Frame& f) {
+    Packet p;
+    RgbPerRay radiance;
+    p.rays.n = 1;
+    p.rays.put(0, {f.T_world_camera.t, f.sun ? -f.sun->centre() : f.T_world_camera.q * Vec3{0, 0, 1}});
+    p.hits.met = 0;
+    p.hits.body.fill(-1);
+    if (f.sun) p.to_sun.fill(f.sun->centre());
+    light_along(f, p, radiance);
+    background_ = radiance[0];
+}
+
+void FramePasses::fill_background(RadianceImage& out) {
+    if (blank_image_ != out.pixels.data() || blank_background_ != background_)
+        std::fill(blank_.begin(), blank_.end(), std::uint8_t{0});
+    blank_image_ = out.pixels.data();
+    blank_background_ = background_;
+    tbb::parallel_for(0, looks_.tiles_y(), [&](int ty) {
+        for (int tx = 0; tx < looks_.tiles_x(); ++tx) {
+            const auto i = static_cast<std::uint32_t>(ty * looks_.tiles_x() + tx);
+            const Tile t = tile(i);
+            Rgb* const first = &out.pixels[static_cast<std::size_t>(t.y) * static_cast<std::size_t>(out.width) +
+                                           static_cast<std::size_t>(t.x)];
+            const bool stays = blank_[i] != 0 && *first == background_;  // else another image took its place
+            blank_[i] = !looks_.looked_at(i);
+            if (blank_[i] == 0 || stays) continue;
+            for (int y = 0; y < t.height; ++y)
+                std::fill_n(first + static_cast<std::ptrdiff_t>(y) * out.width, t.width, background_);
+        }
+    });
+}
+
+namespace {
+
+std::size_t index_of(int x, int y, int width) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
+/// A packet's worth of a tile's pixels, from (x, y) in it on.
+template <class Tile>
+PixelBlock block_of(const Tile& t, int x, int y) {
+    PixelBlock b;
+    b.x_first = t.x + x, b.y_first = t.y + y;
+    b.width = std::min(kBlock, t.width - x), b.height = std::min(kBlock, t.height - y);
+    for (int py = b.y_first; py < b.y_first + b.height; ++py)
+        for (int px = b.x_first; px < b.x_first + b.width; ++px) b.x[b.n] = px, b.y[b.n] = py, ++b.n;
+    return b;
+}
+
+template <class Tile>
+void add_tiny(const Frame& f, const Tile& t, RadianceImage& out, std::vector<float>* variance) {
+    if (!f.tiny.any()) return;
+    for (int y = 0; y < t.height; y += kBlock)
+        for (int x = 0; x < t.width; x += kBlock) add_tiny_bodies(f, block_of(t, x, y), out, variance);
+}
+
+/// Of each pixel's mean, block by block.
+template <class Tile>
+void put_variances(const Tile& t, const PerPixel<PixelSamples>& samples, int image_width,
+                   std::vector<float>& variance) {
+    for (int by = 0; by < t.height; by += kBlock)
+        for (int bx = 0; bx < t.width; bx += kBlock) {
+            const PixelBlock block = block_of(t, bx, by);
+            Lanes<PixelSamples> of_block;
+            Lanes<double> of_means;
+            for (std::size_t i = 0; i < block.n; ++i)
+                of_block[i] = samples[place_in_tile(block.x[i] - t.x, block.y[i] - t.y)];
+            variances_of_means(std::span(of_block).first(block.n), of_means);
+            for (std::size_t i = 0; i < block.n; ++i)
+                variance[block.index(i, image_width)] = static_cast<float>(of_means[i]);
+        }
+}
+
+/// The same where pixels have as many samples as they need.
+template <class Tile>
+void put_variances(const Tile& t, const PerPixel<PixelMean>& means, const TileContrast& contrast, int image_width,
+                   std::vector<float>& variance) {
+    t.each_pixel([&](int x, int y, std::size_t at) {
+        const std::uint32_t n = means[at].count();
+        const float one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f);
+        variance[index_of(x, y, image_width)] =
+            n == 0   ? contrast.middle[at]
+            : n == 1 ? one
+                     : std::max(means[at].step() * means[at].step(), one / static_cast<float>(n));
+    });
+}
+
+Rgb look_at(const TileLooks& looks, std::size_t place) {
+    return {looks.r[place], looks.g[place], looks.b[place]};
+}
+
+}  // namespace
+
+PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+    fill_background(out);
+    const auto spp = static_cast<std::uint32_t>(f.settings.spp);
+    const PassCount count = over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        if (f.one_sample()) {
+            TileLooks& looks = looks_.tile(t.index);
+            w.middles(t, out.width, out.height, 1, 0, looks);
+            t.each_pixel(
+                [&](int x, int y, std::size_t at) { out.pixels[index_of(x, y, out.width)] = look_at(looks, at); });
+        } else {
+            PerPixel<PixelMean> means{};
+            PerPixel<PixelSamples> spread;
+            const auto store = [&](const RgbPerRay& radiance) {
+                for (std::size_t i = 0; i < w.samples.n; ++i) means[w.place[i]].add(radiance[i]);
+                if (variance == nullptr) return;
+                for (std::size_t i = 0; i < w.samples.n; ++i) spread[w.place[i]].add(radiance[i]);
+            };
+            w.samples.middle = false;
+            t.each_pixel([&](int x, int y, std::size_t at) {
+                const auto number = static_cast<std::uint32_t>(index_of(x, y, out.width));
+                for (std::uint32_t s = 0; s < spp; ++s) w.add(t, x, y, at, number, s, store);
+            });
+            w.trace(t, store);
+            t.each_pixel([&](int x, int y, std::size_t at) {
+                out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
+                w.error.add(means[at]);
+            });
+            if (variance != nullptr) put_variances(t, spread, out.width, *variance);
+        }
+        add_tiny(f, t, out, variance);
+        if (f.settings.pixels_done != nullptr)
+            f.settings.pixels_done->fetch_add(static_cast<std::size_t>(t.width * t.height),
+                                              std::memory_order_relaxed);
+    });
+    if (f.settings.pixels_done != nullptr)
+        f.settings.pixels_done->fetch_add(out.pixels.size() - pixels_, std::memory_order_relaxed);
+    if (f.one_sample()) estimate_middles(f);
+    return count;
+}
+
+void FramePasses::estimate_middles(const Frame& f) {
+    over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        TileContrast contrast;
+        looks_.contrast(f, t.index, contrast);
+        w.error.add_middles(contrast);
+    });
+}
+
+PassCount FramePasses::middles(const Frame& f, int stride, int made, const PassLimit& limit) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        w.middles(t, camera_.width, camera_.height, stride, made, looks_.tile(t.index));
+    });
+}
+
+void FramePasses::show_middles(const Frame& f, int stride, RadianceImage& out) {
+    fill_background(out);
+    over_tiles(f, Sums::counts, {}, [&](Worker&, const Tile& t) {
+        const TileLooks& looks = looks_.tile(t.index);
+        t.each_pixel([&](int x, int y, std::size_t) {
+            const int from_x = standing_for(x, out.width, stride), from_y = standing_for(y, out.height, stride);
+            out.pixels[index_of(x, y, out.width)] = look_at(looks, place_in_tile(from_x % kTile, from_y % kTile));
+        });
+        add_tiny(f, t, out, nullptr);
+    });
+}
+
+void FramePasses::make_plan(const Frame& f) {
+    if (!plan_) plan_.emplace(looks_.tiles());
+    if (means_.empty()) means_.resize(looks_.tiles());
+    plan_->weigh(f, looks_, tiles_);
+    over_tiles(f, Sums::errors, {},
+               [&](Worker& w, const Tile& t) { w.error.add_middles(plan_->contrast(t.index)); });
+}
+
+PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to,
+                              const PassLimit& limit) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        PerPixel<PixelMean>& means = means_[t.index];
+        const auto store = [&](const RgbPerRay& radiance) {
+            for (std::size_t i = 0; i < w.samples.n; ++i) means[w.place[i]].add(radiance[i]);
+        };
+        w.samples.middle = false;
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            if (from == SamplePlan::Stage{}) means[at] = {};
+            const std::uint32_t begin = plan_->count(t.index, at, from), end = plan_->count(t.index, at, to);
+            const auto number = static_cast<std::uint32_t>(index_of(x, y, camera_.width));
+            for (std::uint32_t s = begin; s < end; ++s) w.add(t, x, y, at, number, s, store);
+        });
+        w.trace(t, store);
+    });
+}
+
+void FramePasses::show_means(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+    over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        const TileLooks& looks = looks_.tile(t.index);
+        const PerPixel<PixelMean>& means = means_[t.index];
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            out.pixels[index_of(x, y, out.width)] =
+                means[at].count() > 0 ? vec_cast<float>(means[at].mean()) : look_at(looks, at);
+        });
+        w.error.add_tile(looks, plan_->contrast(t.index), means);
+        if (variance != nullptr) put_variances(t, means, plan_->contrast(t.index), out.width, *variance);
+        add_tiny(f, t, out, variance);
+    });
+}
+
+double FramePasses::standard_error() const noexcept {
+    FrameError sum;
+    for (std::size_t chunk = 0; chunk * kChunk < tiles_.size(); ++chunk) sum += errors_[chunk];
+    return sum.standard_error(static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height));
+}
+
+PhaseTimes FramePasses::times() noexcept {
+    PhaseTimes times;
+    for (std::size_t i = 0; i < kPhases; ++i) times[i] = phase_ns_[i].exchange(0, std::memory_order_relaxed);
+    return times;
+}
+
+}  // namespace narpa

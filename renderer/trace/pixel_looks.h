@@ -1,0 +1,86 @@
+/// renderer/trace/pixel_looks.h - what the rays through the pixels' middles show, kept for planning and for the
+/// error of the frame, and what it says of each pixel: how far off is its middle, and how much do samples of it
+/// vary?
+///
+/// Neighbours show the same surface if body, material and sunlight agree, their normals do, and the one lies in the
+/// other's tangent plane. Where they do not, an edge passes between them. One between two middles at a random place
+/// leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is told by its middle, and of
+/// contrast^2 / 6 if by a random point. What stands out from both its neighbours is a detail finer than the pixels,
+/// met by chance, and what varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture:
+/// second differences of independent values of variance v have the mean square 6 v.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "renderer/trace/frame_light.h"
+
+namespace narpa {
+
+inline constexpr int kTile = 8;                            ///< pixels a side: ScreenCover's
+inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four packets of 4 x 4, one after another
+
+/// Place of a pixel of a tile, in the order of the packets.
+constexpr std::size_t place_in_tile(int x, int y) noexcept {
+    return static_cast<std::size_t>(((y >> 2) * 2 + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3));
+}
+
+template <class T>
+using PerPixel = std::array<T, kTilePixels>;
+
+/// The middles of a tile.
+struct alignas(64) TileLooks {
+    PerPixel<float> r, g, b;     ///< radiance
+    PerPixel<float> nx, ny, nz;  ///< normal, world
+    PerPixel<float> depth_m;
+    PerPixel<std::uint32_t> surface;  ///< of body, material and sunlight; 0: background
+};
+
+/// Variances of mean bands, W^2 m^-4 sr^-2.
+struct alignas(64) TileContrast {
+    PerPixel<float> breaks;  ///< edges between it and its four neighbours
+    PerPixel<float> edge;    ///< of one random sample of the pixel, for edges and slopes
+    PerPixel<float> noise;   ///< of one sample, for all else; negative: not known
+    PerPixel<float> middle;  ///< expected squared error of the middle
+};
+
+/// Looks of all tiles of an image.
+class PixelLooks {
+public:
+    PixelLooks(int width, int height);
+
+    [[nodiscard]] int width() const noexcept { return width_; }
+    [[nodiscard]] int height() const noexcept { return height_; }
+    [[nodiscard]] int tiles_x() const noexcept { return tiles_x_; }
+    [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
+    [[nodiscard]] std::size_t tiles() const noexcept { return looks_.size(); }
+    [[nodiscard]] TileLooks& tile(std::size_t i) noexcept { return looks_[i]; }
+    [[nodiscard]] const TileLooks& tile(std::size_t i) const noexcept { return looks_[i]; }
+
+    /// Which tiles have looks in this frame; the others show this background.
+    void begin_frame(const Rgb& background);
+    void set_looked_at(std::size_t tile) noexcept { looked_at_[tile] = 1; }
+    [[nodiscard]] bool looked_at(std::size_t tile) const noexcept { return looked_at_[tile] != 0; }
+
+    /// Puts down what a packet of middles has met. `place`: of each lane in the tile.
+    static void store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
+                      TileLooks& tile) noexcept;
+
+    /// What a tile and its neighbours say of its pixels.
+    void contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
+
+    /// A tile with a rim of its neighbours.
+    struct Around;
+
+private:
+    void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
+
+    int width_, height_, tiles_x_, tiles_y_;
+    float background_ = 0;
+    std::vector<TileLooks> looks_;
+    std::vector<std::uint8_t> looked_at_;
+};
+
+}  // namespace narpa

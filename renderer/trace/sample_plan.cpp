@@ -1,0 +1,157 @@
+#include "renderer/trace/sample_plan.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/trace/sampler.h"
+
+namespace narpa {
+namespace {
+
+/// Edges move by less than a pixel, and thin parts are met by the middles now and then only: pixels beside an edge
+/// get this part of its variance, those next to them that.
+constexpr float kBeside = 0.25f, kNextButOne = 0.04f;
+/// Weight of a pixel that is much like its neighbours, in terms of a typical edge's. About some all is the very
+/// same, as in empty space: they have an eighth of that (kEventful).
+constexpr double kLeastWeight = 1.0 / 32;
+/// Along an edge of little contrast there may be a glint that no middle met: so much of a typical variance is taken
+/// for granted.
+constexpr float kUnseen = 0.05f;
+/// The variance of edges, which falls as n^-1.5, counts to this power beside that of noise, which falls as 1/n: of
+/// the variances of one sample, weights of 2/5 and of 1/2.
+constexpr double kEdgePower = 0.8;
+
+constexpr int kRim = 2;
+constexpr int kSide = kTile + 2 * kRim;
+using Grid = std::array<std::array<float, kSide>, kSide>;
+
+/// The greatest and the sum of 2 r + 1 neighbours.
+template <class Value, class Fold>
+float fold(int r, Value&& value, Fold&& with) {
+    float sum = value(-r);
+    for (int k = 1 - r; k <= r; ++k) sum = with(sum, value(k));
+    return sum;
+}
+
+}  // namespace
+
+SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), sums_(tiles) {}
+
+void SamplePlan::weigh(const Frame& f, const PixelLooks& looks, std::span<const std::uint32_t> tiles) {
+    constexpr std::size_t kGrain = 16;
+    using Range = tbb::blocked_range<std::size_t>;
+    tbb::parallel_for(
+        Range(0, tiles.size(), kGrain),
+        [&](const Range& range) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) contrast_tile(f, looks, tiles[i]);
+        },
+        tbb::simple_partitioner());
+    Sums all;
+    for (const std::uint32_t tile : tiles) {
+        all.variance += sums_[tile].variance;
+        all.deviation += sums_[tile].deviation;
+        all.met += sums_[tile].met;
+    }
+    met_ = all.met;
+    const double typical = all.variance > 0 ? all.variance / all.deviation : 1;
+    for (auto& bin : histogram_) bin.store(0, std::memory_order_relaxed);
+    tbb::parallel_for(
+        Range(0, tiles.size(), kGrain),
+        [&](const Range& range) {
+            std::array<std::uint32_t, kWeights> histogram{};
+            for (std::size_t i = range.begin(); i != range.end(); ++i)
+                weigh_tile(looks, tiles[i], typical * typical, histogram);
+            for (std::size_t w = 0; w < histogram.size(); ++w)
+                if (histogram[w] > 0) histogram_[w].fetch_add(histogram[w], std::memory_order_relaxed);
+        },
+        tbb::simple_partitioner());
+}
+
+void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::size_t tile) noexcept {
+    TileContrast& c = contrasts_[tile];
+    looks.contrast(f, tile, c);
+    Sums sums;
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+        const double variance = static_cast<double>(c.edge[i] + std::max(c.noise[i], 0.0f));
+        sums.variance += variance;
+        sums.deviation += std::sqrt(variance);
+        sums.met += looks.tile(tile).surface[i] != 0;
+    }
+    sums_[tile] = sums;
+}
+
+void SamplePlan::weigh_tile(const PixelLooks& looks, std::size_t tile, double typical_variance,
+                            std::span<std::uint32_t, kWeights> histogram) noexcept {
+    const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
+    Grid edge{}, noise{}, known{};
+    const float unseen = kUnseen / 12 * static_cast<float>(typical_variance);
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x) {
+            const int px = tx * kTile + x - kRim, py = ty * kTile + y - kRim;
+            if (px < 0 || py < 0 || px >= looks.width() || py >= looks.height()) continue;
+            const auto from = static_cast<std::size_t>(py / kTile * looks.tiles_x() + px / kTile);
+            if (!looks.looked_at(from)) continue;
+            const std::size_t place = place_in_tile(px % kTile, py % kTile);
+            edge[y][x] = contrasts_[from].edge[place] + unseen * contrasts_[from].breaks[place];
+            known[y][x] = contrasts_[from].noise[place] >= 0 ? 1.0f : 0.0f;
+            noise[y][x] = std::max(contrasts_[from].noise[place], 0.0f);
+        }
+    // Along the rows, then along the columns.
+    Grid near{}, far{}, noises{}, knowns{};
+    const auto greater = [](float a, float b) { return std::max(a, b); };
+    const auto plus = [](float a, float b) { return a + b; };
+    for (int y = 0; y < kSide; ++y)
+        for (int x = kRim; x < kSide - kRim; ++x) {
+            const auto row = [&](const Grid& g) { return [&g, x, y](int k) { return g[y][x + k]; }; };
+            near[y][x] = fold(1, row(edge), greater);
+            far[y][x] = fold(2, row(edge), greater);
+            noises[y][x] = fold(2, row(noise), plus);
+            knowns[y][x] = fold(2, row(known), plus);
+        }
+    for (int y = kRim; y < kSide - kRim; ++y)
+        for (int x = kRim; x < kSide - kRim; ++x) {
+            const int px = tx * kTile + x - kRim, py = ty * kTile + y - kRim;
+            const std::size_t place = place_in_tile(x - kRim, y - kRim);
+            if (px >= looks.width() || py >= looks.height()) {
+                weights_[tile][place] = -1;
+                continue;
+            }
+            const auto column = [&](const Grid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
+            const float edges = std::max({edge[y][x], kBeside * fold(1, column(near), greater),
+                                          kNextButOne * fold(2, column(far), greater)});
+            const float neighbours = fold(2, column(knowns), plus);
+            const float noisy = neighbours > 0 ? fold(2, column(noises), plus) / neighbours : 0.0f;
+            const double variance = std::pow(static_cast<double>(edges) / typical_variance, kEdgePower) +
+                                    static_cast<double>(noisy) / typical_variance;
+            const double doublings = std::log2(std::max(std::sqrt(variance), kLeastWeight) / kLeastWeight);
+            const auto hash = sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling;
+            const int event = variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0;
+            const int weight = event + static_cast<int>(hash);
+            weights_[tile][place] = static_cast<Weight>(std::min(weight, kWeights - 1));
+            ++histogram[static_cast<std::size_t>(weights_[tile][place])];
+        }
+}
+
+std::uint64_t SamplePlan::total(Stage stage) const noexcept {
+    std::uint64_t sum = 0;
+    for (int w = 0; w < kWeights; ++w)
+        sum += std::uint64_t{histogram_[static_cast<std::size_t>(w)].load(std::memory_order_relaxed)} *
+               count(static_cast<Weight>(w), stage);
+    return sum;
+}
+
+SamplePlan::Stage SamplePlan::reach(Stage from, std::uint64_t samples) const noexcept {
+    const bool all = from.all || samples >= missing(from);
+    const std::uint64_t most = total(from) + samples;
+    int within = std::max(from.level, -kWeights), beyond = kFull + 1;
+    while (within + 1 < beyond) {
+        const int middle = within + (beyond - within) / 2;
+        (total({middle, all}) <= most ? within : beyond) = middle;
+    }
+    return {within, all};
+}
+
+}  // namespace narpa

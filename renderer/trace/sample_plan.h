@@ -1,0 +1,83 @@
+/// renderer/trace/sample_plan.h - how many samples each pixel gets, from what the middles show around it.
+///
+/// For a given sum of samples the error is least where they are proportional to the standard deviation of a pixel's
+/// samples (J. Neyman, J. R. Stat. Soc. 97, 1934), and to a somewhat lower power of it where low-discrepancy points
+/// converge faster than random ones. Numbers are powers of two, at which these points are at their best; between
+/// two powers a hash of the pixel decides, so that sums follow the budget smoothly. Nothing here looks at the
+/// samples that are counted: only at the middles, which are thrown away where there are samples.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "renderer/trace/pixel_looks.h"
+
+namespace narpa {
+
+class SamplePlan {
+public:
+    static constexpr std::uint32_t kMostSamples = 1024;  ///< of a pixel
+
+    explicit SamplePlan(std::size_t tiles);
+
+    /// Weighs the pixels of these tiles, in parallel. No pixel has samples yet.
+    void weigh(const Frame& f, const PixelLooks& looks, std::span<const std::uint32_t> tiles);
+
+    /// A stage of the plan says how many samples each pixel has. Stages only grow.
+    struct Stage {
+        int level = std::numeric_limits<int>::min() / 2;
+        bool all = false;  ///< every pixel that is not just like all around it has one at least
+
+        friend bool operator==(const Stage&, const Stage&) = default;
+    };
+    [[nodiscard]] std::uint32_t count(std::size_t tile, std::size_t place, Stage stage) const noexcept {
+        return count(weights_[tile][place], stage);
+    }
+    /// Of all pixels.
+    [[nodiscard]] std::uint64_t total(Stage stage) const noexcept;
+    /// Samples that are missing for all pixels to have one that should.
+    [[nodiscard]] std::uint64_t missing(Stage stage) const noexcept {
+        return total({stage.level, true}) - total(stage);
+    }
+    /// The furthest stage that takes no more than this many samples beyond those of `from`; first of all, if they
+    /// suffice, those that are missing.
+    [[nodiscard]] Stage reach(Stage from, std::uint64_t samples) const noexcept;
+
+    /// Pixels whose middle met something.
+    [[nodiscard]] std::uint64_t met() const noexcept { return met_; }
+    [[nodiscard]] const TileContrast& contrast(std::size_t tile) const noexcept { return contrasts_[tile]; }
+
+private:
+    using Weight = std::int16_t;             ///< logarithm; -1: a pixel beyond the image
+    static constexpr int kPerDoubling = 64;  ///< weights that differ by so much are as 2 : 1
+    static constexpr int kWeights = 24 * kPerDoubling;
+    static constexpr int kEventful = 3 * kPerDoubling;  ///< below: all is the same around the pixel
+    static constexpr int kFull = std::countr_zero(kMostSamples) * kPerDoubling;  ///< kMostSamples everywhere
+    struct Sums {
+        double variance = 0, deviation = 0;
+        std::uint64_t met = 0;
+    };
+
+    static std::uint32_t count(Weight weight, Stage stage) noexcept {
+        const int doublings = weight + stage.level;
+        if (weight < 0) return 0;
+        if (doublings < 0) return stage.all && weight >= kEventful ? 1 : 0;
+        return doublings < kFull ? 1u << (doublings / kPerDoubling) : kMostSamples;
+    }
+    void contrast_tile(const Frame& f, const PixelLooks& looks, std::size_t tile) noexcept;
+    void weigh_tile(const PixelLooks& looks, std::size_t tile, double typical_variance,
+                    std::span<std::uint32_t, kWeights> histogram) noexcept;
+
+    std::vector<TileContrast> contrasts_;
+    std::vector<PerPixel<Weight>> weights_;
+    std::vector<Sums> sums_;  ///< of each tile
+    std::uint64_t met_ = 0;
+    std::array<std::atomic<std::uint32_t>, kWeights> histogram_{};
+};
+
+}  // namespace narpa

@@ -1,0 +1,173 @@
+// `narpa bench loop` as it is run, and its parts: counts and the shape of what it tells; never times.
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "emulator/loop_bench.h"
+#include "tests/support/temporary_folder.h"
+
+namespace narpa {
+namespace {
+
+struct Done {
+    int status = 0;
+    std::string out;
+};
+
+Done bench(const std::string& arguments, const char* streams) {
+    const std::string command = std::string("timeout 60 ") + NARPA_BIN + " bench loop " + arguments + streams;
+    std::FILE* pipe = ::popen(command.c_str(), "r");
+    Done done;
+    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
+        done.out.append(buffer.data(), n);
+    done.status = WEXITSTATUS(::pclose(pipe));
+    return done;
+}
+
+int first_processor() {
+    cpu_set_t allowed;
+    CPU_ZERO(&allowed);
+    ::sched_getaffinity(0, sizeof allowed, &allowed);
+    int cpu = 0;
+    while (!CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) ++cpu;
+    return cpu;
+}
+
+void expect_in_order(const nlohmann::json& percentiles) {
+    double before = -1e300;
+    for (const char* p : {"p50", "p90", "p99", "p99.9", "max"}) {
+        EXPECT_GE(percentiles[p].get<double>(), before) << percentiles;
+        before = percentiles[p];
+    }
+}
+
+TEST(BenchLoop, TheDockingSceneRunsAloneAndBesideLoad) {
+    const test::TemporaryFolder folder;
+    const Done done = bench("--duration 1 --json -o " + (folder / "plot.png"), " 2>/dev/null");
+    const auto document = nlohmann::json::parse(done.out);
+    SCOPED_TRACE(document.dump(2));
+    EXPECT_EQ(done.status, document["passed"] ? 0 : 1);
+    EXPECT_EQ(document["faults"].empty(), document["passed"].get<bool>());
+    EXPECT_GT(std::filesystem::file_size(folder / "plot.png"), 5000u);
+
+    ASSERT_EQ(document["runs"].size(), 2u);
+    EXPECT_EQ(document["runs"][0]["name"], "idle");
+    EXPECT_TRUE(document["runs"][0]["load"].empty());
+    EXPECT_EQ(document["runs"][1]["name"], "loaded");
+    EXPECT_EQ(document["runs"][1]["load"], std::vector<int>{first_processor()});
+    for (const auto& run : document["runs"]) {
+        ASSERT_EQ(run["cameras"].size(), 1u);
+        const auto& camera = run["cameras"][0];
+        EXPECT_EQ(camera["name"], "nav");
+        EXPECT_EQ(camera["period_ms"], 100);
+        EXPECT_DOUBLE_EQ(camera["allowance_ms"], 100 - 0.19 / 2);  // to the middle of the next exposure
+        EXPECT_EQ(camera["frames"].get<int>() + camera["skipped"].get<int>(), 10);
+        EXPECT_EQ(camera["incomplete"], 0);
+        int frames = 0;
+        for (const auto& count : camera["steps"]) frames += count.get<int>();
+        EXPECT_EQ(camera["frames"], frames);
+        EXPECT_GT(camera["render_ms"]["p50"], 0);
+        for (const char* times : {"wake_late_ms", "render_ms", "mid_exposure_to_hand_over_ms",
+                                  "hand_over_after_deadline_ms", "allowance_used"})
+            expect_in_order(camera[times]);
+        ASSERT_EQ(run["lidars"].size(), 1u);
+        EXPECT_EQ(run["lidars"][0]["name"], "top");
+        EXPECT_GT(run["lidars"][0]["packets"], 0);
+        EXPECT_GE(run["page_faults"]["minor"], 0);
+        EXPECT_GE(run["page_faults"]["major"], 0);
+    }
+}
+
+TEST(BenchLoop, ATimeBudgetIsTheAllowance) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "small.toml")
+        << "[sun]\ndirection = [-1.0, 0.5, 0.7]\n[[body]]\nname = \"b\"\nsphere = {radius_m = 1.0}\n"
+           "[[camera]]\nname = \"c\"\nposition_m = [-5.0, 0.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\n"
+           "resolution = [32, 32]\nfov_horizontal_deg = 30.0\nrate_hz = 20.0\n";
+    const Done done =
+        bench((folder / "small.toml") + " --idle-only --duration 0.5 --budget-ms 30 --late-max 100 --json",
+              " 2>/dev/null");
+    EXPECT_EQ(done.status, 0);
+    const auto document = nlohmann::json::parse(done.out);
+    ASSERT_EQ(document["runs"].size(), 1u);
+    const auto& camera = document["runs"][0]["cameras"][0];
+    EXPECT_EQ(camera["allowance_ms"], 30);
+    EXPECT_EQ(camera["frames"].get<int>() + camera["skipped"].get<int>(), 10);
+    EXPECT_TRUE(document["runs"][0]["lidars"].empty());
+}
+
+TEST(BenchLoop, SaysWhatIsWrongWithItsInput) {
+    const Done load = bench("--load 1023", " 2>&1 >/dev/null");
+    EXPECT_EQ(load.status, 2);
+    EXPECT_NE(load.out.find("--load 1023: this processor is not there"), std::string::npos) << load.out;
+    const Done scene = bench("no_such_scene.toml --duration 1", " 2>&1 >/dev/null");
+    EXPECT_EQ(scene.status, 2);
+    EXPECT_NE(scene.out.find("no_such_scene.toml"), std::string::npos) << scene.out;
+}
+
+TEST(CompetingLoad, KeepsProcessesOnTheirProcessorsAndTakesThemAway) {
+    const int cpu = first_processor();
+    std::vector<int> processes;
+    {
+        auto load = CompetingLoad::start({cpu, cpu});
+        ASSERT_TRUE(load);
+        processes = load->processes();
+        ASSERT_EQ(processes.size(), 2u);
+        for (const int process : processes) {
+            EXPECT_EQ(::kill(process, 0), 0);
+            cpu_set_t bound;
+            CPU_ZERO(&bound);
+            do {  // until it has got so far
+                ASSERT_EQ(::sched_getaffinity(process, sizeof bound, &bound), 0);
+                ::sched_yield();
+            } while (CPU_COUNT(&bound) != 1);
+            EXPECT_TRUE(CPU_ISSET(static_cast<std::size_t>(cpu), &bound));
+        }
+    }
+    for (const int process : processes) EXPECT_EQ(::kill(process, 0), -1);
+}
+
+/// Ten frames fell due: one was never made, two were late, one of these is not whole.
+LoopRun bad_run() {
+    LoopRun run;
+    run.name = "idle";
+    CameraRun& camera = run.cameras.emplace_back();
+    camera.name = "nav";
+    camera.allowance_ns = 50'000'000;
+    camera.stats.frames = 9;
+    camera.stats.skipped = 1;
+    camera.stats.deadline_missed = 2;
+    camera.stats.steps.front() = 8;
+    camera.stats.steps.back() = 1;
+    for (int i = 0; i < 7; ++i) camera.stats.late.add(-25'000'000);
+    for (int i = 0; i < 2; ++i) camera.stats.late.add(5'000'000);
+    return run;
+}
+
+TEST(LoopRun, CountsWhatIsLateAndWhatIsNotWhole) {
+    const CameraRun camera = bad_run().cameras[0];
+    EXPECT_DOUBLE_EQ(camera.late_fraction(), 0.3);
+    EXPECT_EQ(camera.incomplete(), 1u);
+    EXPECT_NEAR(camera.allowance_used(0.5), 0.5, 0.02);  // buckets of 3 %
+    EXPECT_NEAR(camera.allowance_used(1), 1.1, 0.005);
+    EXPECT_EQ(CameraRun{}.late_fraction(), 0);
+}
+
+TEST(LoopRun, FaultsAreSentences) {
+    const std::vector<LoopRun> runs{bad_run()};
+    const std::vector<std::string> faults = loop_faults(runs, 0.1);
+    ASSERT_EQ(faults.size(), 2u);
+    EXPECT_EQ(faults[0], "idle, camera nav: 1 frames without a whole image, expected none");
+    EXPECT_EQ(faults[1], "idle, camera nav: 30 % of the frames late, expected at most 10 %");
+    EXPECT_EQ(loop_faults(runs, 0.3).size(), 1u);
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,86 @@
+// What paths leave out, or do with a part of the rays alone, changes no mean.
+#include "renderer/trace/guide.h"
+#include "tests/renderer/path_support.h"
+
+namespace narpa {
+namespace {
+
+using namespace test;
+
+/// Two plates that face each other a little askew, lit by the Sun from the side.
+Scene facing_plates(double sun_diameter_rad) {
+    Scene s;
+    s.materials = {lambert(0.8f)};
+    add_mesh(s, plate(4, 4));
+    add_mesh(s, plate(3, 3), looking({1.5, 0, 1.5}, {-1, 0, 0}));
+    add_sun(s, {-1, 0.2, 0.6});
+    s.sun->angular_diameter_rad = sun_diameter_rad;
+    return s;
+}
+
+TEST(PathShortcuts, TheLastRayIsLeftOutOnlyWhereItWouldFindNothing) {
+    for (const double diameter : {0.0, 0.0093}) {
+        Scene dark = facing_plates(diameter), glimmering = dark;
+        glimmering.ambient = {1e-20f, 1e-20f, 1e-20f};  // to be looked for, but too faint to count
+        const auto in_the_dark = Tracer::create(dark, 1), all_the_way = Tracer::create(glimmering, 1);
+        ASSERT_TRUE(in_the_dark && all_the_way);
+        const Placement at = placed(dark);
+        std::uint64_t few = 0, many = 0;
+        double sum = 0;
+        for (const int depth : {1, 2, 4}) {
+            const PathSettings settings{.max_depth = depth};
+            for (std::uint32_t pixel = 0; pixel < 64; ++pixel) {
+                const Ray ray = ray_to({-1, -3, 2}, {0.02 * pixel - 0.6, 0.1, 0});
+                const Hit first = in_the_dark->intersect(at, ray, kInfinity);
+                const std::uint32_t sample = 5;
+                Rgb less, more;
+                const auto trace = [&](const Tracer& tracer, Rgb& out) {
+                    return path_radiance(tracer, at, settings, std::span(&ray, 1), std::span(&first, 1),
+                                         {1, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&out, 1));
+                };
+                few += trace(*in_the_dark, less);
+                many += trace(*all_the_way, more);
+                EXPECT_NEAR(less.x, more.x, 1e-6f * more.x + 1e-15f) << depth << ' ' << pixel;
+                sum += static_cast<double>(less.x);
+            }
+        }
+        EXPECT_GT(sum, 1e4);
+        EXPECT_LT(few, 0.85 * static_cast<double>(many));
+    }
+}
+
+TEST(PathShortcuts, GuidingRaysFromAMeshToASmallBodyChangesNoMean) {
+    // The Sun lights a ball that stands low over a plate, and not the plate itself, whose back is to it.
+    Scene s;
+    s.materials = {lambert(0.9f)};
+    add_mesh(s, plate(4, 4));
+    add_sphere(s, 0.2, {0.9, 0, 0.7});
+    add_sun(s, {-1, 0, -0.1});
+    const auto tracer = Tracer::create(s, 1);
+    ASSERT_TRUE(tracer);
+    const Placement at = placed(s);
+    EXPECT_TRUE(Guide::may_help(*tracer, at));
+    const Ray ray = ray_to({-1, 0.1, 2}, {-1.1, 0, 0});
+    const PathSettings guided{.max_depth = 2}, left_to_chance{.max_depth = 2, .guided = false};
+    const Estimate with = light_along(*tracer, at, ray, guided, 1024, 3);
+    const Estimate without = light_along(*tracer, at, ray, left_to_chance, 8192, 4);
+    ASSERT_GT(with.mean.x, 0);
+    EXPECT_LT(with.error, 0.01 * with.mean.x);
+    EXPECT_NEAR(with.mean.x, without.mean.x, kSigmas * std::hypot(with.error, without.error));
+}
+
+TEST(PathShortcuts, NobodyIsGuidedWhereNoBodyLooksSmall) {
+    Scene s;
+    s.materials = {lambert(0.9f)};
+    add_mesh(s, plate(4, 4));
+    add_mesh(s, plate(4, 4), {{}, {0, 0, 1}});
+    const auto tracer = Tracer::create(s, 1);
+    ASSERT_TRUE(tracer);
+    Placement at = placed(s);
+    EXPECT_FALSE(Guide::may_help(*tracer, at));
+    at.set(1, {{}, {0, 0, 100}});
+    EXPECT_TRUE(Guide::may_help(*tracer, at));
+}
+
+}  // namespace
+}  // namespace narpa

@@ -57,16 +57,17 @@ struct FrameSettings {
 ///
 /// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: tiny_bodies.h.
 ///
-/// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. After a first call with the
-/// same sizes it allocates nothing. `aovs` may be null; they show a pinhole's view, tiny bodies among the rest.
+/// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. Takes its memory anew with each
+/// call: for many frames there is CameraRenderer. `aovs` may be null; they show a pinhole's view, tiny bodies among
+/// the rest.
 void render_radiance(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
                      const FrameSettings& settings, RadianceImage& out, Aovs* aovs = nullptr);
 
 /// The same, for a camera's frames one after another: keeps memory and measures from frame to frame, and knows
-/// budgets. What a frame looks like depends on neither.
+/// budgets. What a frame looks like depends on neither. Allocates nothing after the first frame of a kind.
 class CameraRenderer {
 public:
-    /// Both outlive it. All memory is taken here and in the first frame.
+    /// Both outlive it.
     CameraRenderer(const Tracer& tracer, const Camera& camera);
     ~CameraRenderer();
 

@@ -207,13 +207,14 @@ TEST(CameraFrame, AllocatesNothingAfterTheFirstFrame) {
     Aovs aovs;
     std::vector<std::uint8_t> bytes(2 * image.pixels.size());
     FrameSettings settings;
-    settings.spp = 2;
     tbb::task_arena arena(2);
+    CameraRenderer renderer(*tracer, c);
     const auto frames = [&](int n) {
         arena.execute([&] {
             for (int i = 0; i < n; ++i) {
                 settings.frame = static_cast<std::uint32_t>(i);
-                render_radiance(*tracer, at, c, kView, settings, image, &aovs);
+                settings.spp = 1 + i % 2;
+                renderer.render(at, kView, settings, image, &aovs);
                 expose(c, image, 1, settings.frame, bytes);
             }
         });

@@ -151,14 +151,13 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
             for (std::size_t i = 0; i < s.n; ++i) {
                 const PixelSampler sampler(stage.settings.seed, stage.settings.frame, s.number[i]);
                 const SamplePoint u = sampler.point(s.sample[i]);
-                Ray ray = camera_ray(c, stage.T, s.x[i] + u[0] - 0.5, s.y[i] + u[1] - 0.5);
+                // Middles of a frame of several samples still have their own points of the lens and of the Sun.
+                const double x = s.middle ? s.x[i] : s.x[i] + u[0] - 0.5;
+                const double y = s.middle ? s.y[i] : s.y[i] + u[1] - 0.5;
+                Ray ray = camera_ray(c, stage.T, x, y);
                 Vec3 sun = f.sun->sample(u[2], u[3]);
-                if (s.middle) {
-                    ray = camera_ray(c, stage.T, s.x[i], s.y[i]);
-                    sun = f.sun->centre();
-                } else if (c.lens) {
-                    ray = lens_ray(c, *c.lens, stage.T, s.x[i] + u[0] - 0.5, s.y[i] + u[1] - 0.5,
-                                   aperture_point(*c.lens, u[2], u[3]));
+                if (c.lens) {
+                    ray = lens_ray(c, *c.lens, stage.T, x, y, aperture_point(*c.lens, u[2], u[3]));
                     const SamplePoint more = sampler.point(s.sample[i], 1);
                     sun = f.sun->sample(more[0], more[1]);
                 }
@@ -167,6 +166,26 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
                 ASSERT_EQ(p->to_sun[i], sun);
             }
         }
+    }
+}
+
+TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
+    std::mt19937_64 random(7);
+    Camera c = camera(200, 160, 400);
+    c.lens = Lens{0.05, 6};
+    Stage stage(c);
+    stage.settings.spp = 1;
+    const Frame f = make_frame(stage.tracer, stage.at, stage.view, stage.T, stage.settings);
+    auto p = std::make_unique<Packet>();
+    CameraSamples s = some_samples(kPacket, c, 1, random);
+    s.middle = true;
+    RgbPerRay radiance;
+    trace_samples(f, s, stage.tracer.all_bodies(), *p, radiance);
+    for (std::size_t i = 0; i < s.n; ++i) {
+        const Ray ray = camera_ray(c, stage.T, s.x[i], s.y[i]);
+        ASSERT_EQ(p->rays[i].origin, ray.origin);
+        ASSERT_EQ(p->rays[i].direction, ray.direction);
+        ASSERT_EQ(p->to_sun[i], f.sun->centre());
     }
 }
 

@@ -5,9 +5,20 @@
 /// Neighbours show the same surface if body, material and sunlight agree, their normals do, and the one lies in the
 /// other's tangent plane. Where they do not, an edge passes between them. One between two middles at a random place
 /// leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is told by its middle, and of
-/// contrast^2 / 6 if by a random point. What stands out from both its neighbours is a detail finer than the pixels,
-/// met by chance, and what varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture:
-/// second differences of independent values of variance v have the mean square 6 v.
+/// contrast^2 / 6 if by a random point.
+///
+/// What stands out from both its neighbours is a detail, a bar of width w in pixels, with two such edges; but where
+/// w is less than 1 the middles meet it now and then only, and see nothing of it in between. Averaged over its
+/// place, it leaves in each row of pixels that it crosses contrast^2 times
+///     w - w^2 - w^3 / 3          to the middles, w <= 1/2,
+///     1/2 - w + w^2 - w^3 / 3    to the middles, 1/2 <= w <= 1,
+///     w - w^2 + w^3 / 3          to random points, w <= 1,
+/// and from w = 1 on what its two edges do, 1/6 and 1/3. One middle alone meets it in w of the rows up to w = 1, in
+/// 2 - w up to w = 2. With all scales equally frequent, that is w distributed as dw / w, each such meeting stands
+/// for 0.230 contrast^2 beyond the edges' in middles and 0.200 contrast^2 in random points.
+///
+/// What varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture: second differences
+/// of independent values of variance v have the mean square 6 v.
 #pragma once
 
 #include <array>
@@ -41,7 +52,7 @@ struct alignas(64) TileLooks {
 /// Variances of mean bands, W^2 m^-4 sr^-2.
 struct alignas(64) TileContrast {
     PerPixel<float> breaks;  ///< edges between it and its four neighbours
-    PerPixel<float> edge;    ///< of one random sample of the pixel, for edges and slopes
+    PerPixel<float> edge;    ///< of one random sample of the pixel, for edges, details and slopes
     PerPixel<float> noise;   ///< of one sample, for all else; negative: not known
     PerPixel<float> middle;  ///< expected squared error of the middle
 };

@@ -18,8 +18,9 @@ constexpr std::uint64_t kLeastPieces = 1000;
 /// Parts of what is left that go to the first pass after the middles, so that there soon is something to show, and
 /// to each of the next.
 constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
-/// Of rays, whose number follows from that of the samples nearly to the last.
-constexpr double kFirstRays = 0.6, kNextRays = 0.96;
+/// Of rays, whose number follows from that of the samples nearly to the last; where paths are followed, to a tenth
+/// from one pass to the next.
+constexpr double kFirstRays = 0.6, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
 
@@ -217,8 +218,8 @@ private:
         if (budget_.kind == Kind::rays) {
             const auto left = static_cast<double>(rays_left());
             if (left < kRest * static_cast<double>(budget_.rays)) return 0;
-            return static_cast<std::uint64_t>((pass == 0 && !middle_.quick ? kFirstRays : kNextRays) * left /
-                                              rays_each);
+            const double part = middle_.quick ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
+            return static_cast<std::uint64_t>(part * left / rays_each);
         }
         const std::int64_t left = ns_left();
         if (static_cast<double>(left) < kRest * static_cast<double>(budget_.deadline_ns - begun_ns_)) return 0;

@@ -36,6 +36,20 @@ float fold(int r, Value&& value, Fold&& with) {
     return sum;
 }
 
+// What has a pixel's own middle in it are its own values and those of the four beside it: the cross.
+float at_cross(const Grid& g, int x, int y) {
+    return g[y][x] + g[y][x - 1] + g[y][x + 1] + g[y - 1][x] + g[y + 1][x];
+}
+/// The greatest of the four beyond it, and of those two columns off.
+float at_corners(const Grid& g, int x, int y) {
+    return std::max({g[y - 1][x - 1], g[y - 1][x + 1], g[y + 1][x - 1], g[y + 1][x + 1]});
+}
+float at_sides(const Grid& g, int x, int y) {
+    float greatest = 0;
+    for (int k = -1; k <= 1; ++k) greatest = std::max({greatest, g[y + k][x - 2], g[y + k][x + 2]});
+    return greatest;
+}
+
 }  // namespace
 
 SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), sums_(tiles) {}
@@ -63,7 +77,7 @@ void SamplePlan::weigh(const Frame& f, const PixelLooks& looks, std::span<const 
         [&](const Range& range) {
             std::array<std::uint32_t, kWeights> histogram{};
             for (std::size_t i = range.begin(); i != range.end(); ++i)
-                weigh_tile(looks, tiles[i], typical * typical, histogram);
+                weigh_tile(f, looks, tiles[i], typical * typical, histogram);
             for (std::size_t w = 0; w < histogram.size(); ++w)
                 if (histogram[w] > 0) histogram_[w].fetch_add(histogram[w], std::memory_order_relaxed);
         },
@@ -83,7 +97,7 @@ void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::siz
     sums_[tile] = sums;
 }
 
-void SamplePlan::weigh_tile(const PixelLooks& looks, std::size_t tile, double typical_variance,
+void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
                             std::span<std::uint32_t, kWeights> histogram) noexcept {
     const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
     Grid edge{}, noise{}, known{};
@@ -120,10 +134,18 @@ void SamplePlan::weigh_tile(const PixelLooks& looks, std::size_t tile, double ty
                 continue;
             }
             const auto column = [&](const Grid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
-            const float edges = std::max({edge[y][x], kBeside * fold(1, column(near), greater),
-                                          kNextButOne * fold(2, column(far), greater)});
-            const float neighbours = fold(2, column(knowns), plus);
-            const float noisy = neighbours > 0 ? fold(2, column(noises), plus) / neighbours : 0.0f;
+            float edges = std::max({edge[y][x], kBeside * fold(1, column(near), greater),
+                                    kNextButOne * fold(2, column(far), greater)});
+            if (!f.quick) {
+                const float seen = at_corners(edge, x, y);
+                const float breaks = contrasts_[tile].breaks[place];
+                edges = std::max({breaks > 0 ? std::max(seen, unseen * breaks) : 0.0f, kBeside * seen,
+                                  kNextButOne * std::max({far[y - 2][x], far[y + 2][x], at_sides(edge, x, y)})});
+            }
+            const float neighbours = fold(2, column(knowns), plus) - at_cross(known, x, y);
+            const float noisy =
+                neighbours > 0 ? std::max(fold(2, column(noises), plus) - at_cross(noise, x, y), 0.0f) / neighbours
+                               : 0.0f;
             const double variance = std::pow(static_cast<double>(edges) / typical_variance, kEdgePower) +
                                     static_cast<double>(noisy) / typical_variance;
             const double doublings = std::log2(std::max(std::sqrt(variance), kLeastWeight) / kLeastWeight);

@@ -4,7 +4,10 @@
 /// samples (J. Neyman, J. R. Stat. Soc. 97, 1934), and to a somewhat lower power of it where low-discrepancy points
 /// converge faster than random ones. Numbers are powers of two, at which these points are at their best; between
 /// two powers a hash of the pixel decides, so that sums follow the budget smoothly. Nothing here looks at the
-/// samples that are counted: only at the middles, which are thrown away where there are samples.
+/// samples that are counted: only at the middles, which are thrown away where there are samples. And where a middle
+/// is a random sample itself, it has no say in whether it is shown: its neighbours alone tell how noisy the pixel
+/// is and, where paths are followed, how much an edge through it matters; else those that happen to be bright would
+/// be thrown away more often than others, and the image would lose light.
 #pragma once
 
 #include <array>
@@ -70,7 +73,7 @@ private:
         return doublings < kFull ? 1u << (doublings / kPerDoubling) : kMostSamples;
     }
     void contrast_tile(const Frame& f, const PixelLooks& looks, std::size_t tile) noexcept;
-    void weigh_tile(const PixelLooks& looks, std::size_t tile, double typical_variance,
+    void weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
                     std::span<std::uint32_t, kWeights> histogram) noexcept;
 
     std::vector<TileContrast> contrasts_;

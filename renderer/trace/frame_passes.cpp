@@ -383,6 +383,7 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
 }
 
 void FramePasses::show_means(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+    fill_background(out);
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         const TileLooks& looks = looks_.tile(t.index);
         const PerPixel<PixelMean>& means = means_[t.index];

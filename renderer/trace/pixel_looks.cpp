@@ -31,9 +31,11 @@ struct Pairs {
 }  // namespace
 
 struct alignas(64) PixelLooks::Around {
-    Grid<float> radiance{}, nx{}, ny{}, nz{};
-    Grid<float> depth{}, px{}, py{}, pz{};  // positions are the camera's, in the world's axes
+    Grid<float> radiance{}, nx{}, ny{}, nz{}, depth{};
     Grid<std::uint32_t> surface{};
+    /// Where a ray is one metre along the camera's axis, in the world's axes: ahead + x * right + y * down.
+    Vec3f ahead, right, down;
+    int x_first, y_first, x_last, y_last;  ///< pixel of the corner of the rim; the image's last
 };
 
 PixelLooks::PixelLooks(int width, int height)
@@ -49,69 +51,157 @@ void PixelLooks::begin_frame(const Rgb& background) {
     std::fill(looked_at_.begin(), looked_at_.end(), std::uint8_t{0});
 }
 
-void PixelLooks::store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
-                       TileLooks& tile) noexcept {
-    const Vec3 axis = f.T_world_camera.q * Vec3{0, 0, 1};
-    for (std::size_t i = 0; i < p.rays.n; ++i) {
-        const std::size_t at = place[i];
-        tile.r[at] = radiance.r[i], tile.g[at] = radiance.g[i], tile.b[at] = radiance.b[i];
-        const bool met = p.hits.body[i] >= 0;
-        tile.surface[at] = 0;
-        tile.nx[at] = tile.ny[at] = tile.nz[at] = tile.depth_m[at] = 0;
-        if (!met) continue;
-        const std::uint32_t lit = f.quick && is_set(p.lit, i) ? 1u : 0u;
+namespace {
+
+/// What is kept of a packet, lane by lane.
+struct alignas(64) LooksPerRay {
+    Lanes<float> nx, ny, nz, depth_m;
+    Lanes<std::uint32_t> surface;
+};
+
+NARPA_EACH_ISA void look(const Packet& p, const Vec3& axis, std::uint32_t lit, LooksPerRay& out) noexcept {
+    const Lanes<int> shone = masks_of(lit), met = masks_of(p.hits.met);
+    LooksPerRay seen;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const bool is = met[i] != 0;
         const auto body = static_cast<std::uint32_t>(p.hits.body[i] + 1);
         const auto material = static_cast<std::uint32_t>(p.hits.material[i]);
-        tile.surface[at] = ((body * 0x9e3779b1u) ^ (material * 0x85ebca6bu)) << 2 | 2u | lit;
+        const std::uint32_t surface = ((body * 0x9e3779b1u) ^ (material * 0x85ebca6bu)) << 2 | 2u |
+                                      (static_cast<std::uint32_t>(shone[i]) & 1u);
+        seen.surface[i] = is ? surface : 0;
         const Vec3 n = p.hits.shading_normal[i];
-        tile.nx[at] = static_cast<float>(n.x), tile.ny[at] = static_cast<float>(n.y);
-        tile.nz[at] = static_cast<float>(n.z);
-        tile.depth_m[at] = static_cast<float>(p.hits.range_m[i] * dot(p.rays.direction[i], axis));
+        seen.nx[i] = is ? static_cast<float>(n.x) : 0;
+        seen.ny[i] = is ? static_cast<float>(n.y) : 0;
+        seen.nz[i] = is ? static_cast<float>(n.z) : 0;
+        seen.depth_m[i] = is ? static_cast<float>(p.hits.range_m[i] * dot(p.rays.direction[i], axis)) : 0;
     }
+    out = seen;
 }
 
+}  // namespace
+
+void PixelLooks::store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
+                       TileLooks& tile) noexcept {
+    LooksPerRay seen;
+    if (p.hits.met != 0)
+        look(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.quick ? p.lit : 0, seen);
+    else
+        seen = {};
+    // The packets of a tile's middles are its blocks, all but a few.
+    const bool block = p.rays.n == kPacket && place[kPacket - 1] == place[0] + kPacket - 1;
+    const auto put = [&](const auto& from, auto& to) {
+        if (block)
+            std::copy(from.begin(), from.end(), to.begin() + place[0]);
+        else
+            for (std::size_t i = 0; i < p.rays.n; ++i) to[place[i]] = from[i];
+    };
+    put(radiance.r, tile.r), put(radiance.g, tile.g), put(radiance.b, tile.b);
+    put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
+    put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
+}
+
+namespace {
+
+/// `n` pixels of a tile, from `place` on.
+template <std::size_t n, class Around>
+void copy_looks(const TileLooks& t, std::size_t place, Around& a, std::size_t at) {
+    for (std::size_t i = 0; i < n; ++i) {
+        const float r = t.r[place + i], g = t.g[place + i], b = t.b[place + i];
+        a.radiance[at + i] = (r + g + b) / 3;
+    }
+    std::copy_n(&t.nx[place], n, &a.nx[at]);
+    std::copy_n(&t.ny[place], n, &a.ny[at]);
+    std::copy_n(&t.nz[place], n, &a.nz[at]);
+    std::copy_n(&t.depth_m[place], n, &a.depth[at]);
+    std::copy_n(&t.surface[place], n, &a.surface[at]);
+}
+template <class Around>
+void repeat(Around& a, std::size_t from, std::size_t at) {
+    for (Grid<float>* grid : {&a.radiance, &a.nx, &a.ny, &a.nz, &a.depth}) (*grid)[at] = (*grid)[from];
+    a.surface[at] = a.surface[from];
+}
+
+/// Row -1 is the rim above the tile, column -1 the rim on its left.
+constexpr std::size_t cell(int row, int column) {
+    return static_cast<std::size_t>((row + 1) * kRow + column + 1);
+}
+
+}  // namespace
+
+/// Beyond the image its last pixels are repeated: no edge there. The rim's corners are nobody's neighbours.
 void PixelLooks::gather(const Frame& f, std::size_t tile, Around& a) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
-    const auto right = vec_cast<float>(f.T_world_camera.q * Vec3{1 / f.camera.fx, 0, 0});
-    const auto down = vec_cast<float>(f.T_world_camera.q * Vec3{0, 1 / f.camera.fy, 0});
-    const auto ahead =
-        vec_cast<float>(f.T_world_camera.q * Vec3{-f.camera.cx / f.camera.fx, -f.camera.cy / f.camera.fy, 1});
-    for (int row = 0; row < kSide; ++row) {
-        const int y = std::clamp(ty * kTile + row - 1, 0, height_ - 1);
-        for (int column = 0; column < kSide; ++column) {
-            const int x = std::clamp(tx * kTile + column - 1, 0, width_ - 1);
-            const auto at = static_cast<std::size_t>(row * kRow + column);
-            const auto from = static_cast<std::size_t>(y / kTile * tiles_x_ + x / kTile);
-            if (!looked_at(from)) {
-                a.radiance[at] = background_;
-                a.surface[at] = 0;
-                continue;
-            }
-            const TileLooks& t = looks_[from];
-            const std::size_t place = place_in_tile(x % kTile, y % kTile);
-            a.radiance[at] = (t.r[place] + t.g[place] + t.b[place]) / 3;
-            a.surface[at] = t.surface[place];
-            a.nx[at] = t.nx[place], a.ny[at] = t.ny[place], a.nz[at] = t.nz[place];
-            const Vec3f p =
-                (ahead + static_cast<float>(x) * right + static_cast<float>(y) * down) * t.depth_m[place];
-            a.px[at] = p.x, a.py[at] = p.y, a.pz[at] = p.z;
-        }
+    a.right = vec_cast<float>(f.T_world_camera.q * Vec3{1 / f.camera.fx, 0, 0});
+    a.down = vec_cast<float>(f.T_world_camera.q * Vec3{0, 1 / f.camera.fy, 0});
+    a.ahead = vec_cast<float>(f.T_world_camera.q * Vec3{-f.camera.cx / f.camera.fx, -f.camera.cy / f.camera.fy, 1});
+    a.x_first = tx * kTile - 1, a.y_first = ty * kTile - 1;
+    a.x_last = width_ - 1, a.y_last = height_ - 1;
+    const int columns = std::min(kTile, width_ - tx * kTile), rows = std::min(kTile, height_ - ty * kTile);
+    const TileLooks& own = looks_[tile];
+    for (int row = 0; row < kTile; ++row) {
+        copy_looks<4>(own, place_in_tile(0, row), a, cell(row, 0));
+        copy_looks<4>(own, place_in_tile(4, row), a, cell(row, 4));
+    }
+    const auto pixel_of = [&](std::size_t other, int x, int y, std::size_t at) {
+        if (looked_at(other))
+            copy_looks<1>(looks_[other], place_in_tile(x, y), a, at);
+        else
+            a.radiance[at] = background_;
+    };
+    const auto row_of_tiles = static_cast<std::size_t>(tiles_x_);
+    for (int row = 0; row < rows; ++row) {
+        if (tx > 0)
+            pixel_of(tile - 1, kTile - 1, row, cell(row, -1));
+        else
+            repeat(a, cell(row, 0), cell(row, -1));
+        if (tx + 1 < tiles_x_)
+            pixel_of(tile + 1, 0, row, cell(row, columns));
+        else
+            repeat(a, cell(row, columns - 1), cell(row, columns));
+    }
+    for (int column = 0; column < columns; ++column) {
+        if (ty > 0)
+            pixel_of(tile - row_of_tiles, column, kTile - 1, cell(-1, column));
+        else
+            repeat(a, cell(0, column), cell(-1, column));
+        if (ty + 1 < tiles_y_)
+            pixel_of(tile + row_of_tiles, column, 0, cell(rows, column));
+        else
+            repeat(a, cell(rows - 1, column), cell(rows, column));
     }
 }
 
 namespace {
 
+/// Where the pixels' surfaces are, from the camera, in the world's axes.
+struct Positions {
+    Grid<float> x, y, z;
+};
+template <class Around>
+[[gnu::always_inline]] inline void locate(const Around& a, Positions& p) {
+    for (int row = 0; row < kSide + 2; ++row)
+        for (int column = 0; column < kRow; ++column) {
+            const auto at = static_cast<std::size_t>(row * kRow + column);
+            const auto x = static_cast<float>(std::clamp(a.x_first + column, 0, a.x_last));
+            const auto y = static_cast<float>(std::clamp(a.y_first + row, 0, a.y_last));
+            p.x[at] = (a.ahead.x + x * a.right.x + y * a.down.x) * a.depth[at];
+            p.y[at] = (a.ahead.y + x * a.right.y + y * a.down.y) * a.depth[at];
+            p.z[at] = (a.ahead.z + x * a.right.z + y * a.down.z) * a.depth[at];
+        }
+}
+
 /// Compares each with the one `step` further on.
 template <class Around>
-[[gnu::always_inline]] inline void compare(const Around& a, int step, Pairs& pairs) {
-    for (int i = 0; i < kSide * kRow; ++i) {
-        const auto at = static_cast<std::size_t>(i), next = static_cast<std::size_t>(i + step);
+[[gnu::always_inline]] inline void compare(const Around& a, const Positions& p, std::size_t step, Pairs& pairs) {
+    for (std::size_t at = 0; at < kSide * kRow; ++at) {
+        const std::size_t next = at + step;
         const float turn = a.nx[at] * a.nx[next] + a.ny[at] * a.ny[next] + a.nz[at] * a.nz[next];
-        const float dx = a.px[next] - a.px[at], dy = a.py[next] - a.py[at], dz = a.pz[next] - a.pz[at];
+        const float dx = p.x[next] - p.x[at], dy = p.y[next] - p.y[at], dz = p.z[next] - p.z[at];
         const float off = a.nx[at] * dx + a.ny[at] * dy + a.nz[at] * dz;
         const float d = a.radiance[next] - a.radiance[at];
-        const bool steady = turn > kSameNormal && off * off <= kOffPlane2 * (dx * dx + dy * dy + dz * dz);
-        const bool same = a.surface[at] == a.surface[next] && (a.surface[at] == 0 ? d == 0 : steady);
+        const bool steady = (turn > kSameNormal) & (off * off <= kOffPlane2 * (dx * dx + dy * dy + dz * dz));
+        const bool empty = a.surface[at] == 0, even = d == 0;
+        const bool same = (a.surface[at] == a.surface[next]) & ((empty & even) | (!empty & steady));
         pairs.difference[at] = d;
         pairs.edge[at] = same ? 0.0f : 1.0f;
     }
@@ -137,23 +227,31 @@ struct AlongAxis {
             known};
 }
 
-NARPA_EACH_ISA void judge(const PixelLooks::Around& a, Pairs& across, Pairs& down, TileContrast& out) noexcept {
-    compare(a, 1, across);
-    compare(a, kRow, down);
-    for (int y = 0; y < kTile; ++y)
-        for (int x = 0; x < kTile; ++x) {
-            const auto at = static_cast<std::size_t>((y + 1) * kRow + x + 1);
-            const AlongAxis h = along_axis(across, at, 1), v = along_axis(down, at, kRow);
-            const float known = h.known + v.known;
-            const float noise = known > 0 ? (h.bend + v.bend) / (6 * known) : -1.0f;
-            const std::size_t place = place_in_tile(x, y);
-            out.breaks[place] = h.breaks + v.breaks;
-            out.noise[place] = noise;
-            // The steps of a slanting edge are crossed along both axes: together, not twice.
-            const float edges = std::sqrt(h.edges * h.edges + v.edges * v.edges);
-            const float detail = std::max(h.detail, v.detail);
-            out.edge[place] = edges * (1 / 12.0f) + detail * kDetailInSamples + (h.slopes + v.slopes) * (1 / 24.0f);
-            out.middle[place] = edges * (1 / 24.0f) + detail * kDetailInMiddles + std::max(noise, 0.0f);
+NARPA_EACH_ISA void judge(const PixelLooks::Around& a, TileContrast& out) noexcept {
+    Positions positions;
+    Pairs across, down;
+    locate(a, positions);
+    compare(a, positions, 1, across);
+    compare(a, positions, kRow, down);
+    Grid<float> breaks, edge, noise, middle;
+    for (std::size_t at = kRow; at < (kSide - 1) * kRow; ++at) {
+        const AlongAxis h = along_axis(across, at, 1), v = along_axis(down, at, kRow);
+        const float known = h.known + v.known, bend = (h.bend + v.bend) / (6 * std::max(known, 1.0f));
+        noise[at] = known > 0 ? bend : -1.0f;
+        breaks[at] = h.breaks + v.breaks;
+        // The steps of a slanting edge are crossed along both axes: together, not twice.
+        const float edges = std::sqrt(h.edges * h.edges + v.edges * v.edges);
+        const float detail = std::max(h.detail, v.detail);
+        edge[at] = edges * (1 / 12.0f) + detail * kDetailInSamples + (h.slopes + v.slopes) * (1 / 24.0f);
+        middle[at] = edges * (1 / 24.0f) + detail * kDetailInMiddles + std::max(noise[at], 0.0f);
+    }
+    for (int row = 0; row < kTile; ++row)
+        for (int column = 0; column < kTile; column += 4) {
+            const std::size_t at = cell(row, column), place = place_in_tile(column, row);
+            std::copy_n(&breaks[at], 4, &out.breaks[place]);
+            std::copy_n(&edge[at], 4, &out.edge[place]);
+            std::copy_n(&noise[at], 4, &out.noise[place]);
+            std::copy_n(&middle[at], 4, &out.middle[place]);
         }
 }
 
@@ -161,9 +259,8 @@ NARPA_EACH_ISA void judge(const PixelLooks::Around& a, Pairs& across, Pairs& dow
 
 void PixelLooks::contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept {
     Around a;
-    Pairs across, down;
     gather(f, tile, a);
-    judge(a, across, down, out);
+    judge(a, out);
     const int x_end = width_ - static_cast<int>(tile) % tiles_x_ * kTile;
     const int y_end = height_ - static_cast<int>(tile) / tiles_x_ * kTile;
     if (x_end >= kTile && y_end >= kTile) return;

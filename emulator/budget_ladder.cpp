@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <memory>
 
 #include "emulator/clock.h"
+#include "renderer/sensor/detector.h"
 
 namespace narpa {
 namespace {
@@ -30,7 +32,7 @@ struct Climber {
     ErrorAgainst error;
     std::unique_ptr<CameraRenderer> renderer{};  ///< null: the plain loop
     double predicted_squares = 0;
-    bool predicts = true;
+    bool predicts = true;  ///< all frames so far
 };
 
 struct View {
@@ -40,6 +42,8 @@ struct View {
     Rigid3 T_world_camera;
     RadianceImage image;
     TracingThreads& threads;
+    std::vector<std::uint8_t> bytes{};
+    std::vector<double> detector_s{};
 };
 
 /// Renders frame `number`; returns its account, of the loop the rays alone.
@@ -55,10 +59,30 @@ FrameAccount render(View& v, Climber& c, const ReferenceLoop* loop, std::uint32_
     return account;
 }
 
+/// Of all threads.
+double cpu_s() {
+    timespec t{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+double seconds_since(std::int64_t start_ns) {
+    return static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
+}
+
+void expose(View& v, const FrameSettings& s) {
+    const std::int64_t start_ns = monotonic_ns();
+    v.threads.arena.execute([&] { expose(v.camera, v.image, s.seed, s.frame, v.bytes); });
+    v.detector_s.push_back(seconds_since(start_ns));
+}
+
 void measure(View& v, Climber& c, const ReferenceLoop* loop, std::uint32_t number, int frames) {
     const std::int64_t start_ns = monotonic_ns();
+    const double cpu_start_s = cpu_s();
     const FrameAccount account = render(v, c, loop, number);
-    c.rung.seconds.push_back(static_cast<double>(monotonic_ns() - start_ns) * 1e-9);
+    c.rung.seconds.push_back(seconds_since(start_ns));
+    c.rung.cpu_seconds.push_back(cpu_s() - cpu_start_s);
+    if (!c.rung.loop) expose(v, c.settings);
+    c.rung.step = std::max(c.rung.step, account.step);
     c.rung.rays += static_cast<double>(account.rays) / frames;
     c.rung.samples += static_cast<double>(account.samples) / frames;
     for (std::size_t k = 0; k < kPhases; ++k) c.rung.phase_ns[k] += account.phase_ns[k] / frames;
@@ -96,6 +120,9 @@ double median(std::vector<double> values) {
 
 double Rung::median_s() const {
     return median(seconds);
+}
+double Rung::median_cpu_s() const {
+    return median(cpu_seconds);
 }
 
 Ladder climb(const World& world, std::size_t camera_index, const LadderSettings& s, const ReferenceLoop* loop,
@@ -141,6 +168,7 @@ Ladder climb(const World& world, std::size_t camera_index, const LadderSettings&
         add(named(fmt::format("loop {} spp", spp), true, false), settings);
     }
 
+    v.bytes.resize(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
     for (Climber& c : climbers) render(v, c, loop, 0);  // takes its memory
     std::uint32_t number = 1;
     for (int k = 0; k < s.frames; ++k)
@@ -149,7 +177,7 @@ Ladder climb(const World& world, std::size_t camera_index, const LadderSettings&
             measure(v, c, loop, number++, s.frames);
         }
 
-    Ladder ladder{reference.level().value, std::sqrt(reference.variance_of_mean()), {}};
+    Ladder ladder{reference.level().value, std::sqrt(reference.variance_of_mean()), median(v.detector_s), {}};
     for (Climber& c : climbers) {
         const ErrorRow row = c.error.row(c.settings.spp);
         c.rung.rmse = row.rmse;
@@ -160,19 +188,30 @@ Ladder climb(const World& world, std::size_t camera_index, const LadderSettings&
     return ladder;
 }
 
-std::optional<double> speed_up(const Ladder& ladder, const Rung& rung) {
+std::optional<double> speed_up(const Ladder& ladder, const Rung& rung, TimeBy by) {
+    const auto seconds = [&](const Rung& r) { return by == TimeBy::wall ? r.median_s() : r.median_cpu_s(); };
     std::vector<std::array<double, 2>> line;  // of the loop: log error, log time
     for (const Rung& r : ladder.rungs)
-        if (r.loop && r.rmse.value > 0) line.push_back({std::log(r.rmse.value), std::log(r.median_s())});
+        if (r.loop && r.rmse.value > 0) line.push_back({std::log(r.rmse.value), std::log(seconds(r))});
     if (rung.rmse.value <= 0) return {};
     const double wanted = std::log(rung.rmse.value);
     for (std::size_t k = 1; k < line.size(); ++k) {
         const auto& [e0, t0] = line[k - 1];
         const auto& [e1, t1] = line[k];
         if ((wanted > e0) == (wanted > e1) || e0 == e1) continue;
-        return std::exp(t0 + (t1 - t0) * (wanted - e0) / (e1 - e0)) / rung.median_s();
+        return std::exp(t0 + (t1 - t0) * (wanted - e0) / (e1 - e0)) / seconds(rung);
     }
     return {};
+}
+
+std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by) {
+    std::vector<double> all;
+    for (const Rung& r : ladder.rungs)
+        if (!r.loop && r.adaptive == adaptive && r.knows_its_error())
+            if (const auto s = speed_up(ladder, r, by)) all.push_back(*s);
+    if (all.empty()) return {};
+    const auto [least, most] = std::minmax_element(all.begin(), all.end());
+    return SpeedUps{median(all), *least, *most, all.size()};
 }
 
 }  // namespace narpa

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include "emulator/raw_embree_scene.h"
 #include "renderer/trace/sampler.h"
@@ -69,7 +70,7 @@ struct Paths {
     alignas(64) std::array<int, 16> valid{}, asked{};
     std::array<std::size_t, 16> pixel{};
     std::array<Counter, 16> random{};
-    std::array<Rgb, 16> throughput{}, light{}, sunlight{};
+    std::array<Rgb, 16> throughput{}, light{}, incident{};
     std::array<Point, 16> point{};
 
     void start(int i, const Vec3f& origin, const Vec3f& direction) {
@@ -80,6 +81,20 @@ struct Paths {
     }
 };
 
+/// Light that a point is asked for: what comes from `direction` (unit) if nothing stands in the way before `far_m`.
+struct Incident {
+    Vec3f direction;
+    float far_m;
+    Rgb irradiance;  ///< on a surface that faces it, over the density with which it was chosen
+};
+
+/// A triangle that shines.
+struct LampFace {
+    Vec3f corner, side, other_side, normal;  ///< normal: unit
+    Rgb radiance_area;                       ///< radiance times area over the chance to be chosen, W sr^-1
+    float chosen_below;                      ///< sum of the chances up to this one
+};
+
 }  // namespace
 
 struct ReferenceLoop::Impl {
@@ -87,10 +102,16 @@ struct ReferenceLoop::Impl {
     RawScene raw;
     Vec3f to_sun{};
     float sun_radius = 0;  ///< sine of the half angle
+    std::vector<LampFace> lamps{};
 
+    void find_lamps();
     std::uint64_t trace(Paths& p, const FrameSettings& s) const;
     [[nodiscard]] Point point_of(const Paths& p, int i) const;
-    std::uint64_t ask_sun(Paths& p) const;
+    [[nodiscard]] Incident from_sun(Counter& random) const;
+    [[nodiscard]] Incident from_lamps(const Point& p, Counter& random) const;
+    template <class Source>
+    std::uint64_t ask(Paths& p, const Source& source) const;
+    std::uint64_t ask_lights(Paths& p, bool direct) const;
 };
 
 Result<ReferenceLoop> ReferenceLoop::create(const Scene& scene, const Placement& at) {
@@ -104,11 +125,12 @@ Result<ReferenceLoop> ReferenceLoop::create(const Scene& scene, const Placement&
     if (!scene.lights.empty()) return Error{"the scene has a [[light]], expected the Sun alone", scene.file};
     auto raw = RawScene::build(scene, at);
     if (!raw) return raw.error();
-    auto impl = std::make_unique<Impl>(Impl{scene, *std::move(raw), {}, 0});
+    auto impl = std::make_unique<Impl>(Impl{scene, *std::move(raw)});
     if (scene.sun) {
         impl->to_sun = vec_cast<float>(normalized(scene.sun->direction));
         impl->sun_radius = static_cast<float>(std::sin(0.5 * scene.sun->angular_diameter_rad));
     }
+    impl->find_lamps();
     return ReferenceLoop(std::move(impl));
 }
 ReferenceLoop::ReferenceLoop(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -126,30 +148,73 @@ Point ReferenceLoop::Impl::point_of(const Paths& p, int i) const {
     return {on + kLift_m * n, n, view, &scene.materials[raw.face_material[face]]};
 }
 
-/// The light of the Sun on the points of the packet.
-std::uint64_t ReferenceLoop::Impl::ask_sun(Paths& p) const {
-    if (!scene.sun) return 0;
+/// Each triangle is chosen in proportion to its area times its radiance.
+void ReferenceLoop::Impl::find_lamps() {
+    double sum = 0;
+    for (std::size_t face = 0; face < raw.face_material.size(); ++face) {
+        const Rgb& emission = scene.materials[raw.face_material[face]].emission;
+        if (mean_band(emission) <= 0) continue;
+        const Vec3f a = raw.vertices[raw.corners[3 * face]], side = raw.vertices[raw.corners[3 * face + 1]] - a,
+                    other = raw.vertices[raw.corners[3 * face + 2]] - a, across = cross(side, other);
+        const float area = 0.5f * norm(across), power = area * mean_band(emission);
+        if (power <= 0) continue;
+        sum += static_cast<double>(power);
+        lamps.push_back({a, side, other, normalized(across), (area / power) * emission, static_cast<float>(sum)});
+    }
+    const auto total = static_cast<float>(sum);
+    for (LampFace& lamp : lamps) lamp.radiance_area = total * lamp.radiance_area, lamp.chosen_below /= total;
+}
+
+Incident ReferenceLoop::Impl::from_sun(Counter& random) const {
     const auto irradiance = static_cast<float>(scene.sun->irradiance_w_m2);
+    const auto [u, v] = random.two();
+    return {about(to_sun, sun_radius * std::sqrt(u), v), kFar, {irradiance, irradiance, irradiance}};
+}
+
+Incident ReferenceLoop::Impl::from_lamps(const Point& p, Counter& random) const {
+    const float choice = random.two()[0];
+    const auto chosen = std::upper_bound(lamps.begin(), lamps.end() - 1, choice,
+                                         [](float c, const LampFace& lamp) { return c < lamp.chosen_below; });
+    const auto [u, v] = random.two();
+    const float root = std::sqrt(u);
+    const Vec3f d = chosen->corner + (root * (1 - v)) * chosen->side + (root * v) * chosen->other_side - p.position;
+    const float range_m = norm(d);
+    const Vec3f l = (1 / range_m) * d;
+    const float per_area = std::abs(dot(chosen->normal, l)) / (range_m * range_m);  // solid angle; both sides shine
+    return {l, range_m * (1 - 1e-4f), per_area * chosen->radiance_area};
+}
+
+/// The light of one source on the points of the packet.
+template <class Source>
+std::uint64_t ReferenceLoop::Impl::ask(Paths& p, const Source& source) const {
     std::uint64_t rays = 0;
     for (std::size_t i = 0; i < 16; ++i) {
         p.asked[i] = 0;
         if (p.valid[i] == 0) continue;
-        const auto [u, v] = p.random[i].two();
-        const Vec3f l = about(to_sun, sun_radius * std::sqrt(u), v);
+        const auto [l, far_m, irradiance] = source(p.point[i], p.random[i]);
         const float cosine = dot(p.point[i].normal, l);
         if (cosine <= 0) continue;
         p.asked[i] = -1;
         ++rays;
-        p.sunlight[i] = (irradiance * cosine) * brdf(p.point[i], l);
+        p.incident[i] = (cosine * irradiance) * brdf(p.point[i], l);
         const Vec3f& o = p.point[i].position;
         p.shadow.org_x[i] = o.x, p.shadow.org_y[i] = o.y, p.shadow.org_z[i] = o.z;
         p.shadow.dir_x[i] = l.x, p.shadow.dir_y[i] = l.y, p.shadow.dir_z[i] = l.z;
-        p.shadow.tnear[i] = 0, p.shadow.tfar[i] = kFar, p.shadow.mask[i] = ~0u;
+        p.shadow.tnear[i] = 0, p.shadow.tfar[i] = far_m, p.shadow.mask[i] = ~0u;
     }
     if (rays == 0) return 0;
     embree::occluded(raw.scene.get(), p.asked.data(), p.shadow);
     for (std::size_t i = 0; i < 16; ++i)
-        if (p.asked[i] != 0 && p.shadow.tfar[i] >= 0) p.light[i] += p.throughput[i] * p.sunlight[i];
+        if (p.asked[i] != 0 && p.shadow.tfar[i] >= 0) p.light[i] += p.throughput[i] * p.incident[i];
+    return rays;
+}
+
+/// By direct light what shines is seen and lights nothing.
+std::uint64_t ReferenceLoop::Impl::ask_lights(Paths& p, bool direct) const {
+    std::uint64_t rays = 0;
+    if (scene.sun) rays += ask(p, [&](const Point&, Counter& random) { return from_sun(random); });
+    if (!direct && !lamps.empty())
+        rays += ask(p, [&](const Point& point, Counter& random) { return from_lamps(point, random); });
     return rays;
 }
 
@@ -172,12 +237,12 @@ std::uint64_t ReferenceLoop::Impl::trace(Paths& p, const FrameSettings& s) const
             }
             p.point[i] = point_of(p, k);
             const Material& m = *p.point[i].material;
-            p.light[i] += p.throughput[i] * m.emission;
+            if (depth == 0) p.light[i] += p.throughput[i] * m.emission;  // later it is asked for
             if (direct) p.light[i] += scene.ambient * (m.diffuse + m.specular);
             any = true;
         }
         if (!any || (!direct && depth == s.max_depth)) return rays;
-        rays += ask_sun(p);
+        rays += ask_lights(p, direct);
         if (direct) return rays;
         for (int k = 0; k < 16; ++k) {
             const auto i = static_cast<std::size_t>(k);

@@ -1,7 +1,8 @@
 /// emulator/reference_loop.h - a renderer without ideas, to measure narpa's against: the loop that one writes over
 /// Embree in an afternoon. Sixteen rays to a packet; so many samples for each pixel of the frame, jittered in
 /// strata; random numbers by a counter; Lambert and Phong; Sun with shadows; by paths: directions by the cosine,
-/// the Sun asked at each surface. Nothing in it knows where samples are needed, and no number knows of another.
+/// the Sun and one of the surfaces that shine asked at each point. Nothing in it knows where samples are needed,
+/// and no number knows of another.
 ///
 /// It converges to narpa's image of the same scene, which is what makes their times at equal error comparable.
 #pragma once
@@ -16,8 +17,8 @@ namespace narpa {
 
 class ReferenceLoop {
 public:
-    /// Meshes of flat faces, Lambert and Phong without textures, Sun and ambient; an Error for anything else. Both
-    /// outlive it; the bodies stay where `at` has them now.
+    /// Meshes of flat faces, Lambert and Phong without textures, Sun, ambient and surfaces that shine; an Error for
+    /// anything else. Both outlive it; the bodies stay where `at` has them now.
     static Result<ReferenceLoop> create(const Scene& scene, const Placement& at);
     ReferenceLoop(ReferenceLoop&&) noexcept;
     ~ReferenceLoop();

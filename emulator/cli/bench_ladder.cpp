@@ -1,11 +1,15 @@
 // narpa bench render --scenes - the standing scenes, one after another.
 #include "emulator/cli/bench_ladder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <utility>
 
 #include "emulator/cli/bench_scene.h"
+#include "emulator/ladder_plot.h"
 #include "emulator/trajectory.h"
 
 namespace narpa::cli {
@@ -16,18 +20,23 @@ struct Standing {
     RenderSettings::Method method;
     int max_depth;          ///< of paths
     double at_s;            ///< on the approach; negative: no approach
-    double speed_up_least;  ///< over the plain loop at equal error; 0: no loop
+    bool loop;              ///< can the plain loop render it?
+    double speed_up_least;  ///< over the plain loop at equal error; 0: not judged
     int size;               ///< px, the longer side
     int reference_spp;
 };
 using Method = RenderSettings::Method;
 constexpr std::array<Standing, 5> kStanding{{
-    {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, 2, 512, 4096},
-    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, 3, 256, 4096},  // four bounces
-    {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, 0, 320, 4096},
-    {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, 0, 320, 4096},
-    {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, 0, 128, 8192},
+    {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, true, 2, 512, 4096},
+    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 256, 4096},  // four bounces
+    {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, false, 0, 320, 4096},
+    {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, false, 0, 320, 4096},
+    {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, true, 0, 128, 8192},
 }};
+
+/// Medians of times are of so many frames; quick: to see that all runs.
+constexpr int kLadderFrames = 9, kRatioFrames = 15, kLoads = 7, kQuick = 2;
+static_assert(std::min({kLadderFrames, kRatioFrames, kLoads}) >= 7);
 
 /// The scene as the ladder looks at it; a monochrome ideal sensor, as radiance is what counts.
 Result<std::unique_ptr<World>> world_of(const Standing& s, int size, std::size_t& camera) {
@@ -49,8 +58,8 @@ Result<std::unique_ptr<World>> world_of(const Standing& s, int size, std::size_t
     return world;
 }
 
-Result<LadderOf> measure(const Standing& s, const LadderOptions& o, TracingThreads& threads) {
-    LadderOf l;
+Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingThreads& threads) {
+    SceneLadder l;
     l.scene = s.name;
     l.speed_up_least = s.speed_up_least;
     l.reference_spp = o.quick ? 256 : s.reference_spp;
@@ -63,9 +72,9 @@ Result<LadderOf> measure(const Standing& s, const LadderOptions& o, TracingThrea
     LadderSettings settings;
     settings.reference_spp = l.reference_spp;
     settings.t_ns = static_cast<std::int64_t>(std::max(0.0, s.at_s) * 1e9);
-    settings.frames = o.quick ? 2 : 9;
+    settings.frames = o.quick ? kQuick : kLadderFrames;
     std::optional<ReferenceLoop> loop;
-    if (s.speed_up_least > 0) {
+    if (s.loop) {
         Placement at((*world)->scene().bodies.size());
         (*world)->place(settings.t_ns, -1, at);
         auto made = ReferenceLoop::create((*world)->scene(), at);
@@ -97,7 +106,7 @@ Result<CraftRatios> measure_ratios(const LadderOptions& o, TracingThreads& threa
     }
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
-    const int rounds = o.quick ? 2 : 15;
+    const int rounds = o.quick ? kQuick : kRatioFrames;
     const Progress progress;
     progress.tell("craft: a frame beside Embree's calls");
     auto cost = frame_against_raw(**world, cameras[0], rounds, threads);
@@ -105,7 +114,7 @@ Result<CraftRatios> measure_ratios(const LadderOptions& o, TracingThreads& threa
     progress.tell("craft: empty space, moved bodies, first frames");
     CraftRatios r{*cost, frames_of(**world, cameras[1], cameras[2], rounds, threads),
                   still_and_moved(**world, cameras[0], rounds, threads), 0};
-    auto load_s = load_to_first_frame(load, cameras[0], o.quick ? 1 : 7, threads);
+    auto load_s = load_to_first_frame(load, cameras[0], o.quick ? 1 : kLoads, threads);
     if (!load_s) return load_s.error();
     r.load_s = *load_s;
     return r;
@@ -124,6 +133,8 @@ Outcome bench_ladder(const LadderOptions& o) {
         return std::any_of(o.scenes.begin(), o.scenes.end(),
                            [&](const std::string& s) { return s == "all" || s == name; });
     };
+    if (!o.plot.empty())  // minutes before there is something to draw, a file that cannot be is told of
+        if (auto written = write_plot(o.plot, "", {}); !written) return written.error();
     TracingThreads threads(o.threads);
     std::optional<CraftRatios> ratios;
     if (wanted("craft")) {
@@ -132,7 +143,7 @@ Outcome bench_ladder(const LadderOptions& o) {
         ratios = *measured;
         tell_ratios(*ratios);
     }
-    std::vector<LadderOf> ladders;
+    std::vector<SceneLadder> ladders;
     for (const Standing& s : kStanding) {
         if (!wanted(s.name)) continue;
         auto measured = measure(s, o, threads);
@@ -140,15 +151,26 @@ Outcome bench_ladder(const LadderOptions& o) {
         tell_ladder(*measured);
         ladders.push_back(*std::move(measured));
     }
-    const std::vector<std::string> faults = ladder_faults(ladders, ratios);
+    std::vector<std::string> faults;
+    const auto judge = [&](const auto& measured) {
+        for (std::string& fault : bench_faults(measured)) faults.push_back(std::move(fault));
+    };
+    if (ratios) judge(*ratios);
+    for (const SceneLadder& l : ladders) judge(l);
     for (const std::string& fault : faults) say((o.gates ? "failed: " : "not reached: ") + fault);
 
+    const int n_threads = threads.arena.max_concurrency();
+    if (!o.plot.empty()) {
+        const std::string title = fmt::format("Error against time, {} threads; medians of {} frames", n_threads,
+                                              o.quick ? kQuick : kLadderFrames);
+        if (auto written = write_plot(o.plot, title, ladders); !written) return written.error();
+    }
     nlohmann::json document{{"passed", !o.gates || faults.empty()},
                             {"faults", faults},
-                            {"threads", threads.arena.max_concurrency()},
+                            {"threads", n_threads},
                             {"scenes", nlohmann::json::array()}};
     if (ratios) document["craft"] = describe(*ratios);
-    for (const LadderOf& l : ladders) document["scenes"].push_back(describe(l));
+    for (const SceneLadder& l : ladders) document["scenes"].push_back(describe(l));
     return document;
 }
 

@@ -9,9 +9,6 @@
 namespace narpa::cli {
 namespace {
 
-constexpr std::array<const char*, kPhases> kPhaseNames{"aim",         "rays",     "shading",
-                                                       "shadow_rays", "indirect", "passes"};
-
 nlohmann::json describe(const PhaseTimes& times) {
     nlohmann::json out = nlohmann::json::object();
     for (std::size_t k = 0; k < kPhases; ++k) out[kPhaseNames[k]] = static_cast<double>(times[k]) * 1e-9;
@@ -36,48 +33,6 @@ nlohmann::json to_json(const Estimate& e) {
 
 }  // namespace
 
-std::optional<double> typical_speed_up(const Ladder& ladder) {
-    for (const bool adaptive : {true, false}) {
-        std::vector<double> all;
-        for (const Rung& r : ladder.rungs)
-            if (!r.loop && r.adaptive == adaptive)
-                if (const auto s = speed_up(ladder, r)) all.push_back(*s);
-        if (!all.empty()) return median(all);
-    }
-    return {};
-}
-
-std::vector<std::string> ladder_faults(const std::vector<LadderOf>& ladders, const std::optional<CraftRatios>& r) {
-    std::vector<std::string> faults;
-    const auto at_most = [&](const char* what, double value, double bound, const char* unit) {
-        if (!(value <= bound))
-            faults.push_back(fmt::format("{}: {:.4g}{}, expected at most {:g}{}", what, value, unit, bound, unit));
-    };
-    if (r) {
-        at_most("a frame to Embree's calls on its rays", r->cost.to_raw(), kToRawMost, "");
-        at_most("1 % cover to full cover", r->far_and_filled.first_s / r->far_and_filled.second_s, kFarMost, "");
-        at_most("what a moved body costs", 1e3 * (r->still_and_moved.second_s - r->still_and_moved.first_s),
-                1e3 * kMovedMost_s, " ms");
-        at_most("load to first frame", r->load_s, kLoadMost_s, " s");
-    }
-    for (const LadderOf& l : ladders) {
-        for (const Rung& rung : l.ladder.rungs)
-            if (rung.predicted >= 0 && rung.rmse.value > 0 &&
-                !(rung.honesty() >= kHonestyLeast && rung.honesty() <= kHonestyMost))
-                faults.push_back(
-                    fmt::format("{}, {}: the predicted error is {:.2f} of the measured, expected {} to {}", l.scene,
-                                rung.name, rung.honesty(), kHonestyLeast, kHonestyMost));
-        if (l.speed_up_least <= 0) continue;
-        const auto s = typical_speed_up(l.ladder);
-        if (!s)
-            faults.push_back(l.scene + ": no error lies between those of the plain loop");
-        else if (*s < l.speed_up_least)
-            faults.push_back(fmt::format("{}: {:.2f} times as fast as the plain loop, expected {:g} or more",
-                                         l.scene, *s, l.speed_up_least));
-    }
-    return faults;
-}
-
 void tell_ratios(const CraftRatios& r) {
     const FrameCost& c = r.cost;
     const auto ms = [](double s) { return 1e3 * s; };
@@ -98,21 +53,35 @@ void tell_ratios(const CraftRatios& r) {
     say(fmt::format("  load to first frame   {:>9.3f} s", r.load_s));
 }
 
-void tell_ladder(const LadderOf& l) {
-    say(fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (taken out)", l.scene,
-                    l.width, l.height, l.reference_spp, l.ladder.level, l.ladder.reference_noise));
-    say(fmt::format("  {:<14} {:>10} {:>12} {:>20} {:>9} {:>10} {:>9}", "budget", "ms", "rays", "RMSE", "bias, %",
-                    "predicted", "to loop"));
+void tell_ladder(const SceneLadder& l) {
+    say(
+        fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (taken out); detector and "
+                    "conversion {:.3f} ms",
+                    l.scene, l.width, l.height, l.reference_spp, l.ladder.level, l.ladder.reference_noise,
+                    1e3 * l.ladder.detector_s));
+    say(fmt::format("  {:<14} {:>10} {:>10} {:>12} {:>20} {:>9} {:>10} {:>9}  {}", "budget", "ms", "CPU ms", "rays",
+                    "RMSE", "bias, %", "predicted", "to loop", "where the time goes"));
     for (const Rung& r : l.ladder.rungs) {
         const auto s = r.loop ? std::nullopt : speed_up(l.ladder, r);
-        say(fmt::format("  {:<14} {:>10.3f} {:>12.0f} {:>10.4g} +- {:<6.1g} {:>+9.3f} {:>10} {:>9}  {}", r.name,
-                        1e3 * r.median_s(), r.rays, r.rmse.value, r.rmse.standard_error,
-                        100 * r.bias.value / l.ladder.level,
-                        r.predicted >= 0 ? fmt::format("x {:.2f}", r.honesty()) : "-",
-                        s ? fmt::format("x {:.2f}", *s) : "-", shares(r.phase_ns)));
+        const std::string predicted = r.loop        ? ""
+                                      : r.predicted ? fmt::format("x {:.2f}", r.honesty())
+                                                    : "not known";
+        say(fmt::format("  {:<14} {:>10.3f} {:>10.3f} {:>12.0f} {:>10.4g} +- {:<6.1g} {:>+9.3f} {:>10} {:>9}  {}",
+                        r.name, 1e3 * r.median_s(), 1e3 * r.median_cpu_s(), r.rays, r.rmse.value,
+                        r.rmse.standard_error, 100 * r.bias.value / l.ladder.level, predicted,
+                        r.loop ? ""
+                        : s    ? fmt::format("x {:.2f}", *s)
+                               : "-",
+                        shares(r.phase_ns)));
     }
-    if (const auto s = typical_speed_up(l.ladder))
-        say(fmt::format("  {:.2f} times as fast as the plain loop at equal error (median)", *s));
+    for (const bool adaptive : {true, false}) {
+        const auto s = speed_ups(l.ladder, adaptive), cpu = speed_ups(l.ladder, adaptive, TimeBy::cpu);
+        if (!s) continue;
+        say(fmt::format(
+            "  at equal error {:.2f} times as fast as the plain loop: {}, median of {} ({:.2f} to {:.2f}); "
+            "by CPU time {:.2f}",
+            s->median, adaptive ? "budgets in rays" : "fixed spp", s->budgets, s->least, s->most, cpu->median));
+    }
 }
 
 nlohmann::json describe(const CraftRatios& r) {
@@ -137,20 +106,18 @@ nlohmann::json describe(const CraftRatios& r) {
             {"load_s", r.load_s}};
 }
 
-nlohmann::json describe(const LadderOf& l) {
+nlohmann::json describe(const SceneLadder& l) {
     nlohmann::json rungs = nlohmann::json::array();
     for (const Rung& r : l.ladder.rungs) {
-        nlohmann::json rung{{"name", r.name},
-                            {"loop", r.loop},
-                            {"median_s", r.median_s()},
-                            {"frames", r.seconds.size()},
-                            {"rays", r.rays},
-                            {"samples", r.samples},
-                            {"rmse", to_json(r.rmse)},
-                            {"bias", to_json(r.bias)},
-                            {"phase_s", describe(r.phase_ns)}};
-        if (r.predicted >= 0) rung["predicted"] = r.predicted;
-        if (const auto s = r.loop ? std::nullopt : speed_up(l.ladder, r)) rung["speed_up"] = *s;
+        nlohmann::json rung{{"name", r.name},           {"loop", r.loop},          {"adaptive", r.adaptive},
+                            {"median_s", r.median_s()}, {"seconds", r.seconds},    {"rays", r.rays},
+                            {"samples", r.samples},     {"rmse", to_json(r.rmse)}, {"bias", to_json(r.bias)}};
+        if (!r.loop) {
+            rung["step"] = kStepNames[static_cast<std::size_t>(r.step)];
+            rung["predicted"] = r.predicted ? nlohmann::json(*r.predicted) : nlohmann::json(nullptr);
+            rung["phase_s"] = describe(r.phase_ns);
+            if (const auto s = speed_up(l.ladder, r)) rung["speed_up"] = *s;
+        }
         rungs.push_back(std::move(rung));
     }
     nlohmann::json out{
@@ -159,8 +126,17 @@ nlohmann::json describe(const LadderOf& l) {
         {"height", l.height},
         {"reference",
          {{"spp", l.reference_spp}, {"mean", l.ladder.level}, {"noise_rms", l.ladder.reference_noise}}},
+        {"detector_s", l.ladder.detector_s},
         {"rungs", std::move(rungs)}};
-    if (const auto s = typical_speed_up(l.ladder)) out["speed_up"] = *s;
+    for (const bool adaptive : {true, false}) {
+        const auto s = speed_ups(l.ladder, adaptive), cpu = speed_ups(l.ladder, adaptive, TimeBy::cpu);
+        if (!s) continue;
+        out["speed_up"][adaptive ? "rays" : "spp"] = {{"median", s->median},
+                                                      {"least", s->least},
+                                                      {"most", s->most},
+                                                      {"budgets", s->budgets},
+                                                      {"median_by_cpu", cpu->median}};
+    }
     return out;
 }
 

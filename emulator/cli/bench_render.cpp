@@ -158,7 +158,7 @@ void tell_table(const Measured& m, const Camera& c) {
 Outcome bench(Options o) {
     if (!o.ladder.scenes.empty()) {
         o.ladder.threads = o.threads;
-        if (!o.plot.empty()) return Error{"-o is of the convergence of one SCENE, expected without --scenes"};
+        o.ladder.plot = o.plot;
         return bench_ladder(o.ladder);
     }
     for (const int spp : o.spp)
@@ -248,7 +248,8 @@ Command add_bench_render(CLI::App& bench_command) {
         ->check(CLI::IsMember(standing_scenes()));
     c->add_flag("--quick", o->ladder.quick, "With --scenes: small pictures and few of them, to see that it works");
     c->add_flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be");
-    c->add_option("-o,--output", o->plot, "FILE.png: error over samples and over time");
+    c->add_option("-o,--output", o->plot,
+                  "FILE.png: error over samples and over time; with --scenes error over time, and where time goes");
     c->footer(
         "Without --scenes, exit status 1 where a bias is beyond three standard errors, or an error falls more "
         "slowly than "

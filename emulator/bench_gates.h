@@ -1,0 +1,37 @@
+/// emulator/bench_gates.h - what `narpa bench render --scenes` measures, and what it must be.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "emulator/bench_ratios.h"
+#include "emulator/budget_ladder.h"
+
+namespace narpa {
+
+/// One scene.
+struct SceneLadder {
+    std::string scene;
+    int width = 0, height = 0, reference_spp = 0;
+    double speed_up_least = 0;  ///< over the plain loop that the scene must reach; 0: it is not judged by that
+    Ladder ladder;
+};
+/// Of the craft at full size.
+struct CraftRatios {
+    FrameCost cost;
+    TwoFrames far_and_filled, still_and_moved;
+    double load_s = 0;
+};
+
+/// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover; seconds that moved
+/// bodies cost; seconds to the first frame; predicted to measured error.
+inline constexpr double kToRawMost = 1.6, kFarMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
+inline constexpr double kHonestyLeast = 0.85, kHonestyMost = 1.40;
+
+/// What is not as it must be, one sentence each. A rung without a predicted error is one of them, unless its frames
+/// left out what they cannot know of.
+[[nodiscard]] std::vector<std::string> bench_faults(const SceneLadder& scene);
+[[nodiscard]] std::vector<std::string> bench_faults(const CraftRatios& ratios);
+
+}  // namespace narpa

@@ -6,6 +6,8 @@
 namespace narpa::scenes {
 namespace {
 
+constexpr int kDishSegments = 96;  // smooth also where a dish fills the view
+
 /// A wrinkled blanket over one side of the bus: a plate whose outer face T's z axis points to.
 void blanket(Mesh& mesh, const Rigid3& T, double half_u, double half_v, int steps, std::uint64_t seed) {
     Plate p;
@@ -33,7 +35,7 @@ void bus(Mesh& mesh) {
             const Vec3 up = cross(out, along);
             const Rigid3 T{quat_from_columns(along, up, out), half[axis] * out};
             const double u = half[(axis + 1) % 3] - 0.05, v = half[(axis + 2) % 3] - 0.05;
-            blanket(mesh, T, u, v, 86, static_cast<std::uint64_t>(3 * axis + s + 1));
+            blanket(mesh, T, u, v, 83, static_cast<std::uint64_t>(3 * axis + s + 1));
         }
 }
 
@@ -42,10 +44,11 @@ void wing(Mesh& mesh, int side) {
     const double s = side;
     mesh.begin(side > 0 ? "mast_left" : "mast_right", "metal");
     truss(mesh, {0, 0.9 * s, 0}, {0, 7.9 * s, 0}, {0, 0, 1}, 0.24, 40, 0.014);
+    for (const double x : {-0.8, 0.8}) tube(mesh, {0, 1.0 * s, 0.1}, {x, 1.46 * s, 0.16}, 0.03, 12);  // yoke
     for (int k = 0; k < 5; ++k) {
         mesh.begin(side > 0 ? "panels_left" : "panels_right", "cell");
         Plate p;
-        p.nu = 48, p.nv = 60;
+        p.nu = 40, p.nv = 48;
         p.bevel_u = p.bevel_v = 0.005;
         const double y = 1.5 + 1.28 * k, x_axis = s;
         p.shape = [=](double u, double v, double w) {  // rows of cells stand out by a millimetre or two
@@ -62,9 +65,9 @@ void wing(Mesh& mesh, int side) {
 
 void antennas(Mesh& mesh) {
     mesh.begin("dishes", "white");
-    dish(mesh, frame_along({1.3, 0.1, 1.75}, {0.75, -0.3, 0.6}), 1.8, "white", "metal");
-    dish(mesh, frame_along({-0.9, -0.4, 1.8}, {0.4, -0.5, 0.9}), 0.9, "white", "metal");
-    dish(mesh, frame_along({-0.5, 0.4, -1.7}, {0.5, -0.4, -0.8}), 1.1, "white", "metal");
+    dish(mesh, frame_along({1.3, 0.1, 1.75}, {0.75, -0.3, 0.6}), 1.8, "white", "metal", kDishSegments);
+    dish(mesh, frame_along({-0.9, -0.4, 1.8}, {0.4, -0.5, 0.9}), 0.9, "white", "metal", kDishSegments);
+    dish(mesh, frame_along({-0.5, 0.4, -1.7}, {0.5, -0.4, -0.8}), 1.1, "white", "metal", kDishSegments);
     mesh.begin("dish_masts", "metal");
     tube(mesh, {0.7, 0.1, 1.1}, {1.15, 0.15, 1.65}, 0.06, 16);
     tube(mesh, {-0.9, -0.4, 1.1}, {-0.95, -0.38, 1.7}, 0.04, 16);

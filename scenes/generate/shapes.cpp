@@ -187,22 +187,29 @@ void truss(Mesh& mesh, const Vec3& p, const Vec3& q, const Vec3& up, double widt
     }
 }
 
-void dish(Mesh& mesh, const Rigid3& T, double diameter, const std::string& face, const std::string& structure) {
+void dish(Mesh& mesh, const Rigid3& T, double diameter, const std::string& face, const std::string& structure,
+          int segments) {
     const double r = 0.5 * diameter, depth = 0.3 * r, wall = 0.02;
+    const int rings = segments * 5 / 18;
+    const auto bowl = [&](int i) {
+        const double part = static_cast<double>(i) / rings;
+        return ProfilePoint{depth * part * part, r * part};
+    };
     std::vector<ProfilePoint> profile;  // the back from the axis to the rim, then the bowl to the axis
-    for (int i = 0; i <= 10; ++i) profile.push_back({depth * i * i / 100.0 - wall, r * i / 10.0});
-    for (int i = 10; i >= 0; --i) profile.push_back({depth * i * i / 100.0, r * i / 10.0});
+    for (int i = 0; i <= rings; ++i) profile.push_back({bowl(i).a - wall, bowl(i).r});
+    for (int i = rings; i >= 0; --i) profile.push_back(bowl(i));
     mesh.material(face);
-    lathe(mesh, T, profile, 36);
+    lathe(mesh, T, profile, segments);
     mesh.material(structure);
+    const int around = segments * 4 / 9;
     const Vec3 focus{0.9 * r, 0, 0};
-    lathe(mesh, T * Rigid3{{}, focus}, {{-0.06, 0}, {-0.06, 0.05}, {0.06, 0.09}, {0.06, 0}}, 16);
+    lathe(mesh, T * Rigid3{{}, focus}, {{-0.06, 0}, {-0.06, 0.05}, {0.06, 0.09}, {0.06, 0}}, around);
     for (int i = 0; i < 3; ++i) {
         const double angle = 2 * kPi * i / 3;
         tube(mesh, T * Vec3{0.64 * depth, 0.8 * r * std::cos(angle), 0.8 * r * std::sin(angle)}, T * focus, 0.012,
-             6);
+             segments / 6);
     }
-    lathe(mesh, T, {{-0.35, 0}, {-0.35, 0.12}, {0.005, 0.12}, {0.005, 0}}, 16);
+    lathe(mesh, T, {{-0.35, 0}, {-0.35, 0.12}, {0.005, 0.12}, {0.005, 0}}, around);
 }
 
 void handrail(Mesh& mesh, const Rigid3& T, double length) {

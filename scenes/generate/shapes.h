@@ -57,7 +57,8 @@ void plate(Mesh& mesh, const Plate& p);
 /// Square truss from p to q: four longerons, battens and diagonals, `bays` times.
 void truss(Mesh& mesh, const Vec3& p, const Vec3& q, const Vec3& up, double width, int bays, double tube_radius);
 /// Parabolic dish of the given diameter opening to +x, with its feed on a tripod.
-void dish(Mesh& mesh, const Rigid3& T, double diameter, const std::string& face, const std::string& structure);
+void dish(Mesh& mesh, const Rigid3& T, double diameter, const std::string& face, const std::string& structure,
+          int segments = 36);
 /// Handrail of the given length along T's x axis, standing off along its z axis.
 void handrail(Mesh& mesh, const Rigid3& T, double length);
 

@@ -96,12 +96,12 @@ void draw_errors(cv::Mat& image, const Panel& panel) {
     text(image, "RMSE, %", {frame.x - 8, frame.y - 12}, kTextSize, 1, kInk);
     cv::rectangle(image, frame, kInk, 1);
     for (const Kind& kind : kKinds) draw_kind(image, panel, kind, x, y);
-    int row = frame.y + frame.height - 12;
+    int row = frame.y + 20;  // where no curve goes
     for (const Kind& kind : {kKinds[2], kKinds[1]})
         if (const auto s = speed_ups(panel.scene.ladder, kind.adaptive)) {
             text(image, fmt::format("{:.2f} x the loop's speed ({:.2f} to {:.2f})", s->median, s->least, s->most),
-                 {frame.x + 10, row}, kSmall, 0, kind.colour);
-            row -= 18;
+                 {frame.x + frame.width - 10, row}, kSmall, 1, kind.colour);
+            row += 18;
         }
 }
 

@@ -179,7 +179,7 @@ struct RenderSettings {
     Method method = Method::direct;
     int max_depth = 8;              ///< path: surfaces that a path may meet, 1..40 (1 is direct light alone)
     int spp = 1;                    ///< where there is no budget
-    std::int64_t budget_ns = 0;     ///< > 0: a frame's radiance is ready so long after its exposure's end
+    std::int64_t budget_ns = 0;     ///< > 0: a frame is handed over within so long of its exposure's end
     std::uint64_t budget_rays = 0;  ///< > 0: a frame takes at most so many rays of all kinds
     std::uint64_t seed = 0;
     double stale_after_s = 0.5;  ///< commands older than this: the body holds still and is reported stale

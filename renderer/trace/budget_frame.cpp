@@ -11,9 +11,12 @@ using Of = PassCosts::Of;
 /// Textures are averaged over the beam that a sample has where a pixel gets so many. Middles are a frame of two, so
 /// that each takes a point of its own of the lens and of the Sun and shows what these blur.
 constexpr int kMiddleBeam = 2, kBeamSamples = 4;
-/// What waking the threads and a preempted one may take.
-constexpr std::int64_t kSlack_ns = 300'000;
-/// Passes of fewer samples tell of their start and end alone.
+/// What waking the threads and a preempted one may take: so long, or this part of the budget if that is more.
+constexpr std::int64_t kLeastSlack_ns = 300'000;
+constexpr std::int64_t kSlackPart = 40;
+/// By this a cost is believed to be less in each frame that did without, so that one bad measure does not last.
+constexpr double kDoubt = 0.95;
+/// Passes of fewer samples tell of their start and end alone: no more than a bound.
 constexpr std::uint64_t kLeastPieces = 1000;
 /// Parts of what is left that go to the first pass after the middles, so that there soon is something to show, and
 /// to each of the next.
@@ -33,6 +36,7 @@ public:
           costs_(costs),
           budget_(settings.budget),
           begun_ns_(now_ns()),
+          slack_ns_(std::max(kLeastSlack_ns, (budget_.deadline_ns - begun_ns_) / kSlackPart)),
           middle_settings_(with_spp(settings, kMiddleBeam)),
           direct_settings_(by_direct_light(middle_settings_)),
           sample_settings_(with_spp(settings, kBeamSamples)),
@@ -73,7 +77,7 @@ private:
     // What is left.
     [[nodiscard]] std::uint64_t rays_left() const { return budget_.rays - std::min(budget_.rays, rays_); }
     [[nodiscard]] std::int64_t ns_left() const {
-        return budget_.deadline_ns - kSlack_ns - costs_.expected_ns(Of::show, out_.pixels.size()) - now_ns();
+        return budget_.deadline_ns - slack_ns_ - costs_.expected_ns(Of::show, out_.pixels.size()) - now_ns();
     }
     [[nodiscard]] PassLimit limit() const {
         PassLimit l;
@@ -107,7 +111,7 @@ private:
             begin(f);
         }
         const PassCount pass = passes_.middles(f, stride, made, l);
-        if (pass.complete) costs_.note(cost_of(f), pass.samples, pass.wall_ns);
+        costs_.note(cost_of(f), pass.samples, pass.wall_ns);
         if (!book(pass, l, made == 0)) return false;
         account_.step = step;
         to_show_ = ToShow::middles;
@@ -124,10 +128,7 @@ private:
             case Kind::samples: break;
             case Kind::passes: take_as_told(); break;
             case Kind::time:
-                if (costs_.known(cost_of(middle_)) && expected_ns(middle_) <= ns_left() / 2)
-                    take(middle_, 1, 0, FrameStep::one_sample);
-                else
-                    from_coarse_to_fine();
+                if (!take_middles_at_once()) from_coarse_to_fine();
                 break;
             case Kind::rays:
                 if (middle_.quick && 2 * passes_.pixels() <= rays_left())  // the camera's and the Sun's
@@ -137,8 +138,20 @@ private:
                 break;
         }
     }
-    [[nodiscard]] std::int64_t expected_ns(const Frame& f) const {
-        return costs_.expected_ns(cost_of(f), passes_.pixels());
+    /// Where they are sure to fit; should they not, some of the time is left for a coarse frame.
+    bool take_middles_at_once() {
+        const Of what = cost_of(middle_);
+        const std::int64_t left = ns_left();
+        if (!costs_.known(what) || costs_.expected_ns(what, passes_.pixels()) > left / 2) return false;
+        PassLimit most = limit();
+        most.until_ns -= left / 4;
+        return take(middle_, 1, 0, FrameStep::one_sample, most);
+    }
+    /// Is it likely to take no longer than this?
+    [[nodiscard]] bool worth(Of what, std::uint64_t pieces, std::int64_t wall_ns) {
+        const bool fits = costs_.expected_ns(what, pieces) <= wall_ns;
+        if (!fits) costs_.doubt(what);
+        return fits;
     }
 
     [[nodiscard]] FrameStep step_told() const { return static_cast<FrameStep>(budget_.step); }
@@ -169,10 +182,13 @@ private:
     void from_coarse_to_fine() {
         const Frame& f = has_indirect_ ? direct_ : middle_;
         const FrameStep full = has_indirect_ ? FrameStep::no_indirect : FrameStep::one_sample;
-        if (!take(f, 4, 0, FrameStep::coarse_4) || !take(f, 2, 4, FrameStep::coarse_2) || !take(f, 1, 2, full))
+        // Whatever the time, there is to be a whole frame: rather late than in part.
+        const PassLimit first = budget_.kind == Kind::time ? PassLimit{} : limit();
+        if (!take(f, 4, 0, FrameStep::coarse_4, first) || !take(f, 2, 4, FrameStep::coarse_2) ||
+            !take(f, 1, 2, full))
             return;
         if (!has_indirect_ || budget_.kind != Kind::time) return;
-        if (costs_.known(Of::middles) && expected_ns(middle_) > ns_left()) return;
+        if (costs_.known(Of::middles) && !worth(Of::middles, passes_.pixels(), ns_left())) return;
         take(middle_, 1, 0, FrameStep::one_sample);
     }
 
@@ -192,12 +208,13 @@ private:
         for (std::size_t i = 0; i < kMaxPasses; ++i) {
             const SamplePlan::Stage next = plan.reach(stage, whole_step(plan.missing(stage), wanted(i, rays_each)));
             const std::uint64_t samples = plan.total(next) - plan.total(stage);
+            if (samples == 0 && i == 0 && budget_.kind == Kind::time) costs_.doubt(Of::samples);
             if (samples == 0) return;
             if (i > 0) show();  // what the next pass adds to
             const PassLimit l = limit();
             const PassCount pass = passes_.refine(sample_, stage, next, l);
-            if (!book(pass, l, false)) return;
             costs_.note(Of::samples, pass.samples, pass.wall_ns);
+            if (!book(pass, l, false)) return;
             account_.step = FrameStep::refined;
             account_.passes[i] = static_cast<std::uint32_t>(samples);
             to_show_ = ToShow::means;
@@ -227,9 +244,8 @@ private:
                                           static_cast<double>(costs_.fitting(Of::samples, left)));
     }
 
-    [[nodiscard]] bool worth_planning() const {
-        if (budget_.kind == Kind::time) return costs_.expected_ns(Of::plan, passes_.pixels()) < ns_left();
-        return true;
+    [[nodiscard]] bool worth_planning() {
+        return budget_.kind != Kind::time || worth(Of::plan, passes_.pixels(), ns_left());
     }
 
     void show() {
@@ -247,7 +263,7 @@ private:
     FramePasses& passes_;
     PassCosts& costs_;
     const FrameBudget budget_;
-    const std::int64_t begun_ns_;
+    const std::int64_t begun_ns_, slack_ns_;
     const FrameSettings middle_settings_, direct_settings_, sample_settings_;
     const Frame middle_, direct_, sample_;
     const bool has_indirect_;
@@ -264,12 +280,17 @@ private:
 }  // namespace
 
 void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept {
-    if (pieces < kLeastPieces) return;
+    if (pieces == 0) return;
     double& ns = ns_[index(what)];
     const double now = static_cast<double>(wall_ns) / static_cast<double>(pieces);
+    if (pieces < kLeastPieces && !(known(what) && now < ns)) return;
     // A frame that something held up tells little of the next.
     ns = known(what) ? ns + 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns) : now;
     known_[index(what)] = true;
+}
+
+void PassCosts::doubt(Of what) noexcept {
+    ns_[index(what)] *= kDoubt;
 }
 
 std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {

@@ -12,6 +12,8 @@ public:
     enum class Of : std::uint8_t { direct_middles, middles, plan, samples, show };
 
     void note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept;
+    /// It was expected to take too long, and so not measured.
+    void doubt(Of what) noexcept;
     [[nodiscard]] bool known(Of what) const noexcept { return known_[index(what)]; }
     /// Of so many pixels or samples.
     [[nodiscard]] std::int64_t expected_ns(Of what, std::uint64_t pieces) const noexcept {

@@ -18,6 +18,8 @@ namespace {
 
 /// Tiles that a thread takes at a time. Sums are made chunk by chunk, so that the threads have no say in them.
 constexpr std::size_t kChunk = 8;
+/// So many packets go between two looks at the clock.
+constexpr std::uint32_t kPacketsPerLook = 16;
 /// Random numbers of middles that samples may follow: none that a pixel's samples take, as those would not be
 /// independent of their own number.
 constexpr std::uint32_t kFirstMiddle = 0x40000000u;
@@ -83,13 +85,17 @@ struct FramePasses::Tile {
 
 /// What a thread needs: large, so made once for several tiles.
 struct FramePasses::Worker {
-    explicit Worker(const Frame& frame) : f(frame) {}
+    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& pass_given_up)
+        : f(frame), until_ns(limit.until_ns), given_up(pass_given_up) {}
 
     const Frame& f;
+    const std::int64_t until_ns;
+    std::atomic<bool>& given_up;  ///< the pass: looked at often, as a tile may hold many samples
     Packet packet;
     CameraSamples samples;
     Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
     std::uint64_t traced = 0;   ///< samples
+    std::uint32_t packets = 0;
     FrameError error;
 
     /// `sink(lane, place)` is told of each sample, in order.
@@ -104,12 +110,18 @@ struct FramePasses::Worker {
     }
     template <class Sink>
     void trace(const Tile& tile, Sink&& sink) {
-        if (samples.n == 0) return;
-        RgbPerRay radiance;
-        trace_samples(f, samples, tile.bodies, packet, radiance);
-        sink(radiance);
-        traced += samples.n;
+        if (samples.n > 0 && !given_up.load(std::memory_order_relaxed)) {
+            RgbPerRay radiance;
+            trace_samples(f, samples, tile.bodies, packet, radiance);
+            sink(radiance);
+            traced += samples.n;
+            if (++packets % kPacketsPerLook == 0) look_at_clock();
+        }
         samples.n = 0;
+    }
+    void look_at_clock() {
+        if (until_ns != PassLimit{}.until_ns && now_ns() >= until_ns)
+            given_up.store(true, std::memory_order_relaxed);
     }
     void middles(const Tile& tile, int width, int height, int stride, int made, TileLooks& looks) {
         samples.middle = true;
@@ -148,7 +160,6 @@ FramePasses::Tile FramePasses::tile(std::uint32_t index) const noexcept {
 template <class Work>
 PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work) {
     const std::int64_t start = now_ns();
-    const bool timed = limit.until_ns != std::numeric_limits<std::int64_t>::max();
     std::atomic<bool> given_up{false};
     std::atomic<std::uint64_t> samples{0}, rays{0};
     tbb::parallel_for(
@@ -158,11 +169,11 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
             const FlushDenormals flush;
             const std::int64_t begun = f.settings.times ? now_ns() : 0;
             PhaseTimes times{};
-            Worker w(f);
+            Worker w(f, limit, given_up);
             if (f.settings.times) w.packet.times = &times;
             const std::size_t first = chunk.begin() * kChunk, end = std::min(first + kChunk, tiles_.size());
             for (std::size_t i = first; i < end; ++i) {
-                if (timed && now_ns() >= limit.until_ns) given_up.store(true, std::memory_order_relaxed);
+                w.look_at_clock();
                 if (given_up.load(std::memory_order_relaxed)) break;
                 work(w, tile(tiles_[i]));
             }

@@ -53,12 +53,10 @@ void CameraFeed::start_at(std::int64_t t_ns) noexcept {
 }
 
 void CameraFeed::warm_up() {
-    const std::int64_t budget = world_.scene().render.budget_ns;
-    for (int i = 0; i < 2; ++i) {
-        const FrameLedger ledger = unit_.expose(next_, next_mid_ns(), monotonic_ns() + budget);
-        unit_.embed(ledger);
-        unit_.handed_over(monotonic_ns());
-    }
+    unit_.warm_up();
+    const FrameLedger ledger = unit_.expose(next_, next_mid_ns(), monotonic_ns() + world_.scene().render.budget_ns);
+    unit_.embed(ledger);
+    unit_.handed_over(monotonic_ns());
 }
 
 std::int64_t CameraFeed::deadline_ns(std::uint32_t frame) const noexcept {

@@ -54,6 +54,21 @@ FrameBudget CameraUnit::budget(std::int64_t deadline_ns) const noexcept {
 
 FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns, Aovs* aovs,
                                std::atomic<std::size_t>* pixels_done) {
+    return expose(frame, t_mid_ns, budget(deadline_ns), aovs, pixels_done);
+}
+
+void CameraUnit::warm_up() {
+    FrameBudget all = budget(0);
+    if (all.kind != FrameBudget::Kind::samples) {
+        all.kind = FrameBudget::Kind::passes;
+        all.step = static_cast<std::uint8_t>(FrameStep::refined);
+        all.passes[0] = static_cast<std::uint32_t>(radiance_.pixels.size());
+    }
+    embed(expose(0, 0, all, nullptr, nullptr));
+}
+
+FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const FrameBudget& budget, Aovs* aovs,
+                               std::atomic<std::size_t>* pixels_done) {
     const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_);
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
@@ -64,7 +79,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, std::
     settings.method = render.method;
     settings.max_depth = render.max_depth;
     settings.pixels_done = pixels_done;
-    settings.budget = budget(deadline_ns);
+    settings.budget = budget;
     const FrameAccount account = renderer_.render(placement_, T_world_camera, settings, radiance_, aovs);
     t_radiance_ns_ = monotonic_ns();
     // A renderer that stopped late is allowed for as well.

@@ -47,6 +47,9 @@ public:
     /// `pixels_done` is counted up meanwhile, for who wants to watch; null: nobody does.
     FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns = 0,
                        Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);
+    /// Makes a frame for nobody that takes all that frames of this scene can take: pays for what is needed once,
+    /// and shows how fast the renderer is.
+    void warm_up();
     /// Writes the ledger into the last row, where the scene asks for it.
     void embed(const FrameLedger& ledger) noexcept;
     /// The frame just exposed is out at this time, CLOCK_MONOTONIC: the next knows what to allow for.
@@ -58,6 +61,8 @@ public:
 
 private:
     [[nodiscard]] FrameBudget budget(std::int64_t deadline_ns) const noexcept;
+    FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, const FrameBudget& budget, Aovs* aovs,
+                       std::atomic<std::size_t>* pixels_done);
     void tell_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept;
 
     const World& world_;

@@ -17,6 +17,7 @@
 namespace narpa {
 
 struct TracingThreads;
+class StartLine;
 
 struct RunOptions {
     std::string bus;                                                ///< BUS; empty: nothing is commanded
@@ -55,10 +56,9 @@ private:
     Status open_outputs();
 
     void run_real_time(const StopFlag& stop);
-    void warm_up();
-    void run_camera(CameraFeed& feed, const StopFlag& stop);
-    void run_lidar(LidarFeed& feed, const StopFlag& stop);
-    void run_bus(const StopFlag& stop);
+    void run_camera(CameraFeed& feed, StartLine& start, const StopFlag& stop);
+    void run_lidar(LidarFeed& feed, StartLine& start, const StopFlag& stop);
+    void run_bus(StartLine& start, const StopFlag& stop);
 
     void run_lockstep(const StopFlag& stop);
     void advance_to(std::int64_t t_ns, const StopFlag& stop);

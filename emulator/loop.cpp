@@ -4,7 +4,9 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <condition_variable>
 #include <limits>
+#include <mutex>
 #include <thread>
 
 #include "emulator/emulator.h"
@@ -15,26 +17,57 @@ namespace narpa {
 namespace {
 
 constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;
-constexpr std::int64_t kStartLeadNs = 200'000'000;  // for threads whose stacks are locked into memory
-constexpr std::int64_t kBusWaitNs = 2'000'000;      // how long a ledger may wait for the bus thread
-constexpr int kFramesPerTurn = 4096;                // bounds a turn of the bus thread on a saturated bus
+constexpr std::int64_t kStartLeadNs = 50'000'000;
+constexpr std::int64_t kBusWaitNs = 2'000'000;  // how long a ledger may wait for the bus thread
+constexpr int kFramesPerTurn = 4096;            // bounds a turn of the bus thread on a saturated bus
 constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50, kTracingPriority = 49;
 
 }  // namespace
+
+/// Where the threads of a run wait for each other, so that the clock starts when all are ready.
+class StartLine {
+public:
+    explicit StartLine(std::size_t runners) : missing_(runners) {}
+
+    /// Says so, and waits for the start.
+    void ready() {
+        std::unique_lock lock(mutex_);
+        --missing_;
+        changed_.notify_all();
+        changed_.wait(lock, [&] { return started_; });
+    }
+    void wait_until_all_are_ready() {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [&] { return missing_ == 0; });
+    }
+    void go() {
+        const std::lock_guard lock(mutex_);
+        started_ = true;
+        changed_.notify_all();
+    }
+
+private:
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::size_t missing_;
+    bool started_ = false;
+};
 
 // --- Real time ------------------------------------------------------------
 
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
-    warm_up();
-    clock_ = std::make_unique<Clock>(kStartLeadNs);
+    StartLine start(cameras_.size() + lidars_.size() + (can_ ? 1 : 0));
     StopFlag sensors_done{false};
     std::thread bus;
-    if (can_) bus = std::thread([&] { run_bus(sensors_done); });
+    if (can_) bus = std::thread([&] { run_bus(start, sensors_done); });
     std::vector<std::thread> sensors;
-    for (const auto& feed : lidars_) sensors.emplace_back([&, f = feed.get()] { run_lidar(*f, stop); });
-    for (const auto& feed : cameras_) sensors.emplace_back([&, f = feed.get()] { run_camera(*f, stop); });
+    for (const auto& feed : lidars_) sensors.emplace_back([&, f = feed.get()] { run_lidar(*f, start, stop); });
+    for (const auto& feed : cameras_) sensors.emplace_back([&, f = feed.get()] { run_camera(*f, start, stop); });
+    start.wait_until_all_are_ready();
+    clock_ = std::make_unique<Clock>(kStartLeadNs);
+    start.go();
     (void)clock_->wait_until(0, stop);
     const PageFaults before = narpa::page_faults();
     for (std::thread& t : sensors) t.join();
@@ -44,33 +77,36 @@ void Emulator::run_real_time(const StopFlag& stop) {
     if (bus.joinable()) bus.join();
 }
 
-/// The first frame and packet pay for everything that is only needed once: here, before the clock runs.
-void Emulator::warm_up() {
-    for (const auto& feed : cameras_) threads_->arena.execute([&] { feed->warm_up(); });
-    for (const auto& feed : lidars_) feed->warm_up();
-}
+// A sensor's first frames and packets pay for everything that is only needed once, and show how long the next will
+// take: so they are made before the clock runs, by the thread and at the priority that makes the next.
 
-void Emulator::run_camera(CameraFeed& feed, const StopFlag& stop) {
+void Emulator::run_camera(CameraFeed& feed, StartLine& start, const StopFlag& stop) {
     name_thread("narpa-camera");
     touch_stack();
     if (!take_fifo_priority(kCameraPriority)) no_priority_ = true;
+    if (&feed == cameras_.front().get()) threads_->gather();
+    threads_->arena.execute([&] { feed.warm_up(); });
+    start.ready();
     while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop)) {
         threads_->arena.execute([&] { feed.make_next(clock_.get(), end_ns_); });
         t_ns_.store(clock_->now_ns(), std::memory_order_relaxed);
     }
 }
 
-void Emulator::run_lidar(LidarFeed& feed, const StopFlag& stop) {
+void Emulator::run_lidar(LidarFeed& feed, StartLine& start, const StopFlag& stop) {
     name_thread("narpa-lidar");
     touch_stack();
     if (!take_fifo_priority(kLidarPriority)) no_priority_ = true;
+    feed.warm_up();
+    start.ready();
     while (feed.due_ns() <= end_ns_ && clock_->wait_until(feed.due_ns(), stop)) feed.make_next(clock_.get());
 }
 
-void Emulator::run_bus(const StopFlag& stop) {
+void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
     name_thread("narpa-can");
     touch_stack();
     if (!take_fifo_priority(kBusPriority)) no_priority_ = true;
+    start.ready();
     std::int64_t next_heartbeat = 0;
     while (!stop.load(std::memory_order_relaxed)) {
         can_->bus().wait(kBusWaitNs);

@@ -1,11 +1,15 @@
 /// emulator/threads.h - the threads that trace rays: the only place where the emulator meets oneTBB.
 #pragma once
 
+#include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_scheduler_observer.h>
 
 #include <atomic>
+#include <chrono>
+#include <thread>
 #include <vector>
 
 #include "emulator/realtime.h"
@@ -28,6 +32,25 @@ struct TracingThreads {
         real_time.observe(true);
     }
     [[nodiscard]] bool refused() const noexcept { return real_time.refused; }
+
+    /// Returns when all threads were in the arena at once, so that each has its stack, its heap and its priority;
+    /// or, where the kernel does not let them run, soon. Called by the thread that will trace.
+    void gather() {
+        using namespace std::chrono_literals;
+        const int wanted_here = arena.max_concurrency();
+        const auto until = std::chrono::steady_clock::now() + 200ms;
+        std::atomic<int> here{0};
+        arena.execute([&] {
+            tbb::parallel_for(
+                tbb::blocked_range<int>(0, wanted_here, 1),
+                [&](const tbb::blocked_range<int>&) {
+                    ++here;
+                    while (here < wanted_here && std::chrono::steady_clock::now() < until)
+                        std::this_thread::sleep_for(100us);
+                },
+                tbb::simple_partitioner());
+        });
+    }
 
     struct RealTime final : tbb::task_scheduler_observer {
         RealTime(tbb::task_arena& a, std::vector<int> processors)

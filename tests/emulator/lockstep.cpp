@@ -1,9 +1,4 @@
 // Lockstep: the clock is the bus, and nothing but the commands decides what comes out.
-#include <fmt/format.h>
-
-#include <sstream>
-
-#include "protocols/video/embedded_line.h"
 #include "tests/emulator/loop_support.h"
 
 namespace narpa::test {
@@ -55,7 +50,7 @@ TEST_F(Lockstep, IsTheSameBytesOnOneAndOnManyThreads) {
     std::string noisy = small_scene(
         "rate_hz = 20\ndetector = {exposure_s = 0.002, shot_noise = true, read_noise_e = 5.0, bits = 12}\nformat = "
         "\"Y16\"\nembedded_line = true");
-    noisy.replace(noisy.find("[64, 48]"), 8, "[80, 48]");  // wide enough for the embedded line
+    noisy = with_resolution(noisy, "[80, 48]");  // wide enough for the embedded line
     const Files one = run(noisy, bus, 1, "one");
     EXPECT_GT(one.video.size(), 64U * 48 * 20);
     EXPECT_TRUE(one == run(noisy, bus, 2, "two"));
@@ -132,10 +127,6 @@ TEST_F(Lockstep, EndsBeforeTheFrameAtItsDuration) {
     EXPECT_EQ((*emulator)->t_ns(), 1'000'000'000);
 }
 
-std::string with_render(std::string scene_text, const std::string& keys) {
-    return scene_text.replace(scene_text.find("spp = 2"), 7, keys);
-}
-
 TEST_F(Lockstep, TakesNoBudgetInWallTime) {
     RunOptions o;
     o.bus = record(2);
@@ -144,47 +135,6 @@ TEST_F(Lockstep, TakesNoBudgetInWallTime) {
     const auto emulator = Emulator::create(scene(with_render(small_scene(), "budget_ms = 10")), o);
     ASSERT_FALSE(emulator);
     EXPECT_NE(emulator.error().text().find("--budget-rays"), std::string::npos) << emulator.error().text();
-}
-
-TEST_F(Lockstep, ABudgetOfRaysGivesTheSameBytesOnAnyNumberOfThreads) {
-    const std::string bus = record(8);
-    const std::string text = with_render(small_scene("rate_hz = 10\nresolution = [160, 48]\nembedded_line = true"),
-                                         "budget_rays = 40000");
-    const std::string once = text.substr(0, text.find("resolution = [64, 48]\n")) +
-                             text.substr(text.find("resolution = [64, 48]\n") + 22);
-    const Files one = run(once, bus, 1, "one");
-    EXPECT_EQ(frames_, 8U);
-    EXPECT_TRUE(one == run(once, bus, 2, "two"));
-    EXPECT_TRUE(one == run(once, bus, 5, "five"));
-    // The ledger tells what the frame cost, and that this is within the budget.
-    std::istringstream lines(one.ledger);
-    std::string header, line;
-    std::getline(lines, header);
-    int frames = 0;
-    while (std::getline(lines, line)) {
-        const auto cell = [&](const std::string& name) {
-            std::istringstream names(header), values(line);
-            std::string n, v;
-            while (std::getline(names, n, ',') && std::getline(values, v, ','))
-                if (n == name) return v;
-            return std::string("no such column");
-        };
-        EXPECT_EQ(cell("budget_kind"), "rays");
-        EXPECT_EQ(cell("budget"), "40000");
-        EXPECT_EQ(cell("delivery"), "frame");
-        EXPECT_LE(std::stoull(cell("rays")), 40'000U);
-        EXPECT_GE(std::stoull(cell("samples")), 160U * 48U);
-        EXPECT_NEAR(std::stod(cell("samples_per_pixel")), std::stod(cell("samples")) / (160 * 48), 1e-3);
-        ++frames;
-    }
-    EXPECT_EQ(frames, 8);
-    // And so does the image's last row.
-    const std::string_view last(one.video.data() + one.video.size() - 160, 160);
-    const auto ledger = decode_embedded_line({reinterpret_cast<const std::uint8_t*>(last.data()), last.size()});
-    ASSERT_TRUE(ledger);
-    EXPECT_EQ(ledger->frame, 7U);
-    EXPECT_EQ(ledger->budget_kind, BudgetKind::rays);
-    EXPECT_EQ(ledger->budget, 40'000U);
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -28,6 +30,36 @@ inline std::string small_scene(const std::string& camera_keys = "rate_hz = 10") 
            "\n[[lidar]]\nname = \"top\"\nmount = \"chaser\"\nposition_m = [0.1, 0, 0]\n"
            "attitude_wxyz = [0.7071067811865476, 0, 0, -0.7071067811865476]\nmodel = \"VLP-16\"\nrate_hz = 10\n"
            "[render]\nspp = 2\nseed = 42\n";
+}
+
+/// A scene with these keys in [render] in place of `spp = 2`.
+inline std::string with_render(std::string scene_text, const std::string& keys) {
+    return scene_text.replace(scene_text.find("spp = 2"), 7, keys);
+}
+/// A scene whose image is of this size.
+inline std::string with_resolution(std::string scene_text, const std::string& size) {
+    return scene_text.replace(scene_text.find("[64, 48]"), 8, size);
+}
+
+/// The rows of a CSV file, each by the names of its columns.
+inline std::vector<std::map<std::string, std::string>> read_rows(const std::string& path) {
+    const auto cells = [](const std::string& line) {
+        std::vector<std::string> out(1);
+        for (const char c : line) c == ',' ? void(out.emplace_back()) : out.back().push_back(c);
+        return out;
+    };
+    std::ifstream in(path);
+    std::string line;
+    std::getline(in, line);
+    const std::vector<std::string> names = cells(line);
+    std::vector<std::map<std::string, std::string>> rows;
+    while (std::getline(in, line)) {
+        const std::vector<std::string> values = cells(line);
+        EXPECT_EQ(values.size(), names.size()) << line;
+        auto& row = rows.emplace_back();
+        for (std::size_t i = 0; i < std::min(names.size(), values.size()); ++i) row[names[i]] = values[i];
+    }
+    return rows;
 }
 
 class LoopTest : public ::testing::Test {

@@ -21,6 +21,13 @@ public:
     [[nodiscard]] std::uint64_t count() const noexcept { return total_; }
     [[nodiscard]] double max_ns() const noexcept { return static_cast<double>(max_); }
 
+    /// How many samples do not exceed a value, to the bucket.
+    [[nodiscard]] std::uint64_t count_up_to(std::int64_t ns) const noexcept {
+        std::uint64_t seen = 0;
+        for (std::size_t b = 0; b < counts_.size() && upper(b) <= static_cast<std::uint64_t>(ns); ++b)
+            seen += counts_[b];
+        return seen;
+    }
     /// The value that a fraction p of the samples does not exceed; 0 without samples.
     [[nodiscard]] double percentile_ns(double p) const noexcept {
         if (total_ == 0) return 0;
@@ -58,6 +65,10 @@ class SignedHistogram {
 public:
     void add(std::int64_t ns) noexcept { ns < 0 ? before_.add(-ns) : after_.add(ns); }
     [[nodiscard]] std::uint64_t count() const noexcept { return before_.count() + after_.count(); }
+    /// How many samples do not exceed a value, to the bucket; on which side of the mark they are is exact.
+    [[nodiscard]] std::uint64_t count_up_to(std::int64_t ns) const noexcept {
+        return ns < 0 ? before_.count() - before_.count_up_to(-ns - 1) : before_.count() + after_.count_up_to(ns);
+    }
     [[nodiscard]] double max_ns() const noexcept {
         return after_.count() > 0 ? after_.max_ns() : -before_.percentile_ns(0);
     }

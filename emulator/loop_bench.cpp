@@ -13,6 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "emulator/report.h"
+
 namespace narpa {
 namespace {
 
@@ -60,7 +62,7 @@ json to_json(const CameraRun& c) {
             {"wake_late_ms", percentiles_ms(s.wake_late)},
             {"render_ms", percentiles_ms(s.render)},
             {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
-            {"hand_over_after_deadline_ms", percentiles_ms(s.late)},
+            {"hand_over_after_deadline_ms", lateness(s.late)},
             {"allowance_used", percentiles([&](double p) { return c.allowance_used(p); })}};
 }
 
@@ -170,6 +172,8 @@ std::string in_words(const std::vector<LoopRun>& runs) {
                 fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>7.1f}%\n", run.name,
                             c.name, s.frames, s.deadline_missed, s.skipped, c.incomplete(), ms(s.wake_late),
                             ms(s.render), ms(s.hand_over), ms(s.late), 100 * c.allowance_used(0.5));
+            out +=
+                fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_in_words(lateness(s.late)));
         }
         for (const LidarRun& l : run.lidars)
             out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24}\n", run.name, l.name,

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace narpa {
@@ -17,10 +19,14 @@ json percentiles_ms(const Histogram& h) {
 template <class H>
 json percentiles(const H& h, double unit) {
     return {{"p50", h.percentile_ns(0.5) * unit},
+            {"p90", h.percentile_ns(0.9) * unit},
             {"p99", h.percentile_ns(0.99) * unit},
             {"p99.9", h.percentile_ns(0.999) * unit},
             {"max", h.max_ns() * unit}};
 }
+
+/// Bounds of the bins of lateness, ms.
+constexpr std::array kBins{-30.0, -10.0, -3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0, 10.0, 30.0};
 
 /// Frames that got so far, by the names of the steps.
 json of_steps(const CameraStats& s) {
@@ -53,7 +59,7 @@ json of_camera(const CameraFeed& feed) {
             {"steps", of_steps(s)},
             {"samples_per_pixel", percentiles(s.samples_1e3, 1e-3)},
             {"expected_error", s.error_1e9.count() > 0 ? percentiles(s.error_1e9, 1e-9) : json(nullptr)},
-            {"hand_over_after_deadline_ms", percentiles(s.late, 1e-6)},
+            {"hand_over_after_deadline_ms", lateness(s.late)},
             {"wake_late_ms", percentiles_ms(s.wake_late)},
             {"render_ms", percentiles_ms(s.render)},
             {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
@@ -124,6 +130,34 @@ std::uint64_t number(const json& j, const char* key) {
 
 }  // namespace
 
+json lateness(const SignedHistogram& late) {
+    json out = percentiles(late, 1e-6), bins = json::array();
+    std::uint64_t before = 0;
+    for (const double end_ms : kBins) {
+        const std::uint64_t seen = late.count_up_to(std::llround(end_ms * 1e6));
+        bins.push_back({{"up_to_ms", end_ms}, {"frames", seen - before}});
+        before = seen;
+    }
+    bins.push_back({{"up_to_ms", nullptr}, {"frames", late.count() - before}});
+    out["bins"] = bins;
+    return out;
+}
+
+std::string lateness_in_words(const json& lateness) {
+    std::string text;
+    const json& bins = lateness["bins"];
+    for (std::size_t i = 0; i < bins.size(); ++i) {
+        if (number(bins[i], "frames") == 0) continue;
+        const double from = i > 0 ? kBins[i - 1] : kBins[0], to = i < kBins.size() ? kBins[i] : kBins.back();
+        const bool early = to <= 0;
+        const double near = early ? -to : from, far = early ? -from : to;
+        text += fmt::format("{}{} ", text.empty() ? "" : ", ", number(bins[i], "frames"));
+        text += near == far ? fmt::format("over {:g} ms", near) : fmt::format("{:g} to {:g} ms", near, far);
+        text += early ? " early" : " late";
+    }
+    return text.empty() ? "none" : text;
+}
+
 json report(Emulator& emulator) {
     json cameras = json::array(), lidars = json::array();
     for (const auto& feed : emulator.cameras()) cameras.push_back(of_camera(*feed));
@@ -151,10 +185,11 @@ std::string in_words(const json& r) {
                            latency(c["wake_late_ms"]));
         const json& late = c["hand_over_after_deadline_ms"];
         out += fmt::format(
-            "    hand-over after the deadline: p50 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
-            "repeated {}, blank {}\n",
-            late["p50"].get<double>(), late["p99"].get<double>(), late["p99.9"].get<double>(),
-            late["max"].get<double>(), number(c, "repeated"), number(c, "blanked"));
+            "    hand-over after the deadline: p50 {:.2f}, p90 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
+            "repeated {}, blank {}\n    frames: {}\n",
+            late["p50"].get<double>(), late["p90"].get<double>(), late["p99"].get<double>(),
+            late["p99.9"].get<double>(), late["max"].get<double>(), number(c, "repeated"), number(c, "blanked"),
+            lateness_in_words(late));
         const json &spp = c["samples_per_pixel"], &error = c["expected_error"];
         out += fmt::format("    steps: {}; samples per pixel p50 {:.2f}, max {:.2f}", non_zero(c["steps"]),
                            spp["p50"].get<double>(), spp["max"].get<double>());

@@ -205,6 +205,21 @@ TEST_F(Budgets, TheReportCountsFramesByStep) {
     }
 }
 
+TEST(Report, TellsHowManyFramesWereHowLate) {
+    SignedHistogram late;
+    for (int i = 0; i < 7; ++i) late.add(-2'000'000);
+    for (int i = 0; i < 2; ++i) late.add(500'000);
+    late.add(-45'000'000);
+    const nlohmann::json told = lateness(late);
+    EXPECT_EQ(lateness_in_words(told), "1 over 30 ms early, 7 1 to 3 ms early, 2 0.3 to 1 ms late");
+    std::uint64_t frames = 0;
+    for (const nlohmann::json& bin : told["bins"]) frames += bin["frames"].get<std::uint64_t>();
+    EXPECT_EQ(frames, late.count());
+    EXPECT_NEAR(told["p50"].get<double>(), -2, 0.07);
+    EXPECT_EQ(told["max"], 0.5);
+    EXPECT_EQ(lateness_in_words(lateness({})), "none");
+}
+
 /// In real time: how far each frame gets is up to the machine, what is said of it must fit together.
 class BudgetOfTime : public Budgets, public ::testing::WithParamInterface<const char*> {};
 

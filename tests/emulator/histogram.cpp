@@ -48,6 +48,17 @@ TEST(Histogram, SignedPercentilesLieOnBothSidesOfTheMark) {
     EXPECT_EQ(early.max_ns(), -20);
 }
 
+TEST(Histogram, CountsWhatDoesNotExceedAValue) {
+    SignedHistogram h;
+    for (std::int64_t t = -5'000'000; t <= 5'000'000; t += 1'000) h.add(t);
+    EXPECT_EQ(h.count_up_to(-6'000'000), 0U);
+    EXPECT_NEAR(static_cast<double>(h.count_up_to(-1'000'000)), 4'000, 32);  // 3 % of a million
+    EXPECT_EQ(h.count_up_to(-1), 5'000U);                                    // exact at the mark
+    EXPECT_EQ(h.count_up_to(0), 5'001U);
+    EXPECT_NEAR(static_cast<double>(h.count_up_to(3'000'000)), 8'001, 96);
+    EXPECT_EQ(h.count_up_to(6'000'000), h.count());
+}
+
 TEST(Histogram, ExtremesHaveAPlace) {
     Histogram h;
     EXPECT_EQ(h.percentile_ns(0.5), 0);

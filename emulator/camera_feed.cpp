@@ -6,28 +6,10 @@
 #include <cmath>
 #include <span>
 
+#include "emulator/ledger_log.h"
 #include "emulator/trajectory.h"
 
 namespace narpa {
-namespace {
-
-constexpr std::string_view kLedgerHeader =
-    "frame,pose_counter,t_pose_ns,stale,t_exposure_start_ns,t_exposure_mid_ns,t_exposure_end_ns,t_render_start_ns,"
-    "t_render_end_ns,t_hand_over_ns,t_deadline_ns,deadline_met,delivery,step,samples,samples_per_pixel,rays,passes,"
-    "budget_kind,budget,expected_error\n";
-
-/// "307200;614400": the passes after the first, as a replay needs them.
-std::size_t format_passes(std::span<char> out, const FrameLedger& ledger) noexcept {
-    std::size_t size = 0;
-    for (const std::uint32_t samples : ledger.passes) {
-        if (samples == 0) break;
-        size += fmt::format_to_n(out.data() + size, out.size() - size, "{}{}", size > 0 ? ";" : "", samples).size;
-    }
-    return size;
-}
-
-}  // namespace
-
 CameraFeed::CameraFeed(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
     : world_(world), unit_(world, camera), sinks_(std::move(sinks)) {
     const LatePolicy late = unit_.camera().late;
@@ -39,7 +21,7 @@ Status CameraFeed::log_to(const std::string& folder, bool wait_when_full) {
     const std::string stem = folder + "/" + unit_.camera().name;
     auto truth = RowLog::create(stem + ".truth.csv", std::string(kTrajectoryHeader) + "\n", wait_when_full);
     if (!truth) return truth.error();
-    auto ledger = RowLog::create(stem + ".ledger.csv", kLedgerHeader, wait_when_full);
+    auto ledger = RowLog::create(stem + ".ledger.csv", std::string(kLedgerHeader) + "\n", wait_when_full);
     if (!ledger) return ledger.error();
     truth_log_ = *std::move(truth);
     ledger_log_ = *std::move(ledger);
@@ -138,19 +120,11 @@ void CameraFeed::log(const FrameLedger& l) noexcept {
     if (!truth_log_) return;
     std::array<char, RowLog::kMaxLine> row;
     for (std::size_t i = 0; i < world_.scene().bodies.size(); ++i) {
-        const Motion m = world_.motion(i, l.t_exposure_mid_ns);
-        truth_log_->append(
-            {row.data(), format_trajectory_row(row, l.t_exposure_mid_ns, world_.scene().bodies[i].name, m)});
+        truth_log_->append({row.data(), format_trajectory_row(row, l.t_exposure_mid_ns,
+                                                              world_.scene().bodies[i].name, unit_.motions()[i])});
     }
-    std::array<char, 11 * FrameLedger::kPasses> text;
-    const std::string_view passes(text.data(), format_passes(text, l));
-    const auto end = fmt::format_to_n(
-        row.data(), row.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{},{},{},{},{},{},{},{}\n", l.frame,
-        l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns, l.t_exposure_mid_ns, l.t_exposure_end_ns,
-        l.t_render_start_ns, l.t_render_end_ns, l.t_hand_over_ns, l.t_deadline_ns, l.deadline_met,
-        kDeliveries[static_cast<std::size_t>(l.delivery)], l.step, l.samples, l.samples_per_pixel, l.rays, passes,
-        kBudgetKinds[static_cast<std::size_t>(l.budget_kind)], l.budget, l.expected_error);
-    ledger_log_->append({row.data(), end.size});
+    // After the hand-over, which so never waits for it.
+    ledger_log_->append({row.data(), format_ledger_row(row, l, image_crc32(unit_.bytes()))});
     sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
 }
 

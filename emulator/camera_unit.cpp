@@ -27,6 +27,7 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
       index_(static_cast<std::uint8_t>(index)),
       full_scale_(full_scale_radiance(camera_)),
       placement_(world.scene().bodies.size()),
+      motions_(world.scene().bodies.size()),
       renderer_(world.tracer(), camera_),
       radiance_(camera_.width, camera_.height),
       bytes_(frame_bytes(format())) {}
@@ -70,7 +71,7 @@ void CameraUnit::warm_up() {
 FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const FrameBudget& budget, Aovs* aovs,
                                std::atomic<std::size_t>* pixels_done) {
     const RenderSettings& render = world_.scene().render;
-    const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_);
+    const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_, motions_);
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
     FrameSettings settings;
     settings.spp = render.spp;

@@ -58,6 +58,8 @@ public:
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
     [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
+    /// Of every body, as the last frame shows it.
+    [[nodiscard]] std::span<const Motion> motions() const noexcept { return motions_; }
 
 private:
     [[nodiscard]] FrameBudget budget(std::int64_t deadline_ns) const noexcept;
@@ -70,6 +72,7 @@ private:
     std::uint8_t index_;
     double full_scale_;
     Placement placement_;
+    std::vector<Motion> motions_;
     CameraRenderer renderer_;
     RadianceImage radiance_;
     Allowance allowance_;

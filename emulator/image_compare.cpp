@@ -51,6 +51,7 @@ ShiftStatistics edge_shifts(const cv::Mat& picture, const cv::Mat& reference) {
         return std::array<double, 2>{0.5 * (at(x + 1, y) - at(x - 1, y)), 0.5 * (at(x, y + 1) - at(x, y - 1))};
     };
     ShiftStatistics s;
+    std::vector<double> sizes;
     double sum = 0, squares = 0;
     constexpr int border = kWindow + 1;
     for (int y = border; y < height - border; ++y)
@@ -68,12 +69,15 @@ ShiftStatistics edge_shifts(const cv::Mat& picture, const cv::Mat& reference) {
                     steep += h * h;
                 }
             const double shift = along / steep;
-            ++s.count;
+            sizes.push_back(std::abs(shift));
             sum += shift;
             squares += shift * shift;
-            if (std::abs(shift) > std::abs(s.largest_px)) s.largest_px = shift;
         }
+    s.count = sizes.size();
     if (s.count > 0) {
+        const auto p99 = sizes.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(s.count - 1));
+        std::nth_element(sizes.begin(), p99, sizes.end());
+        s.p99_px = *p99;
         s.mean_px = sum / static_cast<double>(s.count);
         s.rms_px = std::sqrt(squares / static_cast<double>(s.count));
     }

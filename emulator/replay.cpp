@@ -2,132 +2,108 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <fstream>
-#include <map>
-#include <string_view>
+#include <algorithm>
+#include <optional>
 
-#include "emulator/run_record.h"
-#include "renderer/scene/scene_file.h"
 #include "emulator/camera_unit.h"
+#include "emulator/run_record.h"
+#include "protocols/video/embedded_line.h"
+#include "renderer/scene/scene_file.h"
+#include "renderer/sensor/detector.h"
 
 namespace narpa {
 namespace {
 
-std::vector<std::string_view> cells_of(std::string_view line, char separator) {
-    std::vector<std::string_view> cells;
-    for (std::size_t start = 0;;) {
-        const std::size_t end = std::min(line.find(separator, start), line.size());
-        cells.push_back(line.substr(start, end - start));
-        if (end == line.size()) return cells;
-        start = end + 1;
+/// Where the bodies were in each of the frames, in the frames' order.
+Result<std::vector<Placement>> placements_of(const std::vector<LoggedFrame>& frames, const World& world,
+                                             const std::string& ledger_file, const std::string& truth_file) {
+    auto rows = read_trajectory(truth_file);
+    if (!rows) return rows.error();
+    const auto by_time = [](const TrajectoryRow& a, const TrajectoryRow& b) { return a.t_ns < b.t_ns; };
+    std::stable_sort(rows->begin(), rows->end(), by_time);
+    const std::size_t bodies = world.scene().bodies.size();
+    std::vector<Placement> placements;
+    placements.reserve(frames.size());
+    for (const LoggedFrame& frame : frames) {
+        const std::int64_t t_ns = frame.ledger.t_exposure_mid_ns;
+        const auto [begin, end] =
+            std::equal_range(rows->begin(), rows->end(), TrajectoryRow{t_ns, {}, {}}, by_time);
+        Placement& at = placements.emplace_back(bodies);
+        for (auto row = begin; row != end; ++row) {
+            const auto body = world.body_named(row->body);
+            if (!body)
+                return Error{fmt::format("body \"{}\" at {:.9f} s, which the scene \"{}\" does not have", row->body,
+                                         static_cast<double>(t_ns) * 1e-9, world.scene().file),
+                             truth_file};
+            at.set(*body, row->motion.T_world_body);
+        }
+        if (static_cast<std::size_t>(end - begin) != bodies)
+            return Error{fmt::format("frame {} at {} ns: {} holds {} poses for this time, expected {}",
+                                     frame.ledger.frame, t_ns, truth_file, end - begin, bodies),
+                         ledger_file, frame.line, 1};
     }
+    return placements;
 }
 
-template <class Number>
-bool read_number(std::string_view text, Number& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc{} && end == text.data() + text.size();
-}
-
-/// The columns that matter here; `passes` is a list like 65536;131072, empty where there were none.
-bool read_cell(std::string_view column, std::string_view text, LoggedFrame& frame) {
-    if (column == "frame") return read_number(text, frame.frame);
-    if (column == "t_exposure_mid_ns") return read_number(text, frame.t_mid_ns);
-    if (column == "samples_per_pixel") {
-        double mean = 0;
-        if (!read_number(text, mean) || !(mean >= 0 && mean <= 65535)) return false;
-        frame.spp = std::max(1, static_cast<int>(mean + 0.5));
-        return true;
-    }
-    if (column == "expected_error") return read_number(text, frame.expected_error);
-    if (column == "step") {
-        int step = 0;
-        if (!read_number(text, step) || step < 0 || step > static_cast<int>(FrameStep::nothing)) return false;
-        frame.step = static_cast<FrameStep>(step);
-        return true;
-    }
-    if (column != "passes" || text.empty()) return true;
-    const auto passes = cells_of(text, ';');
-    if (passes.size() > frame.passes.size()) return false;
-    for (std::size_t i = 0; i < passes.size(); ++i)
-        if (!read_number(passes[i], frame.passes[i])) return false;
-    return true;
+/// "rays: 512, logged 513", where they are not the same.
+template <class Value>
+void expect_same(std::string_view what, const Value& now, const Value& logged, std::vector<std::string>& differs) {
+    if (now != logged) differs.push_back(fmt::format("{}: {}, logged {}", what, now, logged));
 }
 
 }  // namespace
 
-Result<std::vector<LoggedFrame>> read_ledger_log(const std::string& path) {
-    std::ifstream in(path);
-    std::string header, line;
-    if (!in || !std::getline(in, header)) return Error{"cannot be read, expected the ledger log of a camera", path};
-    const std::vector<std::string_view> columns = cells_of(header, ',');
-    for (const std::string_view needed : {"frame", "t_exposure_mid_ns"})
-        if (std::find(columns.begin(), columns.end(), needed) == columns.end())
-            return Error{fmt::format("has no column \"{}\", expected the ledger log of a camera", needed), path, 1,
-                         1};
-    std::vector<LoggedFrame> frames;
-    for (int number = 2; std::getline(in, line); ++number) {
-        const std::vector<std::string_view> cells = cells_of(line, ',');
-        if (cells.size() != columns.size())
-            return Error{fmt::format("{} columns, expected {}", cells.size(), columns.size()), path, number, 1};
-        LoggedFrame frame;
-        for (std::size_t i = 0; i < cells.size(); ++i)
-            if (!read_cell(columns[i], cells[i], frame))
-                return Error{fmt::format("\"{}\" cannot be a {}", cells[i], columns[i]), path, number,
-                             static_cast<int>(cells[i].data() - line.data()) + 1};
-        frames.push_back(frame);
-    }
-    return frames;
-}
-
 struct Replay::Impl {
-    Impl(std::unique_ptr<World> w, std::size_t camera_index, RunRecord r)
+    Impl(std::unique_ptr<World> w, std::size_t camera_index)
         : world(std::move(w)),
           camera(world->scene().cameras[camera_index]),
-          record(std::move(r)),
-          placement(world->scene().bodies.size()),
+          index(static_cast<std::uint8_t>(camera_index)),
+          full_scale(full_scale_radiance(camera)),
           renderer(world->tracer(), camera),
           picture(camera.width, camera.height),
-          reference(camera.width, camera.height) {}
+          reference(camera.width, camera.height),
+          bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})) {}
+
+    [[nodiscard]] FrameSettings settings_of(std::size_t i) const;
+    [[nodiscard]] Rigid3 T_world_camera(std::size_t i) const {
+        return world->sensor_pose(camera.mount, camera.T_mount_camera, placements[i]);
+    }
+    [[nodiscard]] bool bytes_repeat(const LoggedFrame& logged);
 
     std::unique_ptr<World> world;
     const Camera& camera;
-    RunRecord record;
+    std::uint8_t index;
+    double full_scale;
     std::vector<LoggedFrame> frames;
-    std::map<std::int64_t, std::vector<TrajectoryRow>> truth;  ///< by time
-    Placement placement;
+    std::vector<Placement> placements;
     CameraRenderer renderer;
     RadianceImage picture, reference;
     Aovs middles;
-    Rigid3 T_world_camera{};
-    std::uint32_t frame = 0;
-
-    Status place(const LoggedFrame& logged);
-    [[nodiscard]] FrameSettings settings() const;
+    std::vector<std::uint8_t> bytes;
+    std::size_t made = 0;  ///< the frame that `picture` shows
 };
 
 Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const std::string& camera,
                                              const std::string& scene_file) {
-    auto record = read_run_record(folder);
+    const auto record = read_run_record(folder);
     if (!record) return record.error();
-    const std::string& file = scene_file.empty() ? record->scene_file : scene_file;
-    auto scene = read_scene(file);
+    auto scene = read_scene(scene_file.empty() ? record->scene_file : scene_file);
     if (!scene) return scene.error();
-    if (auto good = use_method(*scene, record->render.method); !good) return good.error();
-    scene->render = record->render;
-    auto index = sensor_named(scene->cameras, camera, "camera", scene->file);
+    if (auto good = use_method(*scene, record->method); !good) return good.error();
+    scene->render.max_depth = record->max_depth;
+    scene->render.seed = record->seed;
+    const auto index = sensor_named(scene->cameras, camera, "camera", scene->file);
     if (!index) return index.error();
     const std::string stem = folder + "/" + scene->cameras[*index].name;
     auto frames = read_ledger_log(stem + ".ledger.csv");
     if (!frames) return frames.error();
-    auto truth = read_trajectory(stem + ".truth.csv");
-    if (!truth) return truth.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
-    auto impl = std::make_unique<Impl>(*std::move(world), *index, *std::move(record));
+    auto placements = placements_of(*frames, **world, stem + ".ledger.csv", stem + ".truth.csv");
+    if (!placements) return placements.error();
+    auto impl = std::make_unique<Impl>(*std::move(world), *index);
     impl->frames = *std::move(frames);
-    for (TrajectoryRow& row : *truth) impl->truth[row.t_ns].push_back(std::move(row));
+    impl->placements = *std::move(placements);
     return std::unique_ptr<Replay>(new Replay(std::move(impl)));
 }
 
@@ -143,52 +119,82 @@ const World& Replay::world() const noexcept {
 const Camera& Replay::camera() const noexcept {
     return impl_->camera;
 }
-
-/// Every body where the log says that it was.
-Status Replay::Impl::place(const LoggedFrame& logged) {
-    const auto rows = truth.find(logged.t_mid_ns);
-    if (rows == truth.end())
-        return Error{fmt::format("frame {} has no row in the truth log at {} ns", logged.frame, logged.t_mid_ns)};
-    if (auto loaded = world->load(rows->second, logged.t_mid_ns, logged.t_mid_ns); !loaded) return loaded.error();
-    (void)world->place(logged.t_mid_ns, camera.mount, placement);
-    T_world_camera = world->sensor_pose(camera.mount, camera.T_mount_camera, placement);
-    frame = logged.frame;
-    return Ok{};
-}
-
-FrameSettings Replay::Impl::settings() const {
-    FrameSettings s;
-    s.seed = record.render.seed;
-    s.frame = frame;
-    s.method = record.render.method;
-    s.max_depth = record.render.max_depth;
-    return s;
-}
-
-Status Replay::make(std::size_t i) {
-    const LoggedFrame& logged = impl_->frames[i];
-    if (auto placed = impl_->place(logged); !placed) return placed.error();
-    FrameSettings settings = impl_->settings();
-    settings.spp = logged.spp;
-    if (impl_->record.render.budget_ns > 0 || impl_->record.render.budget_rays > 0) {
-        settings.budget.kind = FrameBudget::Kind::passes;
-        settings.budget.passes = logged.passes;
-        settings.budget.step = static_cast<std::uint8_t>(logged.step);
-    }
-    impl_->renderer.render(impl_->placement, impl_->T_world_camera, settings, impl_->picture);
-    return Ok{};
-}
-
 const RadianceImage& Replay::picture() const noexcept {
     return impl_->picture;
 }
+const RadianceImage& Replay::reference() const noexcept {
+    return impl_->reference;
+}
+bool Replay::has_image(std::size_t i) const noexcept {
+    return static_cast<FrameStep>(impl_->frames[i].ledger.step) != FrameStep::nothing;
+}
 
-ImageDifference Replay::against(int spp) {
-    FrameSettings settings = impl_->settings();
+FrameSettings Replay::Impl::settings_of(std::size_t i) const {
+    const FrameLedger& logged = frames[i].ledger;
+    const RenderSettings& render = world->scene().render;
+    FrameSettings s;
+    s.seed = render.seed;
+    s.frame = logged.frame;
+    s.method = render.method;
+    s.max_depth = render.max_depth;
+    if (logged.budget_kind == BudgetKind::samples) {
+        s.spp = static_cast<int>(logged.budget);
+    } else {
+        s.budget.kind = FrameBudget::Kind::passes;
+        s.budget.passes = logged.passes;
+        s.budget.step = logged.step;
+    }
+    return s;
+}
+
+std::vector<std::string> Replay::make(std::size_t i) {
+    Impl& r = *impl_;
+    const LoggedFrame& logged = r.frames[i];
+    const FrameSettings settings = r.settings_of(i);
+    const FrameAccount account = r.renderer.render(r.placements[i], r.T_world_camera(i), settings, r.picture);
+    r.made = i;
+
+    std::vector<std::string> differs;
+    const FrameLedger& l = logged.ledger;
+    expect_same("step", kStepNames[static_cast<std::size_t>(account.step)], kStepNames[l.step], differs);
+    expect_same("samples", account.samples, l.samples, differs);
+    expect_same("rays", account.rays, l.rays, differs);
+    // A frame that had no time left to estimate its error has time here.
+    if (l.expected_error >= 0)
+        expect_same("expected_error", static_cast<float>(account.standard_error / r.full_scale), l.expected_error,
+                    differs);
+    expose(r.camera, r.picture, settings.seed, l.frame, r.bytes);
+    if (!r.bytes_repeat(logged))
+        differs.push_back(
+            fmt::format("image_crc32: {:08x}, logged {:08x}", image_crc32(r.bytes), logged.image_crc32));
+    return differs;
+}
+
+/// The embedded line is written just before the hand-over: whether the deadline was met then is not in the log
+/// where it was missed after all.
+bool Replay::Impl::bytes_repeat(const LoggedFrame& logged) {
+    if (!camera.embedded_line) return image_crc32(bytes) == logged.image_crc32;
+    FrameLedger line = logged.ledger;
+    line.camera = index;
+    line.t_hand_over_ns = 0;
+    const std::size_t row = bytes.size() / static_cast<std::size_t>(camera.height);
+    const auto same = [&](bool in_time) {
+        line.deadline_met = in_time;
+        (void)encode_embedded_line(line, std::span(bytes).last(row));  // World::create refuses rows too narrow
+        return image_crc32(bytes) == logged.image_crc32;
+    };
+    return (!logged.ledger.deadline_met && same(false)) || same(true);
+}
+
+ReferenceComparison Replay::against(int spp) {
+    Impl& r = *impl_;
+    FrameSettings settings = r.settings_of(r.made);
+    settings.budget = {};
     settings.spp = spp;
     settings.seed = ~settings.seed;
-    impl_->renderer.render(impl_->placement, impl_->T_world_camera, settings, impl_->reference, &impl_->middles);
-    return compare(impl_->picture, impl_->reference, impl_->middles.body, full_scale_radiance(impl_->camera));
+    const FrameAccount account =
+        r.renderer.render(r.placements[r.made], r.T_world_camera(r.made), settings, r.reference, &r.middles);
+    return {compare(r.picture, r.reference, r.middles.body, r.full_scale), std::max(0.0, account.standard_error)};
 }
 
 }  // namespace narpa

@@ -1,36 +1,31 @@
-/// emulator/replay.h - the frames of a logged run once more: what the budget of each cost.
+/// emulator/replay.h - the frames of a logged run once more, bit for bit, and what the budget of each cost.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/result.h"
 #include "emulator/image_compare.h"
+#include "emulator/ledger_log.h"
 #include "emulator/world.h"
-#include "renderer/trace/frame_budget.h"
 
 namespace narpa {
 
-/// What a camera's ledger log says of how a frame was made.
-struct LoggedFrame {
-    std::uint32_t frame = 0;
-    std::int64_t t_mid_ns = 0;
-    int spp = 1;  ///< where there was no budget
-    FrameStep step = FrameStep::refined;
-    std::array<std::uint32_t, kMaxPasses> passes{};
-    double expected_error = 0;  ///< of the full scale; 0: not estimated
+/// The same view with many samples for each pixel.
+struct ReferenceComparison {
+    ImageDifference difference;
+    double reference_error = 0;  ///< the reference's own standard error, W m^-2 sr^-1
 };
-/// Reads CAMERA.ledger.csv, whatever the order of its columns. Errors name file, line and column.
-Result<std::vector<LoggedFrame>> read_ledger_log(const std::string& path);
 
 /// A logged run of one camera, open to be looked at again.
+///
+/// A frame follows from the scene, the bodies' poses, its number, the seed, its step and the sizes of its passes
+/// (renderer/trace/frame_budget.h): the log has them all, so that frames made against the clock repeat as well.
 class Replay {
 public:
-    /// `scene_file` empty: the one that the run had.
+    /// `camera` empty: the first of the scene. `scene_file` empty: the one that the run had.
     static Result<std::unique_ptr<Replay>> open(const std::string& folder, const std::string& camera,
                                                 const std::string& scene_file);
     ~Replay();
@@ -39,11 +34,17 @@ public:
     [[nodiscard]] const World& world() const noexcept;
     [[nodiscard]] const Camera& camera() const noexcept;
 
-    /// Makes frame i of the log as it was made, sample for sample. Frames are asked for in the order of the log.
-    Status make(std::size_t i);
+    /// Whether frame i has an image of its own: one that did not even get to its coarsest step has none to repeat.
+    [[nodiscard]] bool has_image(std::size_t i) const noexcept;
+
+    /// Makes frame i, which has an image, as it was made. Returns what is not as the log tells, in words: nothing
+    /// where the frame repeats bit for bit.
+    std::vector<std::string> make(std::size_t i);
     [[nodiscard]] const RadianceImage& picture() const noexcept;
-    /// How far it is from the same view with `spp` samples for each pixel, of other random numbers than the run's.
-    [[nodiscard]] ImageDifference against(int spp);
+
+    /// Compares the frame made last with `spp` samples for each pixel, of other random numbers than the run's.
+    ReferenceComparison against(int spp);
+    [[nodiscard]] const RadianceImage& reference() const noexcept;
 
 private:
     struct Impl;

@@ -8,15 +8,18 @@
 
 namespace narpa {
 
-/// The scene's file, and what rendered it, with what the command line had changed.
+/// The scene's file, and what decides a frame's bytes beside it, with what the command line had changed. Budgets
+/// are not here: each frame's ledger has its own.
 struct RunRecord {
     std::string scene_file;  ///< absolute
-    RenderSettings render;
+    RenderSettings::Method method{};
+    int max_depth = 0;
+    std::uint64_t seed = 0;
 };
 
 /// Writes FOLDER/run.json.
 Status write_run_record(const std::string& folder, const Scene& scene);
-/// Reads it back. Errors name the file and what was expected.
+/// Reads it back. Errors name file, line and what was expected.
 Result<RunRecord> read_run_record(const std::string& folder);
 
 }  // namespace narpa

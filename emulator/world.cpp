@@ -83,12 +83,14 @@ TrackedPose World::pose(std::size_t body, std::int64_t t_ns) const noexcept {
     return {extrapolate(scene_.bodies[body].initial, static_cast<double>(t_ns) * 1e-9), 0, 0, false, false};
 }
 
-PlacementSource World::place(std::int64_t t_ns, int rider, Placement& out) const noexcept {
+PlacementSource World::place(std::int64_t t_ns, int rider, Placement& out,
+                             std::span<Motion> motions) const noexcept {
     PlacementSource source;
     bool named = false;
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
         const TrackedPose p = pose(i, t_ns);
         out.set(i, p.motion.T_world_body);
+        if (i < motions.size()) motions[i] = p.motion;
         source.stale |= p.stale;
         if (p.commanded && (!named || static_cast<int>(i) == rider)) {
             source.counter = p.counter;

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,14 +38,12 @@ public:
     Status load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns);
 
     /// Puts every body where it is at t. `rider`: the body whose command the source names first (a sensor's
-    /// mount); -1 for none. Allocates nothing.
-    PlacementSource place(std::int64_t t_ns, int rider, Placement& out) const noexcept;
+    /// mount); -1 for none. `motions`: how the bodies move there, as far as it is long; what is asked later may
+    /// rest on newer commands. Allocates nothing.
+    PlacementSource place(std::int64_t t_ns, int rider, Placement& out,
+                          std::span<Motion> motions = {}) const noexcept;
     /// Puts only the bodies that move (all but those at rest without a can_id): after a first `place`.
     void place_moving(std::int64_t t_ns, Placement& out) const noexcept;
-
-    [[nodiscard]] Motion motion(std::size_t body, std::int64_t t_ns) const noexcept {
-        return pose(body, t_ns).motion;
-    }
 
     [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const Placement& at) const noexcept {
         return mount < 0 ? T_mount_sensor : at.T_world_body[static_cast<std::size_t>(mount)] * T_mount_sensor;

@@ -1,100 +1,136 @@
-// narpa replay - the frames of a logged run once more, beside what an unlimited budget would have shown.
+// narpa replay - the frames of a logged run once more: bit for bit, and beside what an unlimited budget would have
+// shown.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 
+#include "emulator/cli/bench_scene.h"
 #include "emulator/cli/cli.h"
-#include "emulator/replay.h"
+#include "emulator/replay_report.h"
 #include "emulator/threads.h"
 
 namespace narpa::cli {
 namespace {
 
+constexpr std::size_t kDifferencesTold = 10;
+constexpr int kFramesCompared = 10;  ///< where nobody says how many
+
 struct Options {
-    std::string folder, camera, scene;
-    int reference = 256, frames = 20, threads = 0;
+    std::string folder, camera, scene, picture;
+    int reference = 0, frames = 0, threads = 0;
 };
 
-/// A frame and how far it is from its reference.
-struct Row {
-    LoggedFrame logged;
-    ImageDifference difference;
+struct Replayed {
+    std::vector<ReplayedFrame> frames;
+    std::size_t not_whole = 0;
+    /// The frame that is farthest from its reference.
+    std::size_t worst = 0;
+    std::optional<RadianceImage> worst_picture, worst_reference;
 };
-
-nlohmann::json to_json(const Row& r, const Scene& scene) {
-    nlohmann::json bodies = nlohmann::json::array();
-    for (const BodyShift& b : r.difference.bodies)
-        bodies.push_back(
-            {{"body", scene.bodies[static_cast<std::size_t>(b.body)].name}, {"x_px", b.x_px}, {"y_px", b.y_px}});
-    return {{"frame", r.logged.frame},
-            {"t_s", static_cast<double>(r.logged.t_mid_ns) * 1e-9},
-            {"rmse", r.difference.rmse / r.difference.full_scale},
-            {"bias", r.difference.bias / r.difference.full_scale},
-            {"expected_error", r.logged.expected_error},
-            {"ssim", r.difference.ssim},
-            {"edges",
-             {{"pixels", r.difference.edges.count},
-              {"mean_px", r.difference.edges.mean_px},
-              {"rms_px", r.difference.edges.rms_px},
-              {"largest_px", r.difference.edges.largest_px}}},
-            {"bodies", bodies}};
-}
-
-double farthest(const ImageDifference& d) {
-    double most = 0;
-    for (const BodyShift& b : d.bodies) most = std::max(most, std::hypot(b.x_px, b.y_px));
-    return most;
-}
-
-std::string in_words(const std::vector<Row>& rows) {
-    std::string out = "  frame     t [s]   RMSE [% fs]   expected      SSIM   edges rms [px]   bodies [px]\n";
-    for (const Row& r : rows)
-        out += fmt::format("{:7} {:9.3f} {:13.4f} {:10.4f} {:9.5f} {:16.4f} {:13.4f}\n", r.logged.frame,
-                           static_cast<double>(r.logged.t_mid_ns) * 1e-9,
-                           100 * r.difference.rmse / r.difference.full_scale, 100 * r.logged.expected_error,
-                           r.difference.ssim, r.difference.edges.rms_px, farthest(r.difference));
-    return out;
-}
 
 /// Evenly spread over the run, first and last among them.
-std::vector<std::size_t> chosen_frames(std::size_t frames, int wanted) {
-    const std::size_t n = std::min(frames, static_cast<std::size_t>(wanted));
+std::vector<std::size_t> chosen_frames(std::size_t frames, std::size_t wanted) {
+    const std::size_t n = std::min(frames, wanted);
     std::vector<std::size_t> chosen;
     for (std::size_t k = 0; k < n; ++k) chosen.push_back(n > 1 ? k * (frames - 1) / (n - 1) : 0);
     return chosen;
 }
 
-Outcome replay(const Options& o) {
+std::vector<std::size_t> frames_for(const Options& o, std::size_t logged) {
+    if (o.frames > 0) return chosen_frames(logged, static_cast<std::size_t>(o.frames));
+    return chosen_frames(logged, o.reference > 0 ? std::size_t{kFramesCompared} : logged);
+}
+
+Replayed make_again(const Options& o, Replay& run) {
     TracingThreads threads(o.threads);
+    const Progress progress;
+    const std::vector<std::size_t> chosen = frames_for(o, run.frames().size());
+    Replayed done;
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+        progress.tell(fmt::format("{}/{}", k, chosen.size()));
+        const std::size_t i = chosen[k];
+        if (!run.has_image(i)) {
+            ++done.not_whole;
+            continue;
+        }
+        ReplayedFrame frame{run.frames()[i], {}, {}};
+        threads.arena.execute([&] {
+            frame.differs = run.make(i);
+            if (o.reference > 0) frame.compared = run.against(o.reference);
+        });
+        done.frames.push_back(std::move(frame));
+        if (!done.frames.back().compared) continue;
+        const auto error = [&](std::size_t at) { return done.frames[at].compared->difference.rmse; };
+        if (!done.worst_picture || error(done.frames.size() - 1) > error(done.worst)) {
+            done.worst = done.frames.size() - 1;
+            done.worst_picture = run.picture();
+            done.worst_reference = run.reference();
+        }
+    }
+    return done;
+}
+
+/// "nav.ledger.csv:12: frame 10: rays: 512, logged 513" for each, as far as anyone wants to read.
+std::string differences_in_words(const std::vector<ReplayedFrame>& frames, const std::string& log) {
+    std::string out;
+    std::size_t told = 0, differing = 0;
+    for (const ReplayedFrame& f : frames) {
+        if (f.differs.empty() || ++differing > kDifferencesTold) continue;
+        out += fmt::format("{}:{}: frame {}: {}\n", log, f.logged.line, f.logged.ledger.frame,
+                           fmt::join(f.differs, "; "));
+        ++told;
+    }
+    if (differing > told) out += fmt::format("and {} frames more\n", differing - told);
+    if (differing > 0)
+        out +=
+            "expected the scene, its meshes and the program as they were in the run, and a processor of its kind\n";
+    return out;
+}
+
+Outcome replay(const Options& o) {
+    if (!o.picture.empty() && o.reference == 0)
+        return Error{
+            fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
     auto run = Replay::open(o.folder, o.camera, o.scene);
     if (!run) return run.error();
-    if ((*run)->frames().empty())
-        return Error{fmt::format("the log holds no frame of camera \"{}\"", (*run)->camera().name), o.folder};
+    const std::string& camera = (*run)->camera().name;
+    const std::string log = o.folder + "/" + camera + ".ledger.csv";
+    if ((*run)->frames().empty()) return Error{fmt::format("holds no frame of camera \"{}\"", camera), log};
 
-    const std::vector<std::size_t> chosen = chosen_frames((*run)->frames().size(), o.frames);
-    const bool terminal = ::isatty(STDERR_FILENO) == 1;
-    std::vector<Row> rows;
-    Status status = Ok{};
-    for (const std::size_t i : chosen) {
-        if (terminal) fmt::print(stderr, "\r{}/{} ", rows.size(), chosen.size());
-        threads.arena.execute([&] {
-            status = (*run)->make(i);
-            if (status) rows.push_back({(*run)->frames()[i], (*run)->against(o.reference)});
-        });
-        if (!status) return status.error();
-    }
-    if (terminal) fmt::print(stderr, "\r{:20}\r", "");
-    say(fmt::format("{}: camera {}, {} of {} frames beside {} samples per pixel\n{}", o.folder,
-                    (*run)->camera().name, rows.size(), (*run)->frames().size(), o.reference, in_words(rows)));
+    const Replayed done = make_again(o, **run);
+    const auto repeated = static_cast<std::size_t>(
+        std::count_if(done.frames.begin(), done.frames.end(), [](const auto& f) { return f.differs.empty(); }));
+    const bool passed = repeated == done.frames.size();
+    say(fmt::format("{}: camera {}: {} of {} frames repeat bit for bit; {} in the log{}", o.folder, camera,
+                    repeated, done.frames.size(), (*run)->frames().size(),
+                    done.not_whole > 0 ? fmt::format("; {} had no whole image", done.not_whole) : ""));
+    if (!passed) say(differences_in_words(done.frames, log));
+
     nlohmann::json frames = nlohmann::json::array();
-    for (const Row& r : rows) frames.push_back(to_json(r, (*run)->world().scene()));
-    return nlohmann::json{{"log", o.folder},
-                          {"camera", (*run)->camera().name},
-                          {"reference_spp", o.reference},
-                          {"full_scale_w_m2_sr", rows.front().difference.full_scale},
-                          {"frames", frames}};
+    for (const ReplayedFrame& f : done.frames)
+        if (f.compared || !f.differs.empty()) frames.push_back(to_json(f, (*run)->world().scene()));
+    nlohmann::json document{{"passed", passed},
+                            {"log", o.folder},
+                            {"camera", camera},
+                            {"frames_logged", (*run)->frames().size()},
+                            {"frames_replayed", done.frames.size()},
+                            {"frames_not_whole", done.not_whole},
+                            {"frames_repeated", repeated},
+                            {"frames", frames}};
+    if (o.reference == 0 || done.frames.empty()) return document;
+    const BudgetCost cost = budget_cost(done.frames);
+    say(in_words(done.frames, cost));
+    document["reference_spp"] = o.reference;
+    document["full_scale_w_m2_sr"] = done.frames.front().compared->difference.full_scale;
+    document["cost"] = to_json(cost);
+    if (!o.picture.empty()) {
+        const std::string title = fmt::format("{}, camera {}: the frame farthest from {} samples per pixel",
+                                              (*run)->world().scene().name, camera, o.reference);
+        const auto written =
+            write_picture(o.picture, title, done.frames[done.worst], *done.worst_picture, *done.worst_reference);
+        if (!written) return written.error();
+    }
+    return document;
 }
 
 }  // namespace
@@ -102,17 +138,23 @@ Outcome replay(const Options& o) {
 Command add_replay(CLI::App& app) {
     auto o = std::make_shared<Options>();
     CLI::App* c = app.add_subcommand(
-        "replay",
-        "Render frames of a logged run once more and tell what their budget cost: error, similarity, shifts");
+        "replay", "Render the frames of a logged run once more, bit for bit, and tell what their budget cost");
     c->add_option("DIR", o->folder, "Folder that `run --log` has written")->required();
     c->add_option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
     c->add_option("--scene", o->scene, "Scene file (default: the one that the run had)");
-    c->add_option("--reference", o->reference, "Samples per pixel of what the frames are compared with")
+    c->add_option("--reference", o->reference,
+                  "Compare with so many samples per pixel: error, similarity, shifts of bodies and edges")
         ->check(CLI::Range(2, 65535));
-    c->add_option("--frames", o->frames, "Frames to look at, spread over the run")->check(CLI::Range(1, 1000000));
-    c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
+    c->add_option("--frames", o->frames,
+                  "Frames to look at, spread over the run (default: all; 10 with --reference)")
+        ->check(CLI::Range(1, 1000000));
+    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
+        ->check(CLI::Range(0, 1024));
+    c->add_option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
     c->footer(
-        "RMSE, bias and expected error are of mean bands, relative to the radiance that fills the sensor's scale.");
+        "Exit status 1 where a frame does not repeat bit for bit. RMSE, bias and errors are of the mean of the "
+        "bands, "
+        "as parts of the radiance that fills the sensor's scale.");
     return [o] { return replay(*o); };
 }
 

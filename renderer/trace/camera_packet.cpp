@@ -103,6 +103,11 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
 
 void trace_samples(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p,
                    RgbPerRay& radiance) {
+    trace_rays(f, s, bodies, p);
+    light_along(f, p, radiance);
+}
+
+void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p) {
     PhaseClock clock(p.times);
     aim(f, s, p);
     p.number = s.number;
@@ -113,7 +118,6 @@ void trace_samples(const Frame& f, const CameraSamples& s, std::span<const std::
     if (f.tiny.any())
         for (std::size_t i = 0; i < s.n; ++i) p.hits.put(i, f.tiny.beyond(p.rays[i], p.hits[i]));
     clock.ends(Phase::rays);
-    light_along(f, p, radiance);
 }
 
 void trace_middles(const Frame& f, const CameraSamples& s, Packet& p) {

@@ -23,6 +23,9 @@ struct CameraSamples {
 void trace_samples(const Frame& f, const CameraSamples& samples, std::span<const std::uint32_t> bodies, Packet& p,
                    RgbPerRay& radiance);
 
+/// The first half of that: without the light.
+void trace_rays(const Frame& f, const CameraSamples& samples, std::span<const std::uint32_t> bodies, Packet& p);
+
 /// The rays alone, through the pixels' middles, and what they meet, tiny bodies among the rest.
 void trace_middles(const Frame& f, const CameraSamples& samples, Packet& p);
 

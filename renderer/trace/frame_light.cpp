@@ -204,6 +204,31 @@ void direct_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
     if (p.lit != 0) add_sunlight(sunlight, p.lit, radiance);
 }
 
+/// All light that comes along the rays of up to kLayer packets.
+void gather_paths(const Frame& f, const PathSettings& settings, std::span<Packet> packets,
+                  std::span<RgbPerRay> radiance) {
+    PhaseClock clock(packets.front().times);
+    constexpr std::size_t kRays = kLayer * kPacket;
+    std::array<Ray, kRays> rays;
+    std::array<Hit, kRays> hits;
+    std::array<Rgb, kRays> light;
+    std::array<std::uint32_t, kRays> number, sample;
+    std::size_t n = 0;
+    for (const Packet& p : packets)
+        for (std::size_t i = 0; i < p.rays.n; ++i, ++n) {
+            rays[n] = p.rays[i], hits[n] = p.hits[i];
+            number[n] = p.number[i], sample[n] = p.sample[i];
+        }
+    packets.front().rays_traced +=
+        path_radiance(f.tracer, f.at, settings, std::span(rays).first(n), std::span(hits).first(n),
+                      {f.settings.seed, f.settings.frame, std::span(number).first(n), std::span(sample).first(n)},
+                      std::span(light).first(n));
+    n = 0;
+    for (std::size_t k = 0; k < packets.size(); ++k)
+        for (std::size_t i = 0; i < packets[k].rays.n; ++i) radiance[k].put(i, light[n++]);
+    clock.ends(Phase::indirect);
+}
+
 }  // namespace
 
 Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
@@ -230,18 +255,17 @@ void light_along(const Frame& f, Packet& p, RgbPerRay& radiance) {
         direct_light(f, p, radiance);
         return;
     }
-    PhaseClock clock(p.times);
-    Lanes<Ray> rays;
-    Lanes<Hit> hits;
-    Lanes<Rgb> light;
-    for (std::size_t i = 0; i < p.rays.n; ++i) rays[i] = p.rays[i], hits[i] = p.hits[i];
-    p.rays_traced +=
-        path_radiance(f.tracer, f.at, f.path, std::span(rays).first(p.rays.n), std::span(hits).first(p.rays.n),
-                      {f.settings.seed, f.settings.frame, std::span(p.number).first(p.rays.n),
-                       std::span(p.sample).first(p.rays.n)},
-                      std::span(light).first(p.rays.n));
-    for (std::size_t i = 0; i < p.rays.n; ++i) radiance.put(i, light[i]);
-    clock.ends(Phase::indirect);
+    gather_paths(f, f.path, std::span(&p, 1), std::span(&radiance, 1));
+}
+
+void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay> radiance) {
+    if (!f.quick) {
+        PathSettings path = f.path;
+        path.shared = true;
+        gather_paths(f, path, packets, radiance);
+        return;
+    }
+    for (std::size_t k = 0; k < packets.size(); ++k) direct_light(f, packets[k], radiance[k]);
 }
 
 }  // namespace narpa

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "renderer/trace/camera_image.h"
 #include "renderer/trace/frame_budget.h"
@@ -72,5 +73,10 @@ private:
 
 /// Radiance that comes back along each ray.
 void light_along(const Frame& f, Packet& packet, RgbPerRay& radiance);
+
+/// Packets whose paths share what they find (PathSettings::shared).
+inline constexpr std::size_t kLayer = 4;
+/// The same of up to kLayer packets, no two rays of them the same pixel's. The time is the first's.
+void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay> radiance);
 
 }  // namespace narpa

@@ -85,54 +85,88 @@ struct FramePasses::Tile {
 
 /// What a thread needs: large, so made once for several tiles.
 struct FramePasses::Worker {
+    /// Samples that have been traced together.
+    struct Batch {
+        CameraSamples samples;
+        Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
+    };
+
     Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& pass_given_up)
         : f(frame), until_ns(limit.until_ns), given_up(pass_given_up) {}
 
     const Frame& f;
     const std::int64_t until_ns;
     std::atomic<bool>& given_up;  ///< the pass: looked at often, as a tile may hold many samples
-    Packet packet;
-    CameraSamples samples;
-    Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
-    std::uint64_t traced = 0;   ///< samples
-    std::uint32_t packets = 0;
+    std::array<Packet, kLayer> packets;
+    std::array<Batch, kLayer> batches;
+    std::size_t full = 0;      ///< of these
+    std::uint64_t traced = 0;  ///< samples
+    std::uint32_t lit = 0;     ///< packets
     FrameError error;
 
-    /// `sink(lane, place)` is told of each sample, in order.
+    [[nodiscard]] std::uint64_t rays_traced() const {
+        std::uint64_t sum = 0;
+        for (const Packet& p : packets) sum += p.rays_traced;
+        return sum;
+    }
+
+    /// `sink(batch, packet, radiance)` is told of the samples, in order.
     template <class Sink>
     void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
              Sink&& sink) {
-        const std::size_t i = samples.n++;
-        samples.x[i] = x, samples.y[i] = y;
-        samples.number[i] = number, samples.sample[i] = sample;
-        place[i] = static_cast<std::uint8_t>(at);
-        if (samples.n == kPacket) trace(tile, sink);
+        Batch& b = batches[full];
+        const std::size_t i = b.samples.n++;
+        b.samples.x[i] = x, b.samples.y[i] = y;
+        b.samples.number[i] = number, b.samples.sample[i] = sample;
+        b.place[i] = static_cast<std::uint8_t>(at);
+        if (b.samples.n < kPacket) return;
+        trace(tile);
+        if (full == (f.quick ? 1 : kLayer)) light(sink);
+    }
+    void trace(const Tile& tile) {
+        Batch& b = batches[full];
+        if (given_up.load(std::memory_order_relaxed)) b.samples.n = 0;
+        if (b.samples.n == 0) return;
+        trace_rays(f, b.samples, tile.bodies, packets[full]);
+        ++full;
     }
     template <class Sink>
-    void trace(const Tile& tile, Sink&& sink) {
-        if (samples.n > 0 && !given_up.load(std::memory_order_relaxed)) {
-            RgbPerRay radiance;
-            trace_samples(f, samples, tile.bodies, packet, radiance);
-            sink(radiance);
-            traced += samples.n;
-            if (++packets % kPacketsPerLook == 0) look_at_clock();
+    void light(Sink&& sink) {
+        std::array<RgbPerRay, kLayer> radiance;
+        if (full > 0) light_along(f, std::span(packets).first(full), radiance);
+        for (std::size_t k = 0; k < full; ++k) {
+            sink(batches[k], packets[k], radiance[k]);
+            traced += batches[k].samples.n;
+            batches[k].samples.n = 0;
+            if (++lit % kPacketsPerLook == 0) look_at_clock();
         }
-        samples.n = 0;
+        full = 0;
+    }
+    /// The samples that are left.
+    template <class Sink>
+    void finish(const Tile& tile, Sink&& sink) {
+        trace(tile);
+        light(sink);
+    }
+    void begin(bool middles) {
+        for (Batch& b : batches) b.samples.middle = middles;
     }
     void look_at_clock() {
         if (until_ns != PassLimit{}.until_ns && now_ns() >= until_ns)
             given_up.store(true, std::memory_order_relaxed);
     }
     void middles(const Tile& tile, int width, int height, int stride, int made, TileLooks& looks) {
-        samples.middle = true;
+        begin(true);
         const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstMiddle;
-        const auto store = [&](const RgbPerRay& radiance) { PixelLooks::store(f, packet, radiance, place, looks); };
+        const auto store = [&](const Batch& b, const Packet& p, const RgbPerRay& radiance) {
+            PixelLooks::store(f, p, radiance, b.place, looks);
+        };
         tile.each_pixel([&](int x, int y, std::size_t at) {
             if (!stands_for(x, width, stride) || !stands_for(y, height, stride)) return;
             if (made > 0 && stands_for(x, width, made) && stands_for(y, height, made)) return;
             add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, store);
         });
-        trace(tile, store);
+        finish(tile, store);
     }
 };
 
@@ -170,7 +204,8 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
             const std::int64_t begun = f.settings.times ? now_ns() : 0;
             PhaseTimes times{};
             Worker w(f, limit, given_up);
-            if (f.settings.times) w.packet.times = &times;
+            if (f.settings.times)
+                for (Packet& p : w.packets) p.times = &times;
             const std::size_t first = chunk.begin() * kChunk, end = std::min(first + kChunk, tiles_.size());
             for (std::size_t i = first; i < end; ++i) {
                 w.look_at_clock();
@@ -178,7 +213,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
                 work(w, tile(tiles_[i]));
             }
             samples.fetch_add(w.traced, std::memory_order_relaxed);
-            if (rays.fetch_add(w.packet.rays_traced, std::memory_order_relaxed) + w.packet.rays_traced > limit.rays)
+            if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
                 given_up.store(true, std::memory_order_relaxed);
             if (sums == Sums::errors) errors_[chunk.begin()] = w.error;
             if (!f.settings.times) return;
@@ -301,6 +336,44 @@ Rgb look_at(const TileLooks& looks, std::size_t place) {
 
 }  // namespace
 
+namespace {
+
+struct SampleRange {
+    std::uint32_t begin, end;
+};
+
+/// All samples of a tile: of one light pixel by pixel; where paths share what they find one of each pixel together,
+/// then the next of each, so that those of one pixel stay independent.
+template <class Worker, class Tile, class Samples, class Sink>
+void sample_tile(Worker& w, const Tile& t, int image_width, Samples&& samples, Sink&& sink) {
+    w.begin(false);
+    const auto add = [&](int x, int y, std::size_t at, std::uint32_t s) {
+        w.add(t, x, y, at, static_cast<std::uint32_t>(index_of(x, y, image_width)), s, sink);
+    };
+    if (w.f.quick) {
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            const SampleRange range = samples(at);
+            for (std::uint32_t s = range.begin; s < range.end; ++s) add(x, y, at, s);
+        });
+    } else {
+        SampleRange all{std::numeric_limits<std::uint32_t>::max(), 0};
+        t.each_pixel([&](int, int, std::size_t at) {
+            const SampleRange range = samples(at);
+            if (range.begin == range.end) return;
+            all = {std::min(all.begin, range.begin), std::max(all.end, range.end)};
+        });
+        for (std::uint32_t s = all.begin; s < all.end; ++s) {
+            t.each_pixel([&](int x, int y, std::size_t at) {
+                if (const SampleRange range = samples(at); range.begin <= s && s < range.end) add(x, y, at, s);
+            });
+            w.finish(t, sink);
+        }
+    }
+    w.finish(t, sink);
+}
+
+}  // namespace
+
 PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
     fill_background(out);
     const auto spp = static_cast<std::uint32_t>(f.settings.spp);
@@ -313,17 +386,17 @@ PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<f
         } else {
             PerPixel<PixelMean> means{};
             PerPixel<PixelSamples> spread;
-            const auto store = [&](const RgbPerRay& radiance) {
-                for (std::size_t i = 0; i < w.samples.n; ++i) means[w.place[i]].add(radiance[i]);
+            const auto store = [&](const Worker::Batch& b, const Packet&, const RgbPerRay& radiance) {
+                for (std::size_t i = 0; i < b.samples.n; ++i) means[b.place[i]].add(radiance[i]);
                 if (variance == nullptr) return;
-                for (std::size_t i = 0; i < w.samples.n; ++i) spread[w.place[i]].add(radiance[i]);
+                for (std::size_t i = 0; i < b.samples.n; ++i) spread[b.place[i]].add(radiance[i]);
             };
-            w.samples.middle = false;
-            t.each_pixel([&](int x, int y, std::size_t at) {
-                const auto number = static_cast<std::uint32_t>(index_of(x, y, out.width));
-                for (std::uint32_t s = 0; s < spp; ++s) w.add(t, x, y, at, number, s, store);
-            });
-            w.trace(t, store);
+            sample_tile(
+                w, t, out.width,
+                [&](std::size_t) {
+                    return SampleRange{0, spp};
+                },
+                store);
             t.each_pixel([&](int x, int y, std::size_t at) {
                 out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
                 w.error.add(means[at]);
@@ -379,17 +452,16 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
                               const PassLimit& limit) {
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         PerPixel<PixelMean>& means = means_[t.index];
-        const auto store = [&](const RgbPerRay& radiance) {
-            for (std::size_t i = 0; i < w.samples.n; ++i) means[w.place[i]].add(radiance[i]);
+        const auto store = [&](const Worker::Batch& b, const Packet&, const RgbPerRay& radiance) {
+            for (std::size_t i = 0; i < b.samples.n; ++i) means[b.place[i]].add(radiance[i]);
         };
-        w.samples.middle = false;
-        t.each_pixel([&](int x, int y, std::size_t at) {
+        t.each_pixel([&](int, int, std::size_t at) {
             if (from == SamplePlan::Stage{}) means[at] = {};
-            const std::uint32_t begin = plan_->count(t.index, at, from), end = plan_->count(t.index, at, to);
-            const auto number = static_cast<std::uint32_t>(index_of(x, y, camera_.width));
-            for (std::uint32_t s = begin; s < end; ++s) w.add(t, x, y, at, number, s, store);
         });
-        w.trace(t, store);
+        const auto samples = [&](std::size_t at) {
+            return SampleRange{plan_->count(t.index, at, from), plan_->count(t.index, at, to)};
+        };
+        sample_tile(w, t, camera_.width, samples, store);
     });
 }
 

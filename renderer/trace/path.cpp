@@ -4,11 +4,13 @@
 #include <array>
 #include <limits>
 #include <optional>
+#include <variant>
 
 #include "base/each_isa.h"
 #include "renderer/trace/lights.h"
 #include "renderer/trace/path_point.h"
 #include "renderer/trace/path_state.h"
+#include "renderer/trace/shared_bounces.h"
 #include "renderer/trace/wide_sampler.h"
 
 namespace narpa {
@@ -19,8 +21,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// as the rest seldom adds much; without any, as on night sides, only behind so many surfaces.
 constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;
 constexpr int kSurfacesInTheDark = 4;
+/// Where paths share what they find, so many suffice.
+constexpr float kSetOut = 0.5f;
 /// Random numbers: two groups for each surface of the longest path, then the roulette's.
-constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40;
+constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40, kSharingGroup = kRouletteGroup + 11;
 /// Suns no wider than this are left to next-event estimation alone where the surface has no lobe: there a ray by
 /// the BSDF finds the disc so seldom that it is not worth the densities.
 constexpr double kNarrowSun_rad = 0.2;
@@ -49,6 +53,7 @@ public:
           guided_(settings.guided && sun_ != nullptr && !settings.direct),
           emitters_(lights_.any(group_)),
           receivers_(emitters_ || lights_.any_with_extent() || guided_),
+          shared_(settings.shared && !settings.direct && settings.max_depth > 1),
           sun_alone_(!lights_.any(Lights::Group::all) && !lights_.any_with_extent() && scene_.ambient == Rgb{}) {}
 
     void run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance) {
@@ -57,12 +62,14 @@ public:
         const int depth = settings_.direct ? 1 : settings_.max_depth;
         for (int met = 0;; ++met) {
             gather(met);
-            if (met == depth || n_ == 0) return;
+            if (met == 1 && shared_) begin_bounces();
+            if (met == depth || n_ == 0) break;
             ask(met, met + 1 < depth);
             if (settings_.direct && !lights_.any_with_extent()) return;
             scatter(met, met + 1 == depth);
             trace();
         }
+        if (n_bounces_ > 0) share_bounces();
     }
     [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
 
@@ -75,6 +82,7 @@ private:
             directions_[i] = rays[i].direction;
             paths_[i] = Path{};
             paths_[i].ray = static_cast<std::uint32_t>(i);
+            paths_[i].to = &radiance_[i];
             if (receivers_) paths_[i].start = receiver_at(rays[i].origin);
         }
     }
@@ -127,6 +135,35 @@ private:
         if (receivers_) path.start = receiver_at(at_, hit, points_[i].plane());
     }
 
+    /// Those of the points met that may stand for others become bounces; light of their paths is theirs.
+    void begin_bounces() {
+        n_bounces_ = 0;
+        for (std::size_t i = 0; i < n_; ++i) {
+            Path& path = paths_[i];
+            if (path.first < 0 || !Bounce::possible(points_[i])) continue;
+            path.bounce = static_cast<int>(n_bounces_);
+            Bounce& b = bounces_[n_bounces_++];
+            b.point = points_[i];
+            b.position = hits_[i].position;
+            b.touching_m = touching_m(static_cast<std::size_t>(hits_[i].body));
+            b.found_from = static_cast<std::size_t>(path.first);
+            b.incident = {};
+        }
+    }
+    /// What stands so close before a body's surface cannot be told from it: meshes are held in single precision.
+    [[nodiscard]] double touching_m(std::size_t body) const {
+        const bool is_mesh = std::holds_alternative<int>(scene_.bodies[body].shape);
+        return (is_mesh ? 4e-6 : 4e-15) * tracer_.bounding_radius_m(body);
+    }
+    [[nodiscard]] Bounce* bounce_at(const Path& path, int met) {
+        return met == 1 && path.bounce >= 0 ? &bounces_[static_cast<std::size_t>(path.bounce)] : nullptr;
+    }
+    void share_bounces() {
+        const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[0]);
+        rays_traced_ += starts_.gather(tracer_, at_, bounces_.from(0, n_bounces_),
+                                       numbers.point(numbers_.sample[0], kSharingGroup)[0], radiance_);
+    }
+
     /// Random numbers of the packet that begins with this path.
     void draw(std::size_t first, std::uint32_t group, Points& u) const {
         const std::size_t n = std::min(kPacket, n_ - first);
@@ -154,8 +191,9 @@ private:
                 if (points_[i].specular()) continue;
                 // To be known before light is asked for, as both ways to find it are weighed against each other.
                 if (guided_ && lit_surfaces_count) path.guide = Guide(tracer_, at_, path.start);
-                if (sun_ != nullptr) ask_sun(i, u[2][k], u[3][k]);
-                if (emitters_) ask_emitters(i, u[2][k], u[0][k], u[1][k]);
+                Bounce* const bounce = bounce_at(path, met);
+                if (sun_ != nullptr) ask_sun(i, u[2][k], u[3][k], bounce);
+                if (emitters_) ask_emitters(i, u[2][k], u[0][k], u[1][k], bounce);
             }
         }
         hear_sun();
@@ -171,7 +209,7 @@ private:
     }
 
     /// A point of the Sun's disc.
-    void ask_sun(std::size_t i, double u, double v) {
+    void ask_sun(std::size_t i, double u, double v, Bounce* bounce) {
         const Vec3 to_sun = sun_has_extent_ ? sun_->sample(u, v) : sun_->centre();
         // Rays find the disc as well, unless it is a point, or nothing beyond the first surface counts.
         const bool alone = !sun_has_extent_ || settings_.direct || (narrow_sun_ && points_[i].has_no_lobe());
@@ -184,11 +222,21 @@ private:
         q.path = i;
         q.towards = to_sun;
         q.range_m = kInfinity;
+        q.to = paths_[i].to;
         q.light = paths_[i].throughput * (r.f_cos * static_cast<float>(arriving));
+        if (bounce == nullptr) return;
+        const auto light = static_cast<float>(arriving);
+        receive(*bounce, Bounce::sun, to_sun, {light, light, light}, q);
+    }
+    /// Of a bounce all that comes of it is what falls in.
+    static void receive(Bounce& bounce, std::size_t kind, const Vec3& from, const Rgb& light, Question& q) {
+        bounce.incident[kind].from = from;
+        q.to = &bounce.incident[kind].light;
+        q.light = light;
     }
 
     /// A point of one of the other emitters.
-    void ask_emitters(std::size_t i, double choice, double u, double v) {
+    void ask_emitters(std::size_t i, double choice, double u, double v, Bounce* bounce) {
         const Path& path = paths_[i];
         const std::optional<LightSample> light = lights_.sample(at_, path.start, group_, choice, u, v);
         if (!light) return;
@@ -198,7 +246,9 @@ private:
         Question& q = light->body < 0 ? asked_of_lights_[to_lights_++] : asked_of_bodies_[to_bodies_++];
         q.path = i;
         q.towards = light->direction;
+        q.to = path.to;
         q.light = path.throughput * r.f_cos;
+        if (bounce != nullptr) receive(*bounce, Bounce::emitter, light->direction, {1, 1, 1}, q);
         q.scatter_pdf = pdf;
         q.body = light->body;
         q.face = light->face;
@@ -244,7 +294,7 @@ private:
     }
     void hear(const Room<Question>& questions, std::size_t first, std::uint32_t lit) {
         for (std::size_t k = 0; k < kPacket; ++k)
-            if (is_set(lit, k)) radiance_[paths_[questions[first + k].path].ray] += questions[first + k].light;
+            if (is_set(lit, k)) *questions[first + k].to += questions[first + k].light;
     }
     void hear_bodies() {
         Asking a;
@@ -259,8 +309,7 @@ private:
                 const double pdf = lights_.pdf(at_, path.start, group_, q.towards, found[k]);
                 if (!(pdf > 0)) continue;  // met where the ray starts
                 const double weight = power_heuristic(pdf, q.scatter_pdf);
-                radiance_[path.ray] +=
-                    q.light * emission(path, q.towards, found[k]) * static_cast<float>(weight / pdf);
+                *q.to += q.light * emission(path, q.towards, found[k]) * static_cast<float>(weight / pdf);
             }
         }
     }
@@ -283,17 +332,33 @@ private:
                 const std::size_t i = first + k;
                 Path& path = paths_[i];
                 if (last && sun_alone_ && path.sun_asked) continue;
+                const bool shares = met == 0 && shared_ && !points_[i].specular();
+                float made_up = 1;
+                const auto survives = [&](float goes_on) {
+                    if (goes_on >= 1) return true;
+                    if (!drawn) draw(first, kRouletteGroup + static_cast<std::uint32_t>(met) / 4, roulette);
+                    drawn = true;
+                    if (roulette[static_cast<std::size_t>(met % 4)][k] >= static_cast<double>(goes_on))
+                        return false;
+                    made_up = 1 / goes_on;
+                    path.throughput = path.throughput / goes_on;
+                    return true;
+                };
+                if (shares) {
+                    const float goes_on = chance_to_set_out(path, points_[i]);
+                    path.first = static_cast<int>(starts_.size());
+                    starts_.add(at_, hits_[i], points_[i], path, goes_on);
+                    if (!survives(goes_on)) continue;
+                }
                 const BsdfSample s = next_direction(i, {u[0][k], u[1][k], u[2][k], u[3][k]});
                 path.throughput = path.throughput * s.weight;
                 path.radiance_scale *= s.radiance_scale;
                 // Out of many shells of dense glass, one in another, it may outgrow single precision.
                 if (path.throughput == Rgb{} || !is_finite(path.throughput)) continue;
-                if (const float goes_on = chance(path, met + 1); goes_on < 1) {
-                    if (!drawn) draw(first, kRouletteGroup + static_cast<std::uint32_t>(met) / 4, roulette);
-                    drawn = true;
-                    if (roulette[static_cast<std::size_t>(met % 4)][k] >= static_cast<double>(goes_on)) continue;
-                    path.throughput = path.throughput / goes_on;
-                }
+                if (!shares && !survives(chance(path, met + 1))) continue;
+                if (Bounce* const bounce = bounce_at(path, met);
+                    bounce != nullptr && !set_out(path, *bounce, s, made_up))
+                    continue;
                 path.direction_pdf = s.pdf;
                 directions_[i] = s.l;
                 if (s.transmitted) {
@@ -304,6 +369,19 @@ private:
             }
         }
         n_ = kept;
+    }
+
+    /// On from a bounce: what the path finds falls in there.
+    [[nodiscard]] static bool set_out(Path& path, Bounce& bounce, const BsdfSample& s, float made_up) {
+        if (!(s.pdf > 0)) return false;
+        const auto greatest = [](const Rgb& c) { return std::max({c.x, c.y, c.z}); };
+        // The roulette has made up for those that it has ended.
+        const float before = greatest(path.throughput), per_pdf = made_up / static_cast<float>(s.pdf);
+        path.throughput = {per_pdf, per_pdf, per_pdf};
+        path.radiance_scale *= per_pdf / before;
+        bounce.incident[Bounce::path].from = s.l;
+        path.to = &bounce.incident[Bounce::path].light;
+        return true;
     }
 
     [[nodiscard]] BsdfSample next_direction(std::size_t i, const SamplePoint& numbers) const {
@@ -320,6 +398,17 @@ private:
         s.pdf = scatter_pdf(path, s.l, r.pdf);
         s.weight = r.f_cos == Rgb{} ? Rgb{} : r.f_cos * static_cast<float>(1 / s.pdf);
         return s;
+    }
+
+    /// Probability with which a path that is shared leaves its first surface, before its direction is known.
+    [[nodiscard]] float chance_to_set_out(const Path& path, const PathPoint& point) const {
+        const Surface& surface = point.surface();
+        // What the sky and a wide Sun send is not shared.
+        if (scene_.ambient != Rgb{} || (sun_has_extent_ && !narrow_sun_)) return 1;
+        if (surface.material->kind > Material::Kind::phong) return kSetOut;
+        const Rgb albedo = surface.diffuse + surface.specular;
+        const float brings = std::max({albedo.x, albedo.y, albedo.z});
+        return kSetOut * std::min(1.0f, brings / (radiance_[path.ray] == Rgb{} ? kFaintInTheDark : kFaint));
     }
 
     /// Probability with which a path goes on behind so many surfaces; it then carries the share of those that end.
@@ -341,7 +430,7 @@ private:
         }
     }
 
-    void add(const Path& path, const Rgb& radiance) { radiance_[path.ray] += path.throughput * radiance; }
+    static void add(const Path& path, const Rgb& radiance) { *path.to += path.throughput * radiance; }
 
     const Tracer& tracer_;
     const Scene& scene_;
@@ -355,6 +444,7 @@ private:
     const bool guided_;     ///< some body may look small from another
     const bool emitters_;   ///< beside the Sun
     const bool receivers_;  ///< somebody asks where the points are
+    const bool shared_;     ///< paths give each other of what they find
     const bool sun_alone_;  ///< nothing else shines
     std::span<Rgb> radiance_;
     std::uint64_t rays_traced_ = 0;
@@ -366,6 +456,9 @@ private:
     Room<Vec3> directions_;  ///< of the rays on their way
     Room<Hit> hits_;         ///< where they start, then where they end
     Room<Question> asked_of_sun_, asked_of_lights_, asked_of_bodies_;
+    std::size_t n_bounces_ = 0;
+    Room<Bounce> bounces_;
+    Starts starts_;
 };
 
 }  // namespace

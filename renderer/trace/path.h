@@ -25,6 +25,10 @@ struct PathSettings {
     /// shadows, ambient_reflectance(surface) times it; black where nothing is hit. Lights with extent are seen, in
     /// mirrors too. max_depth is not read.
     bool direct = false;
+    /// What the paths of a call find on their first ways is shared among them (shared_bounces.h), so that the
+    /// result of each ray depends on the others. All of them should be different pixels', as what they find by the
+    /// same random light is not independent.
+    bool shared = false;
     /// Guide::may_help at this placement; false where it may not: nobody asks further.
     bool guided = true;
 };

@@ -45,6 +45,13 @@ public:
     /// Normal of the plane, unit, on the viewer's side but for silhouettes of smooth meshes.
     [[nodiscard]] const Vec3& plane() const noexcept { return plane_; }
 
+    /// Unit, to where the light is wanted.
+    [[nodiscard]] const Vec3& view() const noexcept { return view_; }
+    /// Is the surface's normal not the plane's?
+    [[nodiscard]] bool bent() const noexcept { return bent_; }
+    /// Lambert's law about the plane's normal: most of most scenes.
+    [[nodiscard]] bool plain() const noexcept { return plain_; }
+
     /// Does light turn in single directions only (bsdf.h)?
     [[nodiscard]] bool specular() const noexcept { return is_specular(*surface_.material); }
     /// Lambert's law alone, about whatever normal?
@@ -100,8 +107,7 @@ private:
 
     Surface surface_{};
     Vec3 plane_{}, view_{};
-    bool bent_ = false;   ///< the surface's normal is not the plane's
-    bool plain_ = false;  ///< Lambert's law about the plane's normal: most of most scenes
+    bool bent_ = false, plain_ = false;
 };
 
 }  // namespace narpa

@@ -32,8 +32,12 @@ private:
 /// What is known of a path.
 struct Path {
     std::uint32_t ray = 0;     ///< the one from the camera that it began with
-    float radiance_scale = 1;  ///< the part of the throughput that leaving a dense medium undoes
-    Rgb throughput{1, 1, 1};   ///< radiance at the camera per radiance along the ray
+    int first = -1;            ///< of its first surface among those that share (shared_bounces.h); -1: it does not
+    int bounce = -1;           ///< index of what it has found for all (shared_bounces.h); -1: nothing
+    float radiance_scale = 1;  ///< the part of the throughput that leaving a dense medium undoes, or that is no
+                               ///< part of what the path brings
+    Rgb throughput{1, 1, 1};   ///< of what it adds to, per radiance along the ray
+    Rgb* to = nullptr;         ///< where its light is added up: at the camera, or where a bounce receives it
     bool sun_asked = false;    ///< the Sun's light along the ray on its way has been asked for in full
     double direction_pdf = std::numeric_limits<double>::infinity();  ///< with which that ray's direction was chosen
     double length_m = 0;                                             ///< of the way from the camera to the point
@@ -45,7 +49,8 @@ struct Path {
 struct Question {
     std::size_t path;
     Vec3 towards;
-    Rgb light;           ///< that it brings to the camera; of a body's surface for each unit of its radiance
+    Rgb* to;             ///< where it is added
+    Rgb light;           ///< that it brings there; of a body's surface for each unit of its radiance
     double range_m;      ///< of lights: how far off
     double scatter_pdf;  ///< with which the path itself could find it
     int body;            ///< of a body's surface, which must be met

@@ -112,6 +112,9 @@ public:
     /// Which of the hits of `wanted` cannot see their light, each in a direction of its own without an end.
     [[nodiscard]] std::uint32_t occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
                                          std::uint32_t wanted) const noexcept;
+    /// The same, each with an end of its own: t_max[i] metres.
+    [[nodiscard]] std::uint32_t occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
+                                         const Lanes<double>& t_max, std::uint32_t wanted) const noexcept;
     /// Which of up to kPacket hits cannot see their light, each in a direction of its own without an end: a bit
     /// each. Only those whose bit is set in `wanted` are asked.
     [[nodiscard]] std::uint32_t occluded(const Placement& at, std::span<const Hit> from,

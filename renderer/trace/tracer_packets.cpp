@@ -261,10 +261,15 @@ void Tracer::intersect(const Placement& at, const RayPacket& rays, std::span<con
 
 std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
                                std::uint32_t wanted) const noexcept {
+    return occluded(at, from, directions, kNoEnd, wanted);
+}
+
+std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
+                               const Lanes<double>& t_max, std::uint32_t wanted) const noexcept {
     if (wanted == 0) return 0;
     const Impl::Leaving leaving(*impl_, at, {from.body, from.face, from.departure_body, from.outside}, directions,
                                 wanted);
-    return impl_->hidden(at, leaving.rays(), kNoEnd, wanted);
+    return impl_->hidden(at, leaving.rays(), t_max, wanted);
 }
 
 namespace {

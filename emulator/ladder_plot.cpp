@@ -70,6 +70,7 @@ void draw_kind(cv::Mat& image, const Panel& panel, const Kind& kind, const Axis&
     for (const Rung* r : rungs) {
         const cv::Point2d at = point(*r, r->rmse.value);
         dot(image, at, 4, kind.colour);
+        if (!r->knows_its_error()) dot(image, at, 2, cv::Scalar::all(255));
         const bool below = kind.adaptive;  // its curve lies on the left of the others
         const cv::Point shift = below ? cv::Point{-7, 15} : cv::Point{4, -8};
         text(image, number_in(r->name), cv::Point(at) + shift, kSmall, below ? 1 : 0, kind.colour);
@@ -155,7 +156,7 @@ void draw_legend(cv::Mat& image) {
             line(image, p + cv::Point2d{0, -5}, p + cv::Point2d{26, -5}, kind.colour, 2);
             dot(image, p + cv::Point2d{13, -5}, 4, kind.colour);
         });
-    entry(58, "thin: the error that the frames tell", [&](cv::Point2d p) {
+    entry(58, "thin: as the frames tell it; hollow: something left out", [&](cv::Point2d p) {
         line(image, p + cv::Point2d{0, -5}, p + cv::Point2d{26, -5}, kAdaptiveColour, 1);
     });
     x = 40;

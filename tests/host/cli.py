@@ -8,7 +8,7 @@ from support import expect, narpa
 
 SUBCOMMANDS = {
     "check": ["SCENE"],
-    "run": ["--can", "--video", "--lidar", "--lockstep", "--duration", "--log"],
+    "run": ["--can", "--video", "--lidar", "--lockstep", "--duration", "--log", "--spp", "--budget-ms", "--budget-rays"],
     "fly": ["--can", "--lockstep"],
     "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
@@ -32,6 +32,7 @@ def check_json():
         ["render", support.SCENE, "--camera", support.CAMERA, "-o", folder / "a.png"],
         ["scan", support.SCENE, "--lidar", support.LIDAR, "-o", folder / "a.pcd"],
         ["run", support.SCENE, "--video", f"{support.CAMERA}={folder}/a.y4m", "--duration", "0.5", "--log", folder / "log"],
+        ["run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "0.5", "--budget-ms", "20"],
     ):
         document = json.loads(narpa(*arguments, "--json").stdout)
         expect(isinstance(document, dict) and document, f"{arguments[0]} --json: one document, keys {sorted(document)}")
@@ -54,6 +55,9 @@ def check_exit_codes():
     expect_refusal(2, "nadir.*nav", "render", support.SCENE, "--camera", "nadir", "-o", folder / "b.png")
     expect_refusal(2, "tiff", "render", support.SCENE, "-o", folder / "b.tiff")
     expect_refusal(2, "--lockstep", "run", support.SCENE, "--lockstep", "--video", f"{support.CAMERA}=none")
+    expect_refusal(2, "--budget-rays", "run", support.SCENE, "--lockstep", "--can", "log:none", "--video",
+                   f"{support.CAMERA}=none", "--budget-ms", "10")  # fmt: skip
+    expect_refusal(2, "--spp", "run", support.SCENE, "--video", f"{support.CAMERA}=none", "--budget-ms", "10", "--spp", "2")
     expect_refusal(2, "--nonsense", "check", support.SCENE, "--nonsense")
     flight = folder / "flight.csv"
     flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"

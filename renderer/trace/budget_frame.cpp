@@ -206,7 +206,7 @@ private:
                                          : static_cast<double>(account_.rays - (account_.samples - met)) /
                                                static_cast<double>(met);
         for (std::size_t i = 0; i < kMaxPasses; ++i) {
-            const SamplePlan::Stage next = plan.reach(stage, whole_step(plan.missing(stage), wanted(i, rays_each)));
+            const SamplePlan::Stage next = plan.reach(stage, wanted(i, rays_each));
             const std::uint64_t samples = plan.total(next) - plan.total(stage);
             if (samples == 0 && i == 0 && budget_.kind == Kind::time) costs_.doubt(Of::samples);
             if (samples == 0) return;
@@ -223,12 +223,6 @@ private:
         }
     }
 
-    /// Samples enough for all pixels that miss one leave as many for the edges, or go to these alone: the others'
-    /// middles are better than that. A pass made anew from its number of samples comes to the same.
-    [[nodiscard]] std::uint64_t whole_step(std::uint64_t missing, std::uint64_t samples) const {
-        const bool half = samples >= missing && samples < 2 * missing && budget_.kind != Kind::passes;
-        return half ? missing - 1 : samples;
-    }
     /// How many samples the next pass shall have; 0: there is none.
     [[nodiscard]] std::uint64_t wanted(std::size_t pass, double rays_each) const {
         if (budget_.kind == Kind::passes) return step_told() == FrameStep::refined ? budget_.passes[pass] : 0;

@@ -35,41 +35,16 @@ void FrameError::add(const PixelMean& mean) noexcept {
     ++pixels_[level];
 }
 
-void FrameError::add_tile(const TileLooks& looks, const TileContrast& contrast,
-                          const PerPixel<PixelMean>& means) noexcept {
-    for (std::size_t i = 0; i < kTilePixels; ++i) {
-        if (means[i].count() == 0) {
+void FrameError::add_tile(const TileContrast& contrast, const PerPixel<PixelMean>& means) noexcept {
+    for (std::size_t i = 0; i < kTilePixels; ++i)
+        if (means[i].count() == 0)
             middles_ += static_cast<double>(contrast.middle[i]);
-        } else if (means[i].count() == 1) {
-            edges_ += static_cast<double>(contrast.edge[i]);
-            ++singles_;
-        } else {
+        else
             add(means[i]);
-        }
-    }
-    const auto single = [&](std::size_t a, std::size_t b, std::size_t c) {
-        return means[a].count() == 1 && means[b].count() == 1 && means[c].count() == 1 &&
-               looks.surface[a] == looks.surface[b] && looks.surface[b] == looks.surface[c];
-    };
-    const auto bend = [&](std::size_t a, std::size_t b, std::size_t c) {
-        if (!single(a, b, c)) return;
-        const double d = mean_band(means[a].mean()) - 2 * mean_band(means[b].mean()) + mean_band(means[c].mean());
-        bends_ += d * d;
-        ++bent_;
-    };
-    for (int y = 0; y < kTile; ++y)
-        for (int x = 1; x < kTile - 1; ++x) {
-            bend(place_in_tile(x - 1, y), place_in_tile(x, y), place_in_tile(x + 1, y));
-            bend(place_in_tile(y, x - 1), place_in_tile(y, x), place_in_tile(y, x + 1));
-        }
 }
 
 FrameError& FrameError::operator+=(const FrameError& b) noexcept {
     middles_ += b.middles_;
-    edges_ += b.edges_;
-    bends_ += b.bends_;
-    bent_ += b.bent_;
-    singles_ += b.singles_;
     for (std::size_t i = 0; i < kDoublings; ++i) {
         steps_[i].last += b.steps_[i].last;
         steps_[i].before += b.steps_[i].before;
@@ -80,8 +55,7 @@ FrameError& FrameError::operator+=(const FrameError& b) noexcept {
 }
 
 double FrameError::standard_error(std::size_t pixels) const noexcept {
-    double sum = middles_ + edges_;
-    if (bent_ > 0) sum += bends_ / (6 * static_cast<double>(bent_)) * static_cast<double>(singles_);
+    double sum = middles_;
     for (std::size_t level = 1; level < kDoublings; ++level) {
         if (pixels_[level] == 0) continue;
         const auto [last, before] = steps_[level];

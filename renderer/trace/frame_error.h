@@ -1,7 +1,7 @@
 /// renderer/trace/frame_error.h - how far a frame is from the truth, told by the frame itself.
 ///
-/// Sums over all pixels, by how each was made: its middle (pixel_looks.h says what that costs), one random sample,
-/// or a power of two of them. Of the last, each doubling of the samples moves the mean by a step whose mean square
+/// Sums over all pixels, by how each was made: its middle (pixel_looks.h says what that costs), or a power of two
+/// of samples. Of these, each doubling of the samples moves the mean by a step whose mean square
 /// is v(n/2) - v(n), v(n) being the variance of the mean of n: the halves of an Owen-scrambled sequence are each as
 /// good as the first, and the whole is their mean (A. Owen, "Scrambled net variance for integrals of smooth
 /// functions", Ann. Stat. 25, 1997). If v falls by the same ratio q each time, what is left after the last step is
@@ -23,7 +23,7 @@ public:
     /// A tile whose pixels show their middles.
     void add_middles(const TileContrast& contrast) noexcept;
     /// A tile whose pixels have samples, as many as each has; where it has none, it shows its middle.
-    void add_tile(const TileLooks& looks, const TileContrast& contrast, const PerPixel<PixelMean>& means) noexcept;
+    void add_tile(const TileContrast& contrast, const PerPixel<PixelMean>& means) noexcept;
     /// A pixel of two samples or more.
     void add(const PixelMean& mean) noexcept;
     FrameError& operator+=(const FrameError& b) noexcept;
@@ -37,11 +37,7 @@ private:
         double last = 0, before = 0;  ///< squared
     };
 
-    double middles_ = 0;      ///< squared errors
-    double edges_ = 0;        ///< of single samples, told by the middles
-    double bends_ = 0;        ///< squared second differences of single samples on one surface
-    std::uint64_t bent_ = 0;  ///< how many
-    std::uint64_t singles_ = 0;
+    double middles_ = 0;  ///< squared errors
     std::array<Steps, kDoublings> steps_{};
     std::array<double, kDoublings> shares_{};  ///< of the last power of two in the number of samples, summed
     std::array<std::uint64_t, kDoublings> pixels_{};

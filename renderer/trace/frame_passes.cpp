@@ -474,7 +474,7 @@ void FramePasses::show_means(const Frame& f, RadianceImage& out, std::vector<flo
             out.pixels[index_of(x, y, out.width)] =
                 means[at].count() > 0 ? vec_cast<float>(means[at].mean()) : look_at(looks, at);
         });
-        w.error.add_tile(looks, plan_->contrast(t.index), means);
+        w.error.add_tile(plan_->contrast(t.index), means);
         if (variance != nullptr) put_variances(t, means, plan_->contrast(t.index), out.width, *variance);
         add_tiny(f, t, out, variance);
     });

@@ -13,13 +13,13 @@ namespace {
 
 /// Edges move by less than a pixel, and thin parts are met by the middles now and then only: pixels beside an edge
 /// get this part of its variance, those next to them that.
-constexpr float kBeside = 0.25f, kNextButOne = 0.04f;
+constexpr float kBeside = 0.05f, kNextButOne = 0.01f;
 /// Weight of a pixel that is much like its neighbours, in terms of a typical edge's. About some all is the very
 /// same, as in empty space: they have an eighth of that (kEventful).
-constexpr double kLeastWeight = 1.0 / 32;
+constexpr double kLeastWeight = 1.0 / 128;
 /// Along an edge of little contrast there may be a glint that no middle met: so much of a typical variance is taken
 /// for granted.
-constexpr float kUnseen = 0.05f;
+constexpr float kUnseen = 0.02f;
 /// The variance of edges, which falls as n^-1.5, counts to this power beside that of noise, which falls as 1/n: of
 /// the variances of one sample, weights of 2/5 and of 1/2.
 constexpr double kEdgePower = 0.8;
@@ -166,14 +166,13 @@ std::uint64_t SamplePlan::total(Stage stage) const noexcept {
 }
 
 SamplePlan::Stage SamplePlan::reach(Stage from, std::uint64_t samples) const noexcept {
-    const bool all = from.all || samples >= missing(from);
     const std::uint64_t most = total(from) + samples;
     int within = std::max(from.level, -kWeights), beyond = kFull + 1;
     while (within + 1 < beyond) {
         const int middle = within + (beyond - within) / 2;
-        (total({middle, all}) <= most ? within : beyond) = middle;
+        (total({middle}) <= most ? within : beyond) = middle;
     }
-    return {within, all};
+    return {within};
 }
 
 }  // namespace narpa

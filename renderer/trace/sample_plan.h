@@ -3,11 +3,16 @@
 /// For a given sum of samples the error is least where they are proportional to the standard deviation of a pixel's
 /// samples (J. Neyman, J. R. Stat. Soc. 97, 1934), and to a somewhat lower power of it where low-discrepancy points
 /// converge faster than random ones. Numbers are powers of two, at which these points are at their best; between
-/// two powers a hash of the pixel decides, so that sums follow the budget smoothly. Nothing here looks at the
-/// samples that are counted: only at the middles, which are thrown away where there are samples. And where a middle
-/// is a random sample itself, it has no say in whether it is shown: its neighbours alone tell how noisy the pixel
-/// is and, where paths are followed, how much an edge through it matters; else those that happen to be bright would
-/// be thrown away more often than others, and the image would lose light.
+/// two powers a hash of the pixel decides, so that sums follow the budget smoothly.
+///
+/// A pixel keeps its middle, which costs nothing more, until it gets kFewest samples at once: where a middle leaves
+/// the squared error e of an edge, 1, 2, 4 or 8 samples leave 2 e, 0.7 e, 0.25 e or 0.09 e, and of these 4 gain
+/// most apiece.
+///
+/// Nothing here looks at the samples that are counted: only at the middles, which are thrown away where there are
+/// samples. And where a middle is a random sample itself, it has no say in whether it is shown: its neighbours
+/// alone tell how noisy the pixel is and, where paths are followed, how much an edge through it matters; else those
+/// that happen to be bright would be thrown away more often than others, and the image would lose light.
 #pragma once
 
 #include <array>
@@ -24,7 +29,7 @@ namespace narpa {
 
 class SamplePlan {
 public:
-    static constexpr std::uint32_t kMostSamples = 1024;  ///< of a pixel
+    static constexpr std::uint32_t kFewest = 4, kMostSamples = 1024;  ///< of a pixel, but for none
 
     explicit SamplePlan(std::size_t tiles);
 
@@ -34,8 +39,6 @@ public:
     /// A stage of the plan says how many samples each pixel has. Stages only grow.
     struct Stage {
         int level = std::numeric_limits<int>::min() / 2;
-        bool all = false;  ///< every pixel that is not just like all around it has one at least
-
         friend bool operator==(const Stage&, const Stage&) = default;
     };
     [[nodiscard]] std::uint32_t count(std::size_t tile, std::size_t place, Stage stage) const noexcept {
@@ -43,12 +46,7 @@ public:
     }
     /// Of all pixels.
     [[nodiscard]] std::uint64_t total(Stage stage) const noexcept;
-    /// Samples that are missing for all pixels to have one that should.
-    [[nodiscard]] std::uint64_t missing(Stage stage) const noexcept {
-        return total({stage.level, true}) - total(stage);
-    }
-    /// The furthest stage that takes no more than this many samples beyond those of `from`; first of all, if they
-    /// suffice, those that are missing.
+    /// The furthest stage that takes no more than this many samples beyond those of `from`.
     [[nodiscard]] Stage reach(Stage from, std::uint64_t samples) const noexcept;
 
     /// Pixels whose middle met something.
@@ -60,6 +58,7 @@ private:
     static constexpr int kPerDoubling = 64;  ///< weights that differ by so much are as 2 : 1
     static constexpr int kWeights = 24 * kPerDoubling;
     static constexpr int kEventful = 3 * kPerDoubling;  ///< below: all is the same around the pixel
+    static constexpr int kFirst = std::countr_zero(kFewest) * kPerDoubling;
     static constexpr int kFull = std::countr_zero(kMostSamples) * kPerDoubling;  ///< kMostSamples everywhere
     struct Sums {
         double variance = 0, deviation = 0;
@@ -68,8 +67,7 @@ private:
 
     static std::uint32_t count(Weight weight, Stage stage) noexcept {
         const int doublings = weight + stage.level;
-        if (weight < 0) return 0;
-        if (doublings < 0) return stage.all && weight >= kEventful ? 1 : 0;
+        if (weight < 0 || doublings < kFirst) return 0;
         return doublings < kFull ? 1u << (doublings / kPerDoubling) : kMostSamples;
     }
     void contrast_tile(const Frame& f, const PixelLooks& looks, std::size_t tile) noexcept;

@@ -78,13 +78,17 @@ NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const
     to_sun = direction;
 }
 
-/// Paths choose their own points of the Sun.
+/// Most paths choose their own points of the Sun.
 void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
-    const bool sun = f.sun && f.quick;
+    const bool sun = f.sun && (f.quick || f.sun_first);
     p.rays.n = s.n;
     if (s.middle && f.one_sample()) {
         aim_at_middles(f, s, p.rays);
-        if (sun) p.to_sun.fill(f.sun->centre());
+        if (f.quick && sun) p.to_sun.fill(f.sun->centre());
+        if (f.quick || !sun) return;
+        Points u;
+        next_points(f, s, 1, u);
+        aim_at_sun(*f.sun, u[0], u[1], p.to_sun);
         return;
     }
     Points u;

@@ -180,6 +180,16 @@ NARPA_EACH_ISA void add_sunlight(const Sunlight& sunlight, std::uint32_t lit, Rg
     radiance = out;
 }
 
+/// Of the lanes seen.
+void add_sun(const Frame& f, Packet& p, Sunlight& sunlight, PhaseClock& clock, RgbPerRay& radiance) {
+    clock.ends(Phase::shading);
+    if (sunlight.lanes == 0) return;
+    p.lit = sunlight.lanes & ~f.tracer.occluded(f.at, p.hits, p.to_sun, sunlight.lanes);
+    p.rays_traced += static_cast<std::uint64_t>(std::popcount(sunlight.lanes));
+    clock.ends(Phase::shadow_rays);
+    if (p.lit != 0) add_sunlight(sunlight, p.lit, radiance);
+}
+
 /// Only light that comes straight from its source counts.
 void direct_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
     p.lit = 0;
@@ -196,37 +206,36 @@ void direct_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
         reflect_sun(seen, p.rays.direction, p.to_sun, f.sun->centre(), f.sun->irradiance(), sunlight);
     for (std::uint32_t rest = seen.others; rest != 0; rest &= rest - 1)
         light_other(f, p, static_cast<std::size_t>(std::countr_zero(rest)), radiance, sunlight);
-    clock.ends(Phase::shading);
-    if (sunlight.lanes == 0) return;
-    p.lit = sunlight.lanes & ~f.tracer.occluded(f.at, p.hits, p.to_sun, sunlight.lanes);
-    p.rays_traced += static_cast<std::uint64_t>(std::popcount(sunlight.lanes));
-    clock.ends(Phase::shadow_rays);
-    if (p.lit != 0) add_sunlight(sunlight, p.lit, radiance);
+    add_sun(f, p, sunlight, clock, radiance);
 }
 
-/// All light that comes along the rays of up to kLayer packets.
-void gather_paths(const Frame& f, const PathSettings& settings, std::span<Packet> packets,
-                  std::span<RgbPerRay> radiance) {
-    PhaseClock clock(packets.front().times);
-    constexpr std::size_t kRays = kLayer * kPacket;
-    std::array<Ray, kRays> rays;
-    std::array<Hit, kRays> hits;
-    std::array<Rgb, kRays> light;
-    std::array<std::uint32_t, kRays> number, sample;
-    std::size_t n = 0;
-    for (const Packet& p : packets)
-        for (std::size_t i = 0; i < p.rays.n; ++i, ++n) {
-            rays[n] = p.rays[i], hits[n] = p.hits[i];
-            number[n] = p.number[i], sample[n] = p.sample[i];
-        }
-    packets.front().rays_traced +=
-        path_radiance(f.tracer, f.at, settings, std::span(rays).first(n), std::span(hits).first(n),
-                      {f.settings.seed, f.settings.frame, std::span(number).first(n), std::span(sample).first(n)},
-                      std::span(light).first(n));
-    n = 0;
-    for (std::size_t k = 0; k < packets.size(); ++k)
-        for (std::size_t i = 0; i < packets[k].rays.n; ++i) radiance[k].put(i, light[n++]);
-    clock.ends(Phase::indirect);
+/// Flat faces without too sharp a lobe, to which the Sun's light comes by its own points alone.
+NARPA_EACH_ISA std::uint32_t lit_by_sun_alone(const HitPacket& hits, const SurfacesSeen& seen) noexcept {
+    const VecPerRay &flat = hits.geometric_normal, &n = seen.normal;
+    Lanes<int> are;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        const bool same = (flat.x[i] == n.x[i]) & (flat.y[i] == n.y[i]) & (flat.z[i] == n.z[i]);
+        are[i] = -static_cast<int>(same & (seen.exponent[i] <= kSharpLobe));
+    }
+    return bits_of(are) & seen.lanes;
+}
+
+/// The Sun's light and emission of first surfaces, where it is as simple as in direct light.
+void first_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
+    p.lit = p.first.lit = 0;
+    if (p.hits.met == 0 || !f.sun_first) return;
+    PhaseClock clock(p.times);
+    SurfacesSeen seen;
+    Sunlight sunlight;
+    look_at_surfaces(f, p, seen);
+    seen.lanes = lit_by_sun_alone(p.hits, seen);
+    if (seen.lanes == 0) return;
+    p.first.lit = seen.lanes;
+    p.first.diffuse = seen.diffuse;
+    p.first.specular = seen.specular;
+    shine(seen, {}, radiance);
+    reflect_sun(seen, p.rays.direction, p.to_sun, f.sun->centre(), f.sun->irradiance(), sunlight);
+    add_sun(f, p, sunlight, clock, radiance);
 }
 
 }  // namespace
@@ -246,6 +255,7 @@ Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera
             lens,
             scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
             direct && !tracer.lights().beyond_the_sun(),
+            !direct && sun_alone_lights_first_surfaces(tracer) && !Guide::may_help(tracer, at),
             {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, Guide::may_help(tracer, at)},
             TinyBodies(tracer, at, camera, T_world_camera, lens)};
 }
@@ -255,17 +265,58 @@ void light_along(const Frame& f, Packet& p, RgbPerRay& radiance) {
         direct_light(f, p, radiance);
         return;
     }
-    gather_paths(f, f.path, std::span(&p, 1), std::span(&radiance, 1));
+    PhaseClock clock(p.times);
+    Lanes<Ray> rays;
+    Lanes<Hit> hits;
+    Lanes<Rgb> light;
+    for (std::size_t i = 0; i < p.rays.n; ++i) rays[i] = p.rays[i], hits[i] = p.hits[i];
+    p.rays_traced +=
+        path_radiance(f.tracer, f.at, f.path, std::span(rays).first(p.rays.n), std::span(hits).first(p.rays.n),
+                      {f.settings.seed, f.settings.frame, std::span(p.number).first(p.rays.n),
+                       std::span(p.sample).first(p.rays.n)},
+                      std::span(light).first(p.rays.n));
+    for (std::size_t i = 0; i < p.rays.n; ++i) radiance.put(i, light[i]);
+    clock.ends(Phase::indirect);
 }
 
 void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay> radiance) {
-    if (!f.quick) {
-        PathSettings path = f.path;
-        path.shared = true;
-        gather_paths(f, path, packets, radiance);
+    if (f.quick) {
+        for (std::size_t k = 0; k < packets.size(); ++k) direct_light(f, packets[k], radiance[k]);
         return;
     }
-    for (std::size_t k = 0; k < packets.size(); ++k) direct_light(f, packets[k], radiance[k]);
+    for (std::size_t k = 0; k < packets.size(); ++k) first_light(f, packets[k], radiance[k]);
+    if (packets.empty()) return;
+    PhaseClock clock(packets.front().times);
+    // One sample of each pixel together, then the next of each: those of a pixel stay independent.
+    struct Place {
+        std::uint8_t packet, lane;
+    };
+    std::array<std::array<Place, kSharing>, kOfAPixel> places;
+    std::array<std::size_t, kOfAPixel> n{};
+    std::size_t rank = 0;
+    std::uint32_t pixel = 0;
+    for (std::size_t k = 0; k < packets.size(); ++k)
+        for (std::size_t i = 0; i < packets[k].rays.n; ++i) {
+            rank = k + i > 0 && packets[k].number[i] == pixel ? rank + 1 : 0;
+            pixel = packets[k].number[i];
+            places[rank][n[rank]++] = {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(i)};
+        }
+    std::array<FirstSurface, kSharing> first;
+    std::array<Rgb, kSharing> light;
+    for (std::size_t r = 0; r < kOfAPixel && n[r] > 0; ++r) {
+        const std::span<const Place> of_rank = std::span(places[r]).first(n[r]);
+        for (std::size_t i = 0; i < n[r]; ++i) {
+            const Packet& p = packets[of_rank[i].packet];
+            const std::size_t lane = of_rank[i].lane;
+            first[i] = {&p.rays, &p.hits, &p.first, lane, p.number[lane], p.sample[lane]};
+            light[i] = radiance[of_rank[i].packet][lane];
+        }
+        packets.front().rays_traced +=
+            shared_path_radiance(f.tracer, f.at, f.path, std::span(first).first(n[r]), f.settings.seed,
+                                 f.settings.frame, std::span(light).first(n[r]));
+        for (std::size_t i = 0; i < n[r]; ++i) radiance[of_rank[i].packet].put(of_rank[i].lane, light[i]);
+    }
+    clock.ends(Phase::indirect);
 }
 
 }  // namespace narpa

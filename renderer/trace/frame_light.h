@@ -24,6 +24,7 @@ struct Frame {
     const Lens* lens;  ///< null: a pinhole
     std::optional<SunDisc> sun;
     bool quick;         ///< sunlight, ambient and emission of what is seen: all that there is to gather
+    bool sun_first;     ///< where it is not: the Sun lights first surfaces as in a quick frame
     PathSettings path;  ///< where it is not
     TinyBodies tiny;
 
@@ -39,12 +40,13 @@ struct Frame {
 struct Packet {
     RayPacket rays;
     HitPacket hits;
-    // Where the frame is quick:
+    // Where the frame is quick, or takes the Sun first:
     VecPerRay to_sun;       ///< a point of the Sun for each, if there is one
     std::uint32_t lit = 0;  ///< out: those that the Sun lights
     // Where it is not: which random numbers each takes.
     Lanes<std::uint32_t> number{};  ///< its PixelSampler's "pixel"
     Lanes<std::uint32_t> sample{};
+    FirstSurfaces first;  ///< out: where the Sun comes first
     // Counted on from packet to packet:
     std::uint64_t rays_traced = 0;  ///< of all kinds
     PhaseTimes* times = nullptr;    ///< null: nobody looks
@@ -74,9 +76,9 @@ private:
 /// Radiance that comes back along each ray.
 void light_along(const Frame& f, Packet& packet, RgbPerRay& radiance);
 
-/// Packets whose paths share what they find (PathSettings::shared).
-inline constexpr std::size_t kLayer = 4;
-/// The same of up to kLayer packets, no two rays of them the same pixel's. The time is the first's.
+/// The same of many packets, whose paths share what they find: of up to kSharing pixels, pixel by pixel up to
+/// kOfAPixel samples each.
+inline constexpr std::size_t kOfAPixel = 16, kTogether = kSharing * kOfAPixel / kPacket;
 void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay> radiance);
 
 }  // namespace narpa

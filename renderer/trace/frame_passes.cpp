@@ -97,8 +97,8 @@ struct FramePasses::Worker {
     const Frame& f;
     const std::int64_t until_ns;
     std::atomic<bool>& given_up;  ///< the pass: looked at often, as a tile may hold many samples
-    std::array<Packet, kLayer> packets;
-    std::array<Batch, kLayer> batches;
+    std::array<Packet, kTogether> packets;
+    std::array<Batch, kTogether> batches;
     std::size_t full = 0;      ///< of these
     std::uint64_t traced = 0;  ///< samples
     std::uint32_t lit = 0;     ///< packets
@@ -121,7 +121,7 @@ struct FramePasses::Worker {
         b.place[i] = static_cast<std::uint8_t>(at);
         if (b.samples.n < kPacket) return;
         trace(tile);
-        if (full == (f.quick ? 1 : kLayer)) light(sink);
+        if (full == (f.quick ? 1 : kTogether)) light(sink);
     }
     void trace(const Tile& tile) {
         Batch& b = batches[full];
@@ -132,7 +132,7 @@ struct FramePasses::Worker {
     }
     template <class Sink>
     void light(Sink&& sink) {
-        std::array<RgbPerRay, kLayer> radiance;
+        std::array<RgbPerRay, kTogether> radiance;
         if (full > 0) light_along(f, std::span(packets).first(full), radiance);
         for (std::size_t k = 0; k < full; ++k) {
             sink(batches[k], packets[k], radiance[k]);
@@ -342,34 +342,23 @@ struct SampleRange {
     std::uint32_t begin, end;
 };
 
-/// All samples of a tile: of one light pixel by pixel; where paths share what they find one of each pixel together,
-/// then the next of each, so that those of one pixel stay independent.
+/// All samples of a tile, pixel by pixel; where paths share what they find so many of each pixel, then the next.
 template <class Worker, class Tile, class Samples, class Sink>
 void sample_tile(Worker& w, const Tile& t, int image_width, Samples&& samples, Sink&& sink) {
     w.begin(false);
-    const auto add = [&](int x, int y, std::size_t at, std::uint32_t s) {
-        w.add(t, x, y, at, static_cast<std::uint32_t>(index_of(x, y, image_width)), s, sink);
-    };
-    if (w.f.quick) {
+    const std::uint32_t most = w.f.quick ? std::numeric_limits<std::uint32_t>::max() : kOfAPixel;
+    std::uint32_t left = 1;
+    for (std::uint32_t done = 0; left > 0; done += most) {
+        left = 0;
         t.each_pixel([&](int x, int y, std::size_t at) {
-            const SampleRange range = samples(at);
-            for (std::uint32_t s = range.begin; s < range.end; ++s) add(x, y, at, s);
+            const auto number = static_cast<std::uint32_t>(index_of(x, y, image_width));
+            const auto [begin, end] = samples(at);
+            const std::uint32_t from = begin + std::min(done, end - begin), to = from + std::min(most, end - from);
+            left = std::max(left, end - to);
+            for (std::uint32_t s = from; s < to; ++s) w.add(t, x, y, at, number, s, sink);
         });
-    } else {
-        SampleRange all{std::numeric_limits<std::uint32_t>::max(), 0};
-        t.each_pixel([&](int, int, std::size_t at) {
-            const SampleRange range = samples(at);
-            if (range.begin == range.end) return;
-            all = {std::min(all.begin, range.begin), std::max(all.end, range.end)};
-        });
-        for (std::uint32_t s = all.begin; s < all.end; ++s) {
-            t.each_pixel([&](int x, int y, std::size_t at) {
-                if (const SampleRange range = samples(at); range.begin <= s && s < range.end) add(x, y, at, s);
-            });
-            w.finish(t, sink);
-        }
+        w.finish(t, sink);
     }
-    w.finish(t, sink);
 }
 
 }  // namespace

@@ -53,12 +53,24 @@ public:
           guided_(settings.guided && sun_ != nullptr && !settings.direct),
           emitters_(lights_.any(group_)),
           receivers_(emitters_ || lights_.any_with_extent() || guided_),
-          shared_(settings.shared && !settings.direct && settings.max_depth > 1),
+          finds_alone_(scene_.ambient != Rgb{} || (sun_has_extent_ && !narrow_sun_)),
           sun_alone_(!lights_.any(Lights::Group::all) && !lights_.any_with_extent() && scene_.ambient == Rgb{}) {}
 
     void run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance) {
         radiance_ = radiance;
         leave_camera(rays, first);
+        go_on();
+    }
+    void run_shared(std::span<const FirstSurface> first, std::span<Rgb> radiance) {
+        shared_ = !settings_.direct && settings_.max_depth > 1;
+        radiance_ = radiance;
+        leave_camera(first);
+        go_on();
+    }
+    [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
+
+private:
+    void go_on() {
         const int depth = settings_.direct ? 1 : settings_.max_depth;
         for (int met = 0;; ++met) {
             gather(met);
@@ -71,9 +83,7 @@ public:
         }
         if (n_bounces_ > 0) share_bounces();
     }
-    [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
 
-private:
     void leave_camera(std::span<const Ray> rays, std::span<const Hit> first) {
         n_ = rays.size();
         for (std::size_t i = 0; i < n_; ++i) {
@@ -85,6 +95,50 @@ private:
             paths_[i].to = &radiance_[i];
             if (receivers_) paths_[i].start = receiver_at(rays[i].origin);
         }
+    }
+
+    void leave_camera(std::span<const FirstSurface> first) {
+        starts_.clear();
+        n_ = 0;
+        for (std::size_t from = 0; from < first.size(); from += kPacket) {
+            const std::span<const FirstSurface> some = first.subspan(from, std::min(kPacket, first.size() - from));
+            Points roulette;
+            if (!finds_alone_) draw(some, kRouletteGroup, roulette);
+            for (std::size_t k = 0; k < some.size(); ++k) {
+                const std::size_t ray = from + k;
+                const FirstSurface& f = some[k];
+                if (!f.lit()) radiance_[ray] = {};
+                if (!f.met() && !lights_.any_with_extent()) {
+                    radiance_[ray] = sky({}, f.rays->direction[f.lane]);
+                    continue;
+                }
+                float chance = 1;
+                int number = -1;
+                if (f.lit()) {
+                    if (!shared_) continue;
+                    const Rgb albedo = f.surfaces->diffuse[f.lane] + f.surfaces->specular[f.lane];
+                    chance = chance_to_set_out(albedo, radiance_[ray]);
+                    number = starts_.add(at_, f, ray, chance);
+                    if (chance < 1 && roulette[0][k] >= static_cast<double>(chance)) continue;
+                }
+                Path& path = paths_[n_];
+                path = Path{};
+                path.ray = static_cast<std::uint32_t>(ray);
+                path.to = &radiance_[ray];
+                path.shares = number;
+                path.lit = path.sun_asked = f.lit();
+                path.throughput = Rgb{1, 1, 1} / chance;
+                if (receivers_) path.start = receiver_at(f.rays->origin[f.lane]);
+                hits_[n_] = (*f.hits)[f.lane];
+                directions_[n_] = f.rays->direction[f.lane];
+                ++n_;
+            }
+        }
+    }
+    void draw(std::span<const FirstSurface> some, std::uint32_t group, Points& u) const {
+        Lanes<std::uint32_t> pixel{}, sample{};
+        for (std::size_t k = 0; k < some.size(); ++k) pixel[k] = some[k].pixel, sample[k] = some[k].sample;
+        next_points(numbers_, some.size(), pixel, sample, group, u);
     }
 
     /// Adds what the rays have found, and makes ready the surfaces where they go on.
@@ -126,7 +180,7 @@ private:
         points_[i] = PathPoint(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * path.length_m,
                                !settings_.direct);
         const Surface& surface = points_[i].surface();
-        if (surface.emission != Rgb{}) {
+        if (surface.emission != Rgb{} && !path.lit) {
             const double light_pdf =
                 path.direction_pdf == kInfinity ? 0 : lights_.pdf(at_, path.start, group_, directions_[i], hit);
             add(path, surface.emission * static_cast<float>(power_heuristic(path.direction_pdf, light_pdf)));
@@ -140,13 +194,14 @@ private:
         n_bounces_ = 0;
         for (std::size_t i = 0; i < n_; ++i) {
             Path& path = paths_[i];
-            if (path.first < 0 || !Bounce::possible(points_[i])) continue;
+            path.lit = false;
+            if (path.shares < 0 || !Bounce::possible(points_[i])) continue;
             path.bounce = static_cast<int>(n_bounces_);
             Bounce& b = bounces_[n_bounces_++];
             b.point = points_[i];
             b.position = hits_[i].position;
             b.touching_m = touching_m(static_cast<std::size_t>(hits_[i].body));
-            b.found_from = static_cast<std::size_t>(path.first);
+            b.found_from = static_cast<std::size_t>(path.shares);
             b.incident = {};
         }
     }
@@ -161,7 +216,8 @@ private:
     void share_bounces() {
         const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[0]);
         rays_traced_ += starts_.gather(tracer_, at_, bounces_.from(0, n_bounces_),
-                                       numbers.point(numbers_.sample[0], kSharingGroup)[0], radiance_);
+                                       numbers.point(numbers_.sample[0], kSharingGroup)[0],
+                                       settings_.pixel_angle_rad, radiance_);
     }
 
     /// Random numbers of the packet that begins with this path.
@@ -186,6 +242,7 @@ private:
             for (std::size_t k = 0; k < kPacket && first + k < n_; ++k) {
                 const std::size_t i = first + k;
                 Path& path = paths_[i];
+                if (path.lit) continue;
                 path.sun_asked = false;
                 path.guide = Guide();
                 if (points_[i].specular()) continue;
@@ -332,7 +389,6 @@ private:
                 const std::size_t i = first + k;
                 Path& path = paths_[i];
                 if (last && sun_alone_ && path.sun_asked) continue;
-                const bool shares = met == 0 && shared_ && !points_[i].specular();
                 float made_up = 1;
                 const auto survives = [&](float goes_on) {
                     if (goes_on >= 1) return true;
@@ -344,10 +400,10 @@ private:
                     path.throughput = path.throughput / goes_on;
                     return true;
                 };
-                if (shares) {
-                    const float goes_on = chance_to_set_out(path, points_[i]);
-                    path.first = static_cast<int>(starts_.size());
-                    starts_.add(at_, hits_[i], points_[i], path, goes_on);
+                const bool sets_out = met == 0 && shared_ && !points_[i].specular();
+                if (sets_out && !path.lit) {
+                    const float goes_on = chance_to_set_out(points_[i].surface(), radiance_[path.ray]);
+                    path.shares = starts_.add(at_, hits_[i], points_[i], path, goes_on);
                     if (!survives(goes_on)) continue;
                 }
                 const BsdfSample s = next_direction(i, {u[0][k], u[1][k], u[2][k], u[3][k]});
@@ -355,7 +411,7 @@ private:
                 path.radiance_scale *= s.radiance_scale;
                 // Out of many shells of dense glass, one in another, it may outgrow single precision.
                 if (path.throughput == Rgb{} || !is_finite(path.throughput)) continue;
-                if (!shares && !survives(chance(path, met + 1))) continue;
+                if (!sets_out && !survives(chance(path, met + 1))) continue;
                 if (Bounce* const bounce = bounce_at(path, met);
                     bounce != nullptr && !set_out(path, *bounce, s, made_up))
                     continue;
@@ -401,14 +457,14 @@ private:
     }
 
     /// Probability with which a path that is shared leaves its first surface, before its direction is known.
-    [[nodiscard]] float chance_to_set_out(const Path& path, const PathPoint& point) const {
-        const Surface& surface = point.surface();
-        // What the sky and a wide Sun send is not shared.
-        if (scene_.ambient != Rgb{} || (sun_has_extent_ && !narrow_sun_)) return 1;
-        if (surface.material->kind > Material::Kind::phong) return kSetOut;
-        const Rgb albedo = surface.diffuse + surface.specular;
+    [[nodiscard]] float chance_to_set_out(const Surface& surface, const Rgb& light) const {
+        const bool plain = surface.material->kind <= Material::Kind::phong;
+        return chance_to_set_out(plain ? surface.diffuse + surface.specular : Rgb{1, 1, 1}, light);
+    }
+    [[nodiscard]] float chance_to_set_out(const Rgb& albedo, const Rgb& light) const {
+        if (finds_alone_) return 1;
         const float brings = std::max({albedo.x, albedo.y, albedo.z});
-        return kSetOut * std::min(1.0f, brings / (radiance_[path.ray] == Rgb{} ? kFaintInTheDark : kFaint));
+        return kSetOut * std::min(1.0f, brings / (light == Rgb{} ? kFaintInTheDark : kFaint));
     }
 
     /// Probability with which a path goes on behind so many surfaces; it then carries the share of those that end.
@@ -441,11 +497,12 @@ private:
     const Lights::Group group_;
     const SunDisc* const sun_;
     const bool sun_has_extent_, narrow_sun_;
-    const bool guided_;     ///< some body may look small from another
-    const bool emitters_;   ///< beside the Sun
-    const bool receivers_;  ///< somebody asks where the points are
-    const bool shared_;     ///< paths give each other of what they find
-    const bool sun_alone_;  ///< nothing else shines
+    const bool guided_;       ///< some body may look small from another
+    const bool emitters_;     ///< beside the Sun
+    const bool receivers_;    ///< somebody asks where the points are
+    const bool finds_alone_;  ///< the sky and a wide Sun, which is not shared
+    bool shared_ = false;     ///< paths give each other of what they find
+    const bool sun_alone_;    ///< nothing else shines
     std::span<Rgb> radiance_;
     std::uint64_t rays_traced_ = 0;
 
@@ -475,6 +532,24 @@ std::uint64_t path_radiance(const Tracer& tracer, const Placement& at, const Pat
         traced += stream.rays_traced();
     }
     return traced;
+}
+
+bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept {
+    const Lights& lights = tracer.lights();
+    if (lights.any(Lights::Group::all) || lights.any_with_extent() || !lights.sun()) return false;
+    return lights.sun()->is_point() || tracer.scene().sun->angular_diameter_rad < kNarrowSun_rad;
+}
+
+std::uint64_t shared_path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
+                                   std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
+                                   std::span<Rgb> radiance) noexcept {
+    if (first.empty()) return 0;
+    std::array<std::uint32_t, kSharing> pixel, sample;
+    for (std::size_t i = 0; i < first.size(); ++i) pixel[i] = first[i].pixel, sample[i] = first[i].sample;
+    Stream stream(tracer, at, settings,
+                  {seed, frame, std::span(pixel).first(first.size()), std::span(sample).first(first.size())});
+    stream.run_shared(first, radiance);
+    return stream.rays_traced();
 }
 
 }  // namespace narpa

@@ -25,10 +25,6 @@ struct PathSettings {
     /// shadows, ambient_reflectance(surface) times it; black where nothing is hit. Lights with extent are seen, in
     /// mirrors too. max_depth is not read.
     bool direct = false;
-    /// What the paths of a call find on their first ways is shared among them (shared_bounces.h), so that the
-    /// result of each ray depends on the others. All of them should be different pixels', as what they find by the
-    /// same random light is not independent.
-    bool shared = false;
     /// Guide::may_help at this placement; false where it may not: nobody asks further.
     bool guided = true;
 };
@@ -47,5 +43,37 @@ struct PathNumbers {
 std::uint64_t path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                             std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
                             std::span<Rgb> radiance) noexcept;
+
+/// What up to kPacket rays meet first, and what of it is known.
+struct FirstSurfaces {
+    /// Hits on flat faces of Lambert's and Phong's materials whose own emission and light straight from the Sun
+    /// stand in the radiance already, and these colours of theirs. Only where nothing else shines but the ambient.
+    std::uint32_t lit = 0;
+    RgbPerRay diffuse, specular;
+};
+/// One of them.
+struct FirstSurface {
+    const RayPacket* rays;
+    const HitPacket* hits;
+    const FirstSurfaces* surfaces;
+    std::size_t lane;
+    std::uint32_t pixel, sample;  ///< as of PathNumbers
+
+    [[nodiscard]] bool met() const noexcept { return is_set(hits->met, lane); }
+    [[nodiscard]] bool lit() const noexcept { return is_set(surfaces->lit, lane); }
+};
+/// Paths that may share what they find.
+inline constexpr std::size_t kSharing = 64;
+/// A lobe this sharp finds the narrow Sun better than the Sun's points find the lobe.
+inline constexpr float kSharpLobe = 1000;
+/// May the Sun's light on first surfaces be taken as above?
+[[nodiscard]] bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept;
+
+/// The same of up to kSharing rays, but what one path finds lights the first surfaces of all (shared_bounces.h), so
+/// that the result of each ray depends on the others. No two should be the same pixel's: what they find by the same
+/// path is not independent. `radiance`: of lit surfaces the light that they have, and all of it after.
+std::uint64_t shared_path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
+                                   std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
+                                   std::span<Rgb> radiance) noexcept;
 
 }  // namespace narpa

@@ -1,6 +1,7 @@
 #include "renderer/trace/shared_bounces.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "base/each_isa.h"
@@ -39,21 +40,65 @@ Rgb Bounce::towards(const Vec3& direction) const noexcept {
     return sum;
 }
 
-void Starts::add(const Placement& at, const Hit& hit, const PathPoint& point, const Path& path,
-                 float chance) noexcept {
-    const std::size_t i = n_ % kPacket;
+Starts::Block& Starts::next_block() noexcept {
     Block& b = block_[n_ / kPacket];
-    if (i == 0) b.special = 0, b.hits.met = 0, b.hits.outside = 0;
-    b.hits.put(i, hit);
-    const Rigid3& T = at.T_world_body[static_cast<std::size_t>(hit.body)];
-    b.origin.put(i, T * hit.departure_body);
+    if (n_ % kPacket == 0) b.special = b.guided = b.hits.outside = 0;
+    return b;
+}
+
+int Starts::add(const Placement& at, const FirstSurface& first, std::size_t ray, float chance) noexcept {
+    Block& b = next_block();
+    const std::size_t i = n_ % kPacket, from = first.lane;
+    const HitPacket& hits = *first.hits;
+    const Vec3 departure = hits.departure_body[from];
+    b.hits.body[i] = hits.body[from];
+    b.hits.face[i] = hits.face[from];
+    b.hits.departure_body.put(i, departure);
+    b.hits.outside |= static_cast<std::uint32_t>(is_set(hits.outside, from)) << i;
+    b.origin.put(i, at.T_world_body[static_cast<std::size_t>(hits.body[from])] * departure);
+    b.plane.put(i, hits.geometric_normal[from]);
+    b.diffuse.put(i, kInvPi * first.surfaces->diffuse[from]);
+    b.chance[i] = chance;
+    if (first.surfaces->specular[from] != Rgb{}) b.special |= 1u << i;
+    ray_[n_] = static_cast<std::uint32_t>(ray);
+    lit_[n_] = &first;
+    return static_cast<int>(n_++);
+}
+
+int Starts::add(const Placement& at, const Hit& hit, const PathPoint& point, const Path& path,
+                float chance) noexcept {
+    Block& b = next_block();
+    const std::size_t i = n_ % kPacket;
+    b.hits.body[i] = hit.body;
+    b.hits.face[i] = hit.face;
+    b.hits.departure_body.put(i, hit.departure_body);
+    b.hits.outside |= static_cast<std::uint32_t>(hit.outside) << i;
+    b.origin.put(i, at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body);
     b.plane.put(i, point.plane());
-    b.diffuse.put(i, point.surface().diffuse * kInvPi);
-    b.chance[i] = static_cast<double>(chance);
-    if (!point.plain() || path.guide.share() > 0) b.special |= 1u << i;
-    points_[n_] = point;
-    paths_[n_] = path;
-    ++n_;
+    b.diffuse.put(i, kInvPi * point.surface().diffuse);
+    b.chance[i] = chance;
+    ray_[n_] = path.ray;
+    lit_[n_] = nullptr;
+    const bool guided = path.guide.share() > 0;
+    if (guided) {
+        b.guided |= 1u << i;
+        paths_[n_] = path;
+    }
+    if (!point.plain() || guided) {
+        b.special |= 1u << i;
+        points_[n_] = point;
+    }
+    return static_cast<int>(n_++);
+}
+
+/// Of lit ones with a lobe.
+void Starts::make_points(const Tracer& tracer, const Placement& at, double pixel_angle_rad) noexcept {
+    for (std::size_t k = 0; k < n_; ++k) {
+        if (lit_[k] == nullptr || !is_set(block_[k / kPacket].special, k % kPacket)) continue;
+        const FirstSurface& f = *lit_[k];
+        const Hit hit = (*f.hits)[f.lane];
+        points_[k] = PathPoint(tracer, at, hit, f.rays->direction[f.lane], pixel_angle_rad * hit.range_m, true);
+    }
 }
 
 NARPA_EACH_ISA void Starts::join(const Block& b, const Bounce& bounce, Join& __restrict j) noexcept {
@@ -65,10 +110,14 @@ NARPA_EACH_ISA void Starts::join(const Block& b, const Bounce& bounce, Join& __r
         const Vec3 l = way * (1 / distance);
         const double leaves = dot(b.plane[i], l), arrives = -dot(normal, l);
         const double touching = bounce.touching_m + kTouchingFarOff * distance;
+        const auto cosine = static_cast<float>(leaves);
         j.direction.put(i, l);
         j.range_m[i] = distance - touching / std::max(arrives, kGrazing);
         j.geometry[i] = arrives / distance2;
-        j.density[i] = leaves * std::numbers::inv_pi * j.geometry[i] * b.chance[i];
+        j.density[i] = leaves * std::numbers::inv_pi;
+        j.reflected.r[i] = b.diffuse.r[i] * cosine;
+        j.reflected.g[i] = b.diffuse.g[i] * cosine;
+        j.reflected.b[i] = b.diffuse.b[i] * cosine;
         faces[i] = -static_cast<int>((leaves > 0) & (arrives > 0) & (distance2 > 0));
     }
     j.lit = bits_of(faces);
@@ -76,8 +125,7 @@ NARPA_EACH_ISA void Starts::join(const Block& b, const Bounce& bounce, Join& __r
 
 std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
                              std::span<Rgb> radiance) const noexcept {
-    std::array<Join, kStream / kPacket> joins;
-    std::array<Lanes<Rgb>, kStream / kPacket> reflected;
+    std::array<Join, kSharing / kPacket> joins;
     double density = 0;
     std::uint64_t rays = 0;
     for (std::size_t k = 0; k < blocks(); ++k) {
@@ -86,43 +134,43 @@ std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bo
         join(b, bounce, j);
         j.lit &= lanes_below(std::min(kPacket, n_ - k * kPacket));
         for_each_lane(j.lit & b.special, [&](std::size_t i) {
-            const PathPoint& p = points_[k * kPacket + i];
+            const PathPoint::Response r = points_[k * kPacket + i].respond(j.direction[i]);
+            j.density[i] = r.pdf;
+            j.reflected.put(i, r.f_cos);
+        });
+        for_each_lane(j.lit & b.guided, [&](std::size_t i) {
             const Path& path = paths_[k * kPacket + i];
-            const PathPoint::Response r = p.respond(j.direction[i]);
-            double pdf = r.pdf;
-            if (const double share = path.guide.share(); share > 0)
-                pdf = (1 - share) * pdf + share * path.guide.pdf(tracer, at, path.start, j.direction[i]);
-            j.density[i] = pdf * j.geometry[i] * b.chance[i];
-            reflected[k][i] = r.f_cos;
+            const double share = path.guide.share();
+            j.density[i] =
+                (1 - share) * j.density[i] + share * path.guide.pdf(tracer, at, path.start, j.direction[i]);
         });
         std::uint32_t asked = j.lit;
         if (bounce.found_from / kPacket == k) asked &= ~(1u << bounce.found_from % kPacket);
-        Lanes<int> beyond;
-        for (std::size_t i = 0; i < kPacket; ++i) beyond[i] = -static_cast<int>(j.range_m[i] > 0);
-        asked &= bits_of(beyond);
+        for_each_lane(asked, [&](std::size_t i) {
+            if (!(j.range_m[i] > 0)) asked &= ~(1u << i);  // they touch
+        });
         j.lit &= ~tracer.occluded(at, b.hits, j.direction, j.range_m, asked);
         rays += static_cast<std::uint64_t>(std::popcount(asked));
-        for_each_lane(j.lit, [&](std::size_t i) { density += j.density[i]; });
+        for_each_lane(j.lit, [&](std::size_t i) {
+            density += j.density[i] * j.geometry[i] * static_cast<double>(b.chance[i]);
+        });
     }
     if (!(density > 0)) return rays;
     const bool even = bounce.point.plain();
     const Rgb light = even ? bounce.towards(bounce.point.plane()) : Rgb{};
     const double per_density = static_cast<double>(scale) / density;
     for (std::size_t k = 0; k < blocks(); ++k) {
-        const Block& b = block_[k];
         const Join& j = joins[k];
         for_each_lane(j.lit, [&](std::size_t i) {
-            const Vec3 l = j.direction[i];
-            Rgb f = is_set(b.special, i) ? reflected[k][i] : b.diffuse[i] * static_cast<float>(dot(b.plane[i], l));
-            f *= static_cast<float>(j.geometry[i] * per_density);
-            radiance[paths_[k * kPacket + i].ray] += f * (even ? light : bounce.towards(-l));
+            const Rgb f = j.reflected[i] * static_cast<float>(j.geometry[i] * per_density);
+            radiance[ray_[k * kPacket + i]] += f * (even ? light : bounce.towards(-j.direction[i]));
         });
     }
     return rays;
 }
 
 std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, std::span<Bounce> bounces, double choice,
-                             std::span<Rgb> radiance) const noexcept {
+                             double pixel_angle_rad, std::span<Rgb> radiance) noexcept {
     Room<float> bright;
     double sum = 0;
     for (std::size_t i = 0; i < bounces.size(); ++i) {
@@ -131,6 +179,7 @@ std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, std::spa
         sum += static_cast<double>(bright[i]);
     }
     if (sum == 0) return 0;
+    make_points(tracer, at, pixel_angle_rad);
     const double wanted = std::min(kBounces, static_cast<double>(bounces.size()));
     double passed = choice;
     std::uint64_t rays = 0;

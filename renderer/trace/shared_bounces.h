@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <span>
 
+#include "renderer/trace/path.h"
 #include "renderer/trace/path_point.h"
 #include "renderer/trace/path_state.h"
 
@@ -29,7 +30,7 @@ struct Bounce {
     PathPoint point;
     Vec3 position{};             ///< world
     double touching_m = 0;       ///< what stands so close before it cannot be told from it
-    std::size_t found_from = 0;  ///< receiver
+    std::size_t found_from = 0;  ///< the start
     std::array<Incident, kIncidents> incident{};
 
     /// May it stand for others? It must send light to all directions of its side.
@@ -38,45 +39,51 @@ struct Bounce {
     [[nodiscard]] Rgb towards(const Vec3& direction) const noexcept;
 };
 
-/// The points from which paths set out.
+/// The points from which paths set out: first surfaces of up to kSharing rays.
 class Starts {
 public:
     void clear() noexcept { n_ = 0; }
-    [[nodiscard]] std::size_t size() const noexcept { return n_; }
-    /// `chance`: with which a path sets out.
-    void add(const Placement& at, const Hit& hit, const PathPoint& point, const Path& path, float chance) noexcept;
+    /// One that is lit already. `ray`: whose radiance it adds to; `chance`: with which a path sets out. Returns its
+    /// number.
+    int add(const Placement& at, const FirstSurface& first, std::size_t ray, float chance) noexcept;
+    /// Any other.
+    int add(const Placement& at, const Hit& hit, const PathPoint& point, const Path& path, float chance) noexcept;
 
-    /// Adds to each receiver's radiance what the bounces send it. `choice`: in [0, 1), chooses some of the bounces
+    /// Adds to each start's radiance what the bounces send it. `choice`: in [0, 1), chooses some of the bounces
     /// where they are many. Returns the number of rays.
     std::uint64_t gather(const Tracer& tracer, const Placement& at, std::span<Bounce> bounces, double choice,
-                         std::span<Rgb> radiance) const noexcept;
+                         double pixel_angle_rad, std::span<Rgb> radiance) noexcept;
 
 private:
-    /// Sixteen of them.
     struct Block {
-        HitPacket hits;
+        std::uint32_t special;  ///< those that reflect by another law than Lambert's about `plane`
+        std::uint32_t guided;   ///< of these those from which rays are guided
+        HitPacket hits;         ///< what of them tells where rays leave
         VecPerRay origin, plane;
         RgbPerRay diffuse;  ///< over pi
-        Lanes<double> chance;
-        std::uint32_t special =
-            0;  ///< those that reflect by another law than Lambert's about `plane`, or are guided
+        Lanes<float> chance;
     };
-    /// What a bounce is to sixteen receivers.
+    /// What a bounce is to sixteen starts.
     struct Join {
         VecPerRay direction;
         Lanes<double> range_m, density, geometry;
-        std::uint32_t lit = 0;
+        RgbPerRay reflected;  ///< BSDF times cosine
+        std::uint32_t lit;
     };
 
+    [[nodiscard]] Block& next_block() noexcept;
+    void make_points(const Tracer& tracer, const Placement& at, double pixel_angle_rad) noexcept;
+    [[nodiscard]] std::size_t blocks() const noexcept { return (n_ + kPacket - 1) / kPacket; }
     static void join(const Block& b, const Bounce& bounce, Join& j) noexcept;
     std::uint64_t gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
                          std::span<Rgb> radiance) const noexcept;
-    [[nodiscard]] std::size_t blocks() const noexcept { return (n_ + kPacket - 1) / kPacket; }
 
     std::size_t n_ = 0;
-    std::array<Block, kStream / kPacket> block_;
-    Room<PathPoint> points_;
-    Room<Path> paths_;
+    std::array<Block, kSharing / kPacket> block_;
+    std::array<std::uint32_t, kSharing> ray_;
+    std::array<const FirstSurface*, kSharing> lit_;  ///< null: the others
+    Room<PathPoint> points_;                         ///< of those that are special
+    Room<Path> paths_;                               ///< of those that are guided
 };
 
 }  // namespace narpa

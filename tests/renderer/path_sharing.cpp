@@ -1,5 +1,6 @@
 // Paths that share what they find: the same light, with less noise, whatever the surfaces and whatever shines.
 
+#include "renderer/trace/camera_image.h"
 #include "tests/renderer/path_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -22,10 +23,13 @@ struct Picture {
     }
 };
 
+/// What the pixels' middles see, in packets.
 struct View {
     std::array<Ray, kPixels> rays;
     std::array<Hit, kPixels> first;
     std::array<std::uint32_t, kPixels> number;
+    std::array<RayPacket, kPixels / kPacket> ray_packets;
+    std::array<HitPacket, kPixels / kPacket> hit_packets;
 
     View(const Tracer& tracer, const Placement& at, const Vec3& eye, const Vec3& target, double width_m) {
         const Vec3 ahead = normalized(target - eye), across = normalized(cross(ahead, {0, 0, 1})),
@@ -36,21 +40,48 @@ struct View {
             rays[i] = ray_to(eye, target + width_m * (x * across + y * down));
             first[i] = tracer.intersect(at, rays[i], kInfinity);
             number[i] = static_cast<std::uint32_t>(i);
+            ray_packets[i / kPacket].n = kPacket;
+            ray_packets[i / kPacket].put(i % kPacket, rays[i]);
         }
+        for (std::size_t k = 0; k < ray_packets.size(); ++k)
+            tracer.intersect(at, ray_packets[k], tracer.all_bodies(), hit_packets[k]);
     }
 };
 
+using Trace = std::uint64_t (*)(const Tracer&, const Placement&, const View&, const PathSettings&,
+                                std::uint64_t seed, std::uint32_t sample, std::array<Rgb, kPixels>& light);
+
+std::uint64_t each_for_itself(const Tracer& tracer, const Placement& at, const View& view,
+                              const PathSettings& settings, std::uint64_t seed, std::uint32_t sample,
+                              std::array<Rgb, kPixels>& light) {
+    std::array<std::uint32_t, kPixels> samples;
+    samples.fill(sample);
+    return path_radiance(tracer, at, settings, view.rays, view.first, {seed, 0, view.number, samples}, light);
+}
+
+std::uint64_t together(const Tracer& tracer, const Placement& at, const View& view, const PathSettings& settings,
+                       std::uint64_t seed, std::uint32_t sample, std::array<Rgb, kPixels>& light) {
+    static_assert(kPixels == kSharing);
+    const FirstSurfaces nothing_known{};
+    std::array<FirstSurface, kSharing> first;
+    for (std::size_t i = 0; i < kPixels; ++i)
+        first[i] = {&view.ray_packets[i / kPacket],
+                    &view.hit_packets[i / kPacket],
+                    &nothing_known,
+                    i % kPacket,
+                    view.number[i],
+                    sample};
+    return shared_path_radiance(tracer, at, settings, first, seed, 0, light);
+}
+
 Picture picture(const Tracer& tracer, const Placement& at, const View& view, const PathSettings& settings,
-                std::uint32_t samples) {
+                std::uint32_t samples, Trace trace) {
     Picture p;
     std::array<std::array<double, kPictures>, kPixels> means{};
     for (int k = 0; k < kPictures; ++k)
         for (std::uint32_t s = 0; s < samples; ++s) {
-            std::array<std::uint32_t, kPixels> sample;
-            sample.fill(s);
             std::array<Rgb, kPixels> light;
-            path_radiance(tracer, at, settings, view.rays, view.first,
-                          {static_cast<std::uint64_t>(k + 1), 0, view.number, sample}, light);
+            trace(tracer, at, view, settings, static_cast<std::uint64_t>(k + 1), s, light);
             for (std::size_t i = 0; i < kPixels; ++i)
                 means[i][static_cast<std::size_t>(k)] += static_cast<double>(light[i].x) / samples;
         }
@@ -98,9 +129,8 @@ TEST_P(Sharing, ChangesNoMeanAndTakesTheNoiseOfWhatFewFind) {
     const View view(*tracer, at, {3, -4, 4}, {0.2, 0.3, -0.5}, 1);
     PathSettings settings;
     settings.max_depth = 5;
-    const Picture alone = picture(*tracer, at, view, settings, 32);
-    settings.shared = true;
-    const Picture shared = picture(*tracer, at, view, settings, 32);
+    const Picture alone = picture(*tracer, at, view, settings, 32, each_for_itself);
+    const Picture shared = picture(*tracer, at, view, settings, 32, together);
     double sum_alone = 0, sum_shared = 0, square = 0;
     for (std::size_t i = 0; i < kPixels; ++i) {
         // Student's t with some 15 degrees of freedom, 64 times.
@@ -141,25 +171,48 @@ INSTANTIATE_TEST_SUITE_P(
              }}),
     [](const auto& info) { return info.param.name; });
 
-TEST(SharedPaths, OfOneRayAloneIsAsGoodAsNone) {
-    const Scene s = dish_and_block();
+/// Of camera frames, in the first band.
+Picture frames(const Scene& s, int spp) {
     const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
-    const Ray ray = ray_to({3, -4, 4}, {0.3, 0.3, -0.7});
-    PathSettings settings;
-    const Estimate alone = light_along(*tracer, placed(s), ray, settings, 512);
-    settings.shared = true;
-    std::array<double, kPictures> means{};
-    const Hit first = tracer->intersect(placed(s), ray, kInfinity);
-    for (std::uint32_t k = 0; k < kPictures; ++k)
-        for (std::uint32_t sample = 0; sample < 512; ++sample)
-            means[k] +=
-                static_cast<double>(light_along(*tracer, placed(s), ray, first, settings, 7, k, sample).x) / 512;
-    double mean = 0, squares = 0;
-    for (const double m : means) mean += m / kPictures;
-    for (const double m : means) squares += (m - mean) * (m - mean);
-    const double error = std::sqrt(squares / (kPictures * (kPictures - 1.0)));
-    EXPECT_NEAR(mean, alone.mean.x, kSigmas * std::hypot(error, alone.error));
+    EXPECT_TRUE(tracer);
+    const Camera c = camera(static_cast<int>(kSide), static_cast<int>(kSide), 40);
+    const Rigid3 T_world_camera = looking({3, -4, 4}, {0.2, 0.3, -0.5});
+    FrameSettings settings;
+    settings.spp = spp;
+    settings.method = RenderSettings::Method::path;
+    settings.max_depth = 5;
+    Picture p;
+    std::array<double, kPixels> squares{};
+    for (int k = 0; k < kPictures; ++k) {
+        settings.frame = static_cast<std::uint32_t>(k);
+        RadianceImage image(c.width, c.height);
+        render_radiance(*tracer, placed(s), c, T_world_camera, settings, image);
+        for (std::size_t i = 0; i < kPixels; ++i) {
+            const auto light = static_cast<double>(image.pixels[i].x);
+            p.mean[i] += light / kPictures;
+            squares[i] += light * light / kPictures;
+        }
+    }
+    for (std::size_t i = 0; i < kPixels; ++i)
+        p.error[i] = std::sqrt(std::max(0.0, squares[i] - p.mean[i] * p.mean[i]) / (kPictures - 1.0));
+    return p;
+}
+
+TEST(SharedPaths, TakeTheSunsLightOnFirstSurfacesAsDirectLightDoes) {
+    Scene s = dish_and_block();
+    const Picture quick = frames(s, 16);
+    // Something shines: nothing is simple any more. Nobody sees it.
+    s.materials.push_back(shining(0, {1e-20f, 1e-20f, 1e-20f}));
+    add_sphere(s, 0.01, {0, 0, -9}, static_cast<int>(s.materials.size()) - 1);
+    const Picture slow = frames(s, 16);
+    double lit = 0;
+    for (std::size_t i = 0; i < kPixels; ++i) {
+        EXPECT_NEAR(quick.mean[i], slow.mean[i],
+                    kSigmas * std::hypot(quick.error[i], slow.error[i]) + 1e-5 * slow.mean[i])
+            << i;
+        lit += slow.mean[i];
+    }
+    EXPECT_GT(lit, 100 * static_cast<double>(kPixels));
 }
 
 TEST(SharedPaths, AllocatesNothing) {
@@ -169,11 +222,9 @@ TEST(SharedPaths, AllocatesNothing) {
     ASSERT_TRUE(tracer);
     const Placement at = placed(s);
     const View view(*tracer, at, {3, -4, 4}, {0.2, 0.3, -0.5}, 1);
-    PathSettings settings;
-    settings.shared = true;
-    picture(*tracer, at, view, settings, 1);
+    picture(*tracer, at, view, {}, 1, together);
     const AllocationCounter counter;
-    picture(*tracer, at, view, settings, 2);
+    picture(*tracer, at, view, {}, 2, together);
     EXPECT_EQ(counter.on_this_thread(), 0U);
 }
 

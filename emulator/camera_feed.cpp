@@ -58,8 +58,12 @@ void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
     ledger.t_deadline_ns = deadline;
     stats_.render.add(monotonic_ns() - wall_start);
     stats_.wake_late.add(started - due);
+    stats_.radiance.add(unit_.durations().radiance_ns);
+    stats_.sensor.add(unit_.durations().sensor_ns);
 
+    const std::int64_t wall_ready = monotonic_ns();
     hand_over(ledger, clock);
+    stats_.send.add(monotonic_ns() - wall_ready);
     account(ledger);
     log(ledger);
     ++next_;

@@ -27,6 +27,7 @@ struct CameraStats {
     std::uint64_t ledgers_lost = 0;                        ///< the CAN thread did not keep up
     std::array<std::uint64_t, kStepNames.size()> steps{};  ///< frames that got so far
     Histogram wake_late, render, hand_over;  ///< after it was due; duration; from mid-exposure to hand-over
+    Histogram radiance, sensor, send;        ///< parts of it: durations
     SignedHistogram late;              ///< hand-over (of what is late and dropped: its end) after the deadline
     Histogram error_1e9, samples_1e3;  ///< expected error, 1e-9 of full scale; samples per pixel, 1e-3
 };

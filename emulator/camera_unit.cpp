@@ -73,6 +73,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_, motions_);
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
+    const std::int64_t begun_ns = monotonic_ns();
     FrameSettings settings;
     settings.spp = render.spp;
     settings.seed = render.seed;
@@ -83,10 +84,13 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     settings.budget = budget;
     const FrameAccount account = renderer_.render(placement_, T_world_camera, settings, radiance_, aovs);
     t_radiance_ns_ = monotonic_ns();
+    durations_.radiance_ns = t_radiance_ns_ - begun_ns;
+    const std::int64_t lit_ns = t_radiance_ns_;
     // A renderer that stopped late is allowed for as well.
     if (settings.budget.kind == FrameBudget::Kind::time)
         t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, render.seed, frame, bytes_);
+    durations_.sensor_ns = monotonic_ns() - lit_ns;
 
     FrameLedger ledger;
     ledger.frame = frame;

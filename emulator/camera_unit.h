@@ -30,6 +30,12 @@ private:
     std::size_t next_ = 0;
 };
 
+/// How long the parts of a frame took, wall time.
+struct FrameDurations {
+    std::int64_t radiance_ns = 0;  ///< rays and light
+    std::int64_t sensor_ns = 0;    ///< detector and conversion to the device's bytes
+};
+
 class CameraUnit {
 public:
     /// `world` must outlive the unit. All memory is taken here; `expose` allocates nothing after its first call.
@@ -58,6 +64,8 @@ public:
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
     [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
+    /// Of the last frame.
+    [[nodiscard]] const FrameDurations& durations() const noexcept { return durations_; }
     /// Of every body, as the last frame shows it.
     [[nodiscard]] std::span<const Motion> motions() const noexcept { return motions_; }
 
@@ -76,6 +84,7 @@ private:
     CameraRenderer renderer_;
     RadianceImage radiance_;
     Allowance allowance_;
+    FrameDurations durations_;
     std::int64_t t_radiance_ns_ = 0;  ///< of the last frame: when it was there, or ought to have been
     std::vector<std::uint8_t> bytes_;
 };

@@ -61,6 +61,13 @@ json to_json(const CameraRun& c) {
             {"steps", steps},
             {"wake_late_ms", percentiles_ms(s.wake_late)},
             {"render_ms", percentiles_ms(s.render)},
+            {"radiance_ms", percentiles_ms(s.radiance)},
+            {"sensor_ms", percentiles_ms(s.sensor)},
+            {"send_ms", percentiles_ms(s.send)},
+            {"samples_per_pixel", percentiles([&](double p) { return s.samples_1e3.percentile_ns(p) * 1e-3; })},
+            {"expected_error", s.error_1e9.count() > 0
+                                   ? percentiles([&](double p) { return s.error_1e9.percentile_ns(p) * 1e-9; })
+                                   : json(nullptr)},
             {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
             {"hand_over_after_deadline_ms", lateness(s.late)},
             {"allowance_used", percentiles([&](double p) { return c.allowance_used(p); })}};
@@ -80,6 +87,19 @@ template <class H>
 std::string ms(const H& h) {
     return fmt::format("{:.2f} / {:.2f} / {:.2f}", h.percentile_ns(0.5) * 1e-6, h.percentile_ns(0.999) * 1e-6,
                        h.percentile_ns(1) * 1e-6);
+}
+
+/// Where the time went, and what it was good for.
+std::string frames_in_words(const CameraStats& s) {
+    std::string steps;
+    for (std::size_t i = 0; i < kStepNames.size(); ++i)
+        if (s.steps[i] > 0) steps += fmt::format("{}{} {}", steps.empty() ? "" : ", ", s.steps[i], kStepNames[i]);
+    std::string out =
+        fmt::format("radiance {}; sensor {}; sinks {}; samples per pixel p50 {:.2f}; {}", ms(s.radiance),
+                    ms(s.sensor), ms(s.send), s.samples_1e3.percentile_ns(0.5) * 1e-3, steps);
+    if (s.error_1e9.count() > 0)
+        out += fmt::format("; expected error p50 {:.3g} % of scale", s.error_1e9.percentile_ns(0.5) * 1e-7);
+    return out;
 }
 
 CameraRun of(const CameraFeed& feed, const RenderSettings& render) {
@@ -172,6 +192,7 @@ std::string in_words(const std::vector<LoopRun>& runs) {
                 fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>7.1f}%\n", run.name,
                             c.name, s.frames, s.deadline_missed, s.skipped, c.incomplete(), ms(s.wake_late),
                             ms(s.render), ms(s.hand_over), ms(s.late), 100 * c.allowance_used(0.5));
+            out += fmt::format("{:>7} {:>8} {}\n", "", "", frames_in_words(s));
             out +=
                 fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_in_words(lateness(s.late)));
         }

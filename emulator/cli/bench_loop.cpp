@@ -17,20 +17,25 @@ constexpr int kCpusMax = 1024;
 struct Options {
     std::string scene, cpus, plot;
     std::vector<int> load;
+    int busy = 0;  ///< processors to keep busy, where `load` does not name them
     bool idle_only = false;
     double late_max_percent = 0.1;
     BudgetOptions budget;
     RunOptions run;
 };
 
-/// One processor, where nothing else is asked for: the first that this process may use.
+/// `busy` processes, or one where nothing is asked for: on the first processors that this process may use, over
+/// again where these are fewer.
 Status choose_load(Options& o) {
     for (const int cpu : o.load)
         if (!parse_cpus(std::to_string(cpu)))
             return Error{fmt::format("--load {}: this processor is not there, or not for this process", cpu)};
-    if (o.load.empty() && !o.idle_only)
-        for (int cpu = 0; cpu < kCpusMax && o.load.empty(); ++cpu)
-            if (parse_cpus(std::to_string(cpu))) o.load = {cpu};
+    if (!o.load.empty() || o.idle_only) return Ok{};
+    std::vector<int> usable;
+    for (int cpu = 0; cpu < kCpusMax; ++cpu)
+        if (parse_cpus(std::to_string(cpu))) usable.push_back(cpu);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(1, o.busy)); ++i)
+        o.load.push_back(usable[i % usable.size()]);
     return Ok{};
 }
 
@@ -103,13 +108,16 @@ Command add_bench_loop(CLI::App& bench_command) {
         "loop",
         "The real-time loop, alone and beside processes that keep processors busy: jitter, latency, deadlines");
     c->add_option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that narpa brings along)");
-    c->add_option("--duration", o->run.duration_s, "Seconds of each of the two runs")
+    c->add_option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
         ->check(CLI::Range(0.1, 86400.0))
         ->capture_default_str();
     CLI::Option* load = c->add_option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)")
                             ->delimiter(',')
                             ->allow_extra_args(false);
-    c->add_flag("--idle-only", o->idle_only, "No run beside load")->excludes(load);
+    CLI::Option* busy = c->add_option("--busy", o->busy, "So many processes that keep processors busy (default: 1)")
+                            ->check(CLI::Range(1, kCpusMax))
+                            ->excludes(load);
+    c->add_flag("--idle-only", o->idle_only, "No run beside load")->excludes(load)->excludes(busy);
     o->budget.add_to(*c);
     c->add_option("--cpus", o->cpus,
                   "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one");

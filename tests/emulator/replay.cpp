@@ -139,7 +139,7 @@ TEST_F(ReplayTest, FramesOfEveryStepRepeat) {
 
 /// The clock chose the passes; the log has them. Commands arrive while frames are made.
 TEST_F(ReplayTest, ARunAgainstTheClockRepeatsBitForBit) {
-    const std::string log = run(scene_with("budget_ms = 20", kDetector, "[320, 240]"), 8, false);
+    const std::string log = run(scene_with("budget_ms = 20", kDetector, "[160, 120]"), 5, false);
     EXPECT_GE(expect_repeats(log), 1U);
     const auto frames = read_ledger_log(log + "/nav.ledger.csv");
     ASSERT_TRUE(frames);

@@ -64,14 +64,18 @@ inline void occluded(RTCScene scene, RTCRay& ray) noexcept {
 #endif
 }
 
-/// Sixteen shadow rays. Without the coherent flag: with it, Embree 3.13 has been seen to loop for ever here
-/// (AVX-512, instances), and it gains little.
-inline void occluded(RTCScene scene, const int* valid, RTCRay16& rays) noexcept {
+/// Sixteen shadow rays. With instances in the scene the coherent flag must not be set here: Embree 3.13 then loops
+/// for ever where there is AVX-512. No scene of ours has any.
+inline void occluded(RTCScene scene, const int* valid, RTCRay16& rays, Run run) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
-    rtcOccluded16(valid, scene, &rays);
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+    if (run == Run::together) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcOccluded16(valid, scene, &rays, &arguments);
 #else
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    if (run == Run::together) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcOccluded16(valid, scene, &context, &rays);
 #endif
 }

@@ -175,11 +175,12 @@ void MeshScene::ask_again(const MeshRays& rays, std::uint32_t suspicious, std::u
     }
 }
 
-NARPA_EACH_ISA std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept {
+NARPA_EACH_ISA std::uint32_t MeshScene::occluded(const MeshRays& rays, std::uint32_t wanted,
+                                                 embree::Run run) const noexcept {
     Query query;
     advance(rays, wanted, query);
     if (query.asked == 0) return 0;
-    embree::occluded(scene_.get(), query.valid.data(), query.rays.ray);
+    embree::occluded(scene_.get(), query.valid.data(), query.rays.ray, run);
     Lanes<int> dark;
     for (std::size_t i = 0; i < kPacket; ++i)
         dark[i] = -static_cast<int>(query.rays.ray.tfar[i] == embree::kOccluded);

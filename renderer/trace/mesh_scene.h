@@ -53,7 +53,8 @@ public:
     /// `hits` stay as they were.
     std::uint32_t intersect(const MeshRays& rays, std::uint32_t wanted, embree::Run run,
                             MeshHits& hits) const noexcept;
-    [[nodiscard]] std::uint32_t occluded(const MeshRays& rays, std::uint32_t wanted) const noexcept;
+    [[nodiscard]] std::uint32_t occluded(const MeshRays& rays, std::uint32_t wanted,
+                                         embree::Run run) const noexcept;
 
     /// Where a ray starts that leaves this face at `position` (on it, or above it by a smooth surface's bulge) on
     /// its outer or inner side: lifted by as much as rounding in single precision can lower it, and as far from the

@@ -109,7 +109,8 @@ public:
     /// those that the rays may meet.
     void intersect(const Placement& at, const RayPacket& rays, std::span<const std::uint32_t> bodies,
                    HitPacket& hits) const noexcept;
-    /// Which of the hits of `wanted` cannot see their light, each in a direction of its own without an end.
+    /// Which of the hits of `wanted` cannot see their light, each in a direction of its own without an end. Fastest
+    /// where the directions are nearly the same, as to the Sun.
     [[nodiscard]] std::uint32_t occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
                                          std::uint32_t wanted) const noexcept;
     /// The same, each with an end of its own: t_max[i] metres.

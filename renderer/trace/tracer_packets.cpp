@@ -144,8 +144,8 @@ public:
         }
         set_out(own_at_, start_, directions, wanted, offset_, direction_);
     }
-    [[nodiscard]] WorldRays rays() const noexcept {
-        return {embree::Run::apart, direction_, own_at_.t, offset_, &own_, &start_, inside_};
+    [[nodiscard]] WorldRays rays(embree::Run run = embree::Run::apart) const noexcept {
+        return {run, direction_, own_at_.t, offset_, &own_, &start_, inside_};
     }
 
 private:
@@ -230,7 +230,7 @@ std::uint32_t Tracer::Impl::hidden(const Placement& at, const WorldRays& rays, c
         if (asked == 0) continue;
         turn(rays, leave, at.T_world_body[body], local);
         if (shape.mesh != nullptr) {
-            dark |= shape.mesh->occluded(local, asked);
+            dark |= shape.mesh->occluded(local, asked, rays.run);
         } else {
             MeshHits nobody_looks;
             dark |= meet(shape.exact, local, leave, asked, nobody_looks);
@@ -261,7 +261,10 @@ void Tracer::intersect(const Placement& at, const RayPacket& rays, std::span<con
 
 std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,
                                std::uint32_t wanted) const noexcept {
-    return occluded(at, from, directions, kNoEnd, wanted);
+    if (wanted == 0) return 0;
+    const Impl::Leaving leaving(*impl_, at, {from.body, from.face, from.departure_body, from.outside}, directions,
+                                wanted);
+    return impl_->hidden(at, leaving.rays(embree::Run::together), kNoEnd, wanted);
 }
 
 std::uint32_t Tracer::occluded(const Placement& at, const HitPacket& from, const VecPerRay& directions,

@@ -72,6 +72,7 @@ struct FramePasses::Tile {
     int x, y, width, height;  ///< pixels
     std::span<const std::uint32_t> bodies;
 
+    [[nodiscard]] bool whole() const { return width == kTile && height == kTile; }
     template <class Do>
     void each_pixel(Do&& act) const {
         for (int block = 0; block < 4; ++block)
@@ -121,7 +122,7 @@ struct FramePasses::Worker {
         b.place[i] = static_cast<std::uint8_t>(at);
         if (b.samples.n < kPacket) return;
         trace(tile);
-        if (full == (f.quick ? 1 : kTogether)) light(sink);
+        if (full == at_a_time()) light(sink);
     }
     void trace(const Tile& tile) {
         Batch& b = batches[full];
@@ -161,12 +162,39 @@ struct FramePasses::Worker {
         const auto store = [&](const Batch& b, const Packet& p, const RgbPerRay& radiance) {
             PixelLooks::store(f, p, radiance, b.place, looks);
         };
+        if (stride == 1 && made == 0 && tile.whole()) {
+            for (int block = 0; block < 4; ++block) {
+                put_block(tile, block, first, width, batches[full]);
+                trace(tile);
+                if (full == at_a_time()) light(store);
+            }
+            light(store);
+            return;
+        }
         tile.each_pixel([&](int x, int y, std::size_t at) {
             if (!stands_for(x, width, stride) || !stands_for(y, height, stride)) return;
             if (made > 0 && stands_for(x, width, made) && stands_for(y, height, made)) return;
             add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, store);
         });
         finish(tile, store);
+    }
+
+private:
+    /// Packets that are lit together.
+    [[nodiscard]] std::size_t at_a_time() const { return f.quick ? 1 : kTogether; }
+
+    /// The middles of 4 x 4 pixels, a whole packet.
+    static void put_block(const Tile& tile, int block, std::uint32_t first, int width, Batch& b) {
+        const int x = tile.x + block % 2 * kBlock, y = tile.y + block / 2 * kBlock;
+        for (int i = 0; i < static_cast<int>(kPacket); ++i) {
+            const auto lane = static_cast<std::size_t>(i);
+            b.samples.x[lane] = x + i % kBlock, b.samples.y[lane] = y + i / kBlock;
+            b.samples.number[lane] =
+                first + static_cast<std::uint32_t>(b.samples.y[lane] * width + b.samples.x[lane]);
+            b.samples.sample[lane] = 0;
+            b.place[lane] = static_cast<std::uint8_t>(block * static_cast<int>(kPacket) + i);
+        }
+        b.samples.n = kPacket;
     }
 };
 

@@ -63,12 +63,14 @@ void tell_ladder(const SceneLadder& l) {
                     "RMSE", "bias, %", "predicted", "to loop", "where the time goes"));
     for (const Rung& r : l.ladder.rungs) {
         const auto s = r.loop ? std::nullopt : speed_up(l.ladder, r);
+        // Frames without random numbers differ by nothing but what their sum rounds to.
+        const double error = r.rmse.standard_error < 1e-9 * r.rmse.value ? 0 : r.rmse.standard_error;
         const std::string predicted = r.loop        ? ""
                                       : r.predicted ? fmt::format("x {:.2f}", r.honesty())
                                                     : "not known";
         say(fmt::format("  {:<14} {:>10.3f} {:>10.3f} {:>12.0f} {:>10.4g} +- {:<6.1g} {:>+9.3f} {:>10} {:>9}  {}",
-                        r.name, 1e3 * r.median_s(), 1e3 * r.median_cpu_s(), r.rays, r.rmse.value,
-                        r.rmse.standard_error, 100 * r.bias.value / l.ladder.level, predicted,
+                        r.name, 1e3 * r.median_s(), 1e3 * r.median_cpu_s(), r.rays, r.rmse.value, error,
+                        100 * r.bias.value / l.ladder.level, predicted,
                         r.loop ? ""
                         : s    ? fmt::format("x {:.2f}", *s)
                                : "-",

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -224,36 +225,39 @@ Command add_bench_render(CLI::App& bench_command) {
     auto o = std::make_shared<Options>();
     CLI::App* c = bench_command.add_subcommand(
         "render", "Error of a picture against samples and time, set beside a reference of many samples");
-    c->add_option("SCENE", o->scene, "Scene file (TOML; default: the Cornell box that narpa brings along)");
-    c->add_option("--camera", o->camera, "Name of the camera (default: the first)");
-    c->add_option("--spp", o->spp, "Samples per pixel to measure at")->delimiter(',')->capture_default_str();
-    c->add_option("--reference-spp", o->reference_spp, "Samples per pixel of the reference, a multiple of 16")
-        ->check(CLI::Range(32, 16 * 65535))
-        ->check([](const std::string& text) {
-            return std::stoll(text) % kReferencePictures == 0 ? "" : "expected a multiple of 16";
-        })
-        ->capture_default_str();
-    c->add_option(
-        "--size", o->size,
-        fmt::format("WxH: the camera's view with so many pixels (default: the longer side has {})", kDefaultSize));
-    c->add_option("--seeds", o->seeds, "Independent pictures at each number of samples")
-        ->check(CLI::Range(2, 65535))
-        ->capture_default_str();
+    const std::array of_one_scene{
+        c->add_option("SCENE", o->scene, "Scene file (TOML; default: the Cornell box that narpa brings along)"),
+        c->add_option("--camera", o->camera, "Name of the camera (default: the first)"),
+        c->add_option("--spp", o->spp, "Samples per pixel to measure at")->delimiter(',')->capture_default_str(),
+        c->add_option("--reference-spp", o->reference_spp, "Samples per pixel of the reference, a multiple of 16")
+            ->check(CLI::Range(32, 16 * 65535))
+            ->check([](const std::string& text) {
+                return std::stoll(text) % kReferencePictures == 0 ? "" : "expected a multiple of 16";
+            })
+            ->capture_default_str(),
+        c->add_option("--size", o->size,
+                      fmt::format("WxH: the camera's view with so many pixels (default: the longer side has {})",
+                                  kDefaultSize)),
+        c->add_option("--seeds", o->seeds, "Independent pictures at each number of samples")
+            ->check(CLI::Range(2, 65535))
+            ->capture_default_str()};
     c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
-    c->add_option(
-         "--scenes", o->ladder.scenes,
-         "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, craft-paths, "
-         "docking, docking-contact, cornell")
-        ->delimiter(',')
-        ->check(CLI::IsMember(standing_scenes()));
-    c->add_flag("--quick", o->ladder.quick, "With --scenes: small pictures and few of them, to see that it works");
-    c->add_flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be");
+    CLI::Option* scenes =
+        c->add_option("--scenes", o->ladder.scenes,
+                      "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, "
+                      "craft-paths, docking, docking-contact, cornell")
+            ->delimiter(',')
+            ->check(CLI::IsMember(standing_scenes()));
+    for (CLI::Option* option : of_one_scene) scenes->excludes(option);
+    c->add_flag("--quick", o->ladder.quick, "With --scenes: small pictures and few of them, to see that it works")
+        ->needs(scenes);
+    c->add_flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be")
+        ->needs(scenes);
     c->add_option("-o,--output", o->plot,
                   "FILE.png: error over samples and over time; with --scenes error over time, and where time goes");
     c->footer(
         "Without --scenes, exit status 1 where a bias is beyond three standard errors, or an error falls more "
-        "slowly than "
-        "spp^-0.47.");
+        "slowly than spp^-0.47.");
     return [o] { return bench(*o); };
 }
 

@@ -131,6 +131,8 @@ INSTANTIATE_TEST_SUITE_P(All, BenchRenderMistake,
                                            Mistake{"--size 64x0", "expected WIDTHxHEIGHT"},
                                            Mistake{"--size 64x64x64", "expected WIDTHxHEIGHT"},
                                            Mistake{"--seeds 1", "--seeds"}, Mistake{"--scenes moon", "--scenes"},
+                                           Mistake{"--scenes cornell --size 8x8", "excludes"},
+                                           Mistake{"--gates", "--gates requires --scenes"},
                                            Mistake{"--reference-spp 100", "multiple of 16"},
                                            Mistake{"--camera nadir", "no camera named \"nadir\""},
                                            Mistake{"nowhere.toml", "nowhere.toml"}));

@@ -76,6 +76,7 @@ private:
 
     // What is left.
     [[nodiscard]] std::uint64_t rays_left() const { return budget_.rays - std::min(budget_.rays, rays_); }
+    [[nodiscard]] std::int64_t time_given() const { return budget_.deadline_ns - begun_ns_; }
     [[nodiscard]] std::int64_t ns_left() const {
         return budget_.deadline_ns - slack_ns_ - costs_.expected_ns(Of::show, out_.pixels.size()) - now_ns();
     }
@@ -111,7 +112,8 @@ private:
             begin(f);
         }
         const PassCount pass = passes_.middles(f, stride, made, l);
-        costs_.note(cost_of(f), pass.samples, pass.wall_ns);
+        // One pixel in 4 x 4 fills a quarter of a packet, and tells nothing of the others' cost.
+        if (stride < 4 || !costs_.known(cost_of(f))) costs_.note(cost_of(f), pass.samples, pass.wall_ns);
         if (!book(pass, l, made == 0)) return false;
         account_.step = step;
         to_show_ = ToShow::middles;
@@ -128,7 +130,7 @@ private:
             case Kind::samples: break;
             case Kind::passes: take_as_told(); break;
             case Kind::time:
-                if (!take_middles_at_once()) from_coarse_to_fine();
+                if (!take_first(middle_, 1, FrameStep::one_sample)) from_coarse_to_fine();
                 break;
             case Kind::rays:
                 if (middle_.quick && 2 * passes_.pixels() <= rays_left())  // the camera's and the Sun's
@@ -138,20 +140,15 @@ private:
                 break;
         }
     }
-    /// Where they are sure to fit; should they not, some of the time is left for a coarse frame.
-    bool take_middles_at_once() {
-        const Of what = cost_of(middle_);
+    /// A pass from which all pixels get something, where it is expected to take no more than half of the time left;
+    /// should it take much more, some of that is kept for a coarser one.
+    bool take_first(const Frame& f, int stride, FrameStep step) {
+        const auto pieces = passes_.pixels() / static_cast<std::uint64_t>(stride * stride);
         const std::int64_t left = ns_left();
-        if (!costs_.known(what) || costs_.expected_ns(what, passes_.pixels()) > left / 2) return false;
+        if (!costs_.known(cost_of(f)) || costs_.expected_ns(cost_of(f), pieces) > left / 2) return false;
         PassLimit most = limit();
         most.until_ns -= left / 4;
-        return take(middle_, 1, 0, FrameStep::one_sample, most);
-    }
-    /// Is it likely to take no longer than this?
-    [[nodiscard]] bool worth(Of what, std::uint64_t pieces, std::int64_t wall_ns) {
-        const bool fits = costs_.expected_ns(what, pieces) <= wall_ns;
-        if (!fits) costs_.doubt(what);
-        return fits;
+        return take(f, stride, 0, step, most);
     }
 
     [[nodiscard]] FrameStep step_told() const { return static_cast<FrameStep>(budget_.step); }
@@ -182,14 +179,18 @@ private:
     void from_coarse_to_fine() {
         const Frame& f = has_indirect_ ? direct_ : middle_;
         const FrameStep full = has_indirect_ ? FrameStep::no_indirect : FrameStep::one_sample;
-        // Whatever the time, there is to be a whole frame: rather late than in part.
-        const PassLimit first = budget_.kind == Kind::time ? PassLimit{} : limit();
-        if (!take(f, 4, 0, FrameStep::coarse_4, first) || !take(f, 2, 4, FrameStep::coarse_2) ||
-            !take(f, 1, 2, full))
-            return;
-        if (!has_indirect_ || budget_.kind != Kind::time) return;
-        if (costs_.known(Of::middles) && !worth(Of::middles, passes_.pixels(), ns_left())) return;
-        take(middle_, 1, 0, FrameStep::one_sample);
+        const bool timed = budget_.kind == Kind::time;
+        if (!timed || !take_first(f, 2, FrameStep::coarse_2)) {
+            // Whatever the time, there is to be a whole frame: rather late than in part.
+            if (!take(f, 4, 0, FrameStep::coarse_4, timed ? PassLimit{} : limit())) return;
+            if (!take(f, 2, 4, FrameStep::coarse_2)) return;
+        }
+        if (!take(f, 1, 2, full)) return;
+        if (!has_indirect_ || !timed) return;
+        if (costs_.known(Of::middles) && costs_.expected_ns(Of::middles, passes_.pixels()) > ns_left())
+            costs_.doubt(Of::middles);
+        else
+            take(middle_, 1, 0, FrameStep::one_sample);
     }
 
     /// Samples where the middles say so.
@@ -233,13 +234,16 @@ private:
             return static_cast<std::uint64_t>(part * left / rays_each);
         }
         const std::int64_t left = ns_left();
-        if (static_cast<double>(left) < kRest * static_cast<double>(budget_.deadline_ns - begun_ns_)) return 0;
+        if (static_cast<double>(left) < kRest * static_cast<double>(time_given())) return 0;
         return static_cast<std::uint64_t>((pass == 0 ? kFirstPart : kNextPart) *
                                           static_cast<double>(costs_.fitting(Of::samples, left)));
     }
 
-    [[nodiscard]] bool worth_planning() {
-        return budget_.kind != Kind::time || worth(Of::plan, passes_.pixels(), ns_left());
+    /// A plan is made to its end, whatever the time: it is begun only where it leaves some for samples.
+    [[nodiscard]] bool worth_planning() const {
+        if (budget_.kind != Kind::time) return true;
+        const auto rest = static_cast<std::int64_t>(2 * kRest * static_cast<double>(time_given()));
+        return costs_.expected_ns(Of::plan, passes_.pixels()) + rest <= ns_left();
     }
 
     void show() {
@@ -279,8 +283,12 @@ void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexce
     const double now = static_cast<double>(wall_ns) / static_cast<double>(pieces);
     if (pieces < kLeastPieces && !(known(what) && now < ns)) return;
     // A frame that something held up tells little of the next.
-    ns = known(what) ? ns + 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns) : now;
-    known_[index(what)] = true;
+    switch (measures_[index(what)]) {
+        case 0: ns = now; break;
+        case 1: ns = std::min(ns, now); break;
+        default: ns += 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns);
+    }
+    if (measures_[index(what)] < 2) ++measures_[index(what)];
 }
 
 void PassCosts::doubt(Of what) noexcept {

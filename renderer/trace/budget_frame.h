@@ -14,7 +14,7 @@ public:
     void note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept;
     /// It was expected to take too long, and so not measured.
     void doubt(Of what) noexcept;
-    [[nodiscard]] bool known(Of what) const noexcept { return known_[index(what)]; }
+    [[nodiscard]] bool known(Of what) const noexcept { return measures_[index(what)] > 0; }
     /// Of so many pixels or samples.
     [[nodiscard]] std::int64_t expected_ns(Of what, std::uint64_t pieces) const noexcept {
         return static_cast<std::int64_t>(ns_[index(what)] * static_cast<double>(pieces));
@@ -25,7 +25,7 @@ public:
 private:
     static constexpr std::size_t index(Of what) noexcept { return static_cast<std::size_t>(what); }
     std::array<double, 5> ns_{100, 300, 30, 200, 10};  ///< apiece; guesses at first
-    std::array<bool, 5> known_{};
+    std::array<std::uint8_t, 5> measures_{};           ///< so far; 2: two or more
 };
 
 /// Makes the frame; its settings' budget is of any kind but `samples`. `variance` may be null.

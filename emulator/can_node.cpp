@@ -1,6 +1,7 @@
 #include "emulator/can_node.h"
 
 #include <algorithm>
+#include <ctime>
 #include <limits>
 
 #include "protocols/can/candump.h"
@@ -12,6 +13,14 @@ CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded)
     for (std::size_t i = 0; i < world.scene().bodies.size(); ++i)
         if (PoseTrack* track = world.track(i))
             listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id), -1});
+}
+
+void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
+    if (!waiting_) return bus_.wait(timeout_ns);
+    // Recorded frames are all there, so the bus itself would not wait for the next one's time.
+    const std::int64_t ns = std::clamp<std::int64_t>(received_.t_received_ns - t_now_ns, 0, timeout_ns);
+    const timespec time{ns / 1'000'000'000, ns % 1'000'000'000};
+    ::clock_nanosleep(CLOCK_MONOTONIC, 0, &time, nullptr);
 }
 
 bool CanNode::receive(std::int64_t t_now_ns, bool& moved) noexcept {

@@ -32,6 +32,8 @@ public:
 
     [[nodiscard]] CanBus& bus() noexcept { return bus_; }
 
+    /// Waits until `receive` may have something to read or the time is over; may wake early.
+    void wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept;
     /// Reads one waiting frame. `moved`: it completed a command that was taken. False: nothing was waiting.
     bool receive(std::int64_t t_now_ns, bool& moved) noexcept;
     void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;

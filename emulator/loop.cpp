@@ -109,7 +109,7 @@ void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
     start.ready();
     std::int64_t next_heartbeat = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-        can_->bus().wait(kBusWaitNs);
+        can_->wait(clock_->now_ns(), kBusWaitNs);
         const std::int64_t now = clock_->now_ns();
         t_ns_.store(now, std::memory_order_relaxed);
         bool moved = false;

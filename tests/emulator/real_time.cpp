@@ -94,6 +94,25 @@ TEST_P(OnceItRuns, TheLoopTouchesNoNewPage) {
 INSTANTIATE_TEST_SUITE_P(By, OnceItRuns,
                          ::testing::Values("spp = 2", "budget_ms = 10", "method = \"path\"\nbudget_ms = 10"));
 
+/// A thread above the tracing ones that does not sleep would take their processor.
+TEST_F(RealTime, ARecordedBusIsWaitedForAsleep) {
+    const std::string log = folder_ / "later.log";
+    std::ofstream(log) << "(1000.000000) narpa 333#00\n(4600.000000) narpa 333#01\n";
+    auto world = World::create(scene(small_scene()));
+    ASSERT_TRUE(world);
+    auto bus = open_can_bus("log:" + log, CanRole::hub);
+    ASSERT_TRUE(bus);
+    CanNode node(**world, **bus, nullptr, true);
+    bool moved = false;
+    ASSERT_TRUE(node.receive(0, moved));
+    ASSERT_FALSE(node.receive(0, moved));  // due in an hour
+    const std::int64_t begun = monotonic_ns();
+    node.wait(0, 20'000'000);
+    EXPECT_GE(monotonic_ns() - begun, 20'000'000);
+    node.wait(3'600'000'000'000, 20'000'000'000);  // due by now
+    EXPECT_TRUE(node.receive(3'600'000'000'000, moved));
+}
+
 TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
     const std::string fifo = folder_ / "nav.fifo";
     ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);

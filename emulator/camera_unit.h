@@ -22,11 +22,12 @@ namespace narpa {
 class Allowance {
 public:
     void add(std::int64_t ns) noexcept { last_[next_++ % last_.size()] = ns; }
-    /// The longest of the last 64: what holds a thread up comes seldom, and then again.
+    /// The longest of the last 512: what holds a thread up comes seldom, and then again. One frame in a thousand
+    /// may be late, so memory has to be of that order.
     [[nodiscard]] std::int64_t ns() const noexcept { return *std::max_element(last_.begin(), last_.end()); }
 
 private:
-    std::array<std::int64_t, 64> last_{};
+    std::array<std::int64_t, 512> last_{};
     std::size_t next_ = 0;
 };
 

@@ -32,6 +32,7 @@ bool may_use(int cpu) noexcept {
 
 void keep_heap() noexcept {
     ::mallopt(M_MMAP_MAX, 0);
+    ::mallopt(M_ARENA_MAX, 1);  // a thread that asks for its first block gets no heap of its own
     ::mallopt(M_TRIM_THRESHOLD, INT_MAX);
 }
 

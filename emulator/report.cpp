@@ -150,7 +150,7 @@ std::string lateness_in_words(const json& lateness) {
         if (number(bins[i], "frames") == 0) continue;
         const double from = i > 0 ? kBins[i - 1] : kBins[0], to = i < kBins.size() ? kBins[i] : kBins.back();
         const bool early = to <= 0;
-        const double near = early ? -to : from, far = early ? -from : to;
+        const double near = std::abs(early ? to : from), far = std::abs(early ? from : to);
         text += fmt::format("{}{} ", text.empty() ? "" : ", ", number(bins[i], "frames"));
         text += near == far ? fmt::format("over {:g} ms", near) : fmt::format("{:g} to {:g} ms", near, far);
         text += early ? " early" : " late";

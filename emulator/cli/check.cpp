@@ -116,7 +116,13 @@ nlohmann::json describe(const World& world) {
     for (const Lidar& l : s.lidars)
         lidars.push_back({{"name", l.name}, {"model", l.model}, {"rate_hz", l.rate_hz}});
     for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
-    nlohmann::json render{{"method", name_of(s.render.method, kMethods)}, {"spp", s.render.spp}};
+    nlohmann::json render{{"method", name_of(s.render.method, kMethods)}};
+    if (s.render.budget_rays > 0)
+        render["budget_rays"] = s.render.budget_rays;
+    else if (s.render.budget_ns > 0)
+        render["budget_ms"] = static_cast<double>(s.render.budget_ns) * 1e-6;
+    else
+        render["spp"] = s.render.spp;
     if (s.render.method == RenderSettings::Method::path) render["max_depth"] = s.render.max_depth;
     return {{"name", s.name},
             {"render", render},
@@ -141,12 +147,20 @@ std::string light_words(const Light& l) {
     return std::string(name_of(l.kind, kLightKinds));
 }
 
+std::string budget_words(const RenderSettings& r) {
+    if (r.budget_rays > 0) return fmt::format("at most {} rays a frame", r.budget_rays);
+    if (r.budget_ns > 0)
+        return fmt::format("{:g} ms from the end of an exposure to the hand-over",
+                           static_cast<double>(r.budget_ns) * 1e-6);
+    return fmt::format("{} sample{} a pixel", r.spp, r.spp > 1 ? "s" : "");
+}
+
 void tell_light(const Scene& s) {
     const bool path = s.render.method == RenderSettings::Method::path;
     say(fmt::format(
-        "  render: {}, {} sample{} a pixel",
+        "  render: {}, {}",
         path ? fmt::format("path tracing over at most {} surfaces", s.render.max_depth) : "direct light",
-        s.render.spp, s.render.spp > 1 ? "s" : ""));
+        budget_words(s.render)));
     std::string kinds;
     for (const auto& [kind, count] : material_kinds(s))
         kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", count, kind);

@@ -66,6 +66,20 @@ TEST(Check, JsonHasTheSame) {
     EXPECT_EQ(scene.at("cameras")[0].at("lens"), true);
 }
 
+TEST(Check, TellsTheBudget) {
+    const TemporaryFolder folder;
+    const std::string file = folder / "s.toml";
+    std::ofstream(file) << with_render(small_scene(), "budget_ms = 60");
+    EXPECT_NE(run_check(file + " 2>&1 >/dev/null")
+                  .text.find("render: direct light, 60 ms from the end of an exposure to the hand-over\n"),
+              std::string::npos);
+    std::ofstream(file) << with_render(small_scene(), "budget_rays = 100000");
+    EXPECT_NE(run_check(file + " 2>&1 >/dev/null").text.find("render: direct light, at most 100000 rays a frame\n"),
+              std::string::npos);
+    EXPECT_EQ(nlohmann::json::parse(run_check("--json " + file + " 2>/dev/null").text).at("scene").at("render"),
+              (nlohmann::json{{"method", "direct"}, {"budget_rays", 100'000}}));
+}
+
 TEST(Check, WarnsOfMirrorsInDirectLight) {
     const TemporaryFolder folder;
     std::ofstream(folder / "s.toml")

@@ -11,12 +11,18 @@
 namespace narpa {
 namespace {
 
-/// Edges move by less than a pixel, and thin parts are met by the middles now and then only: pixels beside an edge
-/// get this part of its variance, those next to them that.
-constexpr float kBeside = 0.05f, kNextButOne = 0.01f;
-/// Weight of a pixel that is much like its neighbours, in terms of a typical edge's. About some all is the very
-/// same, as in empty space: they have an eighth of that (kEventful).
-constexpr double kLeastWeight = 1.0 / 128;
+/// How pixels are weighed against typical edges.
+struct Weighing {
+    /// Edges move by less than a pixel, and thin parts are met by the middles now and then only: pixels beside an
+    /// edge get this part of its variance, those next to them that.
+    float beside, next_but_one;
+    /// Of a pixel that is much like its neighbours, in terms of a typical edge's weight. About some all is the very
+    /// same, as in empty space: they have an eighth of that (kEventful).
+    double least;
+};
+/// Of what their middles show, pixels off an edge have a hundredth of its variance and less. Where paths are
+/// followed, a pixel's edges are told by its neighbours alone; and some light is so rare that no middle has met it.
+constexpr Weighing kByDirectLight{0.05f, 0.01f, 1.0 / 128}, kByPaths{0.25f, 0.04f, 1.0 / 16};
 /// Along an edge of little contrast there may be a glint that no middle met: so much of a typical variance is taken
 /// for granted.
 constexpr float kUnseen = 0.02f;
@@ -70,6 +76,7 @@ void SamplePlan::weigh(const Frame& f, const PixelLooks& looks, std::span<const 
         all.met += sums_[tile].met;
     }
     met_ = all.met;
+    first_ = std::countr_zero(f.quick ? kFewest : kFewestOfPaths) * kPerDoubling;
     const double typical = all.variance > 0 ? all.variance / all.deviation : 1;
     for (auto& bin : histogram_) bin.store(0, std::memory_order_relaxed);
     tbb::parallel_for(
@@ -100,6 +107,7 @@ void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::siz
 void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
                             std::span<std::uint32_t, kWeights> histogram) noexcept {
     const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
+    const Weighing& w = f.quick ? kByDirectLight : kByPaths;
     Grid edge{}, noise{}, known{};
     const float unseen = kUnseen / 12 * static_cast<float>(typical_variance);
     for (int y = 0; y < kSide; ++y)
@@ -134,13 +142,13 @@ void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t
                 continue;
             }
             const auto column = [&](const Grid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
-            float edges = std::max({edge[y][x], kBeside * fold(1, column(near), greater),
-                                    kNextButOne * fold(2, column(far), greater)});
+            float edges = std::max({edge[y][x], w.beside * fold(1, column(near), greater),
+                                    w.next_but_one * fold(2, column(far), greater)});
             if (!f.quick) {
                 const float seen = at_corners(edge, x, y);
                 const float breaks = contrasts_[tile].breaks[place];
-                edges = std::max({breaks > 0 ? std::max(seen, unseen * breaks) : 0.0f, kBeside * seen,
-                                  kNextButOne * std::max({far[y - 2][x], far[y + 2][x], at_sides(edge, x, y)})});
+                edges = std::max({breaks > 0 ? std::max(seen, unseen * breaks) : 0.0f, w.beside * seen,
+                                  w.next_but_one * std::max({far[y - 2][x], far[y + 2][x], at_sides(edge, x, y)})});
             }
             const float neighbours = fold(2, column(knowns), plus) - at_cross(known, x, y);
             const float noisy =
@@ -148,7 +156,7 @@ void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t
                                : 0.0f;
             const double variance = std::pow(static_cast<double>(edges) / typical_variance, kEdgePower) +
                                     static_cast<double>(noisy) / typical_variance;
-            const double doublings = std::log2(std::max(std::sqrt(variance), kLeastWeight) / kLeastWeight);
+            const double doublings = std::log2(std::max(std::sqrt(variance), w.least) / w.least);
             const auto hash = sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling;
             const int event = variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0;
             const int weight = event + static_cast<int>(hash);

@@ -164,16 +164,18 @@ private:
     }
 
     /// How many rays a sample takes is not known before: the first of 4 x 4 pixels tells, and counts if the others
-    /// fit as well.
+    /// fit as well. Not by paths: these share what they find with those that are traced with them, and to make the
+    /// frame again all are traced at once.
     bool begin_with_a_sixteenth() {
         PassLimit part = limit();
         part.rays /= 4;
         if (!take(middle_, 4, 0, FrameStep::nothing, part)) return false;
         to_show_ = ToShow::nothing;
         const double each = static_cast<double>(account_.rays) / static_cast<double>(account_.samples);
-        const double others = static_cast<double>(passes_.pixels() - account_.samples);
-        return each * others <= kNextRays * static_cast<double>(rays_left()) &&
-               take(middle_, 1, 4, FrameStep::one_sample);
+        const std::uint64_t made = has_indirect_ ? 0 : account_.samples;
+        return each * static_cast<double>(passes_.pixels() - made) <=
+                   kNextRays * static_cast<double>(rays_left()) &&
+               take(middle_, 1, has_indirect_ ? 0 : 4, FrameStep::one_sample);
     }
 
     void from_coarse_to_fine() {

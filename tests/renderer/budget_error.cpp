@@ -42,7 +42,7 @@ BudgetView tilted_boxes() {
     add_sun(s, {0.3, 0.4, 1});
     return {std::move(s), 64, 48, 60, looking({0, 0, 15}, {0, 0, 0}, {0, 1, 0})};
 }
-/// Struts that taper from two pixels to nothing: details of all widths.
+/// Struts that taper from two pixels to nothing: details of all widths, and few that no middle meets at all.
 BudgetView tapering_struts() {
     Scene s;
     s.materials.push_back(lambert(0.5f));
@@ -60,7 +60,7 @@ BudgetView tapering_struts() {
                   Vec3{2.6 * (i % 6) - 6.5, 2.6 * (i / 6) - 3.9, 0}});
     }
     add_sun(s, {0.1, 0.1, 1});
-    return {std::move(s), 64, 48, 60, looking({0, 0, 15}, {0, 0, 0}, {0, 1, 0})};
+    return {std::move(s), 96, 72, 90, looking({0, 0, 15}, {0, 0, 0}, {0, 1, 0})};
 }
 
 TEST(BudgetError, EstimateIsHonestWhereEdgesAreStraight) {

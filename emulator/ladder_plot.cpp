@@ -156,7 +156,7 @@ void draw_legend(cv::Mat& image) {
             line(image, p + cv::Point2d{0, -5}, p + cv::Point2d{26, -5}, kind.colour, 2);
             dot(image, p + cv::Point2d{13, -5}, 4, kind.colour);
         });
-    entry(58, "thin: as the frames tell it; hollow: something left out", [&](cv::Point2d p) {
+    entry(58, "thin: as told; hollow: light left out", [&](cv::Point2d p) {
         line(image, p + cv::Point2d{0, -5}, p + cv::Point2d{26, -5}, kAdaptiveColour, 1);
     });
     x = 40;

@@ -172,10 +172,15 @@ private:
         if (!take(middle_, 4, 0, FrameStep::nothing, part)) return false;
         to_show_ = ToShow::nothing;
         const double each = static_cast<double>(account_.rays) / static_cast<double>(account_.samples);
-        const std::uint64_t made = has_indirect_ ? 0 : account_.samples;
-        return each * static_cast<double>(passes_.pixels() - made) <=
-                   kNextRays * static_cast<double>(rays_left()) &&
-               take(middle_, 1, has_indirect_ ? 0 : 4, FrameStep::one_sample);
+        if (!has_indirect_) {
+            const double others = static_cast<double>(passes_.pixels() - account_.samples);
+            return each * others <= kNextRays * static_cast<double>(rays_left()) &&
+                   take(middle_, 1, 4, FrameStep::one_sample);
+        }
+        // More neighbours to share with cost more rays, by up to a half: rather no indirect light than no image.
+        const double all = static_cast<double>(passes_.pixels());
+        return each * all <= kFirstRays * static_cast<double>(rays_left()) &&
+               take(middle_, 1, 0, FrameStep::one_sample);
     }
 
     void from_coarse_to_fine() {

@@ -65,7 +65,7 @@ struct ShadowRays {
     }
     void ask(RTCScene scene) {
         for (int i = 0; i < 16; ++i) valid[static_cast<std::size_t>(i)] = i < n ? -1 : 0;
-        embree::occluded(scene, valid.data(), q);
+        embree::occluded(scene, valid.data(), q, embree::Run::together);
         for (int i = 0; i < n; ++i) shadowed += q.tfar[i] < 0;
         asked += static_cast<std::uint64_t>(n);
         n = 0;

@@ -203,7 +203,7 @@ std::uint64_t ReferenceLoop::Impl::ask(Paths& p, const Source& source) const {
         p.shadow.tnear[i] = 0, p.shadow.tfar[i] = far_m, p.shadow.mask[i] = ~0u;
     }
     if (rays == 0) return 0;
-    embree::occluded(raw.scene.get(), p.asked.data(), p.shadow);
+    embree::occluded(raw.scene.get(), p.asked.data(), p.shadow, embree::Run::apart);
     for (std::size_t i = 0; i < 16; ++i)
         if (p.asked[i] != 0 && p.shadow.tfar[i] >= 0) p.light[i] += p.throughput[i] * p.incident[i];
     return rays;

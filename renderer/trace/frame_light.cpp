@@ -303,6 +303,7 @@ void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay>
         }
     std::array<FirstSurface, kSharing> first;
     std::array<Rgb, kSharing> light;
+    std::array<float, kSharing> variance;
     for (std::size_t r = 0; r < kOfAPixel && n[r] > 0; ++r) {
         const std::span<const Place> of_rank = std::span(places[r]).first(n[r]);
         for (std::size_t i = 0; i < n[r]; ++i) {
@@ -313,8 +314,11 @@ void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay>
         }
         packets.front().rays_traced +=
             shared_path_radiance(f.tracer, f.at, f.path, std::span(first).first(n[r]), f.settings.seed,
-                                 f.settings.frame, std::span(light).first(n[r]));
-        for (std::size_t i = 0; i < n[r]; ++i) radiance[of_rank[i].packet].put(of_rank[i].lane, light[i]);
+                                 f.settings.frame, std::span(light).first(n[r]), std::span(variance).first(n[r]));
+        for (std::size_t i = 0; i < n[r]; ++i) {
+            radiance[of_rank[i].packet].put(of_rank[i].lane, light[i]);
+            packets[of_rank[i].packet].variance[of_rank[i].lane] = variance[i];
+        }
     }
     clock.ends(Phase::indirect);
 }

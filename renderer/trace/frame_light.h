@@ -46,7 +46,8 @@ struct Packet {
     // Where it is not: which random numbers each takes.
     Lanes<std::uint32_t> number{};  ///< its PixelSampler's "pixel"
     Lanes<std::uint32_t> sample{};
-    FirstSurfaces first;  ///< out: where the Sun comes first
+    FirstSurfaces first;    ///< out: where the Sun comes first
+    Lanes<float> variance;  ///< out: of the mean band of light that paths share
     // Counted on from packet to packet:
     std::uint64_t rays_traced = 0;  ///< of all kinds
     PhaseTimes* times = nullptr;    ///< null: nobody looks

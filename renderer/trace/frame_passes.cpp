@@ -350,7 +350,7 @@ void put_variances(const Tile& t, const PerPixel<PixelMean>& means, const TileCo
                    std::vector<float>& variance) {
     t.each_pixel([&](int x, int y, std::size_t at) {
         const std::uint32_t n = means[at].count();
-        const float one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f);
+        const float one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f) + contrast.shared[at];
         variance[index_of(x, y, image_width)] =
             n == 0   ? contrast.middle[at]
             : n == 1 ? one

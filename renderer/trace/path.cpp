@@ -61,9 +61,11 @@ public:
         leave_camera(rays, first);
         go_on();
     }
-    void run_shared(std::span<const FirstSurface> first, std::span<Rgb> radiance) {
+    void run_shared(std::span<const FirstSurface> first, std::span<Rgb> radiance, std::span<float> variance) {
         shared_ = !settings_.direct && settings_.max_depth > 1;
         radiance_ = radiance;
+        variance_ = variance;
+        std::fill(variance.begin(), variance.end(), 0.0f);
         leave_camera(first);
         go_on();
     }
@@ -217,7 +219,7 @@ private:
         const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[0]);
         rays_traced_ += starts_.gather(tracer_, at_, bounces_.from(0, n_bounces_),
                                        numbers.point(numbers_.sample[0], kSharingGroup)[0],
-                                       settings_.pixel_angle_rad, radiance_);
+                                       settings_.pixel_angle_rad, radiance_, variance_);
     }
 
     /// Random numbers of the packet that begins with this path.
@@ -504,6 +506,7 @@ private:
     bool shared_ = false;     ///< paths give each other of what they find
     const bool sun_alone_;    ///< nothing else shines
     std::span<Rgb> radiance_;
+    std::span<float> variance_;  ///< of what is shared
     std::uint64_t rays_traced_ = 0;
 
     std::size_t n_ = 0;  ///< paths that have not ended
@@ -542,13 +545,13 @@ bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept {
 
 std::uint64_t shared_path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                                    std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
-                                   std::span<Rgb> radiance) noexcept {
+                                   std::span<Rgb> radiance, std::span<float> variance) noexcept {
     if (first.empty()) return 0;
     std::array<std::uint32_t, kSharing> pixel, sample;
     for (std::size_t i = 0; i < first.size(); ++i) pixel[i] = first[i].pixel, sample[i] = first[i].sample;
     Stream stream(tracer, at, settings,
                   {seed, frame, std::span(pixel).first(first.size()), std::span(sample).first(first.size())});
-    stream.run_shared(first, radiance);
+    stream.run_shared(first, radiance, variance);
     return stream.rays_traced();
 }
 

@@ -71,9 +71,10 @@ inline constexpr float kSharpLobe = 1000;
 
 /// The same of up to kSharing rays, but what one path finds lights the first surfaces of all (shared_bounces.h), so
 /// that the result of each ray depends on the others. No two should be the same pixel's: what they find by the same
-/// path is not independent. `radiance`: of lit surfaces the light that they have, and all of it after.
+/// path is not independent. `radiance`: of lit surfaces the light that they have, and all of it after. `variance`:
+/// out, of the mean band of what is shared, roughly.
 std::uint64_t shared_path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                                    std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
-                                   std::span<Rgb> radiance) noexcept;
+                                   std::span<Rgb> radiance, std::span<float> variance) noexcept;
 
 }  // namespace narpa

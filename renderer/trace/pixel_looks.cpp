@@ -98,6 +98,7 @@ void PixelLooks::store(const Frame& f, const Packet& p, const RgbPerRay& radianc
     put(radiance.r, tile.r), put(radiance.g, tile.g), put(radiance.b, tile.b);
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
+    if (!f.quick) put(p.variance, tile.shared);
 }
 
 namespace {
@@ -261,6 +262,11 @@ void PixelLooks::contrast(const Frame& f, std::size_t tile, TileContrast& out) c
     Around a;
     gather(f, tile, a);
     judge(a, out);
+    const bool shares = !f.quick && !f.path.direct;
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+        out.shared[i] = shares && looks_[tile].surface[i] != 0 ? looks_[tile].shared[i] : 0;
+        out.middle[i] += out.shared[i];
+    }
     const int x_end = width_ - static_cast<int>(tile) % tiles_x_ * kTile;
     const int y_end = height_ - static_cast<int>(tile) / tiles_x_ * kTile;
     if (x_end >= kTile && y_end >= kTile) return;
@@ -269,7 +275,7 @@ void PixelLooks::contrast(const Frame& f, std::size_t tile, TileContrast& out) c
             if (x >= x_end || y >= y_end) {
                 const std::size_t place = place_in_tile(x, y);
                 out.breaks[place] = 0;
-                out.edge[place] = out.noise[place] = out.middle[place] = 0;
+                out.edge[place] = out.noise[place] = out.middle[place] = out.shared[place] = 0;
             }
 }
 

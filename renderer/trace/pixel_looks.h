@@ -46,6 +46,7 @@ struct alignas(64) TileLooks {
     PerPixel<float> r, g, b;     ///< radiance
     PerPixel<float> nx, ny, nz;  ///< normal, world
     PerPixel<float> depth_m;
+    PerPixel<float> shared;           ///< variance of light that paths share, which neighbours do not show
     PerPixel<std::uint32_t> surface;  ///< of body, material and sunlight; 0: background
 };
 
@@ -54,6 +55,7 @@ struct alignas(64) TileContrast {
     PerPixel<float> breaks;  ///< edges between it and its four neighbours
     PerPixel<float> edge;    ///< of one random sample of the pixel, for edges, details and slopes
     PerPixel<float> noise;   ///< of one sample, for all else; negative: not known
+    PerPixel<float> shared;  ///< of one sample, for light that the tile's paths share: neighbours are off alike
     PerPixel<float> middle;  ///< expected squared error of the middle
 };
 

@@ -97,6 +97,7 @@ void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::siz
     Sums sums;
     for (std::size_t i = 0; i < kTilePixels; ++i) {
         const double variance = static_cast<double>(c.edge[i] + std::max(c.noise[i], 0.0f));
+        sums.shared += static_cast<double>(c.shared[i]);
         sums.variance += variance;
         sums.deviation += std::sqrt(variance);
         sums.met += looks.tile(tile).surface[i] != 0;
@@ -104,10 +105,24 @@ void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::siz
     sums_[tile] = sums;
 }
 
+float SamplePlan::shared_around(const PixelLooks& looks, std::size_t tile) const noexcept {
+    const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
+    double sum = 0, met = 0;
+    for (int y = std::max(ty - 1, 0); y <= std::min(ty + 1, looks.tiles_y() - 1); ++y)
+        for (int x = std::max(tx - 1, 0); x <= std::min(tx + 1, looks.tiles_x() - 1); ++x) {
+            const auto from = static_cast<std::size_t>(y * looks.tiles_x() + x);
+            if (from == tile || !looks.looked_at(from)) continue;
+            sum += sums_[from].shared;
+            met += static_cast<double>(sums_[from].met);
+        }
+    return met > 0 ? static_cast<float>(sum / met) : 0;
+}
+
 void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
                             std::span<std::uint32_t, kWeights> histogram) noexcept {
     const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
     const Weighing& w = f.quick ? kByDirectLight : kByPaths;
+    const float around = f.quick ? 0 : shared_around(looks, tile);
     Grid edge{}, noise{}, known{};
     const float unseen = kUnseen / 12 * static_cast<float>(typical_variance);
     for (int y = 0; y < kSide; ++y)
@@ -154,8 +169,9 @@ void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t
             const float noisy =
                 neighbours > 0 ? std::max(fold(2, column(noises), plus) - at_cross(noise, x, y), 0.0f) / neighbours
                                : 0.0f;
+            const float shared = looks.tile(tile).surface[place] != 0 ? around : 0;
             const double variance = std::pow(static_cast<double>(edges) / typical_variance, kEdgePower) +
-                                    static_cast<double>(noisy) / typical_variance;
+                                    static_cast<double>(noisy + shared) / typical_variance;
             const double doublings = std::log2(std::max(std::sqrt(variance), w.least) / w.least);
             const auto hash = sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling;
             const int event = variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0;

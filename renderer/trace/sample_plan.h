@@ -63,6 +63,7 @@ private:
     static constexpr int kFull = std::countr_zero(kMostSamples) * kPerDoubling;  ///< kMostSamples everywhere
     struct Sums {
         double variance = 0, deviation = 0;
+        double shared = 0;  ///< variance of light that is shared, of all that met something
         std::uint64_t met = 0;
     };
 
@@ -72,6 +73,9 @@ private:
         return doublings < kFull ? 1u << (doublings / kPerDoubling) : kMostSamples;
     }
     void contrast_tile(const Frame& f, const PixelLooks& looks, std::size_t tile) noexcept;
+    /// Variance of the light that is shared, by the tiles around alone: what a tile's own paths found by chance
+    /// must not decide which of its middles stay.
+    [[nodiscard]] float shared_around(const PixelLooks& looks, std::size_t tile) const noexcept;
     void weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
                     std::span<std::uint32_t, kWeights> histogram) noexcept;
 

@@ -124,7 +124,7 @@ NARPA_EACH_ISA void Starts::join(const Block& b, const Bounce& bounce, Join& __r
 }
 
 std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
-                             std::span<Rgb> radiance) const noexcept {
+                             std::span<Rgb> radiance) noexcept {
     std::array<Join, kSharing / kPacket> joins;
     double density = 0;
     std::uint64_t rays = 0;
@@ -163,14 +163,19 @@ std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bo
         const Join& j = joins[k];
         for_each_lane(j.lit, [&](std::size_t i) {
             const Rgb f = j.reflected[i] * static_cast<float>(j.geometry[i] * per_density);
-            radiance[ray_[k * kPacket + i]] += f * (even ? light : bounce.towards(-j.direction[i]));
+            const std::size_t number = k * kPacket + i;
+            const Rgb sent = f * (even ? light : bounce.towards(-j.direction[i]));
+            const float mean = mean_band(sent);
+            radiance[ray_[number]] += sent;
+            sum_[number] += mean;
+            squares_[number] += mean * mean;
         });
     }
     return rays;
 }
 
 std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, std::span<Bounce> bounces, double choice,
-                             double pixel_angle_rad, std::span<Rgb> radiance) noexcept {
+                             double pixel_angle_rad, std::span<Rgb> radiance, std::span<float> variance) noexcept {
     Room<float> bright;
     double sum = 0;
     for (std::size_t i = 0; i < bounces.size(); ++i) {
@@ -180,6 +185,8 @@ std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, std::spa
     }
     if (sum == 0) return 0;
     make_points(tracer, at, pixel_angle_rad);
+    std::fill_n(sum_.begin(), n_, 0.0f);
+    std::fill_n(squares_.begin(), n_, 0.0f);
     const double wanted = std::min(kBounces, static_cast<double>(bounces.size()));
     double passed = choice;
     std::uint64_t rays = 0;
@@ -191,6 +198,12 @@ std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, std::spa
         if (passed >= 1) passed -= 1;
         rays += gather(tracer, at, bounces[i], static_cast<float>(1 / chance), radiance);
     }
+    // Each path that set out brought its part, most of them none: their scatter is that of the sum.
+    double set_out = 0;
+    for (std::size_t k = 0; k < n_; ++k) set_out += static_cast<double>(block_[k / kPacket].chance[k % kPacket]);
+    const auto n = static_cast<float>(std::max(set_out, 2.0));
+    for (std::size_t k = 0; k < n_; ++k)
+        variance[ray_[k]] = std::max(0.0f, squares_[k] - sum_[k] * sum_[k] / n) * n / (n - 1);
     return rays;
 }
 

@@ -50,9 +50,10 @@ public:
     int add(const Placement& at, const Hit& hit, const PathPoint& point, const Path& path, float chance) noexcept;
 
     /// Adds to each start's radiance what the bounces send it. `choice`: in [0, 1), chooses some of the bounces
-    /// where they are many. Returns the number of rays.
+    /// where they are many. `variance`: out, of the mean band of what was added, as far as one go can tell. Returns
+    /// the number of rays.
     std::uint64_t gather(const Tracer& tracer, const Placement& at, std::span<Bounce> bounces, double choice,
-                         double pixel_angle_rad, std::span<Rgb> radiance) noexcept;
+                         double pixel_angle_rad, std::span<Rgb> radiance, std::span<float> variance) noexcept;
 
 private:
     struct Block {
@@ -76,11 +77,12 @@ private:
     [[nodiscard]] std::size_t blocks() const noexcept { return (n_ + kPacket - 1) / kPacket; }
     static void join(const Block& b, const Bounce& bounce, Join& j) noexcept;
     std::uint64_t gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
-                         std::span<Rgb> radiance) const noexcept;
+                         std::span<Rgb> radiance) noexcept;
 
     std::size_t n_ = 0;
     std::array<Block, kSharing / kPacket> block_;
     std::array<std::uint32_t, kSharing> ray_;
+    std::array<float, kSharing> sum_, squares_;      ///< of the mean bands that bounces send to each
     std::array<const FirstSurface*, kSharing> lit_;  ///< null: the others
     Room<PathPoint> points_;                         ///< of those that are special
     Room<Path> paths_;                               ///< of those that are guided

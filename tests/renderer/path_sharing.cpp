@@ -71,7 +71,8 @@ std::uint64_t together(const Tracer& tracer, const Placement& at, const View& vi
                     i % kPacket,
                     view.number[i],
                     sample};
-    return shared_path_radiance(tracer, at, settings, first, seed, 0, light);
+    std::array<float, kSharing> variance;
+    return shared_path_radiance(tracer, at, settings, first, seed, 0, light, variance);
 }
 
 Picture picture(const Tracer& tracer, const Placement& at, const View& view, const PathSettings& settings,

@@ -19,7 +19,7 @@
 
 namespace narpa {
 
-/// A point that a path from one of the receivers has found, and the light that falls in on it.
+/// A point that a path from one of the starts has found, and the light that falls in on it.
 struct Bounce {
     struct Incident {
         Vec3 from{};  ///< unit

@@ -170,7 +170,7 @@ INSTANTIATE_TEST_SUITE_P(
                  add_sphere(s, 0.4, {-0.6, -0.9, -0.9}, first + 1);
                  add_sphere(s, 0.2, {1.2, 0.6, 0.2}, first + 2);
              }}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& test) { return test.param.name; });
 
 /// Of camera frames, in the first band.
 Picture frames(const Scene& s, int spp) {

@@ -24,6 +24,10 @@ constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
 /// Of rays, whose number follows from that of the samples nearly to the last; where paths are followed, to a tenth
 /// from one pass to the next.
 constexpr double kFirstRays = 0.6, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
+/// Of rays, so much may be expected to go to the middles: how many they take is told by a part of them.
+constexpr double kSure = 0.85;
+/// The coarsest image takes two rays for one pixel in 4 x 4, and for those that stand at the edges.
+constexpr std::uint64_t kPixelsOfACoarseRay = 4;
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
 
@@ -163,24 +167,27 @@ private:
         }
     }
 
-    /// How many rays a sample takes is not known before: the first of 4 x 4 pixels tells, and counts if the others
-    /// fit as well. Not by paths: these share what they find with those that are traced with them, and to make the
-    /// frame again all are traced at once.
+    /// How many rays a sample takes is not known before: a sixteenth of the tiles tells, and the others follow if
+    /// they are as good as sure to fit. Should they not, enough is kept for a coarse image.
     bool begin_with_a_sixteenth() {
+        using Tiles = FramePasses::Tiles;
+        if (passes_.pixels() > rays_left()) return false;
         PassLimit part = limit();
-        part.rays /= 4;
-        if (!take(middle_, 4, 0, FrameStep::nothing, part)) return false;
-        to_show_ = ToShow::nothing;
-        const double each = static_cast<double>(account_.rays) / static_cast<double>(account_.samples);
-        if (!has_indirect_) {
-            const double others = static_cast<double>(passes_.pixels() - account_.samples);
-            return each * others <= kNextRays * static_cast<double>(rays_left()) &&
-                   take(middle_, 1, 4, FrameStep::one_sample);
-        }
-        // More neighbours to share with cost more rays, by up to a half: rather no indirect light than no image.
-        const double all = static_cast<double>(passes_.pixels());
-        return each * all <= kFirstRays * static_cast<double>(rays_left()) &&
-               take(middle_, 1, 0, FrameStep::one_sample);
+        part.rays /= 2;
+        const PassCount pilot = passes_.middles(middle_, 1, 0, part, Tiles::a_sixteenth);
+        if (!book(pilot, part, true)) return false;
+        PassLimit rest = limit();
+        rest.rays -= std::min(rest.rays, passes_.pixels() / kPixelsOfACoarseRay);
+        const double each =
+            static_cast<double>(pilot.rays) / static_cast<double>(std::max<std::uint64_t>(pilot.samples, 1));
+        if (each * static_cast<double>(passes_.pixels() - pilot.samples) > kSure * static_cast<double>(rest.rays))
+            return false;
+        const PassCount others = passes_.middles(middle_, 1, 0, rest, Tiles::the_others);
+        if (!book(others, rest, false)) return false;
+        account_.step = FrameStep::one_sample;
+        to_show_ = ToShow::middles;
+        stride_ = 1;
+        return true;
     }
 
     void from_coarse_to_fine() {

@@ -33,6 +33,11 @@ int standing_for(int x, int width, int stride) {
     return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
 }
 
+/// A lattice of tiles.
+bool in_a_sixteenth(int tx, int ty) {
+    return (tx + 6 * ty) % 16 == 0;
+}
+
 /// Where rays that meet no body may still find light: the Sun's disc, lamps.
 class EmittersInView {
 public:
@@ -439,8 +444,10 @@ void FramePasses::estimate_middles(const Frame& f) {
     });
 }
 
-PassCount FramePasses::middles(const Frame& f, int stride, int made, const PassLimit& limit) {
+PassCount FramePasses::middles(const Frame& f, int stride, int made, const PassLimit& limit, Tiles which) {
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        if (which != Tiles::all && in_a_sixteenth(t.x / kTile, t.y / kTile) != (which == Tiles::a_sixteenth))
+            return;
         w.middles(t, camera_.width, camera_.height, stride, made, looks_.tile(t.index));
     });
 }

@@ -46,9 +46,11 @@ public:
     /// Each pixel with `spp` samples, shown at once. Its variance goes to `variance`, if that is not null.
     PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance);
 
+    /// Which tiles a pass goes over: a sixteenth lie spread evenly.
+    enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
     /// Middles of the pixels that stand for squares of `stride` (1, 2 or 4) pixels, but for those that a pass of
     /// stride `made` has seen to (0: none has).
-    PassCount middles(const Frame& f, int stride, int made, const PassLimit& limit);
+    PassCount middles(const Frame& f, int stride, int made, const PassLimit& limit, Tiles which = Tiles::all);
     void show_middles(const Frame& f, int stride, RadianceImage& out);
 
     /// Chooses where samples go; after all middles.

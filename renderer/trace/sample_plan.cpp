@@ -19,10 +19,13 @@ struct Weighing {
     /// Of a pixel that is much like its neighbours, in terms of a typical edge's weight. About some all is the very
     /// same, as in empty space: they have an eighth of that (kEventful).
     double least;
+    /// Of a pixel whose middle met nothing: thin parts of a body may pass between the middles, as its bounds are
+    /// there, and to look for them costs one ray and no shading. In doublings of `least`.
+    int empty;
 };
 /// Of what their middles show, pixels off an edge have a hundredth of its variance and less. Where paths are
 /// followed, a pixel's edges are told by its neighbours alone; and some light is so rare that no middle has met it.
-constexpr Weighing kByDirectLight{0.05f, 0.01f, 1.0 / 128}, kByPaths{0.25f, 0.04f, 1.0 / 16};
+constexpr Weighing kByDirectLight{0.05f, 0.01f, 1.0 / 128, 2}, kByPaths{0.25f, 0.04f, 1.0 / 16, 0};
 /// Along an edge of little contrast there may be a glint that no middle met: so much of a typical variance is taken
 /// for granted.
 constexpr float kUnseen = 0.02f;
@@ -174,7 +177,9 @@ void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t
                                     static_cast<double>(noisy + shared) / typical_variance;
             const double doublings = std::log2(std::max(std::sqrt(variance), w.least) / w.least);
             const auto hash = sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling;
-            const int event = variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0;
+            const bool empty = looks.tile(tile).surface[place] == 0;
+            const int event = std::max(variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0,
+                                       empty ? kEventful + w.empty * kPerDoubling : 0);
             const int weight = event + static_cast<int>(hash);
             weights_[tile][place] = static_cast<Weight>(std::min(weight, kWeights - 1));
             ++histogram[static_cast<std::size_t>(weights_[tile][place])];

@@ -3,11 +3,11 @@
 #include <tbb/blocked_range2d.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "base/each_isa.h"
 #include "emulator/clock.h"
@@ -25,6 +25,10 @@ struct RawHit {
 };
 
 using Region = tbb::blocked_range2d<int>;
+using TileHits = std::array<RawHit, static_cast<std::size_t>(kRawTile* kRawTile)>;
+std::size_t place(int x, int y) {
+    return static_cast<std::size_t>(y * kRawTile + x);
+}
 
 /// Calls `work(tile)` for tiles of the image.
 template <class Work>
@@ -76,72 +80,86 @@ struct ShadowRays {
 
 struct RawEmbree::Impl {
     RawScene raw;
-    std::vector<RawHit> hits;
 };
 
 Result<RawEmbree> RawEmbree::create(const Scene& scene, const Placement& at) {
     auto raw = RawScene::build(scene, at);
     if (!raw) return raw.error();
-    return RawEmbree(std::make_unique<Impl>(Impl{*std::move(raw), {}}));
+    return RawEmbree(std::make_unique<Impl>(Impl{*std::move(raw)}));
 }
 RawEmbree::RawEmbree(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RawEmbree::RawEmbree(RawEmbree&&) noexcept = default;
 RawEmbree::~RawEmbree() = default;
 
-RawCost RawEmbree::trace(const Camera& camera, const Rigid3& T_world_camera, const Vec3& to_sun) {
+namespace {
+
+/// The middles' rays of a tile; what they meet goes to `hits`, row by row.
+std::uint64_t ask_camera(const RawAim& a, RTCScene scene, const Region& tile, TileHits& hits) {
+    alignas(64) RTCRayHit16 q{};
+    alignas(64) std::array<int, 16> valid{};
+    std::uint64_t met = 0;
+    const int x0 = tile.cols().begin(), y0 = tile.rows().begin();
+    for (int y = y0; y < tile.rows().end(); y += 4)
+        for (int x = x0; x < tile.cols().end(); x += 4) {
+            aim(a, x, y, q);
+            for (int i = 0; i < 16; ++i)
+                valid[static_cast<std::size_t>(i)] =
+                    x + i % 4 < tile.cols().end() && y + i / 4 < tile.rows().end() ? -1 : 0;
+            embree::intersect(scene, valid.data(), q, embree::Run::together);
+            for (int i = 0; i < 16; ++i) {
+                if (valid[static_cast<std::size_t>(i)] == 0) continue;
+                const bool hit = q.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+                met += hit ? 1 : 0;
+                hits[place(x + i % 4 - x0, y + i / 4 - y0)] = {hit ? q.ray.tfar[i] : kFar,
+                                                               {q.hit.Ng_x[i], q.hit.Ng_y[i], q.hit.Ng_z[i]}};
+            }
+        }
+    return met;
+}
+
+/// Rays to the Sun from all hits of a tile that face it, 4 x 4 pixels after 4 x 4 pixels.
+void ask_sun(const RawAim& a, RTCScene scene, const Region& tile, const TileHits& hits, const Vec3f& sun,
+             ShadowRays& shadows) {
+    const int width = static_cast<int>(tile.cols().size()), height = static_cast<int>(tile.rows().size());
+    for (int y0 = 0; y0 < height; y0 += 4)
+        for (int x0 = 0; x0 < width; x0 += 4)
+            for (int y = y0; y < std::min(y0 + 4, height); ++y)
+                for (int x = x0; x < std::min(x0 + 4, width); ++x) {
+                    const RawHit& h = hits[place(x, y)];
+                    if (h.depth == kFar) continue;
+                    const Vec3f d = a.ahead + static_cast<float>(x + tile.cols().begin()) * a.across +
+                                    static_cast<float>(y + tile.rows().begin()) * a.down;
+                    if ((dot(h.normal, sun) > 0) == (dot(h.normal, d) > 0)) continue;  // the Sun is behind it
+                    shadows.add(a.origin + h.depth * d);
+                    if (shadows.n == 16) shadows.ask(scene);
+                }
+    if (shadows.n > 0) shadows.ask(scene);
+}
+
+}  // namespace
+
+RawCost RawEmbree::trace(const Camera& camera, const Rigid3& T_world_camera, const Vec3& to_sun) const {
     const RawAim a(camera, T_world_camera);
     const RTCScene scene = impl_->raw.scene.get();
-    std::vector<RawHit>& hits = impl_->hits;
-    hits.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
-    const auto pixel = [&](int x, int y) {
-        return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) + static_cast<std::size_t>(x);
-    };
-
-    RawCost cost;
-    const std::int64_t start_ns = monotonic_ns();
-    over_tiles(camera, [&](const Region& tile) {
-        alignas(64) RTCRayHit16 q{};
-        alignas(64) std::array<int, 16> valid{};
-        for (int y = tile.rows().begin(); y < tile.rows().end(); y += 4)
-            for (int x = tile.cols().begin(); x < tile.cols().end(); x += 4) {
-                aim(a, x, y, q);
-                for (int i = 0; i < 16; ++i)
-                    valid[static_cast<std::size_t>(i)] =
-                        x + i % 4 < tile.cols().end() && y + i / 4 < tile.rows().end() ? -1 : 0;
-                embree::intersect(scene, valid.data(), q, embree::Run::together);
-                for (int i = 0; i < 16; ++i) {
-                    if (valid[static_cast<std::size_t>(i)] == 0) continue;
-                    const bool hit = q.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-                    hits[pixel(x + i % 4, y + i / 4)] = {hit ? q.ray.tfar[i] : kFar,
-                                                         {q.hit.Ng_x[i], q.hit.Ng_y[i], q.hit.Ng_z[i]}};
-                }
-            }
-    });
-    const std::int64_t middle_ns = monotonic_ns();
-
     const Vec3f sun = vec_cast<float>(to_sun);
     std::atomic<std::uint64_t> met{0}, asked{0}, shadowed{0};
+    std::atomic<std::int64_t> primary_ns{0}, shadow_ns{0};
+    const std::int64_t start_ns = monotonic_ns();
     over_tiles(camera, [&](const Region& tile) {
+        const std::int64_t begun_ns = monotonic_ns();
+        TileHits hits;
+        met += ask_camera(a, scene, tile, hits);
+        const std::int64_t middle_ns = monotonic_ns();
         ShadowRays shadows(sun);
-        std::uint64_t here = 0;
-        for (int y0 = tile.rows().begin(); y0 < tile.rows().end(); y0 += 4)
-            for (int x0 = tile.cols().begin(); x0 < tile.cols().end(); x0 += 4)
-                for (int y = y0; y < std::min(y0 + 4, tile.rows().end()); ++y)
-                    for (int x = x0; x < std::min(x0 + 4, tile.cols().end()); ++x) {
-                        const RawHit& h = hits[pixel(x, y)];
-                        if (h.depth == kFar) continue;
-                        ++here;
-                        const Vec3f d = a.ahead + static_cast<float>(x) * a.across + static_cast<float>(y) * a.down;
-                        if ((dot(h.normal, sun) > 0) == (dot(h.normal, d) > 0)) continue;  // the Sun is behind it
-                        shadows.add(a.origin + h.depth * d);
-                        if (shadows.n == 16) shadows.ask(scene);
-                    }
-        if (shadows.n > 0) shadows.ask(scene);
-        met += here, asked += shadows.asked, shadowed += shadows.shadowed;
+        ask_sun(a, scene, tile, hits, sun, shadows);
+        asked += shadows.asked, shadowed += shadows.shadowed;
+        primary_ns += middle_ns - begun_ns, shadow_ns += monotonic_ns() - middle_ns;
     });
-    cost.primary_s = static_cast<double>(middle_ns - start_ns) * 1e-9;
-    cost.shadow_s = static_cast<double>(monotonic_ns() - middle_ns) * 1e-9;
-    cost.primaries = hits.size();
+    RawCost cost;
+    const double wall_s = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
+    cost.primary_s = wall_s * static_cast<double>(primary_ns) / static_cast<double>(primary_ns + shadow_ns);
+    cost.shadow_s = wall_s - cost.primary_s;
+    cost.primaries = static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
     cost.hits = met, cost.shadow_rays = asked, cost.shadowed = shadowed;
     return cost;
 }

@@ -19,7 +19,7 @@ namespace narpa {
 
 namespace {
 
-constexpr std::size_t kStackBytes = 256 * 1024;  // more than a packet of paths and its callers need
+constexpr std::size_t kStackBytes = 1024 * 1024;  // twice what a tile of paths and its callers need
 
 bool may_use(int cpu) noexcept {
     cpu_set_t allowed;

@@ -1,6 +1,7 @@
 #include "renderer/trace/budget_frame.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace narpa {
 namespace {
@@ -15,7 +16,7 @@ constexpr int kMiddleBeam = 2, kBeamSamples = 4;
 constexpr std::int64_t kLeastSlack_ns = 300'000;
 constexpr std::int64_t kSlackPart = 40;
 /// By this a cost is believed to be less in each frame that did without, so that one bad measure does not last.
-constexpr double kDoubt = 0.95;
+constexpr double kDoubt = 0.95, kLeastBelieved = 0.25;
 /// Passes of fewer samples tell of their start and end alone: no more than a bound.
 constexpr std::uint64_t kLeastPieces = 1000;
 /// Parts of what is left that go to the first pass after the middles, so that there soon is something to show, and
@@ -55,7 +56,10 @@ public:
         account_.step = FrameStep::nothing;
         begin(middle_);
         take_middles();
-        if (account_.step == FrameStep::one_sample && worth_planning()) refine();
+        if (passes_.pixels() == 0 && account_.step == FrameStep::one_sample)
+            account_.standard_error = 0;  // nothing in view
+        else if (account_.step == FrameStep::one_sample && worth_planning())
+            refine();
         show();
         account_.phase_ns = passes_.times();
         return account_;
@@ -201,7 +205,9 @@ private:
         }
         if (!take(f, 1, 2, full)) return;
         if (!has_indirect_ || !timed) return;
-        if (costs_.known(Of::middles) && costs_.expected_ns(Of::middles, passes_.pixels()) > ns_left())
+        const std::int64_t left = ns_left();
+        if (left <= 0) return;
+        if (costs_.known(Of::middles) && costs_.expected_ns(Of::middles, passes_.pixels()) > left)
             costs_.doubt(Of::middles);
         else
             take(middle_, 1, 0, FrameStep::one_sample);
@@ -221,9 +227,10 @@ private:
                                          : static_cast<double>(account_.rays - (account_.samples - met)) /
                                                static_cast<double>(met);
         for (std::size_t i = 0; i < kMaxPasses; ++i) {
-            const SamplePlan::Stage next = plan.reach(stage, wanted(i, rays_each));
+            constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
+            const SamplePlan::Stage next = plan.reach(stage, std::min(wanted(i, rays_each), kMost));
             const std::uint64_t samples = plan.total(next) - plan.total(stage);
-            if (samples == 0 && i == 0 && budget_.kind == Kind::time) costs_.doubt(Of::samples);
+            if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.doubt(Of::samples);
             if (samples == 0) return;
             if (i > 0) show();  // what the next pass adds to
             const PassLimit l = limit();
@@ -247,10 +254,12 @@ private:
             const double part = middle_.quick ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
             return static_cast<std::uint64_t>(part * left / rays_each);
         }
-        const std::int64_t left = ns_left();
-        if (static_cast<double>(left) < kRest * static_cast<double>(time_given())) return 0;
+        if (!worth_a_pass()) return 0;
         return static_cast<std::uint64_t>((pass == 0 ? kFirstPart : kNextPart) *
-                                          static_cast<double>(costs_.fitting(Of::samples, left)));
+                                          static_cast<double>(costs_.fitting(Of::samples, ns_left())));
+    }
+    [[nodiscard]] bool worth_a_pass() const {
+        return static_cast<double>(ns_left()) >= kRest * static_cast<double>(time_given());
     }
 
     /// A plan is made to its end, whatever the time: it is begun only where it leaves some for samples.
@@ -303,10 +312,11 @@ void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexce
         default: ns += 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns);
     }
     if (measures_[index(what)] < 2) ++measures_[index(what)];
+    least_ns_[index(what)] = kLeastBelieved * ns;
 }
 
 void PassCosts::doubt(Of what) noexcept {
-    ns_[index(what)] *= kDoubt;
+    ns_[index(what)] = std::max(kDoubt * ns_[index(what)], least_ns_[index(what)]);
 }
 
 std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {

@@ -25,6 +25,7 @@ public:
 private:
     static constexpr std::size_t index(Of what) noexcept { return static_cast<std::size_t>(what); }
     std::array<double, 5> ns_{100, 300, 30, 200, 10};  ///< apiece; guesses at first
+    std::array<double, 5> least_ns_{};                 ///< that doubt leaves of them
     std::array<std::uint8_t, 5> measures_{};           ///< so far; 2: two or more
 };
 

@@ -78,6 +78,10 @@ NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const
     to_sun = direction;
 }
 
+/// Random numbers with which a path would choose its point of the Sun from the first surface: free where that is
+/// chosen here.
+constexpr std::uint32_t kPathsOwn = 2;
+
 /// Most paths choose their own points of the Sun.
 void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
     const bool sun = f.sun && (f.quick || f.sun_first);
@@ -87,8 +91,8 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
         if (f.quick && sun) p.to_sun.fill(f.sun->centre());
         if (f.quick || !sun) return;
         Points u;
-        next_points(f, s, 1, u);
-        aim_at_sun(*f.sun, u[0], u[1], p.to_sun);
+        next_points(f, s, kPathsOwn, u);
+        aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
         return;
     }
     Points u;
@@ -98,8 +102,8 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
     } else {
         aim_through_lens(f, s, p.rays);
         if (!sun) return;
-        next_points(f, s, 1, u);
-        aim_at_sun(*f.sun, u[0], u[1], p.to_sun);
+        next_points(f, s, kPathsOwn, u);
+        aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
     }
 }
 

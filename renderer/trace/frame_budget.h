@@ -30,7 +30,7 @@ enum class FrameStep : std::uint8_t {
 struct FrameBudget {
     enum class Kind : std::uint8_t {
         samples,  ///< FrameSettings::spp for each pixel, in one pass
-        rays,     ///< at most this many rays of all kinds; the same bytes whatever the machine and its load
+        rays,     ///< at most this many rays of all kinds, but those for tiny bodies (tiny_bodies.h); the same bytes whatever the machine and its load
         time,     ///< the radiance is there at the deadline
         passes,   ///< as an account tells: to make the same frame again
     };
@@ -49,7 +49,7 @@ using PhaseTimes = std::array<std::int64_t, kPhases>;
 struct FrameAccount {
     FrameStep step = FrameStep::refined;
     std::uint64_t samples = 0;  ///< through the camera, of the passes that count
-    std::uint64_t rays = 0;     ///< of all kinds, of the passes that count
+    std::uint64_t rays = 0;     ///< of all kinds but tiny bodies', of the passes that count
     std::uint64_t rays_discarded = 0;
     std::array<std::uint32_t, kMaxPasses> passes{};  ///< camera samples of each pass after the first, then 0
     /// Root mean square over the pixels of the standard error of a pixel's mean band, W m^-2 sr^-1; negative: not

@@ -247,6 +247,7 @@ Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera
     // One sample passes the lens at its centre, as through a pinhole.
     const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
+    const bool guided = !direct && Guide::may_help(tracer, at);
     return {tracer,
             at,
             camera,
@@ -255,8 +256,8 @@ Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera
             lens,
             scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
             direct && !tracer.lights().beyond_the_sun(),
-            !direct && sun_alone_lights_first_surfaces(tracer) && !Guide::may_help(tracer, at),
-            {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, Guide::may_help(tracer, at)},
+            !direct && sun_alone_lights_first_surfaces(tracer) && !guided,
+            {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, guided},
             TinyBodies(tracer, at, camera, T_world_camera, lens)};
 }
 

@@ -53,6 +53,11 @@ struct Packet {
     PhaseTimes* times = nullptr;    ///< null: nobody looks
 };
 
+/// CLOCK_MONOTONIC.
+[[nodiscard]] inline std::int64_t now_ns() noexcept {
+    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 /// Where a packet's time goes, if anybody looks.
 class PhaseClock {
 public:
@@ -66,10 +71,6 @@ public:
     }
 
 private:
-    static std::int64_t now_ns() noexcept {
-        return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
-    }
-
     PhaseTimes* times_;
     std::int64_t last_ns_;
 };

@@ -68,10 +68,6 @@ private:
 
 }  // namespace
 
-std::int64_t now_ns() noexcept {
-    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 struct FramePasses::Tile {
     std::uint32_t index;
     int x, y, width, height;  ///< pixels
@@ -96,15 +92,26 @@ struct FramePasses::Worker {
         CameraSamples samples;
         Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
     };
+    /// For packets that are lit together.
+    template <std::size_t N>
+    struct Room {
+        std::array<Packet, N> packets;
+        std::array<Batch, N> batches;
+    };
 
-    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& pass_given_up)
-        : f(frame), until_ns(limit.until_ns), given_up(pass_given_up) {}
+    template <std::size_t N>
+    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& pass_given_up, Room<N>& room)
+        : f(frame),
+          until_ns(limit.until_ns),
+          given_up(pass_given_up),
+          packets(room.packets),
+          batches(room.batches) {}
 
     const Frame& f;
     const std::int64_t until_ns;
     std::atomic<bool>& given_up;  ///< the pass: looked at often, as a tile may hold many samples
-    std::array<Packet, kTogether> packets;
-    std::array<Batch, kTogether> batches;
+    const std::span<Packet> packets;
+    const std::span<Batch> batches;
     std::size_t full = 0;      ///< of these
     std::uint64_t traced = 0;  ///< samples
     std::uint32_t lit = 0;     ///< packets
@@ -127,7 +134,7 @@ struct FramePasses::Worker {
         b.place[i] = static_cast<std::uint8_t>(at);
         if (b.samples.n < kPacket) return;
         trace(tile);
-        if (full == at_a_time()) light(sink);
+        if (full == packets.size()) light(sink);
     }
     void trace(const Tile& tile) {
         Batch& b = batches[full];
@@ -139,7 +146,7 @@ struct FramePasses::Worker {
     template <class Sink>
     void light(Sink&& sink) {
         std::array<RgbPerRay, kTogether> radiance;
-        if (full > 0) light_along(f, std::span(packets).first(full), radiance);
+        if (full > 0) light_along(f, packets.first(full), radiance);
         for (std::size_t k = 0; k < full; ++k) {
             sink(batches[k], packets[k], radiance[k]);
             traced += batches[k].samples.n;
@@ -171,7 +178,7 @@ struct FramePasses::Worker {
             for (int block = 0; block < 4; ++block) {
                 put_block(tile, block, first, width, batches[full]);
                 trace(tile);
-                if (full == at_a_time()) light(store);
+                if (full == packets.size()) light(store);
             }
             light(store);
             return;
@@ -185,9 +192,6 @@ struct FramePasses::Worker {
     }
 
 private:
-    /// Packets that are lit together.
-    [[nodiscard]] std::size_t at_a_time() const { return f.quick ? 1 : kTogether; }
-
     /// The middles of 4 x 4 pixels, a whole packet.
     static void put_block(const Tile& tile, int block, std::uint32_t first, int width, Batch& b) {
         const int x = tile.x + block % 2 * kBlock, y = tile.y + block / 2 * kBlock;
@@ -204,8 +208,7 @@ private:
 };
 
 FramePasses::FramePasses(const Tracer& tracer, const Camera& camera)
-    : tracer_(tracer),
-      camera_(camera),
+    : camera_(camera),
       cover_(tracer, camera),
       looks_(camera.width, camera.height),
       errors_(looks_.tiles() / kChunk + 1),
@@ -229,31 +232,38 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
     const std::int64_t start = now_ns();
     std::atomic<bool> given_up{false};
     std::atomic<std::uint64_t> samples{0}, rays{0};
+    const auto over_chunk = [&](std::size_t chunk, auto&& room) {
+        const std::int64_t begun = f.settings.times ? now_ns() : 0;
+        PhaseTimes times{};
+        Worker w(f, limit, given_up, room);
+        if (f.settings.times)
+            for (Packet& p : w.packets) p.times = &times;
+        const std::size_t first = chunk * kChunk, end = std::min(first + kChunk, tiles_.size());
+        for (std::size_t i = first; i < end; ++i) {
+            w.look_at_clock();
+            if (given_up.load(std::memory_order_relaxed)) break;
+            work(w, tile(tiles_[i]));
+        }
+        samples.fetch_add(w.traced, std::memory_order_relaxed);
+        if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
+            given_up.store(true, std::memory_order_relaxed);
+        if (sums == Sums::errors) errors_[chunk] = w.error;
+        if (!f.settings.times) return;
+        std::int64_t rest = now_ns() - begun;
+        for (std::size_t i = 0; i < kPhases; ++i) rest -= times[i];
+        times[static_cast<std::size_t>(Phase::passes)] += rest;
+        for (std::size_t i = 0; i < kPhases; ++i) phase_ns_[i].fetch_add(times[i], std::memory_order_relaxed);
+    };
+    const std::size_t chunks = (tiles_.size() + kChunk - 1) / kChunk;
     tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, (tiles_.size() + kChunk - 1) / kChunk, 1),
-        [&](const tbb::blocked_range<std::size_t>& chunk) {
+        tbb::blocked_range<std::size_t>(0, chunks, 1),
+        [&](const tbb::blocked_range<std::size_t>& one) {
             if (given_up.load(std::memory_order_relaxed)) return;
             const FlushDenormals flush;
-            const std::int64_t begun = f.settings.times ? now_ns() : 0;
-            PhaseTimes times{};
-            Worker w(f, limit, given_up);
-            if (f.settings.times)
-                for (Packet& p : w.packets) p.times = &times;
-            const std::size_t first = chunk.begin() * kChunk, end = std::min(first + kChunk, tiles_.size());
-            for (std::size_t i = first; i < end; ++i) {
-                w.look_at_clock();
-                if (given_up.load(std::memory_order_relaxed)) break;
-                work(w, tile(tiles_[i]));
-            }
-            samples.fetch_add(w.traced, std::memory_order_relaxed);
-            if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
-                given_up.store(true, std::memory_order_relaxed);
-            if (sums == Sums::errors) errors_[chunk.begin()] = w.error;
-            if (!f.settings.times) return;
-            std::int64_t rest = now_ns() - begun;
-            for (std::size_t i = 0; i < kPhases; ++i) rest -= times[i];
-            times[static_cast<std::size_t>(Phase::passes)] += rest;
-            for (std::size_t i = 0; i < kPhases; ++i) phase_ns_[i].fetch_add(times[i], std::memory_order_relaxed);
+            if (f.quick)
+                over_chunk(one.begin(), Worker::Room<1>());
+            else
+                over_chunk(one.begin(), Worker::Room<kTogether>());
         },
         tbb::simple_partitioner());
     return {!given_up, samples, rays, now_ns() - start};
@@ -357,19 +367,14 @@ void put_variances(const Tile& t, const PerPixel<PixelMean>& means, const TileCo
         const std::uint32_t n = means[at].count();
         const float one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f) + contrast.shared[at];
         variance[index_of(x, y, image_width)] =
-            n == 0   ? contrast.middle[at]
-            : n == 1 ? one
-                     : std::max(means[at].step() * means[at].step(), one / static_cast<float>(n));
+            n == 0 ? contrast.middle[at]
+                   : std::max(means[at].step() * means[at].step(), one / static_cast<float>(n));
     });
 }
 
 Rgb look_at(const TileLooks& looks, std::size_t place) {
     return {looks.r[place], looks.g[place], looks.b[place]};
 }
-
-}  // namespace
-
-namespace {
 
 struct SampleRange {
     std::uint32_t begin, end;

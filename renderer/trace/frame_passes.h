@@ -29,9 +29,6 @@ struct PassCount {
     std::int64_t wall_ns = 0;
 };
 
-/// CLOCK_MONOTONIC.
-[[nodiscard]] std::int64_t now_ns() noexcept;
-
 class FramePasses {
 public:
     /// Both outlive it.
@@ -77,7 +74,6 @@ private:
     void fill_background(RadianceImage& out);
     void estimate_middles(const Frame& f);
 
-    const Tracer& tracer_;
     const Camera& camera_;
     ScreenCover cover_;
     PixelLooks looks_;

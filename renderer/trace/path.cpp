@@ -23,8 +23,9 @@ constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;
 constexpr int kSurfacesInTheDark = 4;
 /// Where paths share what they find, so many suffice.
 constexpr float kSetOut = 0.5f;
-/// Random numbers: two groups for each surface of the longest path, then the roulette's.
-constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40, kSharingGroup = kRouletteGroup + 11;
+/// Random numbers: two groups for each surface of the longest path, then the roulette's, four surfaces a group,
+/// then the choice of what is shared.
+constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40, kSharingGroup = kRouletteGroup + 40 / 4 + 1;
 /// Suns no wider than this are left to next-event estimation alone where the surface has no lobe: there a ray by
 /// the BSDF finds the disc so seldom that it is not worth the densities.
 constexpr double kNarrowSun_rad = 0.2;
@@ -36,7 +37,7 @@ NARPA_EACH_ISA void next_points(const PathNumbers& from, std::size_t n, const La
 }
 
 /// Paths from the camera, surface by surface; those that have ended make room for the rest. What happens to a path
-/// follows from its own ray and its own random numbers alone.
+/// follows from its own ray and its own random numbers alone, but where paths share what they find.
 class Stream {
 public:
     Stream(const Tracer& tracer, const Placement& at, const PathSettings& settings, const PathNumbers& numbers)

@@ -39,7 +39,7 @@ struct PathNumbers {
 
 /// Radiance, W m^-2 sr^-1, that comes back along rays whose first hits are known. Any number of them: from a few
 /// dozen up, packets stay full while paths end. Same values whatever the other rays are. Thread-safe, allocates
-/// nothing; takes 100 kB of stack. Returns the number of rays that it traced.
+/// nothing; takes 200 kB of stack. Returns the number of rays that it traced.
 std::uint64_t path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                             std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
                             std::span<Rgb> radiance) noexcept;

@@ -16,6 +16,8 @@ constexpr int kRow = 16;          // values from row to row: more than there are
 constexpr float kSameNormal = 0.9945f;
 constexpr float kOffPlane2 = 0.0432f;  // squared sine
 
+constexpr float kMostContrast = 2e9f;  // W m^-2 sr^-1
+
 /// What a detail that one middle has met stands for, of all scales together.
 constexpr float kDetailInMiddles = 0.230f, kDetailInSamples = 0.200f;
 
@@ -199,7 +201,8 @@ template <class Around>
         const float turn = a.nx[at] * a.nx[next] + a.ny[at] * a.ny[next] + a.nz[at] * a.nz[next];
         const float dx = p.x[next] - p.x[at], dy = p.y[next] - p.y[at], dz = p.z[next] - p.z[at];
         const float off = a.nx[at] * dx + a.ny[at] * dy + a.nz[at] * dz;
-        const float d = a.radiance[next] - a.radiance[at];
+        // Its fourth power is to be finite; the Sun's disc is 70 times fainter than the most.
+        const float d = std::min(std::max(a.radiance[next] - a.radiance[at], -kMostContrast), kMostContrast);
         const bool steady = (turn > kSameNormal) & (off * off <= kOffPlane2 * (dx * dx + dy * dy + dz * dz));
         const bool empty = a.surface[at] == 0, even = d == 0;
         const bool same = (a.surface[at] == a.surface[next]) & ((empty & even) | (!empty & steady));

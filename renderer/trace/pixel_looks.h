@@ -27,10 +27,11 @@
 #include <vector>
 
 #include "renderer/trace/frame_light.h"
+#include "renderer/trace/screen_cover.h"
 
 namespace narpa {
 
-inline constexpr int kTile = 8;                            ///< pixels a side: ScreenCover's
+inline constexpr int kTile = kCoverTile;                   ///< pixels a side
 inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four packets of 4 x 4, one after another
 
 /// Place of a pixel of a tile, in the order of the packets.

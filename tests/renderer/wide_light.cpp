@@ -158,8 +158,8 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
                 Vec3 sun = f.sun->sample(u[2], u[3]);
                 if (c.lens) {
                     ray = lens_ray(c, *c.lens, stage.T, x, y, aperture_point(*c.lens, u[2], u[3]));
-                    const SamplePoint more = sampler.point(s.sample[i], 1);
-                    sun = f.sun->sample(more[0], more[1]);
+                    const SamplePoint more = sampler.point(s.sample[i], 2);
+                    sun = f.sun->sample(more[2], more[3]);
                 }
                 ASSERT_EQ(p->rays[i].origin, ray.origin);
                 ASSERT_EQ(p->rays[i].direction, ray.direction);

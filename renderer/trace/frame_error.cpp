@@ -20,10 +20,10 @@ double left_after(double step, double ratio) {
 
 }  // namespace
 
-void FrameError::add_middles(const TileContrast& contrast) noexcept {
+void FrameError::add_middles(const TileContrast& contrast, double tiles) noexcept {
     float sum = 0;
     for (const float m : contrast.middle) sum += m;
-    middles_ += static_cast<double>(sum);
+    middles_ += tiles * static_cast<double>(sum);
 }
 
 void FrameError::add(const PixelMean& mean) noexcept {

@@ -20,8 +20,8 @@ namespace narpa {
 
 class FrameError {
 public:
-    /// A tile whose pixels show their middles.
-    void add_middles(const TileContrast& contrast) noexcept;
+    /// A tile whose pixels show their middles, and that stands for so many.
+    void add_middles(const TileContrast& contrast, double tiles = 1) noexcept;
     /// A tile whose pixels have samples, as many as each has; where it has none, it shows its middle.
     void add_tile(const TileContrast& contrast, const PerPixel<PixelMean>& means) noexcept;
     /// A pixel of two samples or more.

@@ -10,10 +10,21 @@
 #include "emulator/trajectory.h"
 
 namespace narpa {
+namespace {
+
+/// YUYV holds black as luma 16 and chroma 128 (ITU-R BT.601), the others as zeros.
+void fill_black(PixelFormat format, std::span<std::uint8_t> bytes) noexcept {
+    for (std::size_t i = 0; i < bytes.size(); ++i)
+        bytes[i] = format != PixelFormat::yuyv ? 0 : i % 2 == 0 ? 16 : 128;
+}
+
+}  // namespace
+
 CameraFeed::CameraFeed(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
     : world_(world), unit_(world, camera), sinks_(std::move(sinks)) {
     const LatePolicy late = unit_.camera().late;
     if (late == LatePolicy::repeat || late == LatePolicy::blank) spare_.resize(unit_.bytes().size());
+    fill_black(unit_.camera().format, spare_);
 }
 
 Status CameraFeed::log_to(const std::string& folder, bool wait_when_full) {

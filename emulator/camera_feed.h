@@ -45,8 +45,9 @@ public:
     /// When the next frame can be made: its exposure is over.
     [[nodiscard]] std::int64_t due_ns() const noexcept { return next_mid_ns() + unit_.exposure_ns() / 2; }
 
-    /// Makes frames for nobody: the first pays for what is needed once, the second shows what the next need on
-    /// their way out.
+    /// Makes three frames for nobody: two that take all that frames of this scene can take pay for what is needed
+    /// once, and the faster of them shows how fast the renderer is; the third shows what the next need on their way
+    /// out.
     void warm_up();
     /// Exposes the next frame and hands it to every sink. `clock`: null in lockstep, where no wall time enters.
     /// `end_ns`: frames from there on are not part of the run, so they cannot be skipped.

@@ -36,6 +36,8 @@ public:
     void wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept;
     /// Reads one waiting frame. `moved`: it completed a command that was taken. False: nothing was waiting.
     bool receive(std::int64_t t_now_ns, bool& moved) noexcept;
+    /// Nothing more will come, and nothing waits for its time.
+    [[nodiscard]] bool ended() const noexcept { return bus_.ended() && !waiting_; }
     void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
 

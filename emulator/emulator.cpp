@@ -30,7 +30,8 @@ Result<std::vector<std::unique_ptr<Sink>>> open_sinks(
     return sinks;
 }
 
-/// A time budget is for real time, and ends before the next frame of the same camera is due.
+/// A time budget is for real time, and ends before the next frame of the same camera is due; the scene's own was
+/// looked at when the scene was read.
 Status check_budget(const Scene& scene, const RunOptions& options) {
     const std::int64_t budget_ns = scene.render.budget_ns;
     if (budget_ns <= 0) return Ok{};
@@ -42,10 +43,9 @@ Status check_budget(const Scene& scene, const RunOptions& options) {
     for (const Camera& c : scene.cameras) {
         const bool wanted = std::ranges::any_of(options.video, [&](const auto& v) { return v.first == c.name; });
         if (wanted && budget_ns > c.period_ns)
-            return Error{
-                fmt::format("a budget of {} ms, expected at most the period of camera \"{}\", {} ms",
-                            static_cast<double>(budget_ns) * 1e-6, c.name, static_cast<double>(c.period_ns) * 1e-6),
-                scene.file};
+            return Error{fmt::format("--budget-ms {}, expected at most the period of camera \"{}\", {} ms",
+                                     static_cast<double>(budget_ns) * 1e-6, c.name,
+                                     static_cast<double>(c.period_ns) * 1e-6)};
     }
     return Ok{};
 }

@@ -116,7 +116,9 @@ void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
         }
         send_ledgers(now);
-        if (can_->bus().ended() && options_.duration_s == 0) end_ns_ = now;  // nothing more will be commanded
+        // Nothing more will be commanded. Said once: a camera that is always behind would never get to an end that
+        // moves on with the time.
+        if (end_ns_ == std::numeric_limits<std::int64_t>::max() && can_->ended()) end_ns_ = now;
         if (now >= next_heartbeat) {
             send_heartbeat(now, RunState::running);
             next_heartbeat += kHeartbeatPeriodNs;

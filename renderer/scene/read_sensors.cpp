@@ -143,6 +143,10 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     read_resolution(table, camera);
     read_projection(table, camera);
     camera.period_ns = read_period_ns(table, camera.period_ns);
+    if (scene.render.budget_ns > camera.period_ns)
+        table.fail("rate_hz", fmt::format("a period of {} ms, expected at least the budget_ms of [render], {}",
+                                          static_cast<double>(camera.period_ns) * 1e-6,
+                                          static_cast<double>(scene.render.budget_ns) * 1e-6));
     camera.format = read_format(table, camera.width);
     camera.embedded_line = table.boolean("embedded_line").value_or(camera.embedded_line);
     if (camera.embedded_line && camera.height < 2)

@@ -27,12 +27,12 @@ private:
     std::vector<std::string>& frames_;
 };
 
-class LatePolicies : public LoopTest, public ::testing::WithParamInterface<const char*> {
+class LatePolicies : public LoopTest, public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {
 protected:
     /// Frames 0 to 4, of which these come late.
     void run(const std::string& budget, std::initializer_list<std::uint32_t> late) {
-        std::string text =
-            small_scene(std::string("rate_hz = 10\nembedded_line = true\nlate_policy = \"") + GetParam() + "\"");
+        std::string text = small_scene("rate_hz = 10\nembedded_line = true\nlate_policy = \"" + policy() +
+                                       "\"\nformat = \"" + format() + "\"");
         text.replace(text.find("[64, 48]"), 8, "[160, 48]");  // wide enough for the embedded line
         text.replace(text.find("spp = 2"), 7, budget);
         // So that no frame is like another.
@@ -43,12 +43,14 @@ protected:
         sinks.push_back(std::make_unique<Keeper>(sent_));
         CameraFeed feed(**world, 0, std::move(sinks));
         feed.keep_ledgers();
+        ASSERT_TRUE(feed.log_to(folder_ / "", true));
         const Clock before(kHourNs), behind(-kHourNs);
         for (std::uint32_t frame = 0; frame < 5; ++frame) {
             const bool is_late = std::ranges::find(late, frame) != late.end();
             // To the clock that is behind, all frames up to its end are missed: this is the last one.
             feed.make_next(is_late ? &behind : &before, feed.next_mid_ns() + 1);
         }
+        ASSERT_TRUE(feed.finish());
         stats_ = feed.stats();
         for (FrameLedger l; feed.ledgers().pop(l);) ledgers_.push_back(l);
         ASSERT_EQ(ledgers_.size(), 5U);
@@ -59,24 +61,36 @@ protected:
             EXPECT_EQ(l.t_hand_over_ns == 0, l.delivery == Delivery::nothing) << l.frame;
             EXPECT_LT(l.step, kStepNames.size() - 1) << l.frame;  // each is whole
         }
+        const auto rows = read_rows(folder_ / "nav.ledger.csv");
+        ASSERT_EQ(rows.size(), 5U);
+        for (std::size_t i = 0; i < 5; ++i) {
+            EXPECT_EQ(rows[i].at("deadline_met"), ledgers_[i].deadline_met ? "1" : "0") << i;
+            EXPECT_EQ(rows[i].at("delivery"), kDeliveries[static_cast<std::size_t>(ledgers_[i].delivery)]) << i;
+        }
         EXPECT_EQ(stats_.frames, 5U);
         EXPECT_EQ(stats_.deadline_missed, late.size());
         EXPECT_EQ(stats_.skipped, 0U);
         EXPECT_EQ(stats_.handed_over, sent_.size());
     }
+    static std::string policy() { return std::get<0>(GetParam()); }
+    static std::string format() { return std::get<1>(GetParam()); }
     static Delivery instead() {
-        const std::string policy = GetParam();
-        return policy == "drop"     ? Delivery::nothing
-               : policy == "repeat" ? Delivery::repeated
-               : policy == "blank"  ? Delivery::blank
-                                    : Delivery::frame;
+        return policy() == "drop"     ? Delivery::nothing
+               : policy() == "repeat" ? Delivery::repeated
+               : policy() == "blank"  ? Delivery::blank
+                                      : Delivery::frame;
     }
     static std::optional<FrameLedger> line_of(const std::string& frame) {
-        const std::string_view row = std::string_view(frame).substr(frame.size() - 160);
+        const std::string_view row = std::string_view(frame).substr(image_size(frame));
         return decode_embedded_line({reinterpret_cast<const std::uint8_t*>(row.data()), row.size()});
     }
+    /// All but the last row.
+    static std::size_t image_size(const std::string& frame) { return frame.size() - frame.size() / 48; }
     static bool black(const std::string& frame) {
-        return std::ranges::all_of(frame, [](char c) { return c == 0; });
+        const std::string pixel = format() == "YUYV" ? std::string("\x10\x80") : std::string(2, '\0');
+        for (std::size_t i = 0; i < frame.size(); ++i)
+            if (frame[i] != pixel[i % 2]) return false;
+        return true;
     }
 
     std::vector<std::string> sent_;
@@ -86,7 +100,7 @@ protected:
 
 TEST_P(LatePolicies, DecideWhatIsHandedOverForALateFrame) {
     run("spp = 2", {2, 3});
-    const std::string policy = GetParam();
+    const std::string policy = this->policy();
     ASSERT_EQ(sent_.size(), policy == "drop" ? 3U : 5U);
     EXPECT_EQ(stats_.repeated, policy == "repeat" ? 2U : 0U);
     EXPECT_EQ(stats_.blanked, policy == "blank" ? 2U : 0U);
@@ -129,10 +143,12 @@ TEST_P(LatePolicies, AFrameWithoutAnyTimeIsLateAndWholeAllTheSame) {
         EXPECT_EQ(kStepNames[l.step], "coarse_4") << l.frame;
     }
     if (instead() != Delivery::frame) return;
-    for (const std::string& frame : sent_) EXPECT_FALSE(black(frame.substr(0, frame.size() - 160)));
+    for (const std::string& frame : sent_) EXPECT_FALSE(black(frame.substr(0, image_size(frame))));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, LatePolicies, ::testing::Values("late", "drop", "repeat", "blank"));
+INSTANTIATE_TEST_SUITE_P(All, LatePolicies,
+                         ::testing::Combine(::testing::Values("late", "drop", "repeat", "blank"),
+                                            ::testing::Values("GREY", "YUYV")));
 
 }  // namespace
 }  // namespace narpa::test

@@ -1,9 +1,10 @@
-// The real-time loop: it keeps step, takes no memory after its start, and does with late frames what it was told.
+// The real-time loop: it keeps step, takes no memory after its start, and ends when it should.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <thread>
 
 #include "tests/emulator/loop_support.h"
@@ -70,8 +71,12 @@ TEST_P(OnceItRuns, TheLoopAllocatesNothing) {
     }
     loop.join();
     EXPECT_EQ(calls, 0U);
-    EXPECT_GT(emulator->cameras().front()->stats().frames, 10U);
-    EXPECT_GT(emulator->lidars().front()->stats().packets, 100U);
+    const CameraStats& c = emulator->cameras().front()->stats();
+    const LidarStats& l = emulator->lidars().front()->stats();
+    EXPECT_EQ(c.frames + c.skipped, 80U);
+    EXPECT_GE(c.frames, 1U);
+    EXPECT_EQ(l.packets + l.skipped, 1'600'000'000U / 1'327'104);
+    EXPECT_GE(l.packets, 1U);
 }
 
 TEST_P(OnceItRuns, TheLoopTouchesNoNewPage) {
@@ -86,9 +91,9 @@ TEST_P(OnceItRuns, TheLoopTouchesNoNewPage) {
     EXPECT_EQ(c.frames + c.skipped, 50U);
     EXPECT_EQ(emulator->page_faults().major, 0);
     const auto refused = [](const std::string& note) { return note.find("not locked") != std::string::npos; };
-    if (std::ranges::none_of(emulator->notices(), refused)) {
-        EXPECT_EQ(emulator->page_faults().minor, 0);
-    }
+    if (std::ranges::any_of(emulator->notices(), refused))
+        GTEST_SKIP() << "memory cannot be locked here: minor page faults come as the kernel likes";
+    EXPECT_EQ(emulator->page_faults().minor, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(By, OnceItRuns,
@@ -111,6 +116,44 @@ TEST_F(RealTime, ARecordedBusIsWaitedForAsleep) {
     EXPECT_GE(monotonic_ns() - begun, 20'000'000);
     node.wait(3'600'000'000'000, 20'000'000'000);  // due by now
     EXPECT_TRUE(node.receive(3'600'000'000'000, moved));
+}
+
+/// Without a duration: after the last of what is recorded, not while that waits for its time.
+TEST_F(RealTime, ARunOnALogEndsAfterItsLastFrame) {
+    const std::string log = folder_ / "half.log";
+    std::ofstream(log) << "(1000.000000) narpa 333#00\n(1000.500000) narpa 333#01\n";
+    RunOptions o;
+    o.bus = "log:" + log;
+    o.video = {{"nav", "none"}};
+    const auto emulator = start(small_scene(), o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    const CameraStats& c = emulator->cameras().front()->stats();
+    EXPECT_GE(c.frames + c.skipped, 5U);
+    EXPECT_EQ(emulator->can()->counters().foreign, 2U);
+}
+
+/// A camera that is always behind gets to the end all the same: that is where the bus ended, and does not move on
+/// while frames of many milliseconds are made.
+TEST_F(RealTime, AnOverloadedRunOnALogEnds) {
+    RunOptions o;
+    o.bus = record(1);
+    o.video = {{"nav", "none"}};
+    o.log_folder = folder_ / "log";
+    const auto emulator = start(with_render(small_scene("rate_hz = 50"), "spp = 1024"), o);
+    ASSERT_TRUE(emulator);
+    std::atomic<bool> ended{false};
+    std::thread loop([&] {
+        EXPECT_TRUE(emulator->run(stop_));
+        ended = true;
+    });
+    while (!ended && emulator->t_ns() < 20'000'000'000) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(ended);
+    stop_ = true;
+    loop.join();
+    const auto frames = read_rows(o.log_folder + "/nav.ledger.csv");
+    ASSERT_FALSE(frames.empty());
+    EXPECT_LT(emulator->t_ns(), std::stoll(frames.front().at("t_hand_over_ns")));
 }
 
 TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
@@ -136,10 +179,11 @@ TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
 TEST_F(RealTime, ABudgetLongerThanAPeriodIsRefused) {
     RunOptions o;
     o.video = {{"nav", "none"}};
-    const auto emulator = Emulator::create(scene(with_render(small_scene("rate_hz = 10"), "budget_ms = 101")), o);
+    Scene overridden = scene(small_scene("rate_hz = 10"));
+    overridden.render.budget_ns = 101'000'000;  // as the command line does; of a scene's own its file tells
+    const auto emulator = Emulator::create(std::move(overridden), o);
     ASSERT_FALSE(emulator);
-    EXPECT_NE(emulator.error().text().find("at most the period of camera \"nav\", 100 ms"), std::string::npos)
-        << emulator.error().text();
+    EXPECT_EQ(emulator.error().text(), "--budget-ms 101, expected at most the period of camera \"nav\", 100 ms");
 }
 
 TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
@@ -159,52 +203,6 @@ TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
     // Nobody commands: every frame says so.
     EXPECT_EQ(emulator->cameras().front()->stats().stale, emulator->cameras().front()->stats().frames);
 }
-
-/// At 10 kHz no frame of 200,000 samples can be ready before the next is due: every frame is late.
-class LateFrames : public RealTime, public ::testing::WithParamInterface<const char*> {};
-
-TEST_P(LateFrames, AreTreatedAsTheSceneSays) {
-    const std::string policy = GetParam();
-    RunOptions o;
-    o.duration_s = 0.2;
-    o.video = {{"nav", folder_ / "late.y4m"}};
-    o.log_folder = folder_ / "log";
-    const std::string text = small_scene("rate_hz = 10000\nlate_policy = \"" + policy + "\"");
-    const auto emulator = start(with_render(text, "spp = 64"), o);
-    ASSERT_TRUE(emulator);
-    ASSERT_TRUE(emulator->run(stop_));
-    const CameraStats& c = emulator->cameras().front()->stats();
-    EXPECT_GT(c.frames, 0U);
-    EXPECT_EQ(c.deadline_missed, c.frames);
-    EXPECT_EQ(c.late.count(), c.frames);
-    EXPECT_GT(c.late.percentile_ns(0.0), 0);
-    EXPECT_EQ(c.repeated, policy == "repeat" ? c.frames : 0U);
-    EXPECT_EQ(c.blanked, policy == "blank" ? c.frames : 0U);
-    // The ledger says what was handed over in each frame's place.
-    std::ifstream ledger(o.log_folder + "/nav.ledger.csv");
-    std::string line;
-    std::getline(ledger, line);
-    std::uint64_t lines = 0;
-    const std::string delivery = policy == "late"     ? ",0,frame,"
-                                 : policy == "drop"   ? ",0,nothing,"
-                                 : policy == "repeat" ? ",0,repeated,"
-                                                      : ",0,blank,";
-    for (; std::getline(ledger, line); ++lines) EXPECT_NE(line.find(delivery), std::string::npos) << line;
-    EXPECT_EQ(lines, c.frames);
-    EXPECT_EQ(c.ledgers_lost, 0U);  // without a bus nobody waits for them
-    EXPECT_EQ(c.frames + c.skipped, 2'000U);
-    EXPECT_EQ(c.handed_over, policy == "drop" ? 0U : c.frames);
-    const std::string video = slurp(folder_ / "late.y4m");
-    const bool has_light =
-        video.find_first_of("\xff\xfe\xfd\xfc\xfb\xfa\xf0\xe0\x80\x60\x50", video.find('\n')) != std::string::npos;
-    if (policy == "late") {
-        EXPECT_TRUE(has_light);
-    } else {
-        EXPECT_FALSE(has_light);  // black, or the last good frame, of which there was none
-    }
-}
-
-INSTANTIATE_TEST_SUITE_P(All, LateFrames, ::testing::Values("late", "drop", "repeat", "blank"));
 
 }  // namespace
 }  // namespace narpa::test

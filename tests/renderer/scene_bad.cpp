@@ -60,6 +60,8 @@ const BadScene kBad[] = {
     {"BudgetRaysZero", "[render]\nbudget_rays = 0\n", 2, 15, "budget_rays: got 0, expected an integer in [1, "},
     {"BudgetAndSpp", "[render]\nspp = 4\nbudget_ms = 10\n", 3, 13, "expected one of spp, budget_ms, budget_rays"},
     {"BudgetOfTwoKinds", "[render]\nbudget_rays = 4\nbudget_ms = 10\n", 2, 15, "budget_ms is given too"},
+    {"BudgetBeyondAPeriod", "[render]\nbudget_ms = 101\n" CAMERA FIELD "rate_hz = 10\n", 7, 11,
+     "rate_hz: a period of 100 ms, expected at least the budget_ms of [render], 101"},
     {"TableExpected", "sun = 3\n", 1, 7, "sun: got 3, expected a table"},
     {"ArrayOfTablesExpected", "[body]\nname = \"b\"\n", 1, 1, "headed [[body]]"},
     {"Atmosphere", "[atmosphere]\nheight_m = 1\n", 1, 1, "atmosphere: not in this version"},

@@ -157,6 +157,9 @@ std::vector<std::string> loop_faults(const std::vector<LoopRun>& runs, double la
     std::vector<std::string> faults;
     for (const LoopRun& run : runs)
         for (const CameraRun& c : run.cameras) {
+            if (c.stats.frames + c.stats.skipped == 0)
+                faults.push_back(
+                    fmt::format("{}, camera {}: no frame fell due, expected one at least", run.name, c.name));
             if (c.incomplete() > 0)
                 faults.push_back(fmt::format("{}, camera {}: {} frames without a whole image, expected none",
                                              run.name, c.name, c.incomplete()));

@@ -59,7 +59,7 @@ struct LoopRun {
 [[nodiscard]] Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunOptions& options,
                                        const std::vector<int>& load, const StopFlag& stop);
 
-/// What is wrong, one sentence each: an incomplete frame, more than this fraction late. Empty: nothing.
+/// What is wrong, one sentence each: no frame, an incomplete one, more than this fraction late. Empty: nothing.
 [[nodiscard]] std::vector<std::string> loop_faults(const std::vector<LoopRun>& runs, double late_max);
 
 [[nodiscard]] nlohmann::json to_json(const LoopRun& run);

@@ -27,14 +27,14 @@ Result<std::vector<Placement>> placements_of(const std::vector<LoggedFrame>& fra
     for (const LoggedFrame& frame : frames) {
         const std::int64_t t_ns = frame.ledger.t_exposure_mid_ns;
         const auto [begin, end] =
-            std::equal_range(rows->begin(), rows->end(), TrajectoryRow{t_ns, {}, {}}, by_time);
+            std::equal_range(rows->begin(), rows->end(), TrajectoryRow{t_ns, {}, {}, 0}, by_time);
         Placement& at = placements.emplace_back(bodies);
         for (auto row = begin; row != end; ++row) {
             const auto body = world.body_named(row->body);
             if (!body)
                 return Error{fmt::format("body \"{}\" at {:.9f} s, which the scene \"{}\" does not have", row->body,
                                          static_cast<double>(t_ns) * 1e-9, world.scene().file),
-                             truth_file};
+                             truth_file, row->line};
             at.set(*body, row->motion.T_world_body);
         }
         if (static_cast<std::size_t>(end - begin) != bodies)
@@ -159,12 +159,13 @@ std::vector<std::string> Replay::make(std::size_t i) {
     expect_same("step", kStepNames[static_cast<std::size_t>(account.step)], kStepNames[l.step], differs);
     expect_same("samples", account.samples, l.samples, differs);
     expect_same("rays", account.rays, l.rays, differs);
+    if (!has_image(i) && l.passes[0] > 0) differs.push_back(fmt::format("passes: none, logged {}", l.passes[0]));
     // A frame that had no time left to estimate its error has time here.
     if (l.expected_error >= 0)
         expect_same("expected_error", static_cast<float>(account.standard_error / r.full_scale), l.expected_error,
                     differs);
     expose(r.camera, r.picture, settings.seed, l.frame, r.bytes);
-    if (!r.bytes_repeat(logged))
+    if (has_image(i) && !r.bytes_repeat(logged))
         differs.push_back(
             fmt::format("image_crc32: {:08x}, logged {:08x}", image_crc32(r.bytes), logged.image_crc32));
     return differs;

@@ -37,8 +37,8 @@ public:
     /// Whether frame i has an image of its own: one that did not even get to its coarsest step has none to repeat.
     [[nodiscard]] bool has_image(std::size_t i) const noexcept;
 
-    /// Makes frame i, which has an image, as it was made. Returns what is not as the log tells, in words: nothing
-    /// where the frame repeats bit for bit.
+    /// Makes frame i as it was made. Returns what is not as the log tells, in words: nothing where the frame
+    /// repeats bit for bit, or has no image and took nothing.
     std::vector<std::string> make(std::size_t i);
     [[nodiscard]] const RadianceImage& picture() const noexcept;
 

@@ -86,16 +86,11 @@ Status write_run_record(const std::string& folder, const Scene& scene) {
     std::error_code unknown;
     const std::filesystem::path file = std::filesystem::absolute(scene.file, unknown);
     const RenderSettings& r = scene.render;
-    const json document{{"format", kFormat},
-                        {"scene", unknown ? scene.file : file.lexically_normal().string()},
-                        {"render",
-                         {{"method", r.method == Method::path ? kPath : kDirect},
-                          {"max_depth", r.max_depth},
-                          {"spp", r.spp},
-                          {"budget_ns", r.budget_ns},
-                          {"budget_rays", r.budget_rays},
-                          {"seed", r.seed},
-                          {"stale_after_s", r.stale_after_s}}}};
+    const json document{
+        {"format", kFormat},
+        {"scene", unknown ? scene.file : file.lexically_normal().string()},
+        {"render",
+         {{"method", r.method == Method::path ? kPath : kDirect}, {"max_depth", r.max_depth}, {"seed", r.seed}}}};
     std::ofstream out(file_in(folder));
     out << document.dump(2) << '\n';
     if (!out.flush()) return Error{"cannot be written", file_in(folder), 0, 0, ErrorKind::failed};

@@ -8,8 +8,8 @@
 
 namespace narpa {
 
-/// The scene's file, and what decides a frame's bytes beside it, with what the command line had changed. Budgets
-/// are not here: each frame's ledger has its own.
+/// The scene's file, and of its [render] what decides a frame's bytes beside its ledger, so that a file changed
+/// since does not. Budgets, which the command line may have changed, are not here: each frame's ledger has its own.
 struct RunRecord {
     std::string scene_file;  ///< absolute
     RenderSettings::Method method{};

@@ -52,7 +52,7 @@ Result<TrajectoryRow> read_row(std::string_view line, const std::string& path, i
     if (std::abs(v[0]) > 9e9) return bad(1, fmt::format("time {} s, expected less than 9e9 s", v[0]));
     if (cells[1].text.empty()) return bad(cells[1].column, "empty body name");
 
-    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1].text), {}};
+    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1].text), {}, number};
     row.motion = {{{v[5], v[6], v[7], v[8]}, {v[2], v[3], v[4]}}, {v[9], v[10], v[11]}, {v[12], v[13], v[14]}};
     if (!accept_attitude(row.motion.T_world_body.q))
         return bad(cells[5].column, fmt::format("attitude of norm {:.6g}, expected a unit quaternion (w, x, y, z)",

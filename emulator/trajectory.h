@@ -23,6 +23,7 @@ struct TrajectoryRow {
     std::int64_t t_ns = 0;
     std::string body;
     Motion motion{};
+    int line = 0;  ///< of the file that it was read from
 };
 
 /// Rows in the order of the file. Errors name file, line and column.

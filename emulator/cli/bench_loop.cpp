@@ -78,7 +78,8 @@ Outcome bench(Options o) {
     auto runs = measure(o, *scene);
     if (!runs) return runs.error();
 
-    const std::vector<std::string> faults = loop_faults(*runs, o.late_max_percent / 100);
+    std::vector<std::string> faults = loop_faults(*runs, o.late_max_percent / 100);
+    if (stop_flag()) faults.emplace_back("interrupted before the end");
     const std::string title =
         fmt::format("{}, {:g} s; load on processors {}", scene->name, o.run.duration_s, fmt::join(o.load, ", "));
     say(title);
@@ -127,7 +128,9 @@ Command add_bench_loop(CLI::App& bench_command) {
         ->check(CLI::Range(0.0, 100.0))
         ->capture_default_str();
     c->add_option("-o,--output", o->plot, "FILE.png: how many frames exceed which time");
-    c->footer("Exit status 1 where a frame is not whole, or more frames are late than --late-max.");
+    c->footer(
+        "Exit status 1 where a frame is not whole, more frames are late than --late-max, none fell due, or the "
+        "bench was interrupted.");
     return [o] { return bench(*o); };
 }
 

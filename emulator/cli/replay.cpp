@@ -23,6 +23,7 @@ struct Options {
 struct Replayed {
     std::vector<ReplayedFrame> frames;
     std::size_t not_whole = 0;
+    std::vector<ReplayedFrame> forged;  ///< of those that are not whole, what cannot be so
     /// The frame that is farthest from its reference.
     std::size_t worst = 0;
     std::optional<RadianceImage> worst_picture, worst_reference;
@@ -51,6 +52,8 @@ Replayed make_again(const Options& o, Replay& run) {
         const std::size_t i = chosen[k];
         if (!run.has_image(i)) {
             ++done.not_whole;
+            if (auto differs = run.make(i); !differs.empty())
+                done.forged.push_back({run.frames()[i], std::move(differs), {}});
             continue;
         }
         ReplayedFrame frame{run.frames()[i], {}, {}};
@@ -71,15 +74,18 @@ Replayed make_again(const Options& o, Replay& run) {
 }
 
 /// "nav.ledger.csv:12: frame 10: rays: 512, logged 513" for each, as far as anyone wants to read.
-std::string differences_in_words(const std::vector<ReplayedFrame>& frames, const std::string& log) {
+std::string differences_in_words(const Replayed& done, const std::string& log) {
     std::string out;
     std::size_t told = 0, differing = 0;
-    for (const ReplayedFrame& f : frames) {
-        if (f.differs.empty() || ++differing > kDifferencesTold) continue;
-        out += fmt::format("{}:{}: frame {}: {}\n", log, f.logged.line, f.logged.ledger.frame,
-                           fmt::join(f.differs, "; "));
-        ++told;
-    }
+    for (const auto* frames : {&done.frames, &done.forged})
+        for (const ReplayedFrame& f : *frames) {
+            if (f.differs.empty() || ++differing > kDifferencesTold) continue;
+            out += fmt::format("{}:{}: frame {}: {}\n", log, f.logged.line, f.logged.ledger.frame,
+                               fmt::join(f.differs, "; "));
+            ++told;
+        }
+    if (done.frames.empty())
+        out += fmt::format("{}: no frame to repeat, expected one with an image at least\n", log);
     if (differing > told) out += fmt::format("and {} frames more\n", differing - told);
     if (differing > 0)
         out +=
@@ -100,13 +106,14 @@ Outcome replay(const Options& o) {
     const Replayed done = make_again(o, **run);
     const auto repeated = static_cast<std::size_t>(
         std::count_if(done.frames.begin(), done.frames.end(), [](const auto& f) { return f.differs.empty(); }));
-    const bool passed = repeated == done.frames.size();
+    const bool passed = repeated > 0 && repeated == done.frames.size() && done.forged.empty();
     say(fmt::format("{}: camera {}: {} of {} frames repeat bit for bit; {} in the log{}", o.folder, camera,
                     repeated, done.frames.size(), (*run)->frames().size(),
                     done.not_whole > 0 ? fmt::format("; {} had no whole image", done.not_whole) : ""));
-    if (!passed) say(differences_in_words(done.frames, log));
+    if (!passed) say(differences_in_words(done, log));
 
     nlohmann::json frames = nlohmann::json::array();
+    for (const ReplayedFrame& f : done.forged) frames.push_back(to_json(f, (*run)->world().scene()));
     for (const ReplayedFrame& f : done.frames)
         if (f.compared || !f.differs.empty()) frames.push_back(to_json(f, (*run)->world().scene()));
     nlohmann::json document{{"passed", passed},
@@ -152,9 +159,8 @@ Command add_replay(CLI::App& app) {
         ->check(CLI::Range(0, 1024));
     c->add_option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
     c->footer(
-        "Exit status 1 where a frame does not repeat bit for bit. RMSE, bias and errors are of the mean of the "
-        "bands, "
-        "as parts of the radiance that fills the sensor's scale.");
+        "Exit status 1 where a frame does not repeat bit for bit, or none has an image to repeat. RMSE, bias and "
+        "errors are of the mean of the bands, as parts of the radiance that fills the sensor's scale.");
     return [o] { return replay(*o); };
 }
 

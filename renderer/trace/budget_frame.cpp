@@ -56,6 +56,10 @@ public:
         account_.step = FrameStep::nothing;
         begin(middle_);
         take_middles();
+        if (account_.step == FrameStep::nothing) {  // nor is what told how dear it is part of an image
+            account_.rays_discarded += account_.rays;
+            account_.rays = account_.samples = 0;
+        }
         if (passes_.pixels() == 0 && account_.step == FrameStep::one_sample)
             account_.standard_error = 0;  // nothing in view
         else if (account_.step == FrameStep::one_sample && worth_planning())

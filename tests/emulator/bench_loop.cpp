@@ -21,8 +21,8 @@ struct Done {
     std::string out;
 };
 
-Done bench(const std::string& arguments, const char* streams) {
-    const std::string command = std::string("timeout 60 ") + NARPA_BIN + " bench loop " + arguments + streams;
+Done bench(const std::string& arguments, const char* streams, const char* within = "timeout 60 ") {
+    const std::string command = std::string(within) + NARPA_BIN + " bench loop " + arguments + streams;
     std::FILE* pipe = ::popen(command.c_str(), "r");
     Done done;
     for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
@@ -110,6 +110,13 @@ TEST(BenchLoop, ATimeBudgetIsTheAllowance) {
     EXPECT_TRUE(document["runs"][0]["lidars"].empty());
 }
 
+TEST(BenchLoop, FailsWhereItWasInterrupted) {
+    const Done done = bench("--idle-only --duration 60 --late-max 100 --json", " 2>/dev/null",
+                            "timeout --preserve-status -s INT 2 ");
+    EXPECT_EQ(done.status, 1);
+    EXPECT_EQ(nlohmann::json::parse(done.out)["faults"].back(), "interrupted before the end");
+}
+
 TEST(BenchLoop, SaysWhatIsWrongWithItsInput) {
     const Done load = bench("--load 1023", " 2>&1 >/dev/null");
     EXPECT_EQ(load.status, 2);
@@ -174,6 +181,10 @@ TEST(LoopRun, FaultsAreSentences) {
     EXPECT_EQ(faults[0], "idle, camera nav: 1 frames without a whole image, expected none");
     EXPECT_EQ(faults[1], "idle, camera nav: 30 % of the frames late, expected at most 10 %");
     EXPECT_EQ(loop_faults(runs, 0.3).size(), 1u);
+    LoopRun none{"idle", {}, {}, {}, {}, {}};
+    none.cameras.emplace_back().name = "nav";
+    EXPECT_EQ(loop_faults({none}, 1),
+              std::vector<std::string>{"idle, camera nav: no frame fell due, expected one at least"});
 }
 
 }  // namespace

@@ -284,7 +284,7 @@ TEST_F(ReplayTest, SaysWhatIsWrongWithALogAndWhere) {
     std::ofstream(ledger) << good_ledger;
 
     tamper(truth, "target", "nobody");
-    expect_refused(log, "body \"nobody\" at 0.000000000 s, which the scene");
+    expect_refused(log, "nav.truth.csv:2: body \"nobody\" at 0.000000000 s, which the scene");
     std::ofstream(truth) << good_truth.substr(0, good_truth.size() / 2);
     expect_refused(log, "nav.truth.csv:");
     std::ofstream(truth) << good_truth;
@@ -296,7 +296,7 @@ TEST_F(ReplayTest, SaysWhatIsWrongWithALogAndWhere) {
     expect_refused(log, "seed: expected a whole number from 0");
     std::ofstream(record_file) << good_record;
     tamper(record_file, "\"direct\"", "\"magic\"");
-    expect_refused(log, "run.json:7:5: method: expected direct or path");
+    expect_refused(log, "run.json:5:5: method: expected direct or path");
     std::ofstream(record_file) << good_record;
     std::filesystem::remove(folder_ / "scene.toml");
     expect_refused(log, "scene.toml");
@@ -434,6 +434,29 @@ TEST_F(ReplayTest, TheProgramTellsHowManyFramesRepeat) {
     EXPECT_NE(bad.out.find("4 of 5 frames repeat bit for bit"), std::string::npos) << bad.out;
     EXPECT_NE(bad.out.find("nav.ledger.csv:5: frame 3: image_crc32: "), std::string::npos) << bad.out;
     EXPECT_NE(bad.out.find(", logged deadbeef"), std::string::npos) << bad.out;
+}
+
+TEST_F(ReplayTest, TheProgramFindsNothingProvedWhereNothingIsRepeated) {
+    const std::string log = run(scene_with("budget_rays = 1"), 2);  // too few for the coarsest image
+    const Done nothing = replay(log + " --json", " 2>/dev/null");
+    EXPECT_EQ(nothing.status, 1);
+    const json document = json::parse(nothing.out);
+    EXPECT_FALSE(document["passed"].get<bool>());
+    EXPECT_EQ(document["frames_replayed"], 0);
+    EXPECT_EQ(document["frames_not_whole"], 2);
+    EXPECT_TRUE(document["frames"].empty());  // what there is of the log is true
+}
+
+/// A frame that got nowhere took nothing: a whole one cannot be hidden behind that step.
+TEST_F(ReplayTest, TheProgramLooksAtFramesWithoutAnImageToo) {
+    const std::string log = run(scene_with("budget_rays = 20000"));
+    set_cell(log, 4, "step", "5");
+    const Done bad = replay(log, " 2>&1");
+    EXPECT_EQ(bad.status, 1);
+    EXPECT_NE(bad.out.find("4 of 4 frames repeat bit for bit"), std::string::npos) << bad.out;
+    for (const char* words :
+         {"nav.ledger.csv:5: frame 3: samples: 0, logged ", "; rays: 0, logged ", "; passes: none"})
+        EXPECT_NE(bad.out.find(words), std::string::npos) << words << "\n" << bad.out;
 }
 
 TEST_F(ReplayTest, TheProgramComparesAndPaints) {

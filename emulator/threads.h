@@ -9,6 +9,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <thread>
 #include <vector>
 
@@ -57,7 +58,7 @@ struct TracingThreads {
             : tbb::task_scheduler_observer(a), cpus(std::move(processors)) {}
         ~RealTime() override { observe(false); }
         void on_scheduler_entry(bool is_worker) override {
-            static thread_local const RealTime* granted_by = nullptr;
+            static thread_local std::uint64_t granted_by = 0;
             static thread_local int cpu = -1;
             if (!cpus.empty()) {
                 const int index = tbb::this_task_arena::current_thread_index();
@@ -65,11 +66,14 @@ struct TracingThreads {
                 if (mine != cpu && !run_on_cpu(mine)) refused = true;
                 cpu = mine;
             }
-            if (granted_by == this) return;
-            granted_by = this;
+            if (granted_by == number) return;
+            granted_by = number;
             touch_stack();
             if (is_worker && !take_fifo_priority(priority)) refused = true;
         }
+        /// Of this object, from 1: another may come to stand where it was.
+        static inline std::atomic<std::uint64_t> made{0};
+        const std::uint64_t number = ++made;
         std::vector<int> cpus;
         int priority = 1;
         std::atomic<bool> refused{false};

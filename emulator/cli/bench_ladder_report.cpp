@@ -111,9 +111,10 @@ nlohmann::json describe(const CraftRatios& r) {
 nlohmann::json describe(const SceneLadder& l) {
     nlohmann::json rungs = nlohmann::json::array();
     for (const Rung& r : l.ladder.rungs) {
-        nlohmann::json rung{{"name", r.name},           {"loop", r.loop},          {"adaptive", r.adaptive},
-                            {"median_s", r.median_s()}, {"seconds", r.seconds},    {"rays", r.rays},
-                            {"samples", r.samples},     {"rmse", to_json(r.rmse)}, {"bias", to_json(r.bias)}};
+        nlohmann::json rung{{"name", r.name},           {"loop", r.loop},       {"adaptive", r.adaptive},
+                            {"median_s", r.median_s()}, {"seconds", r.seconds}, {"cpu_seconds", r.cpu_seconds},
+                            {"rays", r.rays},           {"samples", r.samples}, {"rmse", to_json(r.rmse)},
+                            {"bias", to_json(r.bias)}};
         if (!r.loop) {
             rung["step"] = kStepNames[static_cast<std::size_t>(r.step)];
             rung["predicted"] = r.predicted ? nlohmann::json(*r.predicted) : nlohmann::json(nullptr);

@@ -94,13 +94,15 @@ Command add_run(CLI::App& app) {
     c->add_option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")
         ->take_all()
         ->allow_extra_args(false);
-    c->add_flag("--lockstep", o->run.lockstep,
-                "The clock advances only with commands; no wall time enters any result");
+    CLI::Option* lockstep = c->add_flag("--lockstep", o->run.lockstep,
+                                        "The clock advances only with commands; no wall time enters any result");
     c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         ->check(CLI::Range(0.0, 9e9));
-    c->add_option("--log", o->run.log_folder, "Folder for truth, ledger, CAN log and contact sheet");
+    c->add_option("--log", o->run.log_folder, "Folder for run.json, truth, ledger, CAN log and contact sheet");
     o->budget.add_to(*c);
-    c->add_option("--cpus", o->cpus, "Processors for these threads, as 0,1 or 2-3; each is bound to one");
+    c->add_option("--cpus", o->cpus,
+                  "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
+        ->excludes(lockstep);
     c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
         ->check(CLI::Range(0, 1024));
     return [o] { return run(*o); };

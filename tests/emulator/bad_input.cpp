@@ -94,6 +94,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"SinkWithoutCamera", "run SCENE --video none", nullptr, 2, "CAMERA=SINK"},
         Mistake{"BadUdpPort", "run SCENE --lidar top=udp:127.0.0.1:x", nullptr, 2, "udp:127.0.0.1:x"},
         Mistake{"NothingToPutOut", "run SCENE", nullptr, 2, "--video"},
+        Mistake{"ProcessorsInLockstep", "run SCENE --lockstep --cpus 0 --can log:none --video nav=none", nullptr, 2,
+                "--lockstep excludes --cpus"},
         Mistake{"LockstepWithoutABus", "run SCENE --lockstep --video nav=none", nullptr, 2, "--can"},
         // Pictures and scans
         Mistake{"UnknownImageKind", "render SCENE -o FOLDERa.gif", nullptr, 2, "a.gif"},

@@ -95,6 +95,8 @@ TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {
     for (const auto& rung : document["scenes"][0]["rungs"]) {
         EXPECT_GT(rung["rays"].get<double>(), 0) << rung;
         EXPECT_EQ(rung["seconds"].size(), 2u);
+        ASSERT_EQ(rung["cpu_seconds"].size(), 2u);
+        for (const auto& frame : rung["cpu_seconds"]) EXPECT_GT(frame.get<double>(), 0) << rung;
         if (!rung["loop"].get<bool>()) {
             EXPECT_GT(rung["predicted"].get<double>(), 0) << rung;  // of direct light each frame tells
             EXPECT_GT(rung["phase_s"]["rays"].get<double>(), 0) << rung;

@@ -5,6 +5,7 @@
 #include <sched.h>
 
 #include <mutex>
+#include <optional>
 #include <set>
 
 namespace narpa::test {
@@ -53,6 +54,29 @@ TEST(TracingThreads, AreAllThereOnceTheyAreGathered) {
     threads.gather();
     EXPECT_EQ(visitors.threads.size(), 3U);
     EXPECT_TRUE(visitors.threads.contains(std::this_thread::get_id()));
+}
+
+/// Threads that served another object at the same place are set up anew.
+TEST(TracingThreads, AreSetUpForEachObject) {
+    bool granted = false;
+    std::thread([&] { granted = take_fifo_priority(1); }).join();
+    std::optional<TracingThreads> threads;
+    for (const int priority : {1, 2}) {
+        threads.emplace(3);
+        threads->make_real_time(priority);
+        threads->gather();
+        EXPECT_EQ(threads->refused(), !granted);
+        const std::thread::id caller = std::this_thread::get_id();
+        threads->arena.execute([&] {
+            tbb::parallel_for(0, 1000, [&](int) {
+                sched_param now{};
+                ::sched_getparam(0, &now);
+                if (granted && std::this_thread::get_id() != caller) {
+                    EXPECT_EQ(now.sched_priority, priority);
+                }
+            });
+        });
+    }
 }
 
 TEST(TracingThreads, EachHasAProcessorOfItsOwn) {

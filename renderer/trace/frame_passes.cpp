@@ -34,9 +34,9 @@ int standing_for(int x, int width, int stride) {
     return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
 }
 
-// Lattices of tiles.
+// Lattices of tiles, the first of squares of 4 x 4.
 bool in_a_fifth(int tx, int ty) {
-    return (tx + 2 * ty) % 5 == 0;
+    return (tx / 4 + 2 * (ty / 4)) % 5 == 0;
 }
 bool in_a_sixteenth(int tx, int ty) {
     return (tx + 6 * ty) % 16 == 0;
@@ -173,11 +173,14 @@ struct FramePasses::Worker {
             given_up.store(true, std::memory_order_relaxed);
     }
     void middles(const Tile& tile, int width, int height, int stride, int made, TileLooks& looks) {
+        middles(tile, width, height, stride, made, [&](const Batch& b, const Packet& p, const RgbPerRay& radiance) {
+            PixelLooks::store(f, p, radiance, b.place, looks);
+        });
+    }
+    template <class Store>
+    void middles(const Tile& tile, int width, int height, int stride, int made, Store&& store) {
         begin(true);
         const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstMiddle;
-        const auto store = [&](const Batch& b, const Packet& p, const RgbPerRay& radiance) {
-            PixelLooks::store(f, p, radiance, b.place, looks);
-        };
         if (stride == 1 && made == 0 && tile.whole()) {
             for (int block = 0; block < 4; ++block) {
                 put_block(tile, block, first, width, batches[full]);
@@ -410,10 +413,7 @@ PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<f
     const auto spp = static_cast<std::uint32_t>(f.settings.spp);
     const PassCount count = over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         if (f.one_sample()) {
-            TileLooks& looks = looks_.tile(t.index);
-            w.middles(t, out.width, out.height, 1, 0, looks);
-            t.each_pixel(
-                [&](int x, int y, std::size_t at) { out.pixels[index_of(x, y, out.width)] = look_at(looks, at); });
+            show_one_sample(w, t, out);
         } else {
             PerPixel<PixelMean> means{};
             PerPixel<PixelSamples> spread;
@@ -445,13 +445,40 @@ PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<f
     return count;
 }
 
-/// Of many tiles a fifth is looked at: as good an estimate, to a few hundredths, for a fifth of the time.
+void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) {
+    const auto row = [&](int y) { return &out.pixels[index_of(t.x, y, out.width)]; };
+    if (!looks_serve(t.index)) {
+        w.middles(t, out.width, out.height, 1, 0,
+                  [&](const Worker::Batch& b, const Packet&, const RgbPerRay& light) {
+                      for (std::size_t i = 0; i < b.samples.n; ++i)
+                          row(b.samples.y[i])[b.samples.x[i] - t.x] = light[i];
+                  });
+        return;
+    }
+    const TileLooks& looks = looks_.tile(t.index);
+    w.middles(t, out.width, out.height, 1, 0, looks_.tile(t.index));
+    for (int y = 0; y < t.height; ++y)
+        for (int x = 0; x < t.width; ++x) row(t.y + y)[x] = look_at(looks, place_in_tile(x, y));
+}
+
+/// Of many tiles a fifth is looked at, in squares: an estimate within a tenth for a fifth of the time.
+bool FramePasses::estimates(std::uint32_t tile) const noexcept {
+    const int tx = static_cast<int>(tile) % looks_.tiles_x(), ty = static_cast<int>(tile) / looks_.tiles_x();
+    return tiles_.size() < kManyTiles || in_a_fifth(tx, ty);
+}
+
+/// To these tiles, or to those beside them.
+bool FramePasses::looks_serve(std::uint32_t tile) const noexcept {
+    if (tiles_.size() < kManyTiles) return true;
+    const int tx = static_cast<int>(tile) % looks_.tiles_x(), ty = static_cast<int>(tile) / looks_.tiles_x();
+    for (int y = ty - 1; y <= ty + 1; ++y)
+        for (int x = tx - 1; x <= tx + 1; ++x)
+            if (x >= 0 && y >= 0 && in_a_fifth(x, y)) return true;
+    return false;
+}
+
 void FramePasses::estimate_middles(const Frame& f) {
-    const bool many = tiles_.size() >= kManyTiles;
-    const auto counts = [&](std::uint32_t tile) {
-        const int tx = static_cast<int>(tile) % looks_.tiles_x(), ty = static_cast<int>(tile) / looks_.tiles_x();
-        return !many || in_a_fifth(tx, ty);
-    };
+    const auto counts = [&](std::uint32_t tile) { return estimates(tile); };
     const double seen = static_cast<double>(std::count_if(tiles_.begin(), tiles_.end(), counts));
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         if (!counts(t.index)) return;

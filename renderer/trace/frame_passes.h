@@ -72,6 +72,9 @@ private:
     [[nodiscard]] Tile tile(std::uint32_t index) const noexcept;
     void find_background(const Frame& f);
     void fill_background(RadianceImage& out);
+    void show_one_sample(Worker& w, const Tile& t, RadianceImage& out);
+    [[nodiscard]] bool estimates(std::uint32_t tile) const noexcept;
+    [[nodiscard]] bool looks_serve(std::uint32_t tile) const noexcept;
     void estimate_middles(const Frame& f);
 
     const Camera& camera_;

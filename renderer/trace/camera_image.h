@@ -19,8 +19,8 @@ struct Aovs {
     std::vector<std::int32_t> body;
     std::vector<Rgb> albedo;  ///< base colour with its texture: a mirror's reflectance, white for glass
     /// Of the pixel's mean over the bands (0 for spp < 2, but for tiny bodies), W^2 m^-4 sr^-2: pixel_samples.h
-    /// says how it is estimated and which 95 % interval goes with it. Within a budget: what a frame expects of itself
-    /// (frame_error.h), where it came to refined; else 0.
+    /// says how it is estimated and which 95 % interval goes with it. Within a budget: what a frame expects of
+    /// itself (frame_error.h), where it came to refined; else 0.
     std::vector<float> variance;
 };
 
@@ -58,15 +58,15 @@ struct FrameSettings {
 ///
 /// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: tiny_bodies.h.
 ///
-/// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. Takes its memory anew with each
-/// call: for many frames there is CameraRenderer. `aovs` may be null; they show a pinhole's view, tiny bodies among
-/// the rest.
+/// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. Takes its memory anew with
+/// each call: for many frames there is CameraRenderer. `aovs` may be null; they show a pinhole's view, tiny bodies
+/// among the rest.
 void render_radiance(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
                      const FrameSettings& settings, RadianceImage& out, Aovs* aovs = nullptr);
 
 /// The same, for a camera's frames one after another: keeps memory and measures from frame to frame, and knows
-/// budgets. What a frame looks like depends on neither. Allocates nothing after the first frame of a kind. Tiles that
-/// stay empty from frame to frame are not written again: nobody else may write to `out` in between.
+/// budgets. What a frame looks like depends on neither. Allocates nothing after the first frame of a kind. Tiles
+/// that stay empty from frame to frame are not written again: nobody else may write to `out` in between.
 class CameraRenderer {
 public:
     /// Both outlive it.

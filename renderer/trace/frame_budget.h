@@ -30,9 +30,10 @@ enum class FrameStep : std::uint8_t {
 struct FrameBudget {
     enum class Kind : std::uint8_t {
         samples,  ///< FrameSettings::spp for each pixel, in one pass
-        rays,     ///< at most this many rays of all kinds, but those for tiny bodies (tiny_bodies.h); the same bytes whatever the machine and its load
-        time,     ///< the radiance is there at the deadline
-        passes,   ///< as an account tells: to make the same frame again
+        rays,    ///< at most this many rays of all kinds, but those for tiny bodies (tiny_bodies.h); the same bytes
+                 ///< whatever the machine and its load
+        time,    ///< the radiance is there at the deadline
+        passes,  ///< as an account tells: to make the same frame again
     };
     Kind kind = Kind::samples;
     std::uint64_t rays = 0;

@@ -305,8 +305,14 @@ void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay>
     std::array<FirstSurface, kSharing> first;
     std::array<Rgb, kSharing> light;
     std::array<float, kSharing> variance;
+    std::array<Place, kSharing> of_rank;
     for (std::size_t r = 0; r < kOfAPixel && n[r] > 0; ++r) {
-        const std::span<const Place> of_rank = std::span(places[r]).first(n[r]);
+        // Every other pixel of every other row, then the next such: packets share, and are to lie between one
+        // another.
+        std::size_t put = 0;
+        for (std::size_t c = 0; c < 4; ++c)
+            for (std::size_t i = 0; i < n[r]; ++i)
+                if (((i & 1) | (i >> 1 & 2)) == c) of_rank[put++] = places[r][i];
         for (std::size_t i = 0; i < n[r]; ++i) {
             const Packet& p = packets[of_rank[i].packet];
             const std::size_t lane = of_rank[i].lane;

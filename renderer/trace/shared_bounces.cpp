@@ -11,8 +11,8 @@ namespace {
 
 /// As for lights (lights.cpp): rounding in single precision, where meshes are, and in double.
 constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;
-/// Bounces that are joined to all points, on average; of more the brightest are likeliest.
-constexpr double kBounces = 8;
+/// Bounces that are joined, on average; of more the brightest are likeliest.
+constexpr double kBounces = 32;
 /// A ray along a surface cannot tell where it ends within so many times that.
 constexpr double kGrazing = 1e-3;
 constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
@@ -125,52 +125,43 @@ NARPA_EACH_ISA void Starts::join(const Block& b, const Bounce& bounce, Join& __r
 
 std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
                              std::span<Rgb> radiance) noexcept {
-    std::array<Join, kSharing / kPacket> joins;
+    const std::size_t k = bounce.found_from / kPacket;
+    const Block& b = block_[k];
+    Join j;
+    join(b, bounce, j);
+    j.lit &= lanes_below(std::min(kPacket, n_ - k * kPacket));
+    for_each_lane(j.lit & b.special, [&](std::size_t i) {
+        const PathPoint::Response r = points_[k * kPacket + i].respond(j.direction[i]);
+        j.density[i] = r.pdf;
+        j.reflected.put(i, r.f_cos);
+    });
+    for_each_lane(j.lit & b.guided, [&](std::size_t i) {
+        const Path& path = paths_[k * kPacket + i];
+        const double share = path.guide.share();
+        j.density[i] = (1 - share) * j.density[i] + share * path.guide.pdf(tracer, at, path.start, j.direction[i]);
+    });
+    std::uint32_t asked = j.lit & ~(1u << bounce.found_from % kPacket);
+    for_each_lane(asked, [&](std::size_t i) {
+        if (!(j.range_m[i] > 0)) asked &= ~(1u << i);  // they touch
+    });
+    j.lit &= ~tracer.occluded(at, b.hits, j.direction, j.range_m, asked);
     double density = 0;
-    std::uint64_t rays = 0;
-    for (std::size_t k = 0; k < blocks(); ++k) {
-        const Block& b = block_[k];
-        Join& j = joins[k];
-        join(b, bounce, j);
-        j.lit &= lanes_below(std::min(kPacket, n_ - k * kPacket));
-        for_each_lane(j.lit & b.special, [&](std::size_t i) {
-            const PathPoint::Response r = points_[k * kPacket + i].respond(j.direction[i]);
-            j.density[i] = r.pdf;
-            j.reflected.put(i, r.f_cos);
-        });
-        for_each_lane(j.lit & b.guided, [&](std::size_t i) {
-            const Path& path = paths_[k * kPacket + i];
-            const double share = path.guide.share();
-            j.density[i] =
-                (1 - share) * j.density[i] + share * path.guide.pdf(tracer, at, path.start, j.direction[i]);
-        });
-        std::uint32_t asked = j.lit;
-        if (bounce.found_from / kPacket == k) asked &= ~(1u << bounce.found_from % kPacket);
-        for_each_lane(asked, [&](std::size_t i) {
-            if (!(j.range_m[i] > 0)) asked &= ~(1u << i);  // they touch
-        });
-        j.lit &= ~tracer.occluded(at, b.hits, j.direction, j.range_m, asked);
-        rays += static_cast<std::uint64_t>(std::popcount(asked));
-        for_each_lane(j.lit, [&](std::size_t i) {
-            density += j.density[i] * j.geometry[i] * static_cast<double>(b.chance[i]);
-        });
-    }
+    for_each_lane(
+        j.lit, [&](std::size_t i) { density += j.density[i] * j.geometry[i] * static_cast<double>(b.chance[i]); });
+    const auto rays = static_cast<std::uint64_t>(std::popcount(asked));
     if (!(density > 0)) return rays;
     const bool even = bounce.point.plain();
     const Rgb light = even ? bounce.towards(bounce.point.plane()) : Rgb{};
     const double per_density = static_cast<double>(scale) / density;
-    for (std::size_t k = 0; k < blocks(); ++k) {
-        const Join& j = joins[k];
-        for_each_lane(j.lit, [&](std::size_t i) {
-            const Rgb f = j.reflected[i] * static_cast<float>(j.geometry[i] * per_density);
-            const std::size_t number = k * kPacket + i;
-            const Rgb sent = f * (even ? light : bounce.towards(-j.direction[i]));
-            const float mean = mean_band(sent);
-            radiance[ray_[number]] += sent;
-            sum_[number] += mean;
-            squares_[number] += mean * mean;
-        });
-    }
+    for_each_lane(j.lit, [&](std::size_t i) {
+        const Rgb f = j.reflected[i] * static_cast<float>(j.geometry[i] * per_density);
+        const std::size_t number = k * kPacket + i;
+        const Rgb sent = f * (even ? light : bounce.towards(-j.direction[i]));
+        const float mean = mean_band(sent);
+        radiance[ray_[number]] += sent;
+        sum_[number] += mean;
+        squares_[number] += mean * mean;
+    });
     return rays;
 }
 

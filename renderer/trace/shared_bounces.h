@@ -1,11 +1,11 @@
 /// renderer/trace/shared_bounces.h - light that one path has found lights the points of its neighbours as well.
 ///
 /// Most rays that leave a spacecraft's surfaces meet nothing, and the few that meet a sunlit part of it bring all
-/// that its other parts send. So the points that those few find are joined to all the points from which paths set
-/// out together, by rays that ask for visibility alone, and each such point stands for all of them: multiple
-/// importance sampling by the balance heuristic over the points that could have found it (P. Bekaert, M. Sbert,
-/// J. Halton, "Accelerating path tracing by re-using paths", EGWR 2002). Nothing is biased, as visibility is known
-/// for every pair; a point's own find never weighs more than its albedo, so corners send no fireflies.
+/// that its other parts send. So the points that those few find are joined to sixteen points from which paths set
+/// out, their own among them, by rays that ask for visibility alone, and each such point stands for all of them:
+/// multiple importance sampling by the balance heuristic over the points that could have found it (P. Bekaert, M.
+/// Sbert, J. Halton, "Accelerating path tracing by re-using paths", EGWR 2002). Nothing is biased, as visibility is
+/// known for every pair; a point's own find never weighs more than its albedo, so corners send no fireflies.
 #pragma once
 
 #include <array>
@@ -49,9 +49,10 @@ public:
     /// Any other.
     int add(const Placement& at, const Hit& hit, const PathPoint& point, const Path& path, float chance) noexcept;
 
-    /// Adds to each start's radiance what the bounces send it. `choice`: in [0, 1), chooses some of the bounces
-    /// where they are many. `variance`: out, of the mean band of what was added, as far as one go can tell. Returns
-    /// the number of rays.
+    /// Adds to each start's radiance what the bounces send it that were found from it or from others of its
+    /// sixteen, as they were added one after another. `choice`: in [0, 1), chooses some of the bounces where they
+    /// are many. `variance`: out, of the mean band of what was added, as far as one go can tell. Returns the number
+    /// of rays.
     std::uint64_t gather(const Tracer& tracer, const Placement& at, std::span<Bounce> bounces, double choice,
                          double pixel_angle_rad, std::span<Rgb> radiance, std::span<float> variance) noexcept;
 

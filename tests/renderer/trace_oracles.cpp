@@ -10,6 +10,7 @@
 #include "renderer/trace/ellipsoid.h"
 #include "renderer/trace/shading.h"
 #include "renderer/trace/sphere_roots.h"
+#include "tests/support/oracle.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -18,18 +19,9 @@ namespace {
 using nlohmann::json;
 using namespace test;
 
-json oracle(const std::string& name) {
-    std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/" + name + ".json");
-    return file ? json::parse(file) : json();
-}
 Vec3 vec(const json& j) {
     return {j[0], j[1], j[2]};
 }
-
-#define NEED_ORACLE(variable, name)     \
-    const json variable = oracle(name); \
-    if (variable.is_null())             \
-    GTEST_SKIP() << "no reference numbers beside the project: ../shared/oracles/" name ".json"
 
 TEST(TraceOracle, RaySphere) {
     NEED_ORACLE(reference, "ray_sphere");

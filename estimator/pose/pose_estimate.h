@@ -1,0 +1,40 @@
+/// estimator/pose/pose_estimate.h - a relative pose with what is known of its error.
+///
+/// The state is `T_camera_body`: it takes the target's body coordinates to the camera's (x right, y down, z
+/// forward). An error is a vector of six, (rotation rad, translation m), both in camera axes and on the left:
+/// truth = {exp_rotation(rotation) * q, t + translation}. Covariances and bounds are of this vector, everywhere.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "base/pose.h"
+
+namespace narpa {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+inline Eigen::Vector3d to_eigen(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+inline Vec3 to_vec3(const Eigen::Vector3d& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+/// The pose that lies an error away: {exp_rotation(error[0..2]) * T.q, T.t + error[3..5]}.
+[[nodiscard]] Rigid3 displaced(const Rigid3& T, const Vector6& error);
+/// The error that leads from one pose to the other: displaced(from, error_between(from, to)) is `to`. The rotation
+/// is in [0, pi] and does not depend on the quaternions' signs.
+[[nodiscard]] Vector6 error_between(const Rigid3& from, const Rigid3& to);
+
+/// Normalised estimation error squared, e' C^-1 e: chi-square with six degrees of freedom where the covariance is
+/// right. Infinite where it is not positive definite.
+[[nodiscard]] double normalised_error_squared(const Vector6& error, const Matrix6& covariance);
+
+/// The covariance of T^-1, given that of T.
+[[nodiscard]] Matrix6 covariance_of_inverse(const Rigid3& T, const Matrix6& covariance);
+/// The covariance of T_a_b * T_b_c, given that of T_a_b; T_b_c is exact.
+[[nodiscard]] Matrix6 covariance_of_product(const Rigid3& T_a_b, const Matrix6& covariance_of_a_b,
+                                            const Rigid3& T_b_c);
+
+}  // namespace narpa

@@ -1,0 +1,53 @@
+/// estimator/view/measured_image.h - a camera's frame as numbers to estimate from, and the noise in them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// One value for each pixel, row-major, height x width: linear, in the digital numbers of SensorModel.
+struct MeasuredImage {
+    int width = 0, height = 0;
+    std::vector<float> dn;
+
+    [[nodiscard]] float at(int x, int y) const {
+        return dn[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+    }
+};
+
+/// What a pixel's digital number tells of radiance: DN = black + sum over bands of dn_per_radiance * L, clipped to
+/// 0 .. top, with the variance of read noise, shot noise and rounding. From the camera's detector
+/// (renderer/sensor/detector.h), or of the ideal sensor that it has without one. In units of the converter's DN,
+/// whatever bits of it the format shows.
+struct SensorModel {
+    std::array<double, 3> dn_per_radiance{};  ///< DN per W m^-2 sr^-1 in the red, green, blue band
+    double black_dn = 0;
+    double top_dn = 255;      ///< what a pixel cannot exceed: full well or the end of the converter
+    double read_dn2 = 0;      ///< variance of the read noise
+    double shot_dn = 0;       ///< variance per DN above black; 0: no shot noise
+    double rounding_dn2 = 0;  ///< variance of rounding to the format's step: step^2 / 12
+
+    [[nodiscard]] double dn(const Rgb& radiance) const;  ///< expected, at most top_dn
+    [[nodiscard]] double variance_dn2(double expected_dn) const;
+};
+
+/// RGB24 is read as the mean of its bands, YUYV as its luma.
+[[nodiscard]] SensorModel sensor_model(const Camera& camera);
+
+/// A frame's bytes in the camera's format (renderer/sensor/detector.h) as DN. Of a camera with an embedded line the
+/// image has one row fewer: the last holds no light. Errors: the number of bytes is not the format's.
+[[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);
+
+/// The same camera with 1 / factor of the pixels each way, each of which covers factor x factor of the finer ones;
+/// what does not fill one at the right and at the bottom is left out.
+[[nodiscard]] Camera coarser_camera(const Camera& camera, int factor);
+/// Means over factor x factor pixels: what coarser_camera sees, with 1 / factor^2 of the variance.
+[[nodiscard]] MeasuredImage coarser_image(const MeasuredImage& image, int factor);
+
+}  // namespace narpa

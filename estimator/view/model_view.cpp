@@ -1,0 +1,24 @@
+#include "estimator/view/model_view.h"
+
+namespace narpa {
+
+ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at)
+    : tracer_(tracer),
+      camera_(camera),
+      target_(target),
+      at_(at),
+      renderer_(tracer_, camera_),
+      radiance_(camera.width, camera.height) {}
+
+void ModelView::place(const Rigid3& T_camera_target) {
+    T_world_camera_ = T_world_target() * inverse(T_camera_target);
+    if (camera_.mount >= 0)
+        at_.set(static_cast<std::size_t>(camera_.mount), T_world_camera_ * inverse(camera_.T_mount_camera));
+}
+
+void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {
+    place(T_camera_target);
+    renderer_.render(at_, T_world_camera_, settings, radiance_, aovs ? &aovs_ : nullptr);
+}
+
+}  // namespace narpa

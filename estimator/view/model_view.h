@@ -1,0 +1,48 @@
+/// estimator/view/model_view.h - what the camera would see if the target had a certain pose.
+///
+/// The target stays where the world has it, in the light that falls on it there; the camera goes where the pose
+/// puts it, with the body that it is mounted on.
+#pragma once
+
+#include <cstddef>
+
+#include "renderer/trace/camera_image.h"
+
+namespace narpa {
+
+class ModelView {
+public:
+    /// `tracer` outlives it. `target`: index of the body whose pose is looked for. `at`: where every body is at the
+    /// time of the frame; the target's attitude there tells how the light falls on it.
+    ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at);
+
+    /// Renders the view at this pose; `aovs` tells whether depth, position, normal and body are wanted too. The
+    /// budget of the settings is obeyed. Allocates nothing after the first call of a kind.
+    void render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs);
+
+    [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
+    [[nodiscard]] const Tracer& tracer() const noexcept { return tracer_; }
+    [[nodiscard]] std::size_t target() const noexcept { return target_; }
+    /// Of the last render: linear radiance; first hits through the pixels' middles in world coordinates; and where
+    /// the bodies and the camera were.
+    [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
+    [[nodiscard]] const Aovs& aovs() const noexcept { return aovs_; }
+    [[nodiscard]] const Placement& placement() const noexcept { return at_; }
+    [[nodiscard]] const Rigid3& T_world_camera() const noexcept { return T_world_camera_; }
+    [[nodiscard]] const Rigid3& T_world_target() const noexcept { return at_.T_world_body[target_]; }
+
+    /// Puts camera and mount where this pose has them, without a picture: for rays of one's own.
+    void place(const Rigid3& T_camera_target);
+
+private:
+    const Tracer& tracer_;
+    Camera camera_;
+    std::size_t target_;
+    Placement at_;
+    Rigid3 T_world_camera_{};
+    CameraRenderer renderer_;
+    RadianceImage radiance_;
+    Aovs aovs_;
+};
+
+}  // namespace narpa

@@ -94,6 +94,7 @@ std::string write_dbc(std::span<const DbcBody> bodies, int cameras) {
     for (int i = 0; i < cameras; ++i)
         write_set(out, kLedgerLayout, "Camera" + std::to_string(i) + "_",
                   ledger_base_id(static_cast<std::uint8_t>(i)), telemetry);
+    write_set(out, kEstimateLayout, "", kEstimateBaseId, telemetry);
     write_set(out, kHeartbeatLayout, "", kHeartbeatId, telemetry);
     return "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: Commander narpa\n\n" + out.messages +
            "CM_ \"narpa on CAN. The most negative raw value of a signed signal means: not available.\";\n" +

@@ -1,4 +1,4 @@
-/// protocols/can/messages.h - what is said on CAN: pose commands in, heartbeat and frame ledgers out.
+/// protocols/can/messages.h - what is said on CAN: pose commands in; heartbeat, frame ledgers and estimates out.
 ///
 /// Wire layout: signals.h and README.md; the same tables make narpa.dbc. Nothing here allocates (except texts of
 /// errors), blocks or throws.
@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "protocols/can/frame.h"
 #include "protocols/can/signal_set.h"
+#include "protocols/estimate.h"
 #include "protocols/ledger.h"
 
 namespace narpa {
@@ -113,6 +114,33 @@ public:
     /// Writes `out` only when the status is `complete`.
     [[nodiscard]] DecodeStatus accept(const CanFrame& frame, std::int64_t t_reference_ns,
                                       FrameLedger& out) noexcept;
+    [[nodiscard]] std::uint64_t count(DecodeStatus status) const noexcept { return set_.count(status); }
+
+private:
+    SetDecoder set_;
+};
+
+// --- Estimate ---------------------------------------------------------------------------------------------------
+
+inline constexpr std::uint32_t kEstimateBaseId = 0x710;
+
+using EstimateFrames = std::array<CanFrame, kEstimateFrames.size()>;
+
+/// Ten classic frames at kEstimateBaseId + 0 .. 9; counter = low 8 bits of the frame number. Standard deviations
+/// saturate at 16.777215 m and 1.6777215 rad, positions at their range; of a state `lost` pose and deviations are
+/// "not available", and saturated.
+[[nodiscard]] EstimateFrames encode_classic(const EstimateReport& estimate) noexcept;
+/// One CAN FD frame at kEstimateBaseId + 15 with the same quantities.
+[[nodiscard]] CanFrame encode_fd(const EstimateReport& estimate) noexcept;
+
+/// Reads estimates, classic or FD.
+class EstimateDecoder {
+public:
+    EstimateDecoder() noexcept;
+
+    /// Writes `out` only when the status is `complete`; of a state `lost` only frame, camera, state and time.
+    [[nodiscard]] DecodeStatus accept(const CanFrame& frame, std::int64_t t_reference_ns,
+                                      EstimateReport& out) noexcept;
     [[nodiscard]] std::uint64_t count(DecodeStatus status) const noexcept { return set_.count(status); }
 
 private:

@@ -13,6 +13,7 @@
 #include <span>
 #include <string_view>
 
+#include "protocols/estimate.h"
 #include "protocols/ledger.h"
 
 namespace narpa {
@@ -201,6 +202,70 @@ inline constexpr std::array<Signal, kLedgerSignalCount> kLedgerSignals{{
 
 inline constexpr SetLayout kLedgerLayout{"Ledger", "Time ledger of one camera frame", kLedgerFrames, kLedgerSignals,
                                          472};
+
+// --- Telemetry: the pose that narpa estimates from its own frames -----------------------------------------------
+
+/// Index of each quantity in `kEstimateSignals`; components follow each other.
+enum EstimateSignal : std::size_t {
+    kEstimateTime = 0,
+    kEstimatePosition = 1,
+    kEstimateAttitude = 4,
+    kEstimateSigmaPosition = 8,
+    kEstimateSigmaRotation = 11,
+    kEstimateFrame = 14,
+    kEstimateCamera = 15,
+    kEstimateState = 16,
+    kEstimateSignalCount = 17
+};
+
+inline constexpr double kSigmaRotationSteps_per_rad = 1e7;
+inline constexpr auto kEstimateStateChoices = numbered(kEstimateStates);
+
+inline constexpr std::array<std::string_view, 10> kEstimateFrames{
+    "EstimateTime",       "EstimatePositionX", "EstimatePositionY",  "EstimatePositionZ",  "EstimateAttitudeWX",
+    "EstimateAttitudeYZ", "EstimateSigmaXY",   "EstimateSigmaZRotX", "EstimateSigmaRotYZ", "EstimateState"};
+
+inline constexpr std::array<Signal, kEstimateSignalCount> kEstimateSignals{{
+    {"Time", "ns", "Middle of the exposure: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}, {0, 0, 48}},
+    {"PositionX", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {1, 0, 48}, {0, 48, 48}},
+    {"PositionY", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {2, 0, 48}, {0, 96, 48}},
+    {"PositionZ", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {3, 0, 48}, {0, 144, 48}},
+    {"AttitudeW", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 0, 24}, {0, 192, 24}},
+    {"AttitudeX", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 24, 24}, {0, 216, 24}},
+    {"AttitudeY", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 0, 24}, {0, 240, 24}},
+    {"AttitudeZ", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 24, 24}, {0, 264, 24}},
+    {"SigmaX", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 0, 24}, {0, 288, 24}},
+    {"SigmaY", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 24, 24}, {0, 312, 24}},
+    {"SigmaZ", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {7, 0, 24}, {0, 336, 24}},
+    {"SigmaRotX",
+     "rad",
+     "Standard deviation of the attitude about the camera's axis",
+     kSigmaRotationSteps_per_rad,
+     false,
+     {7, 24, 24},
+     {0, 360, 24}},
+    {"SigmaRotY",
+     "rad",
+     "Standard deviation of the attitude about the camera's axis",
+     kSigmaRotationSteps_per_rad,
+     false,
+     {8, 0, 24},
+     {0, 384, 24}},
+    {"SigmaRotZ",
+     "rad",
+     "Standard deviation of the attitude about the camera's axis",
+     kSigmaRotationSteps_per_rad,
+     false,
+     {8, 24, 24},
+     {0, 408, 24}},
+    {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}, {0, 432, 32}},
+    {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}, {0, 464, 8}},
+    {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {0, 472, 3}, kEstimateStateChoices},
+}};
+
+inline constexpr SetLayout kEstimateLayout{"Estimate",
+                                           "Pose of the target that narpa estimates from its own frames",
+                                           kEstimateFrames, kEstimateSignals, 480};
 
 enum HeartbeatSignal : std::size_t {
     kHeartbeatTime,

@@ -1,0 +1,29 @@
+/// protocols/estimate.h - a relative pose that narpa estimated from one of its own frames.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "base/pose.h"
+
+namespace narpa {
+
+/// What an estimate rests on.
+enum class EstimateState : std::uint8_t {
+    lost,       ///< nothing: the frame gave no pose, and there is none to go on from
+    predicted,  ///< the motion so far: the frame gave no pose that could be trusted
+    measured,   ///< the frame
+};
+inline constexpr std::array<std::string_view, 3> kEstimateStates{"lost", "predicted", "measured"};
+
+struct EstimateReport {
+    std::uint32_t frame = 0;
+    std::uint8_t camera = 0;  ///< index of the camera in the scene
+    EstimateState state = EstimateState::lost;
+    std::int64_t t_ns = 0;  ///< simulation clock: the middle of the exposure
+    Rigid3 T_camera_target{};
+    Vec3 sigma_rotation_rad{}, sigma_position_m{};  ///< standard deviations, camera axes
+};
+
+}  // namespace narpa

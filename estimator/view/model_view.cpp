@@ -1,5 +1,7 @@
 #include "estimator/view/model_view.h"
 
+#include <limits>
+
 namespace narpa {
 
 ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at)
@@ -19,6 +21,12 @@ void ModelView::place(const Rigid3& T_camera_target) {
 void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {
     place(T_camera_target);
     renderer_.render(at_, T_world_camera_, settings, radiance_, aovs ? &aovs_ : nullptr);
+}
+
+Hit ModelView::look_through(double u_px, double v_px) const noexcept {
+    const Vec3 direction{(u_px - camera_.cx) / camera_.fx, (v_px - camera_.cy) / camera_.fy, 1};
+    const Ray ray{T_world_camera_.t, T_world_camera_.q * normalized(direction)};
+    return tracer_.intersect(at_, ray, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace narpa

@@ -16,6 +16,9 @@ public:
     /// time of the frame; the target's attitude there tells how the light falls on it.
     ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at);
 
+    /// Another time: where every body is then.
+    void set_world(const Placement& at) { at_.T_world_body = at.T_world_body; }
+
     /// Renders the view at this pose; `aovs` tells whether depth, position, normal and body are wanted too. The
     /// budget of the settings is obeyed. Allocates nothing after the first call of a kind.
     void render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs);
@@ -33,6 +36,9 @@ public:
 
     /// Puts camera and mount where this pose has them, without a picture: for rays of one's own.
     void place(const Rigid3& T_camera_target);
+    /// What the camera, as it is placed, sees through a point of its image (pinhole; the centre of the top-left
+    /// pixel is (0, 0)). `body` < 0: nothing.
+    [[nodiscard]] Hit look_through(double u_px, double v_px) const noexcept;
 
 private:
     const Tracer& tracer_;

@@ -1,0 +1,133 @@
+/// estimator/pose/levenberg_marquardt.h - damped least squares over six parameters, on normal equations.
+///
+/// The paper's appendix B with its misprints mended: the step (A + lambda D) h = g has the same D, diag(A), as the
+/// gain ratio's denominator h . (lambda D h + g); a rejected step multiplies lambda, and with L_up = 11 and
+/// L_down = 9 (Gavin, "The Levenberg-Marquardt algorithm for nonlinear least squares curve-fitting problems") the
+/// damping cannot return to where it was and cycle. Allocates nothing.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "estimator/pose/pose_estimate.h"
+
+namespace narpa {
+
+/// Of residuals e = measured - predicted with weights W: A = J' W J, g = J' W e, chi2 = e' W e (or the robust
+/// cost). Of A the lower triangle is read.
+struct NormalEquations {
+    Matrix6 A = Matrix6::Zero();
+    Vector6 g = Vector6::Zero();
+    double chi2 = 0;
+};
+
+enum class Damping : std::uint8_t { diagonal, identity };  ///< D = diag(A) or I
+
+struct DampedStep {
+    Vector6 h = Vector6::Zero();
+    double predicted_reduction = 0;  ///< of chi2 by the linear model; > 0 unless g is 0
+    bool solved = false;             ///< false: A + lambda D is not positive definite
+};
+
+/// h = (A + lambda D)^-1 g.
+[[nodiscard]] inline DampedStep damped_step(const NormalEquations& eq, double lambda,
+                                            Damping damping = Damping::diagonal) {
+    const Vector6 D = damping == Damping::diagonal ? Vector6(eq.A.diagonal()) : Vector6(Vector6::Ones());
+    Matrix6 M = eq.A;
+    M.diagonal() += lambda * D;
+    const Eigen::LLT<Matrix6> factor(M);
+    DampedStep step;
+    if (factor.info() != Eigen::Success) return step;
+    step.h = factor.solve(eq.g);
+    step.predicted_reduction = step.h.dot(lambda * D.cwiseProduct(step.h) + eq.g);
+    step.solved = std::isfinite(step.predicted_reduction);
+    return step;
+}
+
+/// A^-1, by the equations scaled to a unit diagonal. False where A has no rank of six within rounding: some
+/// direction is not seen.
+[[nodiscard]] inline bool invert_information(const Matrix6& A, Matrix6& inverse) {
+    const Vector6 scale = A.diagonal().cwiseSqrt().cwiseInverse();
+    if (!scale.allFinite()) return false;
+    const Eigen::LLT<Matrix6> factor(Matrix6(scale.asDiagonal() * A * scale.asDiagonal()));
+    if (factor.info() != Eigen::Success) return false;
+    constexpr double kSmallestPivot = 1e-6;  // squared: 1e-12 of the row's own information is left over
+    if (!(Matrix6(factor.matrixL()).diagonal().minCoeff() > kSmallestPivot)) return false;
+    inverse = scale.asDiagonal() * factor.solve(Matrix6::Identity()) * scale.asDiagonal();
+    return inverse.allFinite();
+}
+
+inline constexpr std::size_t kLmIterationsMax = 200;
+
+struct LmOptions {
+    double lambda = 1e-3;      ///< at the start
+    double gain_min = 1e-3;    ///< a step is taken where the gain ratio exceeds this
+    double step_sigma = 1e-4;  ///< converged: the undamped step is shorter than this, in standard deviations
+    int iterations_max = 50;   ///< steps tried, taken or not; at most kLmIterationsMax
+    Damping damping = Damping::diagonal;
+    double up = 11, down = 9;  ///< lambda *= up where a step is rejected, /= down where it is taken
+};
+
+enum class LmStatus : std::uint8_t { converged, no_convergence, no_start };
+
+struct LmSummary {
+    LmStatus status = LmStatus::no_start;
+    int iterations = 0;                                  ///< steps tried
+    NormalEquations equations;                           ///< at the last state that was evaluated
+    std::array<double, kLmIterationsMax + 1> chi2_at{};  ///< of the state held after so many iterations
+
+    [[nodiscard]] std::span<const double> costs() const {
+        return {chi2_at.data(), static_cast<std::size_t>(iterations) + 1};
+    }
+};
+
+/// Problem: `bool evaluate(const State&, NormalEquations&) const`, false where the state is impossible (a point
+/// behind the camera); `State moved(const State&, const Vector6&) const`. `state`: the start; the minimum in the
+/// end. Fills `summary` in place, for it is not small.
+template <class Problem, class State>
+void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& o, LmSummary& summary) {
+    constexpr double kLambdaMin = 1e-7, kLambdaMax = 1e7;
+    constexpr double kRounding = 1e-14;  // of chi2: a smaller reduction cannot be told from rounding
+    const int iterations_max = std::clamp(o.iterations_max, 0, static_cast<int>(kLmIterationsMax));
+    NormalEquations& now = summary.equations;
+    summary.iterations = 0;
+    summary.status = LmStatus::no_start;
+    if (!problem.evaluate(state, now) || !std::isfinite(now.chi2)) return;
+    summary.chi2_at[0] = now.chi2;
+    summary.status = LmStatus::no_convergence;
+    double lambda = o.lambda;
+    const auto small = [&](const DampedStep& s) {
+        return s.predicted_reduction <= std::max(o.step_sigma * o.step_sigma, kRounding * now.chi2);
+    };
+    while (summary.iterations < iterations_max) {
+        const DampedStep step = damped_step(now, lambda, o.damping);
+        if (step.solved && small(step)) {
+            // Damping makes steps short as well: what counts is how far the undamped one would go.
+            const DampedStep full = damped_step(now, 0, o.damping);
+            if (!full.solved || small(full)) {
+                if (full.solved) state = problem.moved(state, full.h);
+                summary.status = LmStatus::converged;
+                return;
+            }
+        }
+        const int i = ++summary.iterations;
+        NormalEquations there;
+        bool taken = false;
+        if (step.solved) {
+            const State candidate = problem.moved(state, step.h);
+            taken =
+                problem.evaluate(candidate, there) && now.chi2 - there.chi2 > o.gain_min * step.predicted_reduction;
+            if (taken) state = candidate, now = there;
+        }
+        summary.chi2_at[static_cast<std::size_t>(i)] = now.chi2;
+        if (!taken && lambda >= kLambdaMax) return;
+        lambda = taken ? std::max(lambda / o.down, kLambdaMin) : std::min(lambda * o.up, kLambdaMax);
+    }
+}
+
+}  // namespace narpa

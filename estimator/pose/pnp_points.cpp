@@ -1,0 +1,197 @@
+#include "estimator/pose/pnp_points.h"
+
+#include <cmath>
+
+#include "base/each_isa.h"
+
+namespace narpa {
+
+const char* in_words(PnpStatus status) {
+    switch (status) {
+        case PnpStatus::converged: return "converged";
+        case PnpStatus::no_convergence: return "the refinement did not settle within its iterations";
+        case PnpStatus::degenerate:
+            return "the points leave a direction of the pose undetermined (all on one line, or coinciding)";
+        case PnpStatus::behind_camera: return "a point lies behind the camera, expected all in front of it";
+        case PnpStatus::too_few_points: return "fewer points than the 3 that a pose needs (4 without a guess)";
+        case PnpStatus::too_many_points: return "more points than the solver was made for";
+        case PnpStatus::sizes_differ:
+            return "points, pixels and covariances differ in number, expected one of each";
+        case PnpStatus::not_finite: return "a point, a pixel or the pose to start from is not finite";
+        case PnpStatus::bad_camera: return "the camera's focal lengths must be above 0 and all its numbers finite";
+        case PnpStatus::bad_noise: return "sigma must be above 0, and every covariance positive definite";
+        case PnpStatus::no_consensus: return "no pose agrees with enough of the points";
+    }
+    return "unknown";
+}
+
+PnpStatus check(const PnpInput& input) {
+    const Pinhole& c = input.camera;
+    if (!(c.fx > 0 && c.fy > 0 && std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) &&
+          std::isfinite(c.cy)))
+        return PnpStatus::bad_camera;
+    if (input.body_m.size() != input.pixels.size()) return PnpStatus::sizes_differ;
+    if (!input.covariance_px2.empty() && input.covariance_px2.size() != input.pixels.size())
+        return PnpStatus::sizes_differ;
+    if (input.body_m.size() < 3) return PnpStatus::too_few_points;
+    for (const Vec3& p : input.body_m)
+        if (!is_finite(p)) return PnpStatus::not_finite;
+    for (const Pixel& p : input.pixels)
+        if (!std::isfinite(p.u) || !std::isfinite(p.v)) return PnpStatus::not_finite;
+    if (!(input.sigma_px > 0) || !std::isfinite(input.sigma_px)) return PnpStatus::bad_noise;
+    for (const PixelCovariance& s : input.covariance_px2)
+        if (!(s.uu > 0 && s.uu * s.vv > s.uv * s.uv) || !std::isfinite(s.uu * s.vv)) return PnpStatus::bad_noise;
+    return PnpStatus::converged;
+}
+
+PnpPoints::PnpPoints(std::size_t points_max) : groups_((points_max + kGroup - 1) / kGroup) {}
+
+void PnpPoints::assign(const PnpInput& input) {
+    size_ = input.body_m.size();
+    centroid_ = {};
+    for (const Vec3& p : input.body_m) centroid_ += p * (1.0 / static_cast<double>(size_));
+    for (std::size_t i = 0; i < size_; ++i) put(i, input, i);
+    pad();
+}
+
+void PnpPoints::assign(const PnpInput& input, std::span<const std::uint8_t> chosen) {
+    size_ = 0;
+    Vec3 sum{};
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+        if (chosen[i] != 0) sum += input.body_m[i], ++size_;
+    centroid_ = sum / static_cast<double>(size_);
+    for (std::size_t i = 0, to = 0; i < chosen.size(); ++i)
+        if (chosen[i] != 0) put(to++, input, i);
+    pad();
+}
+
+void PnpPoints::put(std::size_t i, const PnpInput& input, std::size_t point) {
+    const Vec3 a = input.body_m[point] - centroid_;
+    const Pixel& p = input.pixels[point];
+    const Pinhole& c = input.camera;
+    Group& to = groups_[i / kGroup];
+    const std::size_t k = i % kGroup;
+    to.x[k] = a.x, to.y[k] = a.y, to.z[k] = a.z;
+    to.u[k] = (p.u - c.cx) / c.fx, to.v[k] = (p.v - c.cy) / c.fy;
+    if (input.covariance_px2.empty()) {
+        to.l00[k] = c.fx / input.sigma_px, to.l10[k] = 0, to.l11[k] = c.fy / input.sigma_px;
+        return;
+    }
+    // C^-1 = W' W with W upper triangular: 1 / sqrt(var(v)) last, and u by what v does not tell of it.
+    const PixelCovariance& s = input.covariance_px2[point];
+    const double w = 1 / std::sqrt(s.uu - s.uv * s.uv / s.vv);
+    to.l00[k] = c.fx * w, to.l10[k] = -c.fy * w * s.uv / s.vv, to.l11[k] = c.fy / std::sqrt(s.vv);
+}
+
+void PnpPoints::pad() {
+    for (std::size_t i = size_; i % kGroup != 0; ++i) {
+        Group& g = groups_[i / kGroup];
+        const std::size_t k = i % kGroup;
+        // The first point once more, without weight: it is in front of the camera where the points are.
+        g.x[k] = g.x[0], g.y[k] = g.y[0], g.z[k] = g.z[0], g.u[k] = g.u[0], g.v[k] = g.v[0];
+        g.l00[k] = g.l10[k] = g.l11[k] = 0;
+    }
+}
+
+CentredPose PnpPoints::centred(const Rigid3& T_camera_body) const {
+    return {T_camera_body.q, T_camera_body * centroid_};
+}
+
+Rigid3 PnpPoints::uncentred(const CentredPose& pose) const {
+    return {pose.q, pose.centroid_m - pose.q * centroid_};
+}
+
+Matrix6 PnpPoints::uncentred(const CentredPose& pose, const Matrix6& covariance) const {
+    // t = centroid - q c  =>  d_t = d_centroid + [q c] r
+    const Vec3 c = pose.q * centroid_;
+    Matrix6 J = Matrix6::Identity();
+    J.bottomLeftCorner<3, 3>() << 0, -c.z, c.y, c.z, 0, -c.x, -c.y, c.x, 0;
+    return J * covariance * J.transpose();
+}
+
+namespace {
+
+// Eight numbers side by side. The types stay inside the function that is compiled for each processor.
+using V = double __attribute__((vector_size(64)));
+static_assert(sizeof(V) == sizeof(PnpPoints::Group::Lanes));
+
+struct Sums {
+    V A[21];  // lower triangle, row by row
+    V g[6];
+    V chi2;
+    double depth_min;
+};
+
+/// R: row-major matrix of the pose; t: the centroid.
+NARPA_EACH_ISA void accumulate(std::span<const PnpPoints::Group> groups, const double* R, const double* t,
+                               const RobustLoss& loss, Sums& sums) {
+    const auto load = [](const PnpPoints::Group::Lanes& lanes) -> const V& {
+        return *reinterpret_cast<const V*>(lanes.data());
+    };
+    V A[21]{}, g[6]{}, chi2{};
+    V nearest = V{} + 1e300;
+    for (const PnpPoints::Group& p : groups) {
+        const V &ax = load(p.x), &ay = load(p.y), &az = load(p.z);
+        const V bx = R[0] * ax + R[1] * ay + R[2] * az;
+        const V by = R[3] * ax + R[4] * ay + R[5] * az;
+        const V bz = R[6] * ax + R[7] * ay + R[8] * az;
+        const V depth = bz + t[2];
+        nearest = depth < nearest ? depth : nearest;
+        const V inverse = 1.0 / depth;
+        const V x = (bx + t[0]) * inverse, y = (by + t[1]) * inverse;
+        const V &l00 = load(p.l00), &l10 = load(p.l10), &l11 = load(p.l11);
+        const V ru = load(p.u) - x, rv = load(p.v) - y;
+        const V eu = l00 * ru + l10 * rv, ev = l11 * rv;
+        const V s = eu * eu + ev * ev;
+        V w = V{} + 1.0;
+        if (loss.kind == Loss::none) {
+            chi2 += s;
+        } else {
+            V cost;
+            for (std::size_t k = 0; k < PnpPoints::kGroup; ++k) w[k] = loss.weight(s[k]), cost[k] = loss.cost(s[k]);
+            chi2 += cost;
+        }
+        // Rows of the whitened residuals by the point in the camera's frame, d(point) = r x b + d(centroid).
+        const V p0 = l00 * inverse, p1 = l10 * inverse, q1 = l11 * inverse;
+        const V pz = -(p0 * x + p1 * y), qz = -(q1 * y);
+        const V ju[6] = {by * pz - bz * p1, bz * p0 - bx * pz, bx * p1 - by * p0, p0, p1, pz};
+        const V jv[6] = {by * qz - bz * q1, -(bx * qz), bx * q1, V{}, q1, qz};
+        int entry = 0;
+#pragma GCC unroll 6
+        for (int i = 0; i < 6; ++i) {
+            const V wu = w * ju[i], wv = w * jv[i];
+            g[i] += wu * eu + wv * ev;
+#pragma GCC unroll 6
+            for (int j = 0; j <= i; ++j) A[entry++] += wu * ju[j] + wv * jv[j];
+        }
+    }
+    for (int i = 0; i < 21; ++i) sums.A[i] = A[i];
+    for (int i = 0; i < 6; ++i) sums.g[i] = g[i];
+    sums.chi2 = chi2;
+    sums.depth_min = nearest[0];
+    for (std::size_t k = 1; k < PnpPoints::kGroup; ++k)
+        if (!(nearest[k] > sums.depth_min)) sums.depth_min = nearest[k];
+}
+
+double total(const V& v) {
+    return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+}
+
+}  // namespace
+
+bool PnpPoints::evaluate(const CentredPose& pose, const RobustLoss& loss, NormalEquations& out) const {
+    const auto c = columns(pose.q);
+    const double R[9] = {c[0].x, c[1].x, c[2].x, c[0].y, c[1].y, c[2].y, c[0].z, c[1].z, c[2].z};
+    const double t[3] = {pose.centroid_m.x, pose.centroid_m.y, pose.centroid_m.z};
+    Sums sums;
+    accumulate({groups_.data(), (size_ + kGroup - 1) / kGroup}, R, t, loss, sums);
+    if (!(sums.depth_min > 0)) return false;
+    for (int i = 0, entry = 0; i < 6; ++i) {
+        out.g[i] = total(sums.g[i]);
+        for (int j = 0; j <= i; ++j, ++entry) out.A(i, j) = out.A(j, i) = total(sums.A[entry]);
+    }
+    out.chi2 = total(sums.chi2);
+    return std::isfinite(out.chi2);
+}
+
+}  // namespace narpa

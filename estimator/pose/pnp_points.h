@@ -1,0 +1,109 @@
+/// estimator/pose/pnp_points.h - points of the body and where the camera sees them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimator/pose/levenberg_marquardt.h"
+#include "estimator/pose/robust_loss.h"
+
+namespace narpa {
+
+/// A pinhole: u = fx x / z + cx, v = fy y / z + cy; camera x right, y down, z forward; the centre of the top-left
+/// pixel is (0, 0).
+struct Pinhole {
+    double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px
+};
+
+struct Pixel {
+    double u = 0, v = 0;
+
+    friend constexpr bool operator==(const Pixel&, const Pixel&) = default;
+};
+
+/// Of one measured pixel: variances and covariance, px^2.
+struct PixelCovariance {
+    double uu = 1, uv = 0, vv = 1;
+};
+
+/// N points: body_m[i] is seen at pixels[i]. `covariance_px2`: one for each, or empty, and then sigma_px holds for
+/// u and v of all.
+struct PnpInput {
+    Pinhole camera;
+    std::span<const Vec3> body_m;
+    std::span<const Pixel> pixels;
+    double sigma_px = 1;
+    std::span<const PixelCovariance> covariance_px2{};
+};
+
+enum class PnpStatus : std::uint8_t {
+    converged,
+    no_convergence,   ///< not within the iterations
+    degenerate,       ///< the points leave some direction of the pose undetermined
+    behind_camera,    ///< the pose to start from has a point behind the camera, or none was found that has not
+    too_few_points,   ///< less than 3
+    too_many_points,  ///< more than the solver was made for
+    sizes_differ,     ///< points, pixels and covariances are not of one number
+    not_finite,       ///< NaN or infinity in a point, a pixel or the pose to start from
+    bad_camera,       ///< a focal length is not above 0, or a number is not finite
+    bad_noise,        ///< sigma_px is not above 0, or a covariance not positive definite
+    no_consensus,     ///< no pose agrees with enough of the points
+};
+/// A sentence that says what was wrong and what was expected.
+[[nodiscard]] const char* in_words(PnpStatus status);
+
+/// `converged` where the input can be used, else what is wrong with it.
+[[nodiscard]] PnpStatus check(const PnpInput& input);
+
+/// The state that is solved for: a camera-frame rotation about the points' centroid, and where the centroid is. In
+/// it rotation and translation are nearly independent wherever the body's origin lies.
+struct CentredPose {
+    Quat q{};
+    Vec3 centroid_m{};  ///< in the camera's frame
+};
+
+/// Points made ready for a solver: centred, normalised, whitened, in groups of eight so that the processor works on
+/// several at a time. Sums are taken in one order on every processor.
+class PnpPoints {
+public:
+    /// Room for so many points; `assign` allocates nothing up to this number.
+    explicit PnpPoints(std::size_t points_max);
+
+    /// `input` must have passed check().
+    void assign(const PnpInput& input);
+    /// Only the points whose flag is not 0; one flag for each.
+    void assign(const PnpInput& input, std::span<const std::uint8_t> chosen);
+
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] std::size_t capacity() const noexcept { return groups_.size() * kGroup; }
+    [[nodiscard]] const Vec3& centroid_body_m() const noexcept { return centroid_; }
+
+    [[nodiscard]] CentredPose centred(const Rigid3& T_camera_body) const;
+    [[nodiscard]] Rigid3 uncentred(const CentredPose& pose) const;
+    /// From errors of a centred pose, (rotation, centroid), to those of pose_estimate.h.
+    [[nodiscard]] Matrix6 uncentred(const CentredPose& pose, const Matrix6& covariance) const;
+
+    /// Normal equations by (rotation rad, centroid m), both in camera axes and on the left. False where a point is
+    /// not in front of the camera.
+    [[nodiscard]] bool evaluate(const CentredPose& pose, const RobustLoss& loss, NormalEquations& out) const;
+
+    static constexpr std::size_t kGroup = 8;
+    struct alignas(64) Group {
+        using Lanes = std::array<double, kGroup>;
+        Lanes x, y, z;        // of the body, from the centroid
+        Lanes u, v;           // (pixel - principal point) / focal length
+        Lanes l00, l10, l11;  // whitened residual = (l00 ru + l10 rv, l11 rv); 0 where there is no point
+    };
+
+private:
+    void put(std::size_t i, const PnpInput& input, std::size_t point);
+    void pad();
+
+    std::size_t size_ = 0;
+    Vec3 centroid_{};
+    std::vector<Group> groups_;
+};
+
+}  // namespace narpa

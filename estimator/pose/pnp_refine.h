@@ -1,0 +1,52 @@
+/// estimator/pose/pnp_refine.h - the pose that fits points best, from a pose near it, without touching the heap.
+///
+/// Levenberg-Marquardt (levenberg_marquardt.h) on the reprojection error. The attitude is a quaternion; classical
+/// Rodrigues parameters are the increment of one step, set to zero after it, so that no attitude is special (a
+/// global CRP vector fails near half a turn). Derivatives are analytic and go straight into the 6 x 6 normal
+/// equations.
+#pragma once
+
+#include "estimator/pose/pnp_points.h"
+
+namespace narpa {
+
+struct RefineOptions {
+    LmOptions lm;
+    RobustLoss loss;
+};
+
+struct PnpFit {
+    PnpStatus status = PnpStatus::no_convergence;
+    Rigid3 T_camera_body{};
+    /// Of T_camera_body (pose_estimate.h), (rad, m): the inverse of the information at the given pixel noise, with
+    /// the robust weights where a loss is on.
+    Matrix6 covariance = Matrix6::Zero();
+    double chi2 = 0;             ///< of the residuals in units of their noise, or the robust cost
+    int degrees_of_freedom = 0;  ///< 2 N - 6: what chi2 is about, where the noise is as given and no loss is on
+    LmSummary summary;
+
+    [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
+    /// The pixel noise that the residuals speak for, as a multiple of the given one; 1 without redundancy.
+    [[nodiscard]] double noise_scale() const {
+        return degrees_of_freedom > 0 ? std::sqrt(chi2 / degrees_of_freedom) : 1.0;
+    }
+};
+
+/// Refines from `start`; `fit` is filled in place. `points` holds what was assigned to it. Every point stays in
+/// front of the camera.
+void refine(const PnpPoints& points, const Rigid3& start, const RefineOptions& options, PnpFit& fit);
+
+/// With room for points_max points, for loops that may not allocate.
+class PnpRefiner {
+public:
+    explicit PnpRefiner(std::size_t points_max) : points_(points_max) {}
+
+    /// Checks the input and refines from `start`. The fit stays valid until the next call.
+    const PnpFit& refine(const PnpInput& input, const Rigid3& start, const RefineOptions& options = {});
+
+private:
+    PnpPoints points_;
+    PnpFit fit_;
+};
+
+}  // namespace narpa

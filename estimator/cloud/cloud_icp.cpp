@@ -1,0 +1,193 @@
+#include "estimator/cloud/cloud_icp.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace narpa {
+namespace {
+
+constexpr std::size_t kFewestBeams = 6;
+constexpr double kTukey = 4.685;        ///< of the biweight: 95 % of the efficiency of least squares
+constexpr double kMadToSigma = 1.4826;  ///< of a normal distribution
+
+/// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
+struct Biweight {
+    double weight = 0, slope = 0;
+    explicit Biweight(double u) {
+        const double r = u / kTukey, s = 1 - r * r;
+        if (s <= 0) return;
+        weight = s * s;
+        slope = s * (1 - 5 * r * r);
+    }
+};
+
+std::string number(double v) {
+    return std::to_string(v);
+}
+
+Status check(std::span<const RangePoint> points) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const RangePoint& p = points[i];
+        const auto error = [&](const std::string& what) {
+            return Error{"point " + std::to_string(i) + " of the sweep: " + what};
+        };
+        if (!is_finite(p.origin_m) || !is_finite(p.direction) || !std::isfinite(p.t_s))
+            return error("origin, direction or time is not finite");
+        if (std::abs(dot(p.direction, p.direction) - 1) > 1e-6)
+            return error("expected a direction of length 1, not " + number(norm(p.direction)));
+        if (!(p.range_m > 0 && std::isfinite(p.range_m)))
+            return error("expected a range > 0, not " + number(p.range_m) + " m");
+    }
+    return Ok{};
+}
+
+Status check(const Rigid3& T, const SweepMotion& motion) {
+    if (!is_finite(T.t) || !(std::abs(norm(T.q) - 1) < 1e-6))
+        return Error{"the pose to start from: expected a finite position and a unit quaternion"};
+    if (!is_finite(motion.velocity_m_s) || !is_finite(motion.rate_rad_s))
+        return Error{"the motion during the sweep is not finite"};
+    return Ok{};
+}
+
+}  // namespace
+
+Status check(const IcpSettings& s) {
+    const auto wrong = [](const char* name, double value, const char* expected) {
+        return Error{std::string(name) + " = " + number(value) + ": expected " + expected};
+    };
+    if (!(s.noise.range_m > 0 && std::isfinite(s.noise.range_m)))
+        return wrong("noise.range_m", s.noise.range_m, "a standard deviation > 0 m");
+    if (!(s.noise.pointing_rad >= 0 && std::isfinite(s.noise.pointing_rad)))
+        return wrong("noise.pointing_rad", s.noise.pointing_rad, "a standard deviation >= 0 rad");
+    if (!(s.search_m >= 0 && std::isfinite(s.search_m))) return wrong("search_m", s.search_m, "a distance >= 0 m");
+    if (s.search_points < kFewestBeams) return wrong("search_points", static_cast<double>(s.search_points), ">= 6");
+    if (s.search_iterations < 0) return wrong("search_iterations", s.search_iterations, ">= 0");
+    if (s.iterations < 1) return wrong("iterations", s.iterations, ">= 1");
+    if (!(s.grazing_cosine > 0 && s.grazing_cosine < 1)) return wrong("grazing_cosine", s.grazing_cosine, "0 to 1");
+    if (!(s.unobserved_below > 0 && s.unobserved_below < 1))
+        return wrong("unobserved_below", s.unobserved_below, "0 to 1");
+    if (!(s.settled >= 0)) return wrong("settled", s.settled, ">= 0");
+    return Ok{};
+}
+
+struct CloudIcp::Pass {
+    Matrix6 hessian = Matrix6::Zero();      ///< sum of weight * J J' / sigma^2
+    Vector6 gradient = Vector6::Zero();     ///< -sum of weight * J distance / sigma^2
+    Matrix6 slope = Matrix6::Zero();        ///< sum of psi' * J J' / sigma^2
+    Matrix6 scores = Matrix6::Zero();       ///< sum of psi^2 * J J' / sigma^2
+    Matrix6 information = Matrix6::Zero();  ///< sum of J J' / sigma^2 of the points used
+    PointSpread spread;
+    double scatter = 1;
+    std::size_t met = 0;
+};
+
+CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
+    association_.associate(T, settings_.noise, settings_.grazing_cosine, search_m, stride, planes_);
+    Pass pass;
+    magnitudes_.clear();
+    for (const PointToPlane& p : planes_)
+        if (p.fate == BeamFate::met) magnitudes_.push_back(std::abs(p.distance_m) / p.sigma_m);
+    pass.met = magnitudes_.size();
+    if (pass.met < kFewestBeams) return pass;
+    const auto middle = magnitudes_.begin() + static_cast<std::ptrdiff_t>(pass.met / 2);
+    std::nth_element(magnitudes_.begin(), middle, magnitudes_.end());
+    out.scatter = kMadToSigma * *middle;
+    pass.scatter = std::max(1.0, out.scatter);
+
+    out.points = planes_.size();
+    out.used = out.missed = out.grazing = out.rejected = out.explained = 0;
+    double squares = 0, moment = 0;
+    for (std::size_t k = 0; k < planes_.size(); ++k) {
+        const PointToPlane& p = planes_[k];
+        out.missed += p.fate == BeamFate::missed;
+        out.grazing += p.fate == BeamFate::grazing;
+        if (p.fate != BeamFate::met) continue;
+        const double e = p.distance_m / p.sigma_m, u = e / pass.scatter;
+        out.explained += std::abs(e) < 4;
+        const Biweight robust(u);
+        if (robust.weight <= 0) {
+            ++out.rejected;
+            continue;
+        }
+        ++out.used;
+        squares += p.distance_m * p.distance_m;
+        const Vector6 J = association_.derivative(T, k * stride, p) / p.sigma_m;
+        const Matrix6 JJ = J * J.transpose();
+        pass.hessian += robust.weight * JJ;
+        pass.gradient -= robust.weight * e * J;
+        pass.slope += robust.slope * JJ;
+        pass.scores += robust.weight * robust.weight * e * e * JJ;
+        pass.information += JJ;
+        const double weight = robust.weight / (p.sigma_m * p.sigma_m);
+        const Vec3 at = T.q * p.surface_m;
+        pass.spread.weight += weight;
+        pass.spread.centre_m += weight * at;
+        moment += weight * dot(at, at);
+    }
+    if (out.used < kFewestBeams) return pass;
+    out.residual_m = std::sqrt(squares / static_cast<double>(out.used));
+    pass.spread.centre_m = pass.spread.centre_m / pass.spread.weight;
+    const Vec3& c = pass.spread.centre_m;
+    pass.spread.radius_m = std::sqrt(std::max(1e-18, moment / pass.spread.weight - dot(c, c)));
+    out.observability = observability(pass.hessian, pass.spread, settings_.unobserved_below);
+    return pass;
+}
+
+void CloudIcp::search(Rigid3& T, CloudEstimate& out) {
+    const std::size_t stride = std::max<std::size_t>(1, association_.size() / settings_.search_points);
+    double radius_m = settings_.search_m;
+    for (int i = 0; i < settings_.search_iterations; ++i) {
+        const Pass pass = look(T, radius_m, stride, out);
+        if (pass.met < kFewestBeams || out.used < kFewestBeams) return;
+        const Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+        T = displaced(T, step);
+        ++out.iterations;
+        radius_m *= 0.75;
+    }
+}
+
+Result<CloudIcp> CloudIcp::create(const Tracer& tracer, std::size_t target, const IcpSettings& settings) {
+    if (target >= tracer.scene().bodies.size())
+        return Error{"no body " + std::to_string(target) + ", the scene has " +
+                     std::to_string(tracer.scene().bodies.size())};
+    if (auto good = check(settings); !good) return good.error();
+    return CloudIcp(tracer, target, settings);
+}
+
+Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const SweepMotion& motion,
+                                      const Rigid3& start) {
+    if (auto good = check(points); !good) return good.error();
+    if (auto good = check(start, motion); !good) return good.error();
+    association_.take(points, motion);
+    planes_.reserve(points.size());
+    magnitudes_.reserve(points.size());
+
+    CloudEstimate out;
+    Rigid3 T = start;
+    if (settings_.search_m > 0) search(T, out);
+    Pass pass;
+    for (int i = 0;; ++i) {
+        pass = look(T, 0, 1, out);
+        if (pass.met < kFewestBeams || out.used < kFewestBeams)
+            return Error{"only " + std::to_string(pass.met) + " of " + std::to_string(points.size()) +
+                             " beams meet the target where it is taken to be, expected at least " +
+                             std::to_string(kFewestBeams),
+                         {},
+                         0,
+                         0,
+                         ErrorKind::failed};
+        if (out.settled || i == settings_.iterations) break;
+        const Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+        T = displaced(T, step);
+        ++out.iterations;
+        const double in_sigmas2 = step.dot(pass.hessian * step) / (pass.scatter * pass.scatter);
+        out.settled = in_sigmas2 < settings_.settled * settings_.settled;
+    }
+    out.T_lidar_target = T;
+    out.covariance = out.observability.covariance(pass.slope, pass.scores);
+    out.bound = out.observability.covariance(pass.information, pass.information);
+    return out;
+}
+
+}  // namespace narpa

@@ -1,0 +1,33 @@
+/// estimator/cloud/range_points.h - a LiDAR's sweep as numbers to estimate from.
+#pragma once
+
+#include "base/pose.h"
+
+namespace narpa {
+
+/// One return, in the LiDAR's frame: the beam as it was fired and the range that was read.
+struct RangePoint {
+    Vec3 origin_m{};     ///< where the beam starts
+    Vec3 direction{};    ///< unit
+    double range_m = 0;  ///< along the beam, > 0
+    double t_s = 0;      ///< when it was fired, after the time that the pose is asked for
+
+    [[nodiscard]] Vec3 position_m() const { return origin_m + range_m * direction; }
+};
+
+/// How the target moves in the LiDAR's axes while the sweep lasts: at t_s after the time of the pose its attitude
+/// is exp_rotation(t_s * rate) * q and its origin lies at t + t_s * velocity.
+struct SweepMotion {
+    Vec3 velocity_m_s{};
+    Vec3 rate_rad_s{};
+};
+
+/// Standard deviations of a return. Seen along the normal of a surface that the beam meets at the angle i from it,
+/// a point is off by sqrt((range cos i)^2 + (distance * pointing * sin i)^2): what pointing and the width of the
+/// footprint do to the range grows as tan i.
+struct RangeNoise {
+    double range_m = 0.02;         ///< with rounding: VLP-16 writes multiples of 2 mm, 0.58 mm RMS
+    double pointing_rad = 5.1e-5;  ///< of the beam's direction: VLP-16's azimuths are rounded to 0.01 deg
+};
+
+}  // namespace narpa

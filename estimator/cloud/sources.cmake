@@ -1,0 +1,1 @@
+target_sources(narpa_estimator PRIVATE cloud/beam_association.cpp cloud/cloud_icp.cpp cloud/observability.cpp)

@@ -1,0 +1,249 @@
+// ICP of sweeps that a spinning LiDAR would make of a generated craft: whether it converges, how far off it is, and
+// whether it knows.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "../support/allocation_counter.h"
+#include "../support/shapes.h"
+#include "estimator/cloud/cloud_icp.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr RangeNoise kNoise{0.02, 1e-4};
+
+void append(Mesh& to, const Mesh& part, const Rigid3& T) {
+    const auto first = static_cast<std::uint32_t>(to.positions.size());
+    for (const Vec3f& p : part.positions) to.positions.push_back(vec_cast<float>(T * vec_cast<double>(p)));
+    for (const auto& f : part.faces) to.faces.push_back({first + f[0], first + f[1], first + f[2]});
+    to.face_material.assign(to.faces.size(), 0);
+}
+
+/// A bus of 3 x 2 x 2 m with two panels, a tilted dish plate and a mast: nothing of it is symmetric.
+Scene craft_scene() {
+    Mesh m;
+    m.name = "craft";
+    append(m, test::box(3, 2, 2), {});
+    append(m, test::box(1.5, 5, 0.1), {exp_rotation({0, 0.4, 0}), {0.3, 3.8, 0}});
+    append(m, test::box(1.5, 3, 0.1), {exp_rotation({0, -0.3, 0}), {-0.2, -2.7, 0.2}});
+    append(m, test::box(0.1, 1.6, 1.6), {exp_rotation({0, 0.5, 0.4}), {1.9, 0.3, 0.8}});
+    append(m, test::box(0.3, 0.3, 2.5), {{}, {-1.0, 0.6, 2.0}});
+    Scene scene;
+    scene.materials.push_back(test::lambert(0.5f));
+    test::add_mesh(scene, std::move(m));
+    return scene;
+}
+
+const SweepMotion kTumbling{{0.3, -0.2, 0.1}, {0.05, 0.08, -0.1}};
+
+struct Bench {
+    Scene scene = craft_scene();
+    Tracer tracer = *Tracer::create(scene, 1);
+
+    /// Of a sixth of a turn in 1/60 s about the y axis, 32 lines of 0.7 degrees, 0.2 degrees apart, as a
+    /// VLP-16 looks: x right, y forward.
+    [[nodiscard]] std::vector<RangePoint> sweep(const Rigid3& T_lidar_target, const SweepMotion& motion,
+                                                std::mt19937_64& random) const {
+        std::normal_distribution<double> normal;
+        std::vector<RangePoint> points;
+        Placement at(1);
+        Vector6 rate;
+        rate << to_eigen(motion.rate_rad_s), to_eigen(motion.velocity_m_s);
+        for (int column = -150; column <= 150; ++column)
+            for (int line = -16; line < 16; ++line) {
+                const double a = 0.2 * kDegree * column, w = 0.7 * kDegree * (line + 0.5);
+                const double t_s = (column + line / 32.0) / 301 / 60;
+                at.set(0, displaced(T_lidar_target, t_s * rate));
+                const Vec3 aim{std::cos(w) * std::sin(a), std::cos(w) * std::cos(a), std::sin(w)};
+                const Vec3 off{normal(random), normal(random), normal(random)};
+                const Ray beam{{0, 0, 0.01}, normalized(aim + kNoise.pointing_rad * off)};
+                const Hit hit = tracer.intersect(at, beam, 200);
+                if (hit.body < 0) continue;
+                points.push_back({beam.origin, aim, hit.range_m + kNoise.range_m * normal(random), t_s});
+            }
+        return points;
+    }
+};
+
+const Bench& bench() {
+    static const Bench b;
+    return b;
+}
+
+Rigid3 truth(std::mt19937_64& random) {
+    std::uniform_real_distribution<double> u(-1, 1);
+    return {test::random_attitude(random), {1.5 * u(random), 15 + 5 * u(random), u(random)}};
+}
+/// `angle` about a random axis, `fraction` of the distance in a random direction.
+Rigid3 start_beside(const Rigid3& T, double angle_rad, double fraction, std::mt19937_64& random) {
+    const Vec3 turn = angle_rad * test::random_direction(random);
+    const Vec3 shift = fraction * norm(T.t) * test::random_direction(random);
+    Vector6 e;
+    e << to_eigen(turn), to_eigen(shift);
+    return displaced(T, e);
+}
+
+IcpSettings settings_for_far_starts() {
+    IcpSettings s;
+    s.noise = kNoise;
+    s.search_m = 1;
+    return s;
+}
+
+/// RMS errors over the Cramer-Rao bound's standard deviations, for the six parts of the error.
+struct Statistics {
+    int count = 0;
+    double nees = 0;
+    Vector6 squares = Vector6::Zero();
+    void add(const CloudEstimate& e, const Rigid3& T) {
+        const Vector6 error = error_between(e.T_lidar_target, T);
+        ++count;
+        nees += normalised_error_squared(error, e.covariance);
+        for (int i = 0; i < 6; ++i) squares[i] += error[i] * error[i] / e.bound(i, i);
+    }
+    [[nodiscard]] double to_bound(int i) const { return std::sqrt(squares[i] / count); }
+};
+
+TEST(IcpSweeps, FindsThePoseFromFiveDegreesAndFivePercent) {
+    std::mt19937_64 random(11);
+    CloudIcp icp = *CloudIcp::create(bench().tracer, 0, settings_for_far_starts());
+    constexpr int kStarts = 100;
+    Statistics all;
+    for (int k = 0; k < kStarts; ++k) {
+        const Rigid3 T = truth(random);
+        const auto points = bench().sweep(T, kTumbling, random);
+        const auto e = icp.align(points, kTumbling, start_beside(T, 5 * kDegree, 0.05, random));
+        ASSERT_TRUE(e) << e.error().text();
+        EXPECT_LT(normalised_error_squared(error_between(e->T_lidar_target, T), e->covariance), 40)
+            << "start " << k << ": a false minimum";
+        EXPECT_GT(static_cast<double>(e->explained), 0.96 * static_cast<double>(e->points)) << "start " << k;
+        EXPECT_NEAR(e->scatter, 1, 0.2);
+        EXPECT_EQ(e->points, e->used + e->missed + e->grazing + e->rejected);
+        if (e->observability.unobserved == 0) all.add(*e, T);  // else it shows a single flat face
+    }
+    EXPECT_GT(all.count, 95);
+    // 95 % of the efficiency is 1.026 of the bound; the rest are four standard errors of this many draws.
+    for (int i = 0; i < 6; ++i) EXPECT_NEAR(all.to_bound(i), 1.026, 4 / std::sqrt(2.0 * all.count)) << i;
+    EXPECT_NEAR(all.nees / all.count, 6, 4 * std::sqrt(12.0 / all.count));
+}
+
+/// A quarter of the returns come from something else in front of the target.
+TEST(IcpSweeps, OutliersDoNotMoveIt) {
+    std::mt19937_64 random(12);
+    std::uniform_real_distribution<double> u(0, 1);
+    CloudIcp icp = *CloudIcp::create(bench().tracer, 0, settings_for_far_starts());
+    constexpr int kStarts = 30;
+    Statistics all;
+    for (int k = 0; k < kStarts; ++k) {
+        const Rigid3 T = truth(random);
+        auto points = bench().sweep(T, {}, random);
+        for (RangePoint& p : points)
+            if (u(random) < 0.25) p.range_m *= 0.5 + 0.45 * u(random);
+        const auto e = icp.align(points, {}, start_beside(T, 2 * kDegree, 0.02, random));
+        ASSERT_TRUE(e) << e.error().text();
+        EXPECT_GT(static_cast<double>(e->rejected), 0.2 * static_cast<double>(e->points));
+        EXPECT_LT(static_cast<double>(e->explained), 0.8 * static_cast<double>(e->points));
+        all.add(*e, T);
+    }
+    for (int i = 0; i < 6; ++i) EXPECT_LT(all.to_bound(i), 1.15 + 4 / std::sqrt(2.0 * all.count)) << i;
+    EXPECT_NEAR(all.nees / all.count, 6, 4 * std::sqrt(12.0 / all.count));
+}
+
+/// Where the motion during the sweep is left out, the pose is off by what the target moves, which the covariance
+/// does not know.
+TEST(IcpSweeps, TheMotionDuringTheSweepCounts) {
+    std::mt19937_64 random(13);
+    const SweepMotion fast{{3, -2, 4}, {0.5, 0.8, -1}};
+    const Rigid3 T = truth(random);
+    const auto points = bench().sweep(T, fast, random);
+    CloudIcp icp = *CloudIcp::create(bench().tracer, 0, settings_for_far_starts());
+    const auto with = icp.align(points, fast, T), without = icp.align(points, {}, T);
+    ASSERT_TRUE(with && without);
+    EXPECT_LT(normalised_error_squared(error_between(with->T_lidar_target, T), with->covariance), 22.5);
+    EXPECT_GT(normalised_error_squared(error_between(without->T_lidar_target, T), without->covariance), 100);
+}
+
+TEST(IcpSweeps, NeedsNoHeapOnceItHasSeenASweep) {
+    if (!test::kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer's heap is not counted";
+    std::mt19937_64 random(14);
+    const Rigid3 T = truth(random);
+    const auto points = bench().sweep(T, kTumbling, random);
+    const Rigid3 start = start_beside(T, 2 * kDegree, 0.02, random);
+    CloudIcp icp = *CloudIcp::create(bench().tracer, 0, settings_for_far_starts());
+    const auto first = icp.align(points, kTumbling, start);
+    const test::AllocationCounter heap;
+    const auto again = icp.align(points, kTumbling, start);
+    EXPECT_EQ(heap.on_this_thread(), 0u);
+    ASSERT_TRUE(first && again);
+    EXPECT_EQ(first->T_lidar_target, again->T_lidar_target);
+    EXPECT_EQ(first->covariance, again->covariance);
+}
+
+TEST(IcpSweeps, TheDerivativeIsThatOfTheDistance) {
+    std::mt19937_64 random(15);
+    const Rigid3 T = truth(random);
+    const SweepMotion fast{{3, -2, 4}, {0.5, 0.8, -1}};
+    const auto points = bench().sweep(T, fast, random);
+    BeamAssociation beams(bench().tracer, 0);
+    beams.take(points, fast);
+    std::vector<PointToPlane> at, before, after;
+    beams.associate(T, kNoise, 0.3, 0, 1, at);
+    constexpr double kStep = 1e-6;
+    std::vector<Vector6> numeric(at.size());
+    for (int j = 0; j < 6; ++j) {
+        beams.associate(displaced(T, -kStep * Vector6::Unit(j)), kNoise, 0.3, 0, 1, before);
+        beams.associate(displaced(T, kStep * Vector6::Unit(j)), kNoise, 0.3, 0, 1, after);
+        for (std::size_t i = 0; i < at.size(); ++i)
+            numeric[i][j] = (after[i].distance_m - before[i].distance_m) / (2 * kStep);
+    }
+    std::size_t looked_at = 0, agree = 0;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+        if (at[i].fate != BeamFate::met || std::abs(at[i].distance_m) > 0.1) continue;
+        // The plane's own turn moves the point by its distance from where the beam meets the plane: the noise.
+        ++looked_at;
+        if ((numeric[i] - beams.derivative(T, i, at[i])).norm() > std::abs(at[i].distance_m) * 4 + 1e-6) continue;
+        ++agree;
+    }
+    EXPECT_GT(looked_at, 1000u);
+    EXPECT_GT(static_cast<double>(agree), 0.99 * static_cast<double>(looked_at))
+        << "but for the few beams that a step takes across an edge";
+}
+
+TEST(IcpSweeps, SaysWhatIsWrong) {
+    std::mt19937_64 random(16);
+    const Rigid3 T = truth(random);
+    const auto points = bench().sweep(T, {}, random);
+    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+    CloudIcp icp = *CloudIcp::create(bench().tracer, 0, {});
+    const auto says = [&](const Result<CloudEstimate>& e, const char* what) {
+        ASSERT_FALSE(e);
+        EXPECT_NE(e.error().text().find(what), std::string::npos) << e.error().text();
+    };
+    says(icp.align({}, {}, T), "only 0 of 0 beams");
+    says(icp.align(points, {}, {T.q, -T.t}), "beams meet the target");
+    says(icp.align(points, {{kNan, 0, 0}, {}}, T), "motion during the sweep");
+    says(icp.align(points, {}, {{2, 0, 0, 0}, T.t}), "unit quaternion");
+    auto bad = points;
+    bad[3].range_m = kNan;
+    says(icp.align(bad, {}, T), "point 3 of the sweep: expected a range > 0");
+    bad[3] = points[3];
+    bad[5].direction = {0, 2, 0};
+    says(icp.align(bad, {}, T), "point 5 of the sweep: expected a direction of length 1");
+
+    EXPECT_FALSE(CloudIcp::create(bench().tracer, 1, {}));
+    for (const auto change :
+         {+[](IcpSettings& s) { s.noise.range_m = 0; }, +[](IcpSettings& s) { s.noise.pointing_rad = kNan; },
+          +[](IcpSettings& s) { s.search_m = -1; }, +[](IcpSettings& s) { s.iterations = 0; },
+          +[](IcpSettings& s) { s.search_points = 2; }, +[](IcpSettings& s) { s.grazing_cosine = 1.5; },
+          +[](IcpSettings& s) { s.unobserved_below = 0; }, +[](IcpSettings& s) { s.settled = kNan; }}) {
+        IcpSettings s;
+        change(s);
+        EXPECT_FALSE(CloudIcp::create(bench().tracer, 0, s));
+    }
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,59 @@
+/// estimator/filter/motion_model.h - how a target moves beside a chaser, and what is known of it as time goes on.
+///
+/// The frame is either inertial or LVLH, that of W. Clohessy and R. Wiltshire (1960): x up, away from the Earth, y
+/// along the circular orbit, z along its momentum; it turns about z with the orbit's rate. The chaser is its
+/// origin.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "base/result.h"
+#include "estimator/pose/pose_estimate.h"
+
+namespace narpa {
+
+using Vector12 = Eigen::Matrix<double, 12, 1>;
+using Matrix12 = Eigen::Matrix<double, 12, 12>;
+
+/// The target beside the chaser: their centres of mass, which are the origins of their body axes.
+struct RelativeState {
+    Vec3 position_m{};      ///< of the target's origin from the chaser's, frame axes
+    Vec3 velocity_m_s{};    ///< its rate of change as the frame sees it
+    Quat q_frame_target{};  ///< target axes to frame axes
+    Vec3 rate_rad_s{};      ///< of the target against inertial space, target axes
+
+    friend bool operator==(const RelativeState&, const RelativeState&) = default;
+};
+
+/// An error is (position m, velocity m/s, attitude rad, rate rad/s), the first two in frame axes, the others in the
+/// target's: the truth's attitude is q_frame_target * exp_rotation(attitude).
+[[nodiscard]] RelativeState displaced(const RelativeState& state, const Vector12& error);
+[[nodiscard]] Vector12 error_between(const RelativeState& from, const RelativeState& to);
+/// e' C^-1 e: chi-square with twelve degrees of freedom where the covariance is right; infinite where it is not
+/// positive definite.
+[[nodiscard]] double normalised_error_squared(const Vector12& error, const Matrix12& covariance);
+
+struct MotionModel {
+    /// 0: a free body, the frame is inertial, velocities stay. > 0: Clohessy and Wiltshire's equations, frame LVLH.
+    double orbit_rate_rad_s = 0;
+    /// The target's, about its centre of mass in its body axes: it tumbles as a rigid body without a torque. None:
+    /// its rate stays as it is in its own axes.
+    std::optional<Eigen::Matrix3d> inertia_kg_m2{};
+    /// White noise that drives what the model leaves out: power spectral densities, on each axis, of acceleration
+    /// (m^2 s^-3) and of angular acceleration (rad^2 s^-3).
+    double acceleration_psd = 1e-8;
+    double angular_acceleration_psd = 1e-10;
+};
+/// An Error names the field, what it is and what was expected.
+[[nodiscard]] Status check(const MotionModel& model);
+
+/// Moves state and covariance on by dt_s >= 0. `acceleration_m_s2`: known, of the target relative to the chaser,
+/// frame axes, constant. Allocates nothing.
+void propagate(const MotionModel& model, double dt_s, const Vec3& acceleration_m_s2, RelativeState& state,
+               Matrix12& covariance);
+
+/// Of (position, velocity) under Clohessy and Wiltshire's equations, in closed form. orbit_rate_rad_s > 0.
+[[nodiscard]] Matrix6 clohessy_wiltshire_transition(double orbit_rate_rad_s, double dt_s);
+
+}  // namespace narpa

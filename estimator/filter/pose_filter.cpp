@@ -1,0 +1,215 @@
+#include "estimator/filter/pose_filter.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace narpa {
+namespace {
+
+using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
+
+Eigen::Matrix3d matrix(const Quat& q) {
+    const auto c = columns(q);
+    Eigen::Matrix3d m;
+    m << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
+    return m;
+}
+
+bool is_unit(const Quat& q) {
+    return std::abs(norm(q) - 1) < 1e-6;
+}
+
+template <int N>
+bool is_covariance(const Eigen::Matrix<double, N, N>& C) {
+    if (!C.allFinite()) return false;
+    if ((C - C.transpose()).cwiseAbs().maxCoeff() > 1e-9 * C.cwiseAbs().maxCoeff()) return false;
+    return Eigen::LLT<Eigen::Matrix<double, N, N>>(C).info() == Eigen::Success;
+}
+
+/// What is wrong with it; null: nothing.
+const char* fault(const PoseMeasurement& m) {
+    if (!is_finite(m.T_sensor_target.t) || !is_finite(m.T_chaser_sensor.t)) return "expected finite positions";
+    if (!is_unit(m.T_sensor_target.q) || !is_unit(m.T_chaser_sensor.q) || !is_unit(m.q_frame_chaser))
+        return "expected quaternions of length 1";
+    if (!is_covariance<6>(m.covariance))
+        return "expected a covariance that is finite, symmetric and positive definite";
+    return nullptr;
+}
+
+/// Where the sensor's axes are in the frame.
+Quat q_frame_sensor(const PoseMeasurement& m) {
+    return m.q_frame_chaser * m.T_chaser_sensor.q;
+}
+
+Rigid3 expected_pose(const RelativeState& state, const PoseMeasurement& m) {
+    const Rigid3 T_chaser_target{conjugate(m.q_frame_chaser) * state.q_frame_target,
+                                 conjugate(m.q_frame_chaser) * state.position_m};
+    return inverse(m.T_chaser_sensor) * T_chaser_target;
+}
+
+/// How the error of a pose in axes that q_frame_axes turns to the frame's depends on that of the state.
+Matrix6x12 pose_jacobian(const Quat& q_frame_axes, const RelativeState& state) {
+    Matrix6x12 H = Matrix6x12::Zero();
+    H.block<3, 3>(0, 6) = matrix(conjugate(q_frame_axes) * state.q_frame_target);
+    H.block<3, 3>(3, 0) = matrix(conjugate(q_frame_axes));
+    return H;
+}
+
+/// The innovation of a measurement, and the factor of its covariance.
+struct Innovation {
+    Matrix6x12 H;
+    Vector6 z;
+    Eigen::LLT<Matrix6> S;
+    double nis = 0;
+
+    Innovation(const RelativeState& state, const Matrix12& P, const PoseMeasurement& m)
+        : H(pose_jacobian(q_frame_sensor(m), state)),
+          z(error_between(expected_pose(state, m), m.T_sensor_target)),
+          S(H * P * H.transpose() + m.covariance),
+          nis(S.matrixL().solve(z).squaredNorm()) {}
+};
+
+void correct(const Innovation& innovation, const Matrix6& measurement_covariance, RelativeState& state,
+             Matrix12& P) {
+    const Matrix6x12& H = innovation.H;
+    const Eigen::Matrix<double, 12, 6> K = innovation.S.solve(H * P).transpose();
+    const Vector12 step = K * innovation.z;
+    state = displaced(state, step);
+    const Matrix12 rest = Matrix12::Identity() - K * H;
+    P = (rest * P * rest.transpose() + K * measurement_covariance * K.transpose()).eval();
+    // Errors are now about the attitude that was just put right: to first order half the step is turned off.
+    Matrix12 reset = Matrix12::Identity();
+    const Eigen::Vector3d a = 0.5 * step.segment<3>(6);
+    reset.block<3, 3>(6, 6) << 1, a.z(), -a.y(), -a.z(), 1, a.x(), a.y(), -a.x(), 1;
+    P = (reset * P * reset.transpose()).eval();
+    P = (0.5 * (P + P.transpose())).eval();
+}
+
+Status check(const FilterSettings& s) {
+    if (auto good = check(s.motion); !good) return good.error();
+    if (!(s.gate > 0)) return Error{"gate = " + std::to_string(s.gate) + ": expected > 0"};
+    if (s.history < 2) return Error{"history = " + std::to_string(s.history) + ": expected 2 events or more"};
+    return Ok{};
+}
+
+}  // namespace
+
+Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, std::int64_t t_ns, const RelativeState& state,
+                                      const Matrix12& covariance) {
+    if (auto good = check(settings); !good) return good.error();
+    if (!is_finite(state.position_m) || !is_finite(state.velocity_m_s) || !is_finite(state.rate_rad_s) ||
+        !is_unit(state.q_frame_target))
+        return Error{"the filter's first state: expected finite numbers and a unit quaternion"};
+    if (!is_covariance<12>(covariance))
+        return Error{"the filter's first covariance: expected it finite, symmetric and positive definite"};
+    PoseFilter filter(settings);
+    filter.t_ns_ = t_ns;
+    filter.now_ = {state, covariance};
+    filter.history_.reserve(settings.history);
+    filter.history_.push_back({t_ns, filter.now_, {}, false, {}});
+    return filter;
+}
+
+Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, const PoseMeasurement& first,
+                                      double velocity_sigma_m_s, double rate_sigma_rad_s) {
+    if (const char* why = fault(first)) return Error{std::string("the filter's first measurement: ") + why};
+    if (!(velocity_sigma_m_s > 0) || !(rate_sigma_rad_s > 0))
+        return Error{"the filter's first velocity and rate: expected standard deviations > 0"};
+    const Rigid3 T_chaser_target = first.T_chaser_sensor * first.T_sensor_target;
+    RelativeState state;
+    state.q_frame_target = normalized(first.q_frame_chaser * T_chaser_target.q);
+    state.position_m = first.q_frame_chaser * T_chaser_target.t;
+    state.rate_rad_s = conjugate(state.q_frame_target) * Vec3{0, 0, settings.motion.orbit_rate_rad_s};
+
+    Matrix12 P = Matrix12::Zero();
+    const Matrix6x12 H = pose_jacobian(q_frame_sensor(first), state);
+    P = H.transpose() * first.covariance *
+        H;  // H takes errors to errors by rotations: its transpose is its inverse
+    for (int i = 0; i < 3; ++i) {
+        P(3 + i, 3 + i) = velocity_sigma_m_s * velocity_sigma_m_s;
+        P(9 + i, 9 + i) = rate_sigma_rad_s * rate_sigma_rad_s;
+    }
+    return create(settings, first.t_ns, state, 0.5 * (P + P.transpose()));
+}
+
+PoseFilter::Knowledge PoseFilter::moved_on(const Event& from, std::int64_t t_ns) const {
+    Knowledge k = from.after;
+    propagate(settings_.motion, 1e-9 * static_cast<double>(t_ns - from.t_ns), from.acceleration_m_s2, k.state,
+              k.covariance);
+    return k;
+}
+
+/// The oldest goes where there is no room.
+void PoseFilter::remember(std::size_t place, const Event& event) {
+    if (history_.size() == settings_.history) {
+        std::move(history_.begin() + 1, history_.begin() + static_cast<std::ptrdiff_t>(place), history_.begin());
+        history_[place - 1] = event;
+    } else {
+        history_.insert(history_.begin() + static_cast<std::ptrdiff_t>(place), event);
+    }
+}
+
+void PoseFilter::predict(std::int64_t t_ns) {
+    if (t_ns <= t_ns_) return;
+    propagate(settings_.motion, 1e-9 * static_cast<double>(t_ns - t_ns_), history_.back().acceleration_m_s2,
+              now_.state, now_.covariance);
+    t_ns_ = t_ns;
+}
+
+bool PoseFilter::accelerate(const Vec3& acceleration_m_s2) {
+    if (!is_finite(acceleration_m_s2)) return false;
+    if (history_.back().acceleration_m_s2 == acceleration_m_s2) return true;
+    remember(history_.size(), {t_ns_, now_, acceleration_m_s2, false, {}});
+    return true;
+}
+
+UpdateResult PoseFilter::update(const PoseMeasurement& m) {
+    if (const char* why = fault(m)) {
+        ++counts_.bad;
+        return {UpdateOutcome::bad, 0, why};
+    }
+    if (m.t_ns < history_.front().t_ns) {
+        ++counts_.too_late;
+        return {UpdateOutcome::too_late, 0, "it is older than what the filter remembers"};
+    }
+    const auto later = std::upper_bound(history_.begin(), history_.end(), m.t_ns,
+                                        [](std::int64_t t, const Event& e) { return t < e.t_ns; });
+    const Event& before = *std::prev(later);
+    Event event{m.t_ns, moved_on(before, m.t_ns), before.acceleration_m_s2, true, m};
+    const Innovation innovation(event.after.state, event.after.covariance, m);
+    if (!(innovation.nis <= settings_.gate)) {
+        ++counts_.gated;
+        ++counts_.gated_in_a_row;
+        predict(m.t_ns);
+        return {UpdateOutcome::gated, innovation.nis, "it contradicts what the filter knows"};
+    }
+    correct(innovation, m.covariance, event.after.state, event.after.covariance);
+
+    std::size_t place = static_cast<std::size_t>(later - history_.begin());
+    counts_.late += m.t_ns < t_ns_;
+    ++counts_.taken;
+    counts_.gated_in_a_row = 0;
+    if (history_.size() == settings_.history) --place;  // the first one goes
+    remember(static_cast<std::size_t>(later - history_.begin()), event);
+    for (std::size_t i = place + 1; i < history_.size(); ++i) {
+        Event& e = history_[i];
+        e.after = moved_on(history_[i - 1], e.t_ns);
+        if (e.measured)
+            correct(Innovation(e.after.state, e.after.covariance, e.measurement), e.measurement.covariance,
+                    e.after.state, e.after.covariance);
+    }
+    t_ns_ = std::max(t_ns_, m.t_ns);
+    now_ = moved_on(history_.back(), t_ns_);
+    return {UpdateOutcome::taken, innovation.nis, ""};
+}
+
+PoseFilter::Pose PoseFilter::pose(const Quat& q_frame_chaser) const {
+    const Matrix6x12 J = pose_jacobian(q_frame_chaser, now_.state);
+    return {
+        {conjugate(q_frame_chaser) * now_.state.q_frame_target, conjugate(q_frame_chaser) * now_.state.position_m},
+        J * now_.covariance * J.transpose()};
+}
+
+}  // namespace narpa

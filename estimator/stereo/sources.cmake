@@ -1,0 +1,1 @@
+target_sources(narpa_estimator PRIVATE stereo/triangulation.cpp)

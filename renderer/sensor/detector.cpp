@@ -58,6 +58,7 @@ Sensor sensor_over_frame(const Camera& c, std::uint64_t seed, std::uint32_t fram
     s.read_noise_e = std::min(s.read_noise_e, limit_e);
     s.top_dn = (1 << s.bits) - 1;
     s.full_dn = std::min(s.top_dn, static_cast<std::int32_t>(s.full_well_e * s.dn_per_e + (s.black_dn + 0.5)));
+    s.dark = DarkLevels(s.black_dn, s.read_noise_e * s.dn_per_e, s.top_dn);
     s.frame = frame;
     s.random = PhiloxSchedule(seed);
     return s;

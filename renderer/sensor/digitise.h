@@ -12,6 +12,7 @@
 
 #include "base/pixel_format.h"
 #include "renderer/scene/scene.h"
+#include "renderer/sensor/dark_levels.h"
 #include "renderer/sensor/noise.h"
 
 namespace narpa {
@@ -28,6 +29,7 @@ struct Sensor {
     bool shot_noise = false;
     std::uint32_t frame = 0;
     PhiloxSchedule random{0};
+    DarkLevels dark;
 };
 [[nodiscard]] Sensor sensor_over_frame(const Camera& camera, std::uint64_t seed, std::uint32_t frame) noexcept;
 
@@ -55,17 +57,45 @@ inline RgbPerRay side_by_side(const Sensor& sensor, const Rgb* radiance) noexcep
     return out;
 }
 
-inline bool any_light(const Lanes<double>& mean_e) noexcept {
-    std::uint64_t any = 0;
-    for (std::size_t i = 0; i < kPacket; ++i) any |= mean_e[i] > 0 ? 1u : 0u;
-    return any != 0;
-}
+/// Random words of pixels without light. One block is for four of them, so those of kPixels are drawn at a time.
+class DarkWords {
+public:
+    static constexpr std::uint32_t kPixels = 4 * kPacket;
 
-inline DnPerLane digitise(const Sensor& sensor, const Lanes<double>& mean_e, std::uint32_t first_pixel,
-                          std::uint32_t band) noexcept {
+    /// Of a packet: `first_pixel` is a multiple of kPacket.
+    const Lanes<std::uint32_t>& of(const Sensor& sensor, std::uint32_t first_pixel, std::uint32_t band) noexcept {
+        OfBand& b = bands_[band];
+        const std::uint32_t group = first_pixel / kPixels;
+        if (!b.drawn || b.group != group) {
+            b.words = philox(sensor.random, group * static_cast<std::uint32_t>(kPacket), sensor.frame,
+                             kBesideTheLit + band);
+            b.drawn = true;
+            b.group = group;
+        }
+        switch (first_pixel / kPacket % 4) {
+            case 0: return b.words.w0;
+            case 1: return b.words.w1;
+            case 2: return b.words.w2;
+            default: return b.words.w3;
+        }
+    }
+
+private:
+    static constexpr std::uint32_t kBesideTheLit = 4;  ///< counters that no pixel with light has
+    struct OfBand {
+        BlockPerLane words;
+        std::uint32_t group;
+        bool drawn = false;
+    };
+    std::array<OfBand, 3> bands_;
+};
+
+/// Of pixels with any light; of others too where there is no table.
+inline DnPerLane digitise_lit(const Sensor& sensor, const Lanes<double>& mean_e, bool any_light,
+                              std::uint32_t first_pixel, std::uint32_t band) noexcept {
     Lanes<double> e = mean_e;
     std::int32_t top_dn = sensor.full_dn;
-    if (sensor.read_noise_e > 0 || (sensor.shot_noise && any_light(mean_e))) {
+    if (sensor.read_noise_e > 0 || (sensor.shot_noise && any_light)) {
         const BlockPerLane random = philox(sensor.random, first_pixel, sensor.frame, band);
         const NormalsPerLane normal = normals(random);
         if (sensor.shot_noise) e = poisson(mean_e, normal, random);
@@ -81,12 +111,47 @@ inline DnPerLane digitise(const Sensor& sensor, const Lanes<double>& mean_e, std
     return dn;
 }
 
+inline DnPerLane digitise_dark(const Sensor& sensor, const Lanes<std::uint32_t>& words) noexcept {
+    DnPerLane dn;
+    for (std::size_t i = 0; i < kPacket; ++i) dn[i] = sensor.dark.level(words[i]);
+    return dn;
+}
+
+/// What a pixel draws is up to its own light alone.
+inline DnPerLane digitise(const Sensor& sensor, const Lanes<double>& mean_e, std::uint32_t first_pixel,
+                          std::uint32_t band, DarkWords& dark_words) noexcept {
+    std::uint64_t lit = 0;
+    for (std::size_t i = 0; i < kPacket; ++i) lit += mean_e[i] > 0 ? 1u : 0u;
+    if (lit == kPacket || !sensor.dark.any()) return digitise_lit(sensor, mean_e, lit > 0, first_pixel, band);
+    const DnPerLane dark = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
+    if (lit == 0) return dark;
+    DnPerLane dn = digitise_lit(sensor, mean_e, true, first_pixel, band);
+    for (std::size_t i = 0; i < kPacket; ++i) dn[i] = mean_e[i] > 0 ? dn[i] : dark[i];
+    return dn;
+}
+
+inline bool is_black(const Rgb* radiance) noexcept {
+    std::array<std::uint32_t, 3 * kPacket> bits;
+    static_assert(sizeof bits == kPacket * sizeof(Rgb));
+    std::memcpy(bits.data(), radiance, sizeof bits);
+    std::uint32_t any = 0;
+    for (const std::uint32_t of_one : bits) any |= of_one;
+    return any == 0;
+}
+
 /// DN of each band; of a monochrome pixel the first alone.
 struct alignas(64) DnPerBand {
     std::array<DnPerLane, 3> dn;
 };
-inline DnPerBand digitise(const Sensor& sensor, bool mono, const Rgb* radiance,
-                          std::uint32_t first_pixel) noexcept {
+inline DnPerBand digitise(const Sensor& sensor, bool mono, const Rgb* radiance, std::uint32_t first_pixel,
+                          DarkWords& dark_words) noexcept {
+    DnPerBand out;
+    const std::uint32_t bands = mono ? 1 : 3;
+    if (sensor.dark.any() && is_black(radiance)) {
+        for (std::uint32_t band = 0; band < bands; ++band)
+            out.dn[band] = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
+        return out;
+    }
     const RgbPerRay l = side_by_side(sensor, radiance);
     std::array<Lanes<double>, 3> mean_e;
     const auto [red, green, blue] = sensor.electrons_per_radiance;
@@ -95,9 +160,8 @@ inline DnPerBand digitise(const Sensor& sensor, bool mono, const Rgb* radiance,
     for (std::size_t i = 0; i < kPacket; ++i) mean_e[2][i] = blue * static_cast<double>(l.b[i]);
     if (mono)
         for (std::size_t i = 0; i < kPacket; ++i) mean_e[0][i] = mean_e[0][i] + mean_e[1][i] + mean_e[2][i];
-    DnPerBand out;
-    for (std::uint32_t band = 0; band < (mono ? 1 : 3); ++band)
-        out.dn[band] = digitise(sensor, mean_e[band], first_pixel, band);
+    for (std::uint32_t band = 0; band < bands; ++band)
+        out.dn[band] = digitise(sensor, mean_e[band], first_pixel, band, dark_words);
     return out;
 }
 
@@ -150,8 +214,8 @@ inline std::array<std::uint32_t, kPacket / 2> to_yuyv(int bits, const DnPerBand&
 
 /// Sixteen pixels into kPacket * bytes_per_pixel(format) bytes.
 inline void write_packet(const Sensor& sensor, PixelFormat format, const Rgb* radiance, std::uint32_t first_pixel,
-                         std::uint8_t* out) noexcept {
-    const DnPerBand c = digitise(sensor, is_mono(format), radiance, first_pixel);
+                         DarkWords& dark_words, std::uint8_t* out) noexcept {
+    const DnPerBand c = digitise(sensor, is_mono(format), radiance, first_pixel, dark_words);
     const auto put = [out](const auto& bytes) { std::memcpy(out, bytes.data(), sizeof bytes); };
     switch (format) {
         case PixelFormat::grey: return put(to_grey(sensor.bits, c.dn[0]));
@@ -161,18 +225,21 @@ inline void write_packet(const Sensor& sensor, PixelFormat format, const Rgb* ra
     }
 }
 
-/// Pixels one after another, from `first_pixel` of the image on: `out` is where the first one's bytes go.
+/// Pixels one after another, from `first_pixel` of the image on, a multiple of kPacket: `out` is where the first
+/// one's bytes go.
 inline void write_pixels(const Sensor& sensor, PixelFormat format, std::span<const Rgb> radiance,
                          std::size_t first_pixel, std::uint8_t* out) noexcept {
     const std::size_t bytes = bytes_per_pixel(format);
     Lanes<Rgb> rest{};
     std::array<std::uint8_t, 3 * kPacket> rest_out;
+    DarkWords dark_words;
     for (std::size_t i = 0; i < radiance.size(); i += kPacket) {
         const std::size_t count = std::min(kPacket, radiance.size() - i);
         const bool whole = count == kPacket;
         if (!whole) std::copy_n(&radiance[i], count, rest.begin());
         write_packet(sensor, format, whole ? &radiance[i] : rest.data(),
-                     static_cast<std::uint32_t>(first_pixel + i), whole ? out + i * bytes : rest_out.data());
+                     static_cast<std::uint32_t>(first_pixel + i), dark_words,
+                     whole ? out + i * bytes : rest_out.data());
         if (!whole) std::copy_n(rest_out.begin(), count * bytes, out + i * bytes);
     }
 }

@@ -1,4 +1,4 @@
-target_sources(narpa_renderer PRIVATE sensor/detector.cpp)
+target_sources(narpa_renderer PRIVATE sensor/dark_levels.cpp sensor/detector.cpp)
 # Loops over sixteen lanes become vector code; GCC would first write out those that stand in another loop. No exception
 # flag is looked at, so both sides of a choice may be computed.
 set_source_files_properties(sensor/detector.cpp PROPERTIES COMPILE_OPTIONS

@@ -4,16 +4,17 @@
 #include <cmath>
 #include <limits>
 #include <queue>
+#include <unordered_map>
 #include <span>
 
 namespace narpa {
 namespace {
 
 constexpr std::size_t kBins = 16;
-constexpr float kPieceShare = 1.0f / 40;  ///< a piece's box has a surface like this square of the mesh's extent
+constexpr float kPieceShare = 1.0f / 160;  ///< a piece's box has a surface like this square of the mesh's extent
 constexpr int kMostHalvings = 13;         ///< of one triangle
-constexpr float kMostPieces = 16384;      ///< roughly, that large triangles are cut to
-constexpr std::size_t kCells = 64;        ///< of the grid, along the mesh's largest extent
+constexpr float kMostPieces = 65536;      ///< roughly, that large triangles are cut to
+constexpr std::size_t kCells = 256;        ///< of the grid, along the mesh's largest extent
 
 struct Box {
     static constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -50,7 +51,8 @@ std::size_t step_at(float x, std::size_t steps) {
 /// whose middles share a cell of a grid, much smaller than the leaves, are one.
 class Pieces {
 public:
-    explicit Pieces(const Mesh& mesh) : box_of_cell_(kCells * kCells * kCells, kNone) {
+    explicit Pieces(const Mesh& mesh) {
+        box_of_cell_.reserve(mesh.faces.size());
         for (const auto& f : mesh.faces)
             for (const std::uint32_t vertex : f) all_.add(mesh.positions[vertex]);
         float surfaces = 0;
@@ -64,8 +66,6 @@ public:
     [[nodiscard]] const Box& all() const { return all_; }
 
 private:
-    static constexpr std::uint32_t kNone = 0xffff'ffffu;
-
     static Triangle corners(const Mesh& mesh, const std::array<std::uint32_t, 3>& f) {
         return {mesh.positions[f[0]], mesh.positions[f[1]], mesh.positions[f[2]]};
     }
@@ -95,12 +95,12 @@ private:
         for (std::size_t k = 0; k < 3; ++k) {
             cell = cell * kCells + step_at((box.middle(k) - all_.low[k]) * cells_per_metre_, kCells);
         }
-        std::uint32_t& known = box_of_cell_[cell];
-        if (known == kNone) known = static_cast<std::uint32_t>(boxes_.size()), boxes_.emplace_back();
-        boxes_[known].add(box);
+        const auto [known, is_new] = box_of_cell_.try_emplace(cell, boxes_.size());
+        if (is_new) boxes_.emplace_back();
+        boxes_[known->second].add(box);
     }
 
-    std::vector<std::uint32_t> box_of_cell_;
+    std::unordered_map<std::size_t, std::size_t> box_of_cell_;
     std::vector<Box> boxes_;
     Box all_;
     float largest_ = 0, cells_per_metre_ = 0;

@@ -1,4 +1,4 @@
-/// renderer/trace/box_tree.h - boxes about the parts of a mesh, from one about all of it down to a few hundred.
+/// renderer/trace/box_tree.h - boxes about the parts of a mesh, from one about all of it down to a few thousand.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-inline constexpr std::size_t kBoxLeaves = 448;  ///< at most
+inline constexpr std::size_t kBoxLeaves = 4096;  ///< at most
 
 /// In the mesh's frame, metres; along its axes.
 struct BoxNode {

@@ -172,9 +172,9 @@ struct FramePasses::Worker {
         if (until_ns != PassLimit{}.until_ns && now_ns() >= until_ns)
             given_up.store(true, std::memory_order_relaxed);
     }
-    void middles(const Tile& tile, int width, int height, int stride, int made, TileLooks& looks) {
+    void middles(const Tile& tile, int width, int height, int stride, int made, PixelLooks& looks) {
         middles(tile, width, height, stride, made, [&](const Batch& b, const Packet& p, const RgbPerRay& radiance) {
-            PixelLooks::store(f, p, radiance, b.place, looks);
+            looks.store(f, p, radiance, b.place, tile.index);
         });
     }
     template <class Store>
@@ -456,7 +456,7 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
         return;
     }
     const TileLooks& looks = looks_.tile(t.index);
-    w.middles(t, out.width, out.height, 1, 0, looks_.tile(t.index));
+    w.middles(t, out.width, out.height, 1, 0, looks_);
     for (int y = 0; y < t.height; ++y)
         for (int x = 0; x < t.width; ++x) row(t.y + y)[x] = look_at(looks, place_in_tile(x, y));
 }
@@ -492,7 +492,7 @@ PassCount FramePasses::middles(const Frame& f, int stride, int made, const PassL
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         if (which != Tiles::all && in_a_sixteenth(t.x / kTile, t.y / kTile) != (which == Tiles::a_sixteenth))
             return;
-        w.middles(t, camera_.width, camera_.height, stride, made, looks_.tile(t.index));
+        w.middles(t, camera_.width, camera_.height, stride, made, looks_);
     });
 }
 

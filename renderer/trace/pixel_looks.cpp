@@ -46,11 +46,11 @@ PixelLooks::PixelLooks(int width, int height)
       tiles_x_((width + kTile - 1) / kTile),
       tiles_y_((height + kTile - 1) / kTile),
       looks_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
-      looked_at_(looks_.size(), 0) {}
+      known_(looks_.size(), Known::nothing) {}
 
 void PixelLooks::begin_frame(const Rgb& background) {
-    background_ = mean_band(background);
-    std::fill(looked_at_.begin(), looked_at_.end(), std::uint8_t{0});
+    background_ = background;
+    std::fill(known_.begin(), known_.end(), Known::nothing);
 }
 
 namespace {
@@ -82,8 +82,17 @@ NARPA_EACH_ISA void look(const Packet& p, const Vec3& axis, std::uint32_t lit, L
 
 }  // namespace
 
+bool PixelLooks::shows_background(const Packet& p, const RgbPerRay& radiance) const noexcept {
+    if (p.hits.met != 0) return false;
+    for (std::size_t i = 0; i < p.rays.n; ++i)
+        if (radiance[i] != background_) return false;
+    return true;
+}
+
 void PixelLooks::store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
-                       TileLooks& tile) noexcept {
+                       std::size_t tile_index) noexcept {
+    TileLooks& tile = looks_[tile_index];
+    if (!shows_background(p, radiance)) known_[tile_index] = Known::something;
     LooksPerRay seen;
     if (p.hits.met != 0)
         look(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.quick ? p.lit : 0, seen);
@@ -141,6 +150,7 @@ void PixelLooks::gather(const Frame& f, std::size_t tile, Around& a) const noexc
     a.x_last = width_ - 1, a.y_last = height_ - 1;
     const int columns = std::min(kTile, width_ - tx * kTile), rows = std::min(kTile, height_ - ty * kTile);
     const TileLooks& own = looks_[tile];
+    const float background = mean_band(background_);
     for (int row = 0; row < kTile; ++row) {
         copy_looks<4>(own, place_in_tile(0, row), a, cell(row, 0));
         copy_looks<4>(own, place_in_tile(4, row), a, cell(row, 4));
@@ -149,7 +159,7 @@ void PixelLooks::gather(const Frame& f, std::size_t tile, Around& a) const noexc
         if (looked_at(other))
             copy_looks<1>(looks_[other], place_in_tile(x, y), a, at);
         else
-            a.radiance[at] = background_;
+            a.radiance[at] = background;
     };
     const auto row_of_tiles = static_cast<std::size_t>(tiles_x_);
     for (int row = 0; row < rows; ++row) {
@@ -261,7 +271,20 @@ NARPA_EACH_ISA void judge(const PixelLooks::Around& a, TileContrast& out) noexce
 
 }  // namespace
 
+/// It and its neighbours show the background alone.
+bool PixelLooks::in_empty_space(std::size_t tile) const noexcept {
+    const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
+    const auto empty = [&](std::size_t other) { return known_[other] != Known::something; };
+    const auto row_of_tiles = static_cast<std::size_t>(tiles_x_);
+    return empty(tile) && (tx == 0 || empty(tile - 1)) && (tx + 1 == tiles_x_ || empty(tile + 1)) &&
+           (ty == 0 || empty(tile - row_of_tiles)) && (ty + 1 == tiles_y_ || empty(tile + row_of_tiles));
+}
+
 void PixelLooks::contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept {
+    if (in_empty_space(tile)) {
+        out = {};
+        return;
+    }
     Around a;
     gather(f, tile, a);
     judge(a, out);

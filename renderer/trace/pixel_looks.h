@@ -75,12 +75,12 @@ public:
 
     /// Which tiles have looks in this frame; the others show this background.
     void begin_frame(const Rgb& background);
-    void set_looked_at(std::size_t tile) noexcept { looked_at_[tile] = 1; }
-    [[nodiscard]] bool looked_at(std::size_t tile) const noexcept { return looked_at_[tile] != 0; }
+    void set_looked_at(std::size_t tile) noexcept { known_[tile] = Known::background; }
+    [[nodiscard]] bool looked_at(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
 
     /// Puts down what a packet of middles has met. `place`: of each lane in the tile.
-    static void store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
-                      TileLooks& tile) noexcept;
+    void store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
+               std::size_t tile) noexcept;
 
     /// What a tile and its neighbours say of its pixels.
     void contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
@@ -90,11 +90,15 @@ public:
 
 private:
     void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
+    [[nodiscard]] bool shows_background(const Packet& p, const RgbPerRay& radiance) const noexcept;
+    [[nodiscard]] bool in_empty_space(std::size_t tile) const noexcept;
 
     int width_, height_, tiles_x_, tiles_y_;
-    float background_ = 0;
+    Rgb background_{};
     std::vector<TileLooks> looks_;
-    std::vector<std::uint8_t> looked_at_;
+    /// Of a tile: not looked at; no more than the background so far; something.
+    enum class Known : std::uint8_t { nothing, background, something };
+    std::vector<Known> known_;
 };
 
 }  // namespace narpa

@@ -18,11 +18,6 @@ constexpr int kFlowWindow_px = 21, kFlowLevels = 4;
 /// Of the frame's pixels so many may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
 
-std::uint8_t tone(double dn, const SensorModel& sensor, double top_dn) {
-    const double part = std::clamp((dn - sensor.black_dn) / (top_dn - sensor.black_dn), 0.0, 1.0);
-    return static_cast<std::uint8_t>(255 * std::sqrt(part) + 0.5);
-}
-
 cv::Mat as_mat(const TonedImage& image) {
     return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data())};
 }
@@ -59,25 +54,44 @@ FeatureMatch pair_of(const cv::Point2f& view, const cv::Point2f& frame) {
 
 }  // namespace
 
-double tone_top_dn(const MeasuredImage& frame, const SensorModel& sensor) {
+ToneScale::ToneScale(const MeasuredImage& frame, const SensorModel& sensor) : sensor_(sensor) {
     std::vector<float> dn = frame.dn;
-    if (dn.empty()) return sensor.top_dn;
-    const auto rank = static_cast<std::ptrdiff_t>((1 - kBeyondTop) * static_cast<double>(dn.size() - 1));
-    std::nth_element(dn.begin(), dn.begin() + rank, dn.end());
-    return std::max<double>(dn[static_cast<std::size_t>(rank)], sensor.black_dn + 1);
+    double top_dn = sensor.top_dn;
+    if (!dn.empty()) {
+        const auto rank = static_cast<std::ptrdiff_t>((1 - kBeyondTop) * static_cast<double>(dn.size() - 1));
+        std::nth_element(dn.begin(), dn.begin() + rank, dn.end());
+        top_dn = std::max<double>(dn[static_cast<std::size_t>(rank)], sensor.black_dn + 1);
+    }
+    black_ = stabilised(sensor.black_dn);
+    steps_ = 255 / (stabilised(top_dn) - black_);
 }
 
-TonedImage toned(const MeasuredImage& frame, const SensorModel& sensor, double top_dn) {
+/// A change by the standard deviation of the noise is a change by 1.
+double ToneScale::stabilised(double dn) const {
+    const double above = dn - sensor_.black_dn, constant = sensor_.read_dn2 + sensor_.rounding_dn2;
+    if (sensor_.shot_dn <= 0) return above / std::sqrt(constant);
+    return 2 / sensor_.shot_dn * std::sqrt(std::max(0.0, sensor_.shot_dn * above + constant));
+}
+
+std::uint8_t ToneScale::tone(double dn) const {
+    return static_cast<std::uint8_t>(std::clamp(steps_ * (stabilised(dn) - black_), 0.0, 255.0) + 0.5);
+}
+
+double ToneScale::variance() const {
+    return steps_ * steps_ + 1.0 / 12;
+}
+
+TonedImage ToneScale::toned(const MeasuredImage& frame) const {
     TonedImage out{frame.width, frame.height, {}};
     out.pixels.reserve(frame.dn.size());
-    for (const float dn : frame.dn) out.pixels.push_back(tone(dn, sensor, top_dn));
+    for (const float dn : frame.dn) out.pixels.push_back(tone(dn));
     return out;
 }
 
-TonedImage toned(const RadianceImage& view, const SensorModel& sensor, double top_dn) {
+TonedImage ToneScale::toned(const RadianceImage& view) const {
     TonedImage out{view.width, view.height, {}};
     out.pixels.reserve(view.pixels.size());
-    for (const Rgb& L : view.pixels) out.pixels.push_back(tone(sensor.dn(L), sensor, top_dn));
+    for (const Rgb& L : view.pixels) out.pixels.push_back(tone(sensor_.dn(L)));
     return out;
 }
 
@@ -127,7 +141,7 @@ struct FeatureMatcher::Impl {
         cv::buildOpticalFlowPyramid(as_mat(frame), frame_levels, window, kFlowLevels);
         std::vector<std::uint8_t> found, found_back;
         std::vector<float> error;
-        const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.003);
+        const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 0.0005);
         cv::calcOpticalFlowPyrLK(view_levels, frame_levels, start, there, found, error, window, kFlowLevels, stop);
         cv::calcOpticalFlowPyrLK(frame_levels, view_levels, there, home, found_back, error, window, kFlowLevels,
                                  stop);

@@ -11,17 +11,32 @@
 
 namespace narpa {
 
-/// Eight bits a pixel, row-major: the square root of the light, so that shot noise is the same everywhere and what
-/// lies in the dark shows. 255 is `top`.
+/// Light as eight bits a pixel, row-major, in steps of equal noise: the generalised Anscombe transform (Murtagh,
+/// Starck and Bijaoui 1995) of DN, so that a step in the dark, where rounding hides it, weighs no more than one in
+/// the light.
 struct TonedImage {
     int width = 0, height = 0;
     std::vector<std::uint8_t> pixels;
 };
 
-/// DN that stands at the top of the scale for both pictures: nearly the brightest of the frame.
-[[nodiscard]] double tone_top_dn(const MeasuredImage& frame, const SensorModel& sensor);
-[[nodiscard]] TonedImage toned(const MeasuredImage& frame, const SensorModel& sensor, double top_dn);
-[[nodiscard]] TonedImage toned(const RadianceImage& view, const SensorModel& sensor, double top_dn);
+/// One for a frame and for the views that it is compared with.
+class ToneScale {
+public:
+    /// 255 stands for nearly the brightest of the frame.
+    ToneScale(const MeasuredImage& frame, const SensorModel& sensor);
+
+    [[nodiscard]] TonedImage toned(const MeasuredImage& frame) const;
+    [[nodiscard]] TonedImage toned(const RadianceImage& view) const;
+    /// Variance of a pixel of a toned frame, in its own steps: the sensor's noise, and rounding to eight bits.
+    [[nodiscard]] double variance() const;
+
+private:
+    [[nodiscard]] double stabilised(double dn) const;
+    [[nodiscard]] std::uint8_t tone(double dn) const;
+
+    SensorModel sensor_;
+    double black_ = 0, steps_ = 1;  ///< 255 / (top - black), stabilised
+};
 
 enum class FeatureKind : std::uint8_t {
     sift,     ///< Lowe 2004

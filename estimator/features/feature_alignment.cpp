@@ -1,0 +1,312 @@
+#include "estimator/features/feature_alignment.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "estimator/features/flow_noise.h"
+
+namespace narpa {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// Half the window over which a match's noise is summed: that of the optical flow.
+constexpr int kHalfWindow_px = 10;
+/// Of a descriptor's place, where nothing better is known: as measured, 0.15 to 0.4 px.
+constexpr double kDescriptor_px = 0.3;
+/// A match whose residual exceeds this many of the others' median is no match.
+constexpr double kOutlier = 4;
+/// Median of the length of a residual of unit variance in u and in v: Rayleigh's.
+constexpr double kRayleighMedian = 1.17741;
+/// Neighbouring rays this far off must meet the surface that the feature's own ray met.
+constexpr double kNeighbour_px = 1.5;
+/// They may lie off its tangent plane by this many pixels' worth of depth: a bend is a corner, a step is an
+/// outline.
+constexpr double kStep_px = 6;
+
+/// Steps whose square, normalised by the covariance, is less, are noise: a view chooses other features than the one
+/// before.
+constexpr double kSettledSquared = 9;
+/// Of the blocks in which the target is looked for.
+constexpr int kBlock_px = 6;
+
+PixelCovariance with_floor(const PixelCovariance& c, double floor_px) {
+    return {c.uu + floor_px * floor_px, c.uv, c.vv + floor_px * floor_px};
+}
+
+Pixel seen_at(const Camera& camera, const Vec3& p) {
+    return {camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
+}
+
+/// Of a point's pixel by the pose's error (pose_estimate.h).
+Eigen::Matrix<double, 2, 6> pixel_derivative(const Camera& camera, const Rigid3& T, const Vec3& body_m) {
+    const Vec3 a = T.q * body_m, p = a + T.t;
+    Eigen::Matrix<double, 2, 3> by_point;
+    by_point << camera.fx / p.z, 0, -camera.fx * p.x / (p.z * p.z), 0, camera.fy / p.z,
+        -camera.fy * p.y / (p.z * p.z);
+    Eigen::Matrix3d minus_skew;
+    minus_skew << 0, a.z, -a.y, -a.z, 0, a.x, a.y, -a.x, 0;
+    Eigen::Matrix<double, 2, 6> J;
+    J << by_point * minus_skew, by_point;
+    return J;
+}
+
+/// Part of a window's side that it shares with another so far away.
+double overlap(double distance_px) {
+    return std::max(0.0, 1 - std::abs(distance_px) / (2 * kHalfWindow_px + 1));
+}
+
+double mahalanobis(double du, double dv, const PixelCovariance& c) {
+    return (c.vv * du * du - 2 * c.uv * du * dv + c.uu * dv * dv) / (c.uu * c.vv - c.uv * c.uv);
+}
+
+double root_mean_square(const std::vector<double>& lengths) {
+    double squares = 0;
+    for (const double l : lengths) squares += l * l;
+    return lengths.empty() ? 0 : std::sqrt(squares / static_cast<double>(lengths.size()));
+}
+
+double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+}  // namespace
+
+std::string_view name(FeatureStatus status) noexcept {
+    constexpr std::array<std::string_view, 4> names{"settled", "unsettled", "few matches", "no pose"};
+    return names[static_cast<std::size_t>(status)];
+}
+
+/// Matches of one view, with their places on the body.
+struct FeatureAlignment::Points {
+    std::vector<Vec3> body_m;
+    std::vector<Pixel> pixels;
+    std::vector<PixelCovariance> noise;  ///< of the sensor alone
+
+    [[nodiscard]] std::size_t size() const { return body_m.size(); }
+
+    [[nodiscard]] std::vector<double> residuals_px(const Camera& camera, const Rigid3& T) const {
+        std::vector<double> lengths;
+        lengths.reserve(size());
+        for (std::size_t i = 0; i < size(); ++i) {
+            const Pixel p = seen_at(camera, T * body_m[i]);
+            lengths.push_back(std::hypot(p.u - pixels[i].u, p.v - pixels[i].v));
+        }
+        return lengths;
+    }
+    void keep(const std::vector<std::uint8_t>& wanted) {
+        std::size_t n = 0;
+        for (std::size_t i = 0; i < size(); ++i)
+            if (wanted[i] != 0) body_m[n] = body_m[i], pixels[n] = pixels[i], noise[n] = noise[i], ++n;
+        body_m.resize(n), pixels.resize(n), noise.resize(n);
+    }
+    [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const {
+        std::vector<PixelCovariance> all;
+        all.reserve(size());
+        for (const PixelCovariance& c : noise) all.push_back(with_floor(c, floor_px));
+        return all;
+    }
+    /// What it adds to the covariance that the errors beyond the sensor's noise of two matches are alike as far as
+    /// their windows overlap: C (sum over pairs of J_i' W_i S_ij W_j J_j) C.
+    [[nodiscard]] Matrix6 covariance_of_shared_errors(const Camera& camera, const Rigid3& T, const Matrix6& C,
+                                                      double floor_px) const {
+        std::vector<Eigen::Matrix<double, 6, 2>> pulls;  // J' W
+        pulls.reserve(size());
+        for (std::size_t i = 0; i < size(); ++i) {
+            const PixelCovariance c = with_floor(noise[i], floor_px);
+            Eigen::Matrix2d S;
+            S << c.uu, c.uv, c.uv, c.vv;
+            pulls.emplace_back(pixel_derivative(camera, T, body_m[i]).transpose() * S.inverse());
+        }
+        Matrix6 middle = Matrix6::Zero();
+        for (std::size_t i = 0; i < size(); ++i)
+            for (std::size_t j = 0; j < i; ++j) {
+                const double shared = overlap(pixels[i].u - pixels[j].u) * overlap(pixels[i].v - pixels[j].v);
+                if (shared <= 0) continue;
+                const Matrix6 pair = shared * pulls[i] * pulls[j].transpose();
+                middle += pair + pair.transpose();
+            }
+        return floor_px * floor_px * C * middle * C;
+    }
+    /// The error of a match beyond the sensor's noise that makes chi^2 what its degrees of freedom say; 0 where the
+    /// noise explains it all.
+    [[nodiscard]] double floor_px(const Camera& camera, const Rigid3& T) const {
+        const double freedom = std::max(1.0, 2 * static_cast<double>(size()) - 6);
+        const auto chi2 = [&](double floor) {
+            double sum = 0;
+            for (std::size_t i = 0; i < size(); ++i) {
+                const Pixel p = seen_at(camera, T * body_m[i]);
+                sum += mahalanobis(p.u - pixels[i].u, p.v - pixels[i].v, with_floor(noise[i], floor));
+            }
+            return sum;
+        };
+        double low = 0, high = 10;
+        if (chi2(low) <= freedom) return 0;
+        for (int k = 0; k < 40; ++k) (chi2(0.5 * (low + high)) > freedom ? low : high) = 0.5 * (low + high);
+        return high;
+    }
+};
+
+FeatureAlignment::FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target,
+                                   const Placement& at, const FeatureSettings& settings)
+    : view_(tracer, camera, target, at),
+      sensor_(sensor_model(camera)),
+      settings_(settings),
+      matcher_(settings.kind, settings.features) {}
+
+bool FeatureAlignment::on_smooth_surface(double u, double v, const Hit& hit) const {
+    const Camera& camera = view_.camera();
+    const double step_m = kStep_px * hit.range_m / camera.fx;
+    constexpr std::array<std::array<double, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+    return std::all_of(kAround.begin(), kAround.end(), [&](const std::array<double, 2>& d) {
+        const Hit beside = view_.look_through(u + kNeighbour_px * d[0], v + kNeighbour_px * d[1]);
+        if (beside.body != hit.body) return false;
+        const Vec3 between = beside.position - hit.position;
+        const double off_plane =
+            std::min(std::abs(dot(between, hit.geometric_normal)), std::abs(dot(between, beside.geometric_normal)));
+        return off_plane < step_m;
+    });
+}
+
+/// Where features are looked for: blocks of pixels whose middle shows the target.
+void FeatureAlignment::find_target() {
+    const Camera& camera = view_.camera();
+    const auto width = static_cast<std::size_t>(camera.width);
+    on_target_.assign(width * static_cast<std::size_t>(camera.height), 0);
+    for (int v0 = 0; v0 < camera.height; v0 += kBlock_px)
+        for (int u0 = 0; u0 < camera.width; u0 += kBlock_px) {
+            const double middle = 0.5 * (kBlock_px - 1);
+            if (view_.look_through(u0 + middle, v0 + middle).body != static_cast<int>(view_.target())) continue;
+            const int u1 = std::min(u0 + kBlock_px, camera.width), v1 = std::min(v0 + kBlock_px, camera.height);
+            for (int v = v0; v < v1; ++v)
+                std::fill(&on_target_[static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u0)],
+                          &on_target_[static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u1 - 1)] + 1,
+                          std::uint8_t{255});
+        }
+}
+
+/// Features of the view as it was rendered last that lie on the target, and where the frame has them.
+void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones,
+                              Points& points, FeatureRound& round) {
+    points = {};
+    const auto target = static_cast<int>(view_.target());
+    find_target();
+    TonedImage toned_view = tones.toned(view_.radiance());
+    if (toned_view.height != frame.height) {  // the frame's last row was its embedded line
+        toned_view.height = frame.height;
+        const auto pixels = static_cast<std::size_t>(frame.height) * static_cast<std::size_t>(frame.width);
+        toned_view.pixels.resize(pixels), on_target_.resize(pixels);
+    }
+    const std::vector<FeatureMatch> matches = matcher_.match(toned_view, toned_frame, on_target_);
+    const Rigid3 T_target_world = inverse(view_.T_world_target());
+    for (const FeatureMatch& m : matches) {
+        const Hit hit = view_.look_through(m.view_u, m.view_v);
+        if (hit.body != target || !on_smooth_surface(m.view_u, m.view_v, hit)) continue;
+        PixelCovariance noise{kDescriptor_px * kDescriptor_px, 0, kDescriptor_px * kDescriptor_px};
+        if (settings_.kind == FeatureKind::corners) {
+            const Eigen::Matrix2d C =
+                flow_covariance(toned_frame, tones.variance(), m.frame_u, m.frame_v, kHalfWindow_px);
+            if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;
+            noise = {C(0, 0), C(0, 1), C(1, 1)};
+        }
+        points.body_m.push_back(T_target_world * hit.position);
+        points.pixels.push_back({m.frame_u, m.frame_v});
+        points.noise.push_back(noise);
+    }
+    round.matches = static_cast<int>(points.size());
+}
+
+FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placement& at, const Rigid3& guess) {
+    FeatureEstimate estimate;
+    estimate.T_camera_target = guess;
+    view_.set_world(at);
+    const Camera& camera = view_.camera();
+    const ToneScale tones(frame, sensor_);
+    const TonedImage toned_frame = tones.toned(frame);
+    FrameSettings render_settings;
+    render_settings.spp = settings_.spp;
+    render_settings.seed = settings_.seed;
+    const Pinhole pinhole{camera.fx, camera.fy, camera.cx, camera.cy};
+    PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
+    double floor_px = 1;  // until the matches tell
+    Points points;
+    for (int k = 0; k < settings_.renders_max; ++k) {
+        FeatureRound& round = estimate.rounds.emplace_back();
+        auto start = Clock::now();
+        view_.render(estimate.T_camera_target, render_settings, false);
+        round.render_ms = ms_since(start);
+        start = Clock::now();
+        gather(frame, toned_frame, tones, points, round);
+        round.match_ms = ms_since(start);
+        start = Clock::now();
+        if (points.size() < kFewestMatches) return estimate;
+
+        // Outliers first: a pose that they cannot pull far, and who agrees with it.
+        const auto solve = [&](Loss loss) {
+            const std::vector<PixelCovariance> covariances = points.covariances(floor_px);
+            RefineOptions options;
+            options.loss.kind = loss;
+            const PnpInput input{pinhole, points.body_m, points.pixels, 1, covariances};
+            const PnpFit& fit = refiner.refine(input, estimate.T_camera_target, options);
+            for (const double chi2 : fit.summary.costs())
+                round.cost.push_back(chi2 / static_cast<double>(points.size()));
+            return fit;
+        };
+        const std::vector<double> before = points.residuals_px(camera, estimate.T_camera_target);
+        floor_px = std::max(floor_px, median(before) / kRayleighMedian);
+        PnpFit fit = solve(Loss::cauchy);
+        for (int tries = 0; tries < 2 && fit.ok(); ++tries) {
+            const std::vector<double> residuals = points.residuals_px(camera, fit.T_camera_body);
+            const double scale = median(residuals) / kRayleighMedian;
+            std::vector<std::uint8_t> agrees;
+            for (const double r : residuals) agrees.push_back(r < kOutlier * scale ? 1 : 0);
+            points.keep(agrees);
+            if (points.size() < kFewestMatches) return estimate;
+            floor_px = points.floor_px(camera, fit.T_camera_body);
+            fit = solve(Loss::none);
+        }
+        estimate.solver = fit.status;
+        if (!fit.ok()) {
+            estimate.status = FeatureStatus::no_pose;
+            return estimate;
+        }
+        std::vector<double> moved;
+        for (const Vec3& p : points.body_m) {
+            const Pixel a = seen_at(camera, estimate.T_camera_target * p),
+                        b = seen_at(camera, fit.T_camera_body * p);
+            moved.push_back(std::hypot(a.u - b.u, a.v - b.v));
+        }
+        round.agreeing = estimate.agreeing = static_cast<int>(points.size());
+        round.before_px = root_mean_square(points.residuals_px(camera, estimate.T_camera_target));
+        round.after_px = root_mean_square(points.residuals_px(camera, fit.T_camera_body));
+        round.moved_px = root_mean_square(moved);
+        round.solve_ms = ms_since(start);
+        const Vector6 step = error_between(estimate.T_camera_target, fit.T_camera_body);
+        estimate.T_camera_target = fit.T_camera_body;
+        estimate.floor_px = floor_px = points.floor_px(camera, fit.T_camera_body);
+        estimate.covariance = fit.covariance + points.covariance_of_shared_errors(camera, fit.T_camera_body,
+                                                                                  fit.covariance, floor_px);
+        estimate.status = FeatureStatus::unsettled;
+        if (round.moved_px < settings_.settled_px ||
+            normalised_error_squared(step, estimate.covariance) < kSettledSquared) {
+            estimate.status = FeatureStatus::settled;
+            break;
+        }
+    }
+    estimate.bound =
+        refiner.refine({pinhole, points.body_m, points.pixels, 1, points.noise}, estimate.T_camera_target)
+            .covariance;
+    return estimate;
+}
+
+}  // namespace narpa

@@ -1,0 +1,88 @@
+/// estimator/features/feature_alignment.h - the pose of the target by rendering and comparing points.
+///
+/// The paper's section VI: render the model at the guess, match features of the render with the frame, take each
+/// one's place on the body from the render's own geometry, solve for the pose, and do it again from there until
+/// the view stops moving. The place on the body is exact: a ray through the feature, not a pixel of a depth map.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "estimator/features/feature_matcher.h"
+#include "estimator/pose/pnp_refine.h"
+#include "estimator/view/model_view.h"
+
+namespace narpa {
+
+struct FeatureSettings {
+    FeatureKind kind = FeatureKind::corners;
+    int features = 400;        ///< looked for in the view
+    int renders_max = 10;      ///< views rendered for a frame
+    double settled_px = 0.02;  ///< a solution that moves the points by less (RMS) is the last
+    int spp = 4;               ///< of the views
+    std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
+};
+
+enum class FeatureStatus : std::uint8_t {
+    settled,
+    unsettled,    ///< still moving after renders_max views
+    few_matches,  ///< fewer than kFewestMatches points agree
+    no_pose,      ///< the solver found none: its reason is in `fit`
+};
+inline constexpr int kFewestMatches = 8;
+[[nodiscard]] std::string_view name(FeatureStatus status) noexcept;
+
+/// One view rendered and compared.
+struct FeatureRound {
+    int matches = 0, agreeing = 0;
+    double before_px = 0, after_px = 0;  ///< distance of agreeing matches, RMS, at the guess and at the solution
+    double moved_px = 0;                 ///< how far the solution moved the points, RMS
+    std::vector<double> cost;            ///< chi^2 a point after each step of the solver
+    double render_ms = 0, match_ms = 0, solve_ms = 0;
+};
+
+struct FeatureEstimate {
+    FeatureStatus status = FeatureStatus::few_matches;
+    PnpStatus solver = PnpStatus::converged;
+    Rigid3 T_camera_target{};
+    /// Of the matches' own scatter: what the sensor's noise explains, and what is left over (`floor_px`). Matches
+    /// whose windows overlap share what is left over in proportion.
+    Matrix6 covariance = Matrix6::Zero();
+    /// Cramer-Rao for these points with nothing but the sensor's noise.
+    Matrix6 bound = Matrix6::Zero();
+    int agreeing = 0;
+    double floor_px = 0;  ///< error of a match beyond the sensor's noise, in u and in v
+    std::vector<FeatureRound> rounds;
+
+    [[nodiscard]] bool ok() const noexcept {
+        return status == FeatureStatus::settled || status == FeatureStatus::unsettled;
+    }
+};
+
+/// Keeps what it renders with from frame to frame.
+class FeatureAlignment {
+public:
+    /// `tracer` outlives it. `target`: index of the body. `at`: as of ModelView.
+    FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at,
+                     const FeatureSettings& settings = {});
+
+    /// `at`: where the bodies are when the frame is exposed. Points that the view shows where the frame does not
+    /// (occlusion, other light) are outvoted, not told. Runs on the calling thread's TBB arena.
+    [[nodiscard]] FeatureEstimate align(const MeasuredImage& frame, const Placement& at, const Rigid3& guess);
+
+private:
+    struct Points;
+    void gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones, Points& points,
+                FeatureRound& round);
+    void find_target();
+    [[nodiscard]] bool on_smooth_surface(double u, double v, const Hit& hit) const;
+
+    ModelView view_;
+    SensorModel sensor_;
+    FeatureSettings settings_;
+    FeatureMatcher matcher_;
+    std::vector<std::uint8_t> on_target_;  ///< of each pixel of the view
+};
+
+}  // namespace narpa

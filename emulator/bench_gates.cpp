@@ -45,7 +45,7 @@ std::vector<std::string> bench_faults(const CraftRatios& r) {
             faults.push_back(fmt::format("{}: {:.4g}{}, expected at most {:g}{}", what, value, unit, bound, unit));
     };
     at_most("a frame to Embree's calls on its rays", r.cost.to_raw(), kToRawMost, "");
-    at_most("1 % cover to full cover", r.far_and_filled.first_s / r.far_and_filled.second_s, kFarMost, "");
+    at_most("1 % cover to full cover", r.space.edge_s / r.space.filled_s, kEdgeMost, "");
     at_most("what a moved body costs", 1e3 * (r.still_and_moved.second_s - r.still_and_moved.first_s),
             1e3 * kMovedMost_s, " ms");
     at_most("load to first frame", r.load_s, kLoadMost_s, " s");

@@ -17,16 +17,23 @@ struct SceneLadder {
     double speed_up_least = 0;  ///< over the plain loop that the scene must reach; 0: it is not judged by that
     Ladder ladder;
 };
+/// Frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at its edge, and
+/// all of, both from near by through one lens. Medians, seconds.
+struct EmptySpace {
+    double far_s = 0, edge_s = 0, filled_s = 0;
+};
 /// Of the craft at full size.
 struct CraftRatios {
-    FrameCost cost;
-    TwoFrames far_and_filled, still_and_moved;
+    FrameCost cost, far;
+    EmptySpace space;
+    TwoFrames still_and_moved;
     double load_s = 0;
 };
 
-/// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover; seconds that moved
+/// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover, triangles as
+/// large; seconds that moved
 /// bodies cost; seconds to the first frame; predicted to measured error.
-inline constexpr double kToRawMost = 1.6, kFarMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
+inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
 inline constexpr double kHonestyLeast = 0.85, kHonestyMost = 1.40;
 
 /// What is not as it must be, one sentence each. A rung without a predicted error is one of them, unless its frames

@@ -1,7 +1,7 @@
 #include "emulator/bench_ratios.h"
 
 #include <algorithm>
-#include <vector>
+#include <memory>
 
 #include "emulator/budget_ladder.h"
 #include "emulator/clock.h"
@@ -96,15 +96,16 @@ Result<FrameCost> frame_against_raw(const World& world, std::size_t index, int r
     return cost;
 }
 
-TwoFrames frames_of(const World& world, std::size_t first, std::size_t second, int rounds,
-                    TracingThreads& threads) {
-    Maker a(world, first, threads), b(world, second, threads);
-    std::vector<double> a_s, b_s;
-    for (int k = 0; k < rounds; ++k) {
-        a_s.push_back(a.make().frame_s());
-        b_s.push_back(b.make().frame_s());
-    }
-    return {median(a_s), median(b_s)};
+std::vector<double> frames_of(const World& world, std::span<const std::size_t> cameras, int rounds,
+                              TracingThreads& threads) {
+    std::vector<std::unique_ptr<Maker>> makers;
+    for (const std::size_t camera : cameras) makers.push_back(std::make_unique<Maker>(world, camera, threads));
+    std::vector<std::vector<double>> seconds(cameras.size());
+    for (int round = 0; round < rounds; ++round)
+        for (std::size_t k = 0; k < cameras.size(); ++k) seconds[k].push_back(makers[k]->make().frame_s());
+    std::vector<double> medians;
+    for (const std::vector<double>& of_camera : seconds) medians.push_back(median(of_camera));
+    return medians;
 }
 
 TwoFrames still_and_moved(const World& world, std::size_t camera, int rounds, TracingThreads& threads) {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "emulator/raw_embree.h"
 #include "emulator/threads.h"
@@ -25,12 +27,13 @@ struct FrameCost {
 [[nodiscard]] Result<FrameCost> frame_against_raw(const World& world, std::size_t camera, int rounds,
                                                   TracingThreads& threads);
 
+/// Medians, seconds.
 struct TwoFrames {
     double first_s = 0, second_s = 0;
 };
-/// Frames of two cameras.
-[[nodiscard]] TwoFrames frames_of(const World& world, std::size_t first, std::size_t second, int rounds,
-                                  TracingThreads& threads);
+/// Frames of several cameras, in their order.
+[[nodiscard]] std::vector<double> frames_of(const World& world, std::span<const std::size_t> cameras, int rounds,
+                                            TracingThreads& threads);
 /// Frames of one camera with all bodies at rest, and with each of them somewhere else (by 0.1 mm and 0.01 mrad, so
 /// that it shows the same) in every frame.
 [[nodiscard]] TwoFrames still_and_moved(const World& world, std::size_t camera, int rounds,

@@ -98,9 +98,10 @@ Result<CraftRatios> measure_ratios(const LadderOptions& o, TracingThreads& threa
     };
     auto scene = load();
     if (!scene) return scene.error();
-    std::array<std::size_t, 3> cameras{};
-    for (std::size_t k = 0; k < 3; ++k) {
-        auto index = sensor_named(scene->cameras, std::array{"near", "far", "filled"}[k], "camera", scene->file);
+    constexpr std::array kCameras{"near", "far", "edge", "filled"};
+    std::array<std::size_t, kCameras.size()> cameras{};
+    for (std::size_t k = 0; k < cameras.size(); ++k) {
+        auto index = sensor_named(scene->cameras, kCameras[k], "camera", scene->file);
         if (!index) return index.error();
         cameras[k] = *index;
     }
@@ -112,8 +113,11 @@ Result<CraftRatios> measure_ratios(const LadderOptions& o, TracingThreads& threa
     auto cost = frame_against_raw(**world, cameras[0], rounds, threads);
     if (!cost) return cost.error();
     progress.tell("craft: empty space, moved bodies, first frames");
-    CraftRatios r{*cost, frames_of(**world, cameras[1], cameras[2], rounds, threads),
-                  still_and_moved(**world, cameras[0], rounds, threads), 0};
+    auto far = frame_against_raw(**world, cameras[1], rounds, threads);
+    if (!far) return far.error();
+    const std::vector<double> space = frames_of(**world, std::span(cameras).subspan(1), rounds, threads);
+    CraftRatios r{
+        *cost, *far, {space[0], space[1], space[2]}, still_and_moved(**world, cameras[0], rounds, threads), 0};
     auto load_s = load_to_first_frame(load, cameras[0], o.quick ? 1 : kLoads, threads);
     if (!load_s) return load_s.error();
     r.load_s = *load_s;

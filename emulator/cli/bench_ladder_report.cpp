@@ -45,9 +45,10 @@ void tell_ratios(const CraftRatios& r) {
         ms(c.frame_s), ms(c.radiance_s), ms(c.detector_s), ms(c.hand_over_s)));
     if (const std::string text = shares(c.phase_ns); !text.empty()) say("  radiance goes to      " + text);
     say(fmt::format("  frame / Embree        {:>9.3f}", c.to_raw()));
-    say(fmt::format("  1 % / full cover      {:>9.4f}      {:.3f} / {:.3f} ms",
-                    r.far_and_filled.first_s / r.far_and_filled.second_s, ms(r.far_and_filled.first_s),
-                    ms(r.far_and_filled.second_s)));
+    say(fmt::format("  1 % / full cover      {:>9.4f}      {:.3f} / {:.3f} ms", r.space.edge_s / r.space.filled_s,
+                    ms(r.space.edge_s), ms(r.space.filled_s)));
+    say(fmt::format("  the same, from afar   {:>9.4f}      {:.3f} ms; Embree's calls on its rays alone {:.3f} ms",
+                    r.space.far_s / r.space.filled_s, ms(r.space.far_s), ms(r.far.raw.seconds())));
     say(fmt::format("  a moved body costs    {:>9.3f} ms",
                     ms(r.still_and_moved.second_s - r.still_and_moved.first_s)));
     say(fmt::format("  load to first frame   {:>9.3f} s", r.load_s));
@@ -100,9 +101,12 @@ nlohmann::json describe(const CraftRatios& r) {
             {"hand_over_s", r.cost.hand_over_s},
             {"phase_s", describe(r.cost.phase_ns)},
             {"frame_to_raw", r.cost.to_raw()},
-            {"far_s", r.far_and_filled.first_s},
-            {"filled_s", r.far_and_filled.second_s},
-            {"far_to_filled", r.far_and_filled.first_s / r.far_and_filled.second_s},
+            {"edge_s", r.space.edge_s},
+            {"filled_s", r.space.filled_s},
+            {"edge_to_filled", r.space.edge_s / r.space.filled_s},
+            {"far_s", r.space.far_s},
+            {"far_to_filled", r.space.far_s / r.space.filled_s},
+            {"far_raw_s", r.far.raw.seconds()},
             {"still_s", r.still_and_moved.first_s},
             {"moved_s", r.still_and_moved.second_s},
             {"load_s", r.load_s}};

@@ -112,14 +112,14 @@ TEST(BenchLadder, TheMedianOverBudgetsInRaysMustReachItsSpeedUp) {
 TEST(BenchLadder, RatiosOfTheCraftMustHold) {
     CraftRatios good{};
     good.cost.frame_s = 1.5, good.cost.raw.primary_s = 0.6, good.cost.raw.shadow_s = 0.4;
-    good.far_and_filled = {0.039, 1};
+    good.space = {0.1, 0.039, 1};  // from afar it is only told
     good.still_and_moved = {0.1, 0.1009};
     good.load_s = 0.29;
     EXPECT_TRUE(bench_faults(good).empty());
     const CraftRatios none{};  // 0 / 0 is no ratio that holds
     EXPECT_EQ(bench_faults(none).size(), 2u);
     CraftRatios bad = good;
-    bad.cost.frame_s = 1.7, bad.far_and_filled.first_s = 0.05, bad.still_and_moved.second_s = 0.2, bad.load_s = 1;
+    bad.cost.frame_s = 1.7, bad.space.edge_s = 0.05, bad.still_and_moved.second_s = 0.2, bad.load_s = 1;
     EXPECT_EQ(bench_faults(bad).size(), 4u);
 }
 

@@ -122,11 +122,12 @@ inline DnPerLane digitise(const Sensor& sensor, const Lanes<double>& mean_e, std
                           std::uint32_t band, DarkWords& dark_words) noexcept {
     std::uint64_t lit = 0;
     for (std::size_t i = 0; i < kPacket; ++i) lit += mean_e[i] > 0 ? 1u : 0u;
-    if (lit == kPacket || !sensor.dark.any()) return digitise_lit(sensor, mean_e, lit > 0, first_pixel, band);
-    const DnPerLane dark = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
-    if (lit == 0) return dark;
-    DnPerLane dn = digitise_lit(sensor, mean_e, true, first_pixel, band);
-    for (std::size_t i = 0; i < kPacket; ++i) dn[i] = mean_e[i] > 0 ? dn[i] : dark[i];
+    const bool dark = sensor.dark.any() && lit < kPacket;
+    if (dark && lit == 0) return digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
+    DnPerLane dn = digitise_lit(sensor, mean_e, lit > 0, first_pixel, band);
+    if (!dark) return dn;
+    const DnPerLane without = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
+    for (std::size_t i = 0; i < kPacket; ++i) dn[i] = mean_e[i] > 0 ? dn[i] : without[i];
     return dn;
 }
 

@@ -4,16 +4,16 @@
 #include <cmath>
 #include <limits>
 #include <queue>
-#include <unordered_map>
 #include <span>
+#include <unordered_map>
 
 namespace narpa {
 namespace {
 
 constexpr std::size_t kBins = 16;
 constexpr float kPieceShare = 1.0f / 160;  ///< a piece's box has a surface like this square of the mesh's extent
-constexpr int kMostHalvings = 13;         ///< of one triangle
-constexpr float kMostPieces = 65536;      ///< roughly, that large triangles are cut to
+constexpr int kMostHalvings = 13;          ///< of one triangle
+constexpr float kMostPieces = 65536;       ///< roughly, that large triangles are cut to
 constexpr std::size_t kCells = 256;        ///< of the grid, along the mesh's largest extent
 
 struct Box {

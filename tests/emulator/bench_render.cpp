@@ -86,8 +86,8 @@ TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {
     SCOPED_TRACE(document.dump(2));
     const auto& craft = document["craft"];
     EXPECT_NEAR(craft["covered"].get<double>(), 0.27, 0.02);
-    for (const char* time :
-         {"frame_s", "radiance_s", "detector_s", "far_s", "far_raw_s", "edge_s", "filled_s", "still_s", "moved_s", "load_s"})
+    for (const char* time : {"frame_s", "radiance_s", "detector_s", "far_s", "far_raw_s", "edge_s", "filled_s",
+                             "still_s", "moved_s", "load_s"})
         EXPECT_GT(craft[time].get<double>(), 0) << time;
     ASSERT_EQ(document["scenes"].size(), 1u);
     double before = INFINITY;  // the plain loop's error falls from rung to rung: 1, 4, 16, 64, 256 spp

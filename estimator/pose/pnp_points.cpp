@@ -1,6 +1,7 @@
 #include "estimator/pose/pnp_points.h"
 
 #include <cmath>
+#include <limits>
 
 #include "base/each_isa.h"
 
@@ -173,6 +174,35 @@ NARPA_EACH_ISA void accumulate(std::span<const PnpPoints::Group> groups, const d
         if (!(nearest[k] > sums.depth_min)) sums.depth_min = nearest[k];
 }
 
+/// s of every lane: infinite behind the camera, 0 where there is no point.
+NARPA_EACH_ISA void square_residuals(std::span<const PnpPoints::Group> groups, const double* R, const double* t,
+                                     double* out) {
+    const auto load = [](const PnpPoints::Group::Lanes& lanes) -> const V& {
+        return *reinterpret_cast<const V*>(lanes.data());
+    };
+    const V infinite = V{} + std::numeric_limits<double>::infinity();
+    for (const PnpPoints::Group& p : groups) {
+        const V &ax = load(p.x), &ay = load(p.y), &az = load(p.z);
+        const V depth = R[6] * ax + R[7] * ay + R[8] * az + t[2];
+        const V inverse = 1.0 / depth;
+        const V ru = load(p.u) - (R[0] * ax + R[1] * ay + R[2] * az + t[0]) * inverse;
+        const V rv = load(p.v) - (R[3] * ax + R[4] * ay + R[5] * az + t[1]) * inverse;
+        const V eu = load(p.l00) * ru + load(p.l10) * rv, ev = load(p.l11) * rv;
+        const V s = depth > 0 ? eu * eu + ev * ev : infinite;
+        for (std::size_t k = 0; k < PnpPoints::kGroup; ++k) *out++ = s[k];
+    }
+}
+
+struct Matrix {
+    double R[9], t[3];
+    explicit Matrix(const CentredPose& pose) {
+        const auto c = columns(pose.q);
+        for (int i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j) R[3 * i + static_cast<int>(j)] = c[j][i];
+        for (int i = 0; i < 3; ++i) t[i] = pose.centroid_m[i];
+    }
+};
+
 double total(const V& v) {
     return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
 }
@@ -180,11 +210,9 @@ double total(const V& v) {
 }  // namespace
 
 bool PnpPoints::evaluate(const CentredPose& pose, const RobustLoss& loss, NormalEquations& out) const {
-    const auto c = columns(pose.q);
-    const double R[9] = {c[0].x, c[1].x, c[2].x, c[0].y, c[1].y, c[2].y, c[0].z, c[1].z, c[2].z};
-    const double t[3] = {pose.centroid_m.x, pose.centroid_m.y, pose.centroid_m.z};
+    const Matrix m(pose);
     Sums sums;
-    accumulate({groups_.data(), (size_ + kGroup - 1) / kGroup}, R, t, loss, sums);
+    accumulate({groups_.data(), (size_ + kGroup - 1) / kGroup}, m.R, m.t, loss, sums);
     if (!(sums.depth_min > 0)) return false;
     for (int i = 0, entry = 0; i < 6; ++i) {
         out.g[i] = total(sums.g[i]);
@@ -192,6 +220,28 @@ bool PnpPoints::evaluate(const CentredPose& pose, const RobustLoss& loss, Normal
     }
     out.chi2 = total(sums.chi2);
     return std::isfinite(out.chi2);
+}
+
+double PnpPoints::truncated_cost(const CentredPose& pose, double s_max) const {
+    const Matrix m(pose);
+    double sum = 0;
+    for (std::size_t i = 0; i < size_; i += kGroup) {
+        std::array<double, kGroup> s;
+        square_residuals({&groups_[i / kGroup], 1}, m.R, m.t, s.data());
+        for (std::size_t k = 0; k < std::min(kGroup, size_ - i); ++k) {
+            sum += s[k] < s_max ? s[k] : s_max;
+        }
+    }
+    return sum;
+}
+
+void PnpPoints::squared_residuals(const CentredPose& pose, std::span<double> out) const {
+    const Matrix m(pose);
+    for (std::size_t i = 0; i < size_; i += kGroup) {
+        std::array<double, kGroup> s;
+        square_residuals({&groups_[i / kGroup], 1}, m.R, m.t, s.data());
+        std::copy_n(s.data(), std::min(kGroup, size_ - i), out.data() + i);
+    }
 }
 
 }  // namespace narpa

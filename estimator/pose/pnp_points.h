@@ -80,6 +80,16 @@ public:
     [[nodiscard]] std::size_t capacity() const noexcept { return groups_.size() * kGroup; }
     [[nodiscard]] const Vec3& centroid_body_m() const noexcept { return centroid_; }
 
+    /// Of point i: from the centroid, body axes; and ((u - cx) / fx, (v - cy) / fy).
+    [[nodiscard]] Vec3 centred_body_m(std::size_t i) const {
+        const Group& g = groups_[i / kGroup];
+        return {g.x[i % kGroup], g.y[i % kGroup], g.z[i % kGroup]};
+    }
+    [[nodiscard]] Pixel normalised(std::size_t i) const {
+        const Group& g = groups_[i / kGroup];
+        return {g.u[i % kGroup], g.v[i % kGroup]};
+    }
+
     [[nodiscard]] CentredPose centred(const Rigid3& T_camera_body) const;
     [[nodiscard]] Rigid3 uncentred(const CentredPose& pose) const;
     /// From errors of a centred pose, (rotation, centroid), to those of pose_estimate.h.
@@ -88,6 +98,12 @@ public:
     /// Normal equations by (rotation rad, centroid m), both in camera axes and on the left. False where a point is
     /// not in front of the camera.
     [[nodiscard]] bool evaluate(const CentredPose& pose, const RobustLoss& loss, NormalEquations& out) const;
+
+    /// sum of min(s, s_max) over the points, s = r' C^-1 r; a point that is not in front of the camera counts
+    /// s_max.
+    [[nodiscard]] double truncated_cost(const CentredPose& pose, double s_max) const;
+    /// s of every point, into `out`; infinite where a point is not in front of the camera.
+    void squared_residuals(const CentredPose& pose, std::span<double> out) const;
 
     static constexpr std::size_t kGroup = 8;
     struct alignas(64) Group {

@@ -26,6 +26,10 @@ struct PnpFit {
     LmSummary summary;
 
     [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
+    /// Predicted standard deviation of the position (all three axes), as a part of the range.
+    [[nodiscard]] double relative_position_sigma() const {
+        return std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) / norm(T_camera_body.t);
+    }
     /// The pixel noise that the residuals speak for, as a multiple of the given one; 1 without redundancy.
     [[nodiscard]] double noise_scale() const {
         return degrees_of_freedom > 0 ? std::sqrt(chi2 / degrees_of_freedom) : 1.0;

@@ -1,0 +1,133 @@
+#include "estimator/pose/pnp.h"
+
+#include <algorithm>
+
+namespace narpa {
+namespace {
+
+constexpr double kFlatSigma = 3;         // thinner than this in the picture, a body's depth tells nothing
+constexpr double kReversibleSigma = 20;  // thicker than this, the reversed pose cannot fit
+constexpr std::size_t kSurePoints = 6;   // with fewer, wrong minima fit within the noise
+
+double typical_sigma_px(const PnpInput& input) {
+    if (input.covariance_px2.empty()) return input.sigma_px;
+    double sum = 0;
+    for (const PixelCovariance& s : input.covariance_px2) sum += 0.5 * (s.uu + s.vv);
+    return std::sqrt(sum / static_cast<double>(input.covariance_px2.size()));
+}
+
+/// How many standard deviations the body's thinnest direction covers in the picture, about.
+double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, const Spread& spread) {
+    double mean_u = 0, mean_v = 0, sum = 0;
+    const double n = static_cast<double>(points.size());
+    for (const BodyPoint& p : points) {
+        mean_u += p.seen.u / n, mean_v += p.seen.v / n;
+        sum += p.seen.u * p.seen.u + p.seen.v * p.seen.v;
+    }
+    const double seen_rms = std::sqrt(std::max(0.0, sum / n - mean_u * mean_u - mean_v * mean_v));
+    return input.camera.fx * seen_rms * spread.rms_m.z / (spread.rms_m.x * typical_sigma_px(input));
+}
+
+bool is_a_line(const Spread& spread) {
+    return !(spread.rms_m.y > 1e-5 * spread.rms_m.x);
+}
+
+bool same_minimum(const PnpFit& a, const PnpFit& b) {
+    const Vector6 e = error_between(a.T_camera_body, b.T_camera_body);
+    if (e.head<3>().norm() < 1e-9 && e.tail<3>().norm() < 1e-9 * norm(a.T_camera_body.t)) return true;
+    return normalised_error_squared(e, a.covariance) < 0.01;
+}
+
+}  // namespace
+
+PnpSolver::PnpSolver(std::size_t points_max) : points_(points_max), all_(points_max) {
+    gathered_.reserve(points_max);
+    squared_.resize(points_max);
+    flags_.resize(points_max);
+    starts_.reserve(8);
+    solution_.inlier.reserve(points_max);
+}
+
+const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& options) {
+    solution_.status = check(input);
+    solution_.has_second = solution_.imprecise = false;
+    solution_.fit.chi2 = std::numeric_limits<double>::infinity();
+    solution_.fit.status = PnpStatus::behind_camera;
+    solution_.hypotheses = 0;
+    solution_.inliers = input.body_m.size();
+    if (!solution_.ok()) return solution_;
+    if (input.body_m.size() > points_.capacity()) {
+        solution_.status = PnpStatus::too_many_points;
+        return solution_;
+    }
+    if (input.body_m.size() < 4) {
+        solution_.status = PnpStatus::too_few_points;
+        return solution_;
+    }
+    solution_.inlier.assign(input.body_m.size(), 1);
+    options.outliers ? solve_with_outliers(input, options) : solve_all(input, options);
+    if (solution_.status != PnpStatus::converged) return solution_;
+    solution_.status = solution_.fit.status;
+    solution_.imprecise = solution_.fit.ok() && !(solution_.fit.relative_position_sigma() <= kImpreciseSigma);
+    return solution_;
+}
+
+void PnpSolver::solve_all(const PnpInput& input, const PnpOptions& options) {
+    points_.assign(input);
+    gather();
+    const Spread spread = spread_of(gathered_);
+    if (is_a_line(spread)) {
+        solution_.status = PnpStatus::degenerate;
+        return;
+    }
+    const double depth = depth_in_sigma(input, gathered_, spread);
+    const Starts starts = orthographic_starts(gathered_, spread, depth < kFlatSigma);
+    for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i], options);
+    const bool sure = fits_the_noise() && points_.size() >= kSurePoints;
+    if (!sure) {
+        starts_.clear();
+        opencv_starts(input, depth < kFlatSigma, starts_);
+        for (const Rigid3& T : starts_) consider(T, options);
+    }
+    if (!sure || depth < kReversibleSigma) consider_reversed(spread, options);
+}
+
+void PnpSolver::gather() {
+    gathered_.clear();
+    for (std::size_t i = 0; i < points_.size(); ++i)
+        gathered_.push_back({points_.centred_body_m(i), points_.normalised(i)});
+}
+
+void PnpSolver::consider(const CentredPose& start, const PnpOptions& options) {
+    consider(points_.uncentred(start), options);
+}
+
+void PnpSolver::consider(const Rigid3& start, const PnpOptions& options) {
+    refine(points_, start, {options.lm, {}}, trial_);
+    if (trial_.status == PnpStatus::behind_camera || trial_.status == PnpStatus::not_finite) return;
+    PnpFit& first = solution_.fit;
+    PnpFit& second = solution_.second;
+    if (!std::isfinite(first.chi2)) {
+        first = trial_;
+    } else if (same_minimum(first, trial_)) {
+        if (trial_.chi2 < first.chi2) first = trial_;
+    } else if (trial_.chi2 < first.chi2) {
+        second = first, first = trial_;
+        solution_.has_second = true;
+    } else if (!solution_.has_second || trial_.chi2 < second.chi2) {
+        second = trial_;
+        solution_.has_second = true;
+    }
+}
+
+void PnpSolver::consider_reversed(const Spread& spread, const PnpOptions& options) {
+    if (!std::isfinite(solution_.fit.chi2)) return;
+    consider(depth_reversed(points_.centred(solution_.fit.T_camera_body), spread), options);
+}
+
+bool PnpSolver::fits_the_noise() const {
+    const double freedom = solution_.fit.degrees_of_freedom;
+    return solution_.fit.chi2 < freedom + 5 * std::sqrt(2 * freedom);
+}
+
+}  // namespace narpa

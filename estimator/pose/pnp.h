@@ -1,0 +1,80 @@
+/// estimator/pose/pnp.h - a pose from points alone: no guess, outliers if need be, and never a silent choice.
+///
+/// Starts (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the noise
+/// allows, or points are too few to tell, OpenCV's SQPNP and IPPE are asked as well. The pose that a nearly flat or
+/// far body shows just as well is always looked for, and reported where the data cannot refuse it.
+#pragma once
+
+#include <vector>
+
+#include "estimator/pose/pnp_refine.h"
+#include "estimator/pose/pnp_start.h"
+
+namespace narpa {
+
+struct PnpOptions {
+    bool outliers = false;      ///< some pixels may belong to other points: RANSAC first (Fischler and Bolles 1981)
+    int hypotheses_max = 2000;  ///< that RANSAC may try, of either kind
+    double inliers_min = 0.25;  ///< part of the points that must agree, and five at least
+    std::uint64_t seed = 1;     ///< of RANSAC's samples
+    LmOptions lm;
+};
+
+inline constexpr double kAmbiguousChi2 = 9;             ///< three standard deviations
+inline constexpr double kImpreciseSigma = 0.01;         ///< of the range
+inline constexpr double kInlierSquaredResidual = 13.8;  ///< 99.9 % of chi-square with two degrees of freedom
+
+struct PnpSolution {
+    PnpStatus status = PnpStatus::no_convergence;
+    PnpFit fit;  ///< of the least chi2, from the inliers alone
+    /// Another minimum with all points in front of the camera, if one was found.
+    bool has_second = false;
+    PnpFit second;
+    bool imprecise =
+        false;  ///< the position's sigma exceeds 1 % of the range: next to a danger cylinder, or too far
+    std::vector<std::uint8_t> inlier;  ///< for each point 1 where the fit used it
+    std::size_t inliers = 0;
+    int hypotheses = 0;  ///< that RANSAC tried
+
+    [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
+    /// The second pose may be the true one: its chi2 is less than 9 above the first's.
+    [[nodiscard]] bool ambiguous() const noexcept { return has_second && second.chi2 - fit.chi2 < kAmbiguousChi2; }
+};
+
+class PnpSolver {
+public:
+    explicit PnpSolver(std::size_t points_max);
+
+    /// At least four points. The solution stays valid until the next call. Allocates only where OpenCV is asked.
+    const PnpSolution& solve(const PnpInput& input, const PnpOptions& options = {});
+
+private:
+    void solve_all(const PnpInput& input, const PnpOptions& options);
+    void solve_with_outliers(const PnpInput& input, const PnpOptions& options);
+    void gather();
+    void consider(const CentredPose& start, const PnpOptions& options);
+    void consider(const Rigid3& start, const PnpOptions& options);
+    void consider_reversed(const Spread& spread, const PnpOptions& options);
+    [[nodiscard]] bool fits_the_noise() const;
+    [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);
+    [[nodiscard]] bool find_consensus(const PnpInput& input, const PnpOptions& options, bool orthographic);
+    void try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
+    void try_p3p(const PnpInput& input, const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
+    void try_hypothesis(const CentredPose& pose, const PnpOptions& options);
+
+    PnpPoints points_, all_;  // those in use, and with outliers
+    std::vector<BodyPoint> gathered_;
+    std::vector<double> squared_;
+    std::vector<std::uint8_t> flags_;
+    std::vector<Rigid3> starts_;
+    PnpFit trial_;
+    struct Consensus {
+        double cost_of_sample = 0;  // of the best sample, before refinement
+        double cost = 0;            // of the best pose
+        Rigid3 T{};
+        std::size_t inliers = 0;
+    } consensus_;
+    PnpSolution solution_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,17 @@
+/// estimator/pose/pnp_ceres.h - the refinement of pnp_refine.h once more, by Ceres: a reference for results and
+/// time.
+#pragma once
+
+#include "estimator/pose/pnp_refine.h"
+
+namespace narpa {
+
+/// Ceres's Levenberg-Marquardt over a quaternion manifold and a translation, automatic derivatives, dense Cholesky;
+/// one residual block and one loss for each point. The covariance is that of pnp_refine.h at this minimum.
+[[nodiscard]] PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const RobustLoss& loss = {});
+
+/// Ceres's TinySolver, which takes no losses and none of Ceres's set-up: over a rotation vector from the start and
+/// a translation.
+[[nodiscard]] PnpFit refine_with_tiny_solver(const PnpInput& input, const Rigid3& start);
+
+}  // namespace narpa

@@ -1,0 +1,126 @@
+#include <algorithm>
+#include <random>
+
+#include "estimator/pose/pnp.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kSampleSquaredResidual = 36;  // a pose of three noisy points misses the others by more than noise
+constexpr double kMissedConsensus = 1e-4;      // probability that no sample was clean
+constexpr std::size_t kInliersMin = 5;
+constexpr int kP3pHypothesesMax = 500;
+const RobustLoss kPolish{Loss::cauchy, 2};
+
+std::array<std::size_t, 3> draw_three(std::minstd_rand& random, std::size_t n) {
+    std::array<std::size_t, 3> drawn{};
+    for (std::size_t k = 0; k < 3;) {
+        drawn[k] = random() % n;
+        if (std::find(drawn.begin(), drawn.begin() + k, drawn[k]) == drawn.begin() + k) ++k;
+    }
+    return drawn;
+}
+
+/// Samples after which one of three inliers was among them, all but surely, where so many of n are inliers.
+double samples_needed(std::size_t inliers, std::size_t n) {
+    const auto m = static_cast<double>(inliers), all = static_cast<double>(n);
+    const double clean = m * (m - 1) * (m - 2) / (all * (all - 1) * (all - 2));
+    if (clean >= 1) return 0;
+    if (clean <= 0) return std::numeric_limits<double>::infinity();
+    return std::log(kMissedConsensus) / std::log1p(-clean);
+}
+
+}  // namespace
+
+void PnpSolver::solve_with_outliers(const PnpInput& input, const PnpOptions& options) {
+    all_.assign(input);
+    if (!find_consensus(input, options, true) && !find_consensus(input, options, false)) {
+        solution_.status = PnpStatus::no_consensus;
+        return;
+    }
+    // The inliers of a pose from inliers: settles within a few rounds.
+    constexpr int kRounds = 5;
+    Rigid3 T = consensus_.T;
+    for (int round = 0; round < kRounds; ++round) {
+        const std::vector<std::uint8_t>& before = solution_.inlier;
+        const std::size_t inliers = mark_inliers(all_, T, flags_);
+        const bool settled = round > 0 && std::equal(before.begin(), before.end(), flags_.begin());
+        if (settled || inliers < kInliersMin) break;
+        solution_.inlier.assign(flags_.begin(), flags_.begin() + static_cast<std::ptrdiff_t>(before.size()));
+        solution_.inliers = inliers;
+        points_.assign(input, solution_.inlier);
+        refine(points_, T, {options.lm, {}}, solution_.fit);
+        T = solution_.fit.T_camera_body;
+    }
+    gather();
+    const Spread spread = spread_of(gathered_);
+    if (solution_.fit.ok()) consider_reversed(spread, options);
+}
+
+std::size_t PnpSolver::mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags) {
+    points.squared_residuals(points.centred(T), squared_);
+    std::size_t inliers = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        flags[i] = squared_[i] < kInlierSquaredResidual ? 1 : 0;
+        inliers += flags[i];
+    }
+    return inliers;
+}
+
+bool PnpSolver::find_consensus(const PnpInput& input, const PnpOptions& options, bool orthographic) {
+    const std::size_t n = all_.size();
+    const int tries = orthographic ? options.hypotheses_max : std::min(options.hypotheses_max, kP3pHypothesesMax);
+    std::minstd_rand random(static_cast<std::minstd_rand::result_type>(options.seed));
+    consensus_ = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), {}, 0};
+    for (int tried = 0; tried < tries && tried < samples_needed(consensus_.inliers, n); ++tried) {
+        ++solution_.hypotheses;
+        const auto drawn = draw_three(random, n);
+        if (orthographic) {
+            try_orthographic(drawn, options);
+        } else {
+            try_p3p(input, drawn, options);
+        }
+    }
+    const auto enough = static_cast<std::size_t>(options.inliers_min * static_cast<double>(n));
+    return consensus_.inliers >= std::max(kInliersMin, enough);
+}
+
+void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
+    std::array<BodyPoint, 3> sample;
+    Vec3 mean{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
+        mean += sample[k].body_m * (1.0 / 3);
+    }
+    for (BodyPoint& p : sample) p.body_m -= mean;
+    const Starts starts = orthographic_starts(sample, spread_of(sample), true);
+    for (std::size_t i = 0; i < starts.count; ++i) {
+        const CentredPose& s = starts.pose[i];
+        try_hypothesis({s.q, s.centroid_m - s.q * mean}, options);
+    }
+}
+
+void PnpSolver::try_p3p(const PnpInput& input, const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
+    std::array<Vec3, 3> body;
+    std::array<Pixel, 3> pixels;
+    for (std::size_t k = 0; k < 3; ++k) body[k] = input.body_m[drawn[k]], pixels[k] = input.pixels[drawn[k]];
+    starts_.clear();
+    opencv_p3p(input.camera, body, pixels, starts_);
+    for (const Rigid3& T : starts_) try_hypothesis(all_.centred(T), options);
+}
+
+void PnpSolver::try_hypothesis(const CentredPose& pose, const PnpOptions& options) {
+    const double cost_of_sample = all_.truncated_cost(pose, kSampleSquaredResidual);
+    if (!(cost_of_sample < consensus_.cost_of_sample)) return;
+    consensus_.cost_of_sample = cost_of_sample;
+    // Local optimisation (Chum, Matas and Kittler 2003): the best samples are refined by all that agrees.
+    refine(all_, all_.uncentred(pose), {options.lm, kPolish}, trial_);
+    if (trial_.status != PnpStatus::converged) return;
+    const double cost = all_.truncated_cost(all_.centred(trial_.T_camera_body), kInlierSquaredResidual);
+    if (!(cost < consensus_.cost)) return;
+    consensus_.cost = cost;
+    consensus_.T = trial_.T_camera_body;
+    consensus_.inliers = mark_inliers(all_, consensus_.T, flags_);
+}
+
+}  // namespace narpa

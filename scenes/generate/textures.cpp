@@ -206,7 +206,23 @@ Picture ring() {
     return picture;
 }
 
+/// Dust in patches, grains, and here and there a bright stone of a texel or two.
+Picture ground() {
+    Picture picture;
+    picture.paint([](int x, int y) {
+        double value = 0.78 + 0.16 * fractal_noise(x / 150.0, y / 150.0, 90) +
+                       0.12 * fractal_noise(x / 16.0, y / 16.0, 95) + 0.08 * (hash01(x, y, 99) - 0.5);
+        if (hash01(x / 2, y / 2, 100) > 0.996) value += 0.2;
+        return value * Vec3{1, 1, 1};
+    });
+    return picture;
+}
+
 }  // namespace
+
+void write_ground_texture(const std::string& directory) {
+    ground().write(directory + "/ground.png");
+}
 
 void write_textures(const std::string& directory) {
     hull().write(directory + "/hull.png");

@@ -1,4 +1,5 @@
-/// scenes/generate/textures.h - the pictures on the station's skin: 1024 x 1024, 8 bits a band.
+/// scenes/generate/textures.h - the pictures on the station's skin, and on the ground of the descent: 1024 x 1024,
+/// 8 bits a band.
 #pragma once
 
 #include <string>
@@ -20,7 +21,10 @@ inline constexpr double kHatchTile = 1.28;
 /// ring.png covers the docking ring's face, kRingTile metres across, its centre at (0.5, 0.5).
 inline constexpr double kRingTile = 2.0;
 
-/// Writes the five pictures into `directory`. Throws std::runtime_error where it cannot.
+/// Writes ground.png. Throws std::runtime_error where it cannot.
+void write_ground_texture(const std::string& directory);
+
+/// Writes the station's five pictures into `directory`. Throws std::runtime_error where it cannot.
 void write_textures(const std::string& directory);
 
 }  // namespace narpa::scenes

@@ -1,0 +1,50 @@
+/// estimator/stereo/epipolar_warp.h - where the pixels of one camera lie in another, for a surface of given inverse
+/// depth.
+///
+/// A pixel's ray in the other camera's frame, at unit depth in its own, is affine in the pixel; on a plane the
+/// inverse depth is too. So a patch of a plane is carried over exactly, by the homography that the plane induces.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "base/pose.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+class EpipolarWarp {
+public:
+    EpipolarWarp(const Camera& from, const Camera& to, const Rigid3& T_to_from);
+
+    [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& px) const {
+        return origin_ + px.x() * across_ + px.y() * down_;
+    }
+    /// Is the point before the other camera?
+    [[nodiscard]] bool is_before(const Eigen::Vector3d& ray, double inverse_depth) const {
+        return ray.z() + inverse_depth * t_.z() > 0;
+    }
+    [[nodiscard]] Eigen::Vector2d px(const Eigen::Vector3d& ray, double inverse_depth) const {
+        const Eigen::Vector3d q = ray + inverse_depth * t_;
+        return focal_px_.cwiseProduct(q.head<2>() / q.z()) + centre_px_;
+    }
+    /// Change of `px` per change of the inverse depth: along the epipolar line.
+    [[nodiscard]] Eigen::Vector2d px_slope(const Eigen::Vector3d& ray, double inverse_depth) const {
+        const Eigen::Vector3d q = ray + inverse_depth * t_;
+        return focal_px_.cwiseProduct(t_.head<2>() - t_.z() / q.z() * q.head<2>()) / q.z();
+    }
+    /// The inverse depth at which `px` has this coordinate (0 column, 1 row), where the epipolar line crosses it.
+    [[nodiscard]] double inverse_depth_at(const Eigen::Vector3d& ray, int axis, double coordinate_px) const {
+        const double n = (coordinate_px - centre_px_[axis]) / focal_px_[axis];
+        return (ray[axis] - n * ray.z()) / (n * t_.z() - t_[axis]);
+    }
+    /// Inverse depth in the other camera's frame.
+    [[nodiscard]] double inverse_depth_there(const Eigen::Vector3d& ray, double inverse_depth) const {
+        return inverse_depth / (ray.z() + inverse_depth * t_.z());
+    }
+
+private:
+    Eigen::Vector3d origin_, across_, down_, t_;
+    Eigen::Vector2d focal_px_, centre_px_;
+};
+
+}  // namespace narpa

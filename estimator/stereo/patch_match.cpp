@@ -1,0 +1,216 @@
+#include "estimator/stereo/patch_match.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace narpa {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Shift (2), slopes (2) and curvatures (3) of the inverse depth over the patch, gain, offset.
+using Vector = Eigen::Matrix<double, 9, 1>;
+using Matrix = Eigen::Matrix<double, 9, 9>;
+
+using Relief = Eigen::Matrix<double, 5, 1>;
+
+constexpr int kIterationsMax = 20;
+constexpr double kSettled_px = 1e-4, kFarthest_px = 1.5;
+/// What neither plane nor curvature describes of where a pixel lies in the other picture, interpolation and its
+/// aliases among it: each pixel for itself. Measured on scenes/descent, where it makes the scatter across epipolar
+/// lines (which relief does not touch) the predicted one at four levels of noise.
+constexpr double kUnexplained_px = 0.06;
+/// How far the ground bends the picture of a patch's edge beyond a plane's.
+constexpr double kCurvature_px = 0.1;
+/// Weights of a picture's pixel and its neighbours each way before it is interpolated: they take the frequencies
+/// that a step between two pixels has aliased, and this part of the variance of noise.
+constexpr double kNeighbour = 0.125, kMiddle = 1 - 2 * kNeighbour;
+constexpr double kSoftNoise =
+    (kMiddle * kMiddle + 2 * kNeighbour * kNeighbour) * (kMiddle * kMiddle + 2 * kNeighbour * kNeighbour);
+/// Correlations that differ by less than this are the same.
+constexpr double kAlike = 1e-3;
+/// Pixels nearer to the top than this are taken as full.
+constexpr double kFull = 0.98;
+
+template <class Visit>  // (Vector2d offset, double dn)
+void for_each_pixel(const Patch& patch, Visit visit) {
+    const double* dn = patch.dn.data();
+    for (int y = -patch.radius_px; y <= patch.radius_px; ++y)
+        for (int x = -patch.radius_px; x <= patch.radius_px; ++x) visit(Vector2d(x, y), *dn++);
+}
+
+class Correlation {
+public:
+    void add(double a, double b) { ++n_, a_ += a, b_ += b, aa_ += a * a, bb_ += b * b, ab_ += a * b; }
+    [[nodiscard]] double value() const {
+        const double va = aa_ - a_ * a_ / n_, vb = bb_ - b_ * b_ / n_;
+        return va > 0 && vb > 0 ? (ab_ - a_ * b_ / n_) / std::sqrt(va * vb) : 0;
+    }
+
+private:
+    double n_ = 0, a_ = 0, b_ = 0, aa_ = 0, bb_ = 0, ab_ = 0;
+};
+
+/// Of the patch with what the other picture shows where a facing plane would have it, moved by `shift`.
+std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
+                                  double inverse_depth, const Vector2d& shift) {
+    Correlation c;
+    bool inside = true;
+    for_each_pixel(patch, [&](const Vector2d& offset, double dn) {
+        if (!inside) return;
+        const Vector3d ray = warp.ray(patch.centre_px() + offset);
+        if (!warp.is_before(ray, inverse_depth)) return void(inside = false);
+        const Vector2d px = warp.px(ray, inverse_depth) + shift;
+        if (!there.spline.holds(px)) return void(inside = false);
+        c.add(dn, there.spline.dn(px));
+    });
+    if (!inside) return {};
+    return c.value();
+}
+
+/// The weight of a pixel, less towards the patch's edge.
+double window(const Patch& patch, const Vector2d& offset) {
+    const double sigma = 0.5 * (patch.radius_px + 0.5);
+    return std::exp(-offset.squaredNorm() / (2 * sigma * sigma));
+}
+
+/// Sums of a step of the fit.
+struct Normal {
+    Matrix H = Matrix::Zero();      ///< weighted by window and noise
+    Matrix noise = Matrix::Zero();  ///< covariance of `b`, from the sensors' noise
+    Vector b = Vector::Zero();
+    double squares = 0, expected_squares = 0;
+    Correlation correlation;
+};
+
+MeasuredImage softened(const MeasuredImage& image) {
+    MeasuredImage out = image, across = image;
+    const auto index = [&](int x, int y) {
+        return static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
+    };
+    const auto mix = [](float before, float here, float after) {
+        return static_cast<float>(kMiddle * here + kNeighbour * (before + after));
+    };
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            across.dn[index(x, y)] =
+                mix(image.at(std::max(x - 1, 0), y), image.at(x, y), image.at(std::min(x + 1, image.width - 1), y));
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            out.dn[index(x, y)] = mix(across.at(x, std::max(y - 1, 0)), across.at(x, y),
+                                      across.at(x, std::min(y + 1, image.height - 1)));
+    return out;
+}
+
+}  // namespace
+
+StereoView::StereoView(const Camera& c, const MeasuredImage& frame)
+    : camera(c), sensor(sensor_model(c)), image(frame), soft(softened(frame)), spline(soft) {}
+
+bool cut_patch(const StereoView& view, int u, int v, int radius_px, Patch& patch) {
+    if (u < radius_px || v < radius_px || u >= view.image.width - radius_px || v >= view.image.height - radius_px)
+        return false;
+    patch.u = u, patch.v = v, patch.radius_px = radius_px;
+    patch.dn.clear();
+    for (int y = v - radius_px; y <= v + radius_px; ++y)
+        for (int x = u - radius_px; x <= u + radius_px; ++x) {
+            if (view.image.at(x, y) >= kFull * view.sensor.top_dn) return false;
+            patch.dn.push_back(view.soft.at(x, y));
+        }
+    return true;
+}
+
+std::optional<WholePixelMatch> search_line(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
+                                           const InverseDepths& range) {
+    struct Candidate {
+        Vector2d px;
+        double inverse_depth, correlation;
+    };
+    std::vector<Candidate> candidates;
+    const Vector3d ray = warp.ray(patch.centre_px());
+    if (!warp.is_before(ray, range.low)) return {};
+    const Vector2d first = warp.px(ray, range.low), along = warp.px_slope(ray, range.low);
+    if (!(along.norm() > 0)) return {};
+    // One pixel for each row or each column, whichever the line crosses more of.
+    const int axis = std::abs(along.x()) >= std::abs(along.y()) ? 0 : 1;
+    const double edge = axis == 0 ? there.image.width - 1 : there.image.height - 1;
+    const double last =
+        warp.is_before(ray, range.high) ? warp.px(ray, range.high)[axis] : std::copysign(edge + 1, along[axis]);
+    const double from = std::round(std::min(first[axis], last)), to = std::round(std::max(first[axis], last));
+    for (double c = std::max(from, 0.0); c <= std::min(to, edge); ++c) {
+        const Vector2d px = first + (c - first[axis]) / along[axis] * along;
+        const double rho = std::clamp(warp.inverse_depth_at(ray, axis, c), range.low, range.high);
+        const Vector2d whole = px.array().round();
+        if (const auto match = correlation(patch, warp, there, rho, whole - warp.px(ray, rho)))
+            candidates.push_back({whole, rho, *match});
+    }
+    if (candidates.empty()) return {};
+    const auto best = std::ranges::max_element(candidates, {}, &Candidate::correlation);
+    double second = -1;
+    for (const Candidate& c : candidates)
+        if ((c.px - best->px).lpNorm<Eigen::Infinity>() >= kApart_px) second = std::max(second, c.correlation);
+    return WholePixelMatch{best->px, best->inverse_depth, best->correlation,
+                           (1 - best->correlation + kAlike) / (1 - second + kAlike)};
+}
+
+std::optional<SubPixelMatch> fit_patch(const Patch& patch, const StereoView& here, const EpipolarWarp& warp,
+                                       const StereoView& there, const WholePixelMatch& start) {
+    const Vector3d middle = warp.ray(patch.centre_px());
+    const double rho0 = start.inverse_depth;
+    const Vector2d px0 = warp.px(middle, rho0);
+    // Slopes and curvatures in pixels of shift at the patch's edge.
+    const double per_px = 1 / warp.px_slope(middle, rho0).norm();
+    Matrix prior = Matrix::Zero();
+    prior.diagonal().segment<3>(4).setConstant(1 / (kCurvature_px * kCurvature_px));
+    Vector p = Vector::Zero();
+    p.head<2>() = start.px - px0, p[7] = 1;
+    Normal n;
+    for (int iteration = 0;; ++iteration) {
+        n = {};
+        bool inside = true;
+        for_each_pixel(patch, [&](const Vector2d& offset, double dn) {
+            if (!inside) return;
+            const Vector3d ray = warp.ray(patch.centre_px() + offset);
+            const Vector2d at = offset / patch.radius_px;
+            Relief relief;
+            relief << at, at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
+            const double rho = rho0 + per_px * p.segment<5>(2).dot(relief);
+            if (!warp.is_before(ray, rho)) return void(inside = false);
+            const Vector2d px = warp.px(ray, rho) + p.head<2>();
+            if (!there.spline.holds(px)) return void(inside = false);
+            const auto s = there.spline.sample(px);
+            Vector J;
+            J << s.gradient, per_px * s.gradient.dot(warp.px_slope(ray, rho)) * relief, -dn, -1;
+            const double residual = p[7] * dn + p[8] - s.dn;
+            const double noise = there.sensor.variance_dn2(s.dn) + p[7] * p[7] * here.sensor.variance_dn2(dn);
+            const double unexplained = kUnexplained_px * kUnexplained_px * s.gradient.squaredNorm();
+            const double w = window(patch, offset), weight = w / (noise + unexplained);
+            n.H += weight * J * J.transpose();
+            n.noise += w * weight * J * J.transpose();
+            n.b += weight * residual * J;
+            n.squares += weight * residual * residual;
+            n.expected_squares += weight * (kSoftNoise * noise + unexplained);
+            n.correlation.add(dn, s.dn);
+        });
+        if (!inside) return {};
+        n.H += prior, n.noise += prior, n.b -= prior * p;
+        const Eigen::LDLT<Matrix> factors(n.H);
+        if (!factors.isPositive()) return {};
+        const Vector step = factors.solve(n.b);
+        if (!step.allFinite()) return {};
+        if (step.head<2>().norm() < kSettled_px) {
+            const Matrix C = factors.solve(factors.solve(n.noise).transpose());
+            const double misfit = n.squares / n.expected_squares;
+            return SubPixelMatch{px0 + p.head<2>(), std::max(1.0, misfit) * C.topLeftCorner<2, 2>(),
+                                 n.correlation.value(), misfit};
+        }
+        if (iteration == kIterationsMax) return {};
+        p += step;
+        if ((px0 + p.head<2>() - start.px).norm() > kFarthest_px) return {};
+    }
+}
+
+}  // namespace narpa

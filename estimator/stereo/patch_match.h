@@ -1,0 +1,69 @@
+/// estimator/stereo/patch_match.h - one patch of a picture found in another: to the whole pixel, then between
+/// pixels.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "estimator/stereo/epipolar_warp.h"
+#include "estimator/stereo/spline_image.h"
+
+namespace narpa {
+
+/// A camera's picture with all that is needed to match it.
+struct StereoView {
+    Camera camera;
+    SensorModel sensor;
+    MeasuredImage image,
+        soft;            ///< as taken; with the highest frequencies damped, which do not survive interpolation
+    SplineImage spline;  ///< of the soft one
+
+    StereoView(const Camera& c, const MeasuredImage& frame);
+};
+
+/// A square of whole pixels about a whole pixel; may be kept and filled again.
+struct Patch {
+    int u = 0, v = 0, radius_px = 0;
+    std::vector<double> dn;  ///< row-major, 2 radius + 1 each way
+
+    [[nodiscard]] Eigen::Vector2d centre_px() const { return {u, v}; }
+};
+/// False where the square leaves the picture or a pixel of it is full.
+[[nodiscard]] bool cut_patch(const StereoView& view, int u, int v, int radius_px, Patch& patch);
+
+struct InverseDepths {
+    double low = 0, high = 0;  ///< 1 / m, in the frame of the patch's camera
+};
+
+struct WholePixelMatch {
+    Eigen::Vector2d px{0, 0};  ///< whole
+    double inverse_depth = 0;  ///< of the point of the epipolar line nearest to it
+    double correlation = 0;    ///< normalised: -1 .. 1
+    /// (1 - correlation) over the same of the best that lies at least kApart_px away: near 0 is unique, 1 is not.
+    double ambiguity = 0;
+};
+inline constexpr double kApart_px = 3;
+
+/// The best of the whole pixels that the epipolar line comes by between two inverse depths, by the correlation with
+/// the patch as a plane would show it that faces the patch's camera at that depth. Nothing where none lies inside.
+[[nodiscard]] std::optional<WholePixelMatch> search_line(const Patch& patch, const EpipolarWarp& warp,
+                                                         const StereoView& there, const InverseDepths& range);
+
+struct SubPixelMatch {
+    Eigen::Vector2d px{0, 0};
+    Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
+    double correlation = 0;
+    /// Squared residuals over what is expected of them. The covariance has grown by it where it is above 1.
+    double misfit = 0;
+};
+
+/// Least squares on a shift, the relief of the ground (a plane's slopes in inverse depth, and small curvatures),
+/// gain and offset: Lucas and Kanade 1981, with the homography of the plane. Pixels are weighted by the sensors'
+/// noise and what is left unexplained of their places, and by a Gaussian about the middle; the covariance follows
+/// from the same. Nothing where it does not settle within a pixel and a half of the whole-pixel match.
+[[nodiscard]] std::optional<SubPixelMatch> fit_patch(const Patch& patch, const StereoView& here,
+                                                     const EpipolarWarp& warp, const StereoView& there,
+                                                     const WholePixelMatch& start);
+
+}  // namespace narpa

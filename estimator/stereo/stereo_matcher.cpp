@@ -1,0 +1,130 @@
+#include "estimator/stereo/stereo_matcher.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+namespace narpa {
+namespace {
+
+using Eigen::Vector2d;
+
+/// Corners down to this part of the strongest one's eigenvalue, over blocks of so many pixels.
+constexpr double kLeastStrength = 1e-4;
+constexpr int kCornerBlock_px = 5, kCornersPerPoint = 10;
+/// Of an exact pixel: small beside any match, large beside rounding.
+constexpr double kExact_px = 1e-4;
+/// There and back by whole pixels.
+constexpr double kHome_px = 1.5;
+
+std::string size_text(int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+}
+
+Status check_frame(const char* which, const Camera& camera, const MeasuredImage& frame) {
+    const int height = camera.height - (camera.embedded_line ? 1 : 0);
+    if (frame.width != camera.width || frame.height != height ||
+        frame.dn.size() != static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(height))
+        return Error{std::string("the ") + which + " frame is " + size_text(frame.width, frame.height) +
+                     ", expected " + size_text(camera.width, height)};
+    if (!std::ranges::all_of(frame.dn, [](float dn) { return std::isfinite(dn); }))
+        return Error{std::string("the ") + which + " frame has a pixel that is no number, expected DN"};
+    return Ok{};
+}
+
+Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredImage& right,
+             const StereoSettings& s) {
+    if (auto good = check_frame("left", pair.left, left); !good) return good;
+    if (auto good = check_frame("right", pair.right, right); !good) return good;
+    const PixelMeasurement somewhere = exact_pixel({0, 0});
+    if (triangulate(pair, somewhere, somewhere).status == TriangulationStatus::bad_input)
+        return Error{
+            "a stereo pair with no focal length or a pose that is not one, expected finite numbers and a unit "
+            "quaternion"};
+    if (norm(pair.T_right_left.t) == 0) return Error{"a stereo pair without a baseline, expected two places"};
+    if (!(s.nearest_m > 0 && s.farthest_m > s.nearest_m))
+        return Error{"depths from " + std::to_string(s.nearest_m) + " to " + std::to_string(s.farthest_m) +
+                     " m, expected 0 < nearest < farthest"};
+    if (s.patch_radius_px < 2 || s.patch_radius_px > 50 || s.points_max < 1 || s.apart_px < 1)
+        return Error{"expected a patch radius of 2 .. 50 px, at least one point, corners at least 1 px apart"};
+    return Ok{};
+}
+
+std::vector<cv::Point2f> corners(const MeasuredImage& image, const StereoSettings& settings) {
+    const cv::Mat pixels(image.height, image.width, CV_32F, const_cast<float*>(image.dn.data()));
+    std::vector<cv::Point2f> found;
+    cv::goodFeaturesToTrack(pixels, found, kCornersPerPoint * settings.points_max, kLeastStrength,
+                            settings.apart_px, {}, kCornerBlock_px);
+    return found;
+}
+
+class Matching {
+public:
+    Matching(const StereoPair& pair, const MeasuredImage& left, const MeasuredImage& right,
+             const StereoSettings& settings)
+        : pair_(pair),
+          settings_(settings),
+          left_(pair.left, left),
+          right_(pair.right, right),
+          there_(pair.left, pair.right, pair.T_right_left),
+          back_(pair.right, pair.left, inverse(pair.T_right_left)) {}
+
+    void take_corner(int u, int v, StereoPoints& out) {
+        StereoCounts& n = out.counts;
+        if (!cut_patch(left_, u, v, settings_.patch_radius_px, patch_)) return void(++n.cut_off);
+        const InverseDepths range{1 / settings_.farthest_m, 1 / settings_.nearest_m};
+        const auto whole = search_line(patch_, there_, right_, range);
+        if (!whole) return void(++n.cut_off);
+        if (whole->correlation < kLeastCorrelation) return void(++n.unlike);
+        if (whole->ambiguity > kMostAmbiguity) return void(++n.ambiguous);
+        if (!comes_home(*whole, range)) return void(++n.inconsistent);
+        const auto match = fit_patch(patch_, left_, there_, right_, *whole);
+        if (!match) return void(++n.unsettled);
+        StereoPoint p{patch_.centre_px(), *whole, *match, {}};
+        p.point = triangulate(pair_, exact_pixel(p.left_px), {match->px, match->covariance_px2});
+        if (p.point.epipolar_sigmas > kFarthestOff_sigmas) return void(++n.off_line);
+        if (p.point.status != TriangulationStatus::good) return void(++n.without_depth);
+        ++n.accepted;
+        out.points.push_back(p);
+    }
+
+private:
+    /// Does the search from the right frame end where it began in the left one?
+    bool comes_home(const WholePixelMatch& whole, const InverseDepths& range) {
+        const Eigen::Vector3d ray = there_.ray(patch_.centre_px());
+        const double a = there_.inverse_depth_there(ray, range.low);
+        const double b = there_.inverse_depth_there(ray, range.high);
+        if (!cut_patch(right_, static_cast<int>(whole.px.x()), static_cast<int>(whole.px.y()),
+                       settings_.patch_radius_px, right_patch_))
+            return false;
+        const auto home = search_line(right_patch_, back_, left_, {std::min(a, b), std::max(a, b)});
+        return home && (home->px - patch_.centre_px()).norm() < kHome_px;
+    }
+
+    const StereoPair& pair_;
+    const StereoSettings& settings_;
+    StereoView left_, right_;
+    EpipolarWarp there_, back_;
+    Patch patch_, right_patch_;
+};
+
+}  // namespace
+
+PixelMeasurement exact_pixel(const Vector2d& px) {
+    return {px, kExact_px * kExact_px * Eigen::Matrix2d::Identity()};
+}
+
+Result<StereoPoints> match_stereo(const StereoPair& pair, const MeasuredImage& left, const MeasuredImage& right,
+                                  const StereoSettings& settings) {
+    if (auto good = check(pair, left, right, settings); !good) return good.error();
+    Matching matching(pair, left, right, settings);
+    StereoPoints out;
+    for (const cv::Point2f& corner : corners(left, settings)) {
+        if (out.counts.accepted == settings.points_max) break;
+        matching.take_corner(cvRound(corner.x), cvRound(corner.y), out);
+    }
+    return out;
+}
+
+}  // namespace narpa

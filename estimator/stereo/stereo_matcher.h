@@ -1,0 +1,54 @@
+/// estimator/stereo/stereo_matcher.h - points of a scene from two frames of known relative pose.
+///
+/// Corners of the left frame (Shi and Tomasi 1994) are looked for along their epipolar lines in the right one,
+/// first to the whole pixel, as the paper's section V does, then between pixels. A point is the middle of the left
+/// pixel that its corner was found in, so that the left pixel is exact and the whole error is the match's.
+#pragma once
+
+#include <vector>
+
+#include "estimator/stereo/patch_match.h"
+#include "estimator/stereo/triangulation.h"
+
+namespace narpa {
+
+struct StereoSettings {
+    int points_max = 100;                  ///< the strongest corners that pass all checks
+    double nearest_m = 0, farthest_m = 0;  ///< depths in the left frame between which points are looked for
+    int patch_radius_px = 9;               ///< 2 .. 50; the smaller, the less relief and the more noise
+    int apart_px = 12;                     ///< least distance of two corners
+};
+
+struct StereoPoint {
+    Eigen::Vector2d left_px{0, 0};  ///< whole, exact
+    WholePixelMatch whole;          ///< in the right frame
+    SubPixelMatch match;            ///< in the right frame
+    TriangulatedPoint point;        ///< from `match`
+};
+
+/// Corners that were looked at, by what became of them.
+struct StereoCounts {
+    int accepted = 0;
+    int cut_off = 0;       ///< the patch, or all of its epipolar line, leaves a frame, or is overexposed
+    int unlike = 0;        ///< correlation below kLeastCorrelation
+    int ambiguous = 0;     ///< another place along the line looks nearly as much like it
+    int inconsistent = 0;  ///< the right frame's patch is found elsewhere in the left one
+    int unsettled = 0;     ///< the sub-pixel fit does not settle
+    int off_line = 0;      ///< more than kFarthestOff_sigmas from the epipolar line
+    int without_depth = 0;
+};
+inline constexpr double kLeastCorrelation = 0.8, kMostAmbiguity = 0.7, kFarthestOff_sigmas = 3;
+
+struct StereoPoints {
+    std::vector<StereoPoint> points;
+    StereoCounts counts;
+};
+
+/// Errors: a frame that is not its camera's size, a pair that cannot be triangulated, depths that are no range.
+[[nodiscard]] Result<StereoPoints> match_stereo(const StereoPair& pair, const MeasuredImage& left,
+                                                const MeasuredImage& right, const StereoSettings& settings);
+
+/// The left pixel of a match, which is known by definition, as a measurement.
+[[nodiscard]] PixelMeasurement exact_pixel(const Eigen::Vector2d& px);
+
+}  // namespace narpa

@@ -77,6 +77,7 @@ void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
     stats_.send.add(monotonic_ns() - wall_ready);
     account(ledger);
     log(ledger);
+    if (watcher_) show(ledger, clock != nullptr);
     ++next_;
     if (clock) let_go_of_missed(*clock, end_ns);
 }
@@ -123,6 +124,14 @@ void CameraFeed::account(const FrameLedger& ledger) noexcept {
     if (ledger.expected_error >= 0)
         stats_.error_1e9.add(std::llround(1e9 * std::min(1.0, static_cast<double>(ledger.expected_error))));
     if (keeps_ledgers_) stats_.ledgers_lost += !ledgers_.push(ledger);
+}
+
+void CameraFeed::show(const FrameLedger& ledger, bool real_time) {
+    if (static_cast<FrameStep>(ledger.step) == FrameStep::nothing) return;
+    if (real_time)
+        watcher_->offer(ledger, unit_.bytes(), unit_.placement());
+    else
+        watcher_->look(ledger, unit_.bytes(), unit_.placement());
 }
 
 /// A frame whose successor is already due is not made any more: the stream stays in step with the clock.

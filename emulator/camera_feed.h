@@ -11,6 +11,7 @@
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
 #include "emulator/contact_sheet.h"
+#include "emulator/estimate_feed.h"
 #include "emulator/histogram.h"
 #include "emulator/row_log.h"
 #include "emulator/spsc_ring.h"
@@ -59,6 +60,8 @@ public:
     /// Ledgers for the CAN thread: kept only where there is one.
     void keep_ledgers() noexcept { keeps_ledgers_ = true; }
     SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
+    /// Who looks at the frames as they go out; outlives the run.
+    void show_to(EstimateFeed& watcher) noexcept { watcher_ = &watcher; }
     /// Flushes sinks and logs and writes the contact sheet.
     Status finish();
 
@@ -71,6 +74,7 @@ private:
     void account(const FrameLedger& ledger) noexcept;
     void let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept;
     void log(const FrameLedger& ledger) noexcept;
+    void show(const FrameLedger& ledger, bool real_time);
 
     const World& world_;
     CameraUnit unit_;
@@ -79,6 +83,7 @@ private:
     std::vector<std::uint8_t> spare_;  ///< `repeat`: the last frame in time; `blank`: black; else empty
     SpscRing<FrameLedger, 64> ledgers_;
     bool keeps_ledgers_ = false;
+    EstimateFeed* watcher_ = nullptr;
     CameraStats stats_;
 
     std::string folder_;

@@ -66,6 +66,14 @@ void CanNode::send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept {
     }
 }
 
+void CanNode::send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept {
+    if (bus_.carries_fd()) {
+        put(encode_fd(estimate), t_now_ns);
+    } else {
+        for (const CanFrame& frame : encode_classic(estimate)) put(frame, t_now_ns);
+    }
+}
+
 void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
     heartbeat.counter = heartbeat_counter_++;
     put(encode(heartbeat), t_now_ns);

@@ -1,4 +1,5 @@
-/// emulator/can_node.h - narpa on the CAN bus: commands in, heartbeat and frame ledgers out. One thread uses it.
+/// emulator/can_node.h - narpa on the CAN bus: commands in, heartbeat, frame ledgers and estimates out. One thread
+/// uses it.
 #pragma once
 
 #include <array>
@@ -39,6 +40,7 @@ public:
     /// Nothing more will come, and nothing waits for its time.
     [[nodiscard]] bool ended() const noexcept { return bus_.ended() && !waiting_; }
     void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
+    void send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept;
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
 
     /// Simulation time up to which every commanded body has commands, and the time of the first frame that has

@@ -73,6 +73,8 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
         options.duration_s > 0 ? std::llround(options.duration_s * 1e9) : std::numeric_limits<std::int64_t>::max();
     emulator->threads_ = std::make_unique<TracingThreads>(options.threads, options.cpus);
     if (auto opened = emulator->open_outputs(); !opened) return opened.error();
+    if (options.estimate)
+        if (auto opened = emulator->open_estimator(); !opened) return opened.error();
     return emulator;
 }
 
@@ -123,6 +125,28 @@ Status Emulator::open_outputs() {
     return Ok{};
 }
 
+Status Emulator::open_estimator() {
+    const Scene& scene = world_->scene();
+    if (cameras_.empty())
+        return Error{"--estimate needs frames to look at, expected --video CAMERA=SINK too (SINK may be none)"};
+    const auto index = sensor_named(
+        scene.cameras,
+        options_.estimate_camera.empty() ? cameras_.front()->unit().camera().name : options_.estimate_camera,
+        "camera", scene.file);
+    if (!index) return index.error();
+    const auto feed = std::ranges::find_if(
+        cameras_, [&](const auto& f) { return f->unit().camera().name == scene.cameras[*index].name; });
+    if (feed == cameras_.end())
+        return Error{fmt::format("--estimate {}: this camera puts nothing out, expected --video {}=SINK too",
+                                 scene.cameras[*index].name, scene.cameras[*index].name)};
+    auto tracker = FrameTracker::create(*world_, *index, *options_.estimate);
+    if (!tracker) return tracker.error();
+    estimates_ = std::make_unique<EstimateFeed>(*std::move(tracker), *world_, *index);
+    if (can_) estimates_->keep_reports();
+    (*feed)->show_to(*estimates_);
+    return options_.log_folder.empty() ? Status{Ok{}} : estimates_->log_to(options_.log_folder, options_.lockstep);
+}
+
 Status Emulator::run(const StopFlag& stop) {
     if (options_.lockstep) {
         run_lockstep(stop);
@@ -136,6 +160,8 @@ Status Emulator::run(const StopFlag& stop) {
     for (const auto& feed : cameras_)
         if (auto done = feed->finish(); !done && status) status = done.error();
     for (const auto& feed : lidars_) feed->finish();
+    if (estimates_)
+        if (auto done = estimates_->finish(); !done && status) status = done.error();
     if (can_log_)
         if (auto done = can_log_->close(); !done && status) status = done.error();
     return status;

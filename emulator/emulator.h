@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "base/result.h"
 #include "emulator/camera_feed.h"
 #include "emulator/can_node.h"
+#include "emulator/estimate_feed.h"
 #include "emulator/lidar_feed.h"
 #include "emulator/realtime.h"
 #include "emulator/stop.h"
@@ -23,10 +25,12 @@ struct RunOptions {
     std::string bus;                                                ///< BUS; empty: nothing is commanded
     std::vector<std::pair<std::string, std::string>> video, lidar;  ///< sensor name and SINK, one sensor many times
     bool lockstep = false;
-    double duration_s = 0;   ///< of simulation time; 0: until stopped, or the end of a log
-    std::string log_folder;  ///< empty: no log
-    int threads = 0;         ///< that trace rays; 0: all cores, or as many as `cpus`
-    std::vector<int> cpus;   ///< that these are bound to, in real time; empty: none
+    double duration_s = 0;                     ///< of simulation time; 0: until stopped, or the end of a log
+    std::string log_folder;                    ///< empty: no log
+    int threads = 0;                           ///< that trace rays; 0: all cores, or as many as `cpus`
+    std::vector<int> cpus;                     ///< that these are bound to, in real time; empty: none
+    std::optional<TrackerOptions> estimate{};  ///< the pose of a target beside the run, from one camera's frames
+    std::string estimate_camera;               ///< empty: the first that puts frames out
 };
 
 class Emulator {
@@ -43,6 +47,8 @@ public:
     [[nodiscard]] CanNode* can() noexcept { return can_.get(); }
     [[nodiscard]] const std::vector<std::unique_ptr<CameraFeed>>& cameras() const noexcept { return cameras_; }
     [[nodiscard]] const std::vector<std::unique_ptr<LidarFeed>>& lidars() const noexcept { return lidars_; }
+    /// Null where nothing is estimated.
+    [[nodiscard]] const EstimateFeed* estimates() const noexcept { return estimates_.get(); }
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
     /// Simulation time reached.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
@@ -54,16 +60,19 @@ public:
 private:
     Emulator();
     Status open_outputs();
+    Status open_estimator();
 
     void run_real_time(const StopFlag& stop);
     void run_camera(CameraFeed& feed, StartLine& start, const StopFlag& stop);
     void run_lidar(LidarFeed& feed, StartLine& start, const StopFlag& stop);
     void run_bus(StartLine& start, const StopFlag& stop);
+    void run_estimator(const StopFlag& stop);
 
     void run_lockstep(const StopFlag& stop);
     void advance_to(std::int64_t t_ns, const StopFlag& stop);
 
     void send_ledgers(std::int64_t t_ns) noexcept;
+    void send_estimates(std::int64_t t_ns) noexcept;
     void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
     [[nodiscard]] std::uint64_t output_drops() const noexcept;
 
@@ -75,6 +84,7 @@ private:
     std::unique_ptr<CanNode> can_;
     std::vector<std::unique_ptr<CameraFeed>> cameras_;
     std::vector<std::unique_ptr<LidarFeed>> lidars_;
+    std::unique_ptr<EstimateFeed> estimates_;
     std::unique_ptr<TracingThreads> threads_;
     std::unique_ptr<Clock> clock_;
     std::atomic<std::int64_t> t_ns_{0};

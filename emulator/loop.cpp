@@ -62,6 +62,8 @@ void Emulator::run_real_time(const StopFlag& stop) {
     StopFlag sensors_done{false};
     std::thread bus;
     if (can_) bus = std::thread([&] { run_bus(start, sensors_done); });
+    std::thread estimator;
+    if (estimates_) estimator = std::thread([&] { run_estimator(sensors_done); });
     std::vector<std::thread> sensors;
     for (const auto& feed : lidars_) sensors.emplace_back([&, f = feed.get()] { run_lidar(*f, start, stop); });
     for (const auto& feed : cameras_) sensors.emplace_back([&, f = feed.get()] { run_camera(*f, start, stop); });
@@ -74,6 +76,7 @@ void Emulator::run_real_time(const StopFlag& stop) {
     const PageFaults after = narpa::page_faults();
     page_faults_ = {after.minor - before.minor, after.major - before.major};
     sensors_done = true;
+    if (estimator.joinable()) estimates_->wake(), estimator.join();
     if (bus.joinable()) bus.join();
 }
 
@@ -116,6 +119,7 @@ void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
         }
         send_ledgers(now);
+        send_estimates(now);
         // Nothing more will be commanded. Said once: a camera that is always behind would never get to an end that
         // moves on with the time.
         if (end_ns_ == std::numeric_limits<std::int64_t>::max() && can_->ended()) end_ns_ = now;
@@ -126,6 +130,13 @@ void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
     }
     send_ledgers(clock_->now_ns());
     send_heartbeat(clock_->now_ns(), RunState::stopping);
+}
+
+/// Without priority, in an arena of its own: it takes what the sensors leave.
+void Emulator::run_estimator(const StopFlag& stop) {
+    name_thread("narpa-estimate");
+    tbb::task_arena alone(1);
+    alone.execute([&] { estimates_->run(stop); });
 }
 
 // --- Lockstep ------------------------------------------------------------
@@ -169,6 +180,7 @@ void Emulator::advance_to(std::int64_t t_ns, const StopFlag& stop) {
         } else if (t_camera < end_ns_) {
             threads_->arena.execute([&] { (*camera)->make_next(nullptr, end_ns_); });
             send_ledgers(t_camera);
+            send_estimates(t_camera);
         } else {
             break;
         }
@@ -187,6 +199,11 @@ void Emulator::send_ledgers(std::int64_t t_ns) noexcept {
             can_->send(ledger, t_ns);
         }
     }
+}
+
+void Emulator::send_estimates(std::int64_t t_ns) noexcept {
+    EstimateReport report;
+    while (estimates_ && estimates_->reports().pop(report)) can_->send(report, t_ns);
 }
 
 /// Faults are those since the last heartbeat.

@@ -119,6 +119,15 @@ const World& Replay::world() const noexcept {
 const Camera& Replay::camera() const noexcept {
     return impl_->camera;
 }
+std::size_t Replay::camera_index() const noexcept {
+    return impl_->index;
+}
+const Placement& Replay::placement(std::size_t i) const noexcept {
+    return impl_->placements[i];
+}
+std::span<const std::uint8_t> Replay::bytes() const noexcept {
+    return impl_->bytes;
+}
 const RadianceImage& Replay::picture() const noexcept {
     return impl_->picture;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ public:
     [[nodiscard]] const std::vector<LoggedFrame>& frames() const noexcept;
     [[nodiscard]] const World& world() const noexcept;
     [[nodiscard]] const Camera& camera() const noexcept;
+    [[nodiscard]] std::size_t camera_index() const noexcept;
+    /// Where the bodies were in frame i.
+    [[nodiscard]] const Placement& placement(std::size_t i) const noexcept;
 
     /// Whether frame i has an image of its own: one that did not even get to its coarsest step has none to repeat.
     [[nodiscard]] bool has_image(std::size_t i) const noexcept;
@@ -41,6 +45,8 @@ public:
     /// repeats bit for bit, or has no image and took nothing.
     std::vector<std::string> make(std::size_t i);
     [[nodiscard]] const RadianceImage& picture() const noexcept;
+    /// The frame made last as the device would take it.
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept;
 
     /// Compares the frame made last with `spp` samples for each pixel, of other random numbers than the run's.
     ReferenceComparison against(int spp);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "emulator/estimate_report.h"
+
 namespace narpa {
 namespace {
 
@@ -83,6 +85,13 @@ json of_lidar(const LidarFeed& feed) {
             {"fire_ms", percentiles_ms(s.fire)},
             {"due_to_sent_ms", percentiles_ms(s.hand_over)},
             {"sinks", sinks}};
+}
+
+json of_estimates(const EstimateFeed& feed) {
+    return {{"camera", feed.camera().name},
+            {"target", feed.target()},
+            {"passed_over", feed.passed_over()},
+            {"summary", to_json(summarise(feed.frames()))}};
 }
 
 json of_bus(CanNode& node) {
@@ -167,6 +176,7 @@ json report(Emulator& emulator) {
             {"simulated_s", static_cast<double>(emulator.t_ns()) * 1e-9},
             {"cameras", cameras},
             {"lidars", lidars},
+            {"estimate", emulator.estimates() ? of_estimates(*emulator.estimates()) : json(nullptr)},
             {"can", emulator.can() ? of_bus(*emulator.can()) : json(nullptr)},
             {"page_faults", {{"minor", emulator.page_faults().minor}, {"major", emulator.page_faults().major}}},
             {"notices", emulator.notices()},
@@ -215,6 +225,10 @@ std::string in_words(const json& r) {
             out += fmt::format("    -> {}: {} sent, {} dropped\n", s["sink"].get<std::string>(), number(s, "sent"),
                                number(s, "dropped"));
     }
+    if (const json& e = r["estimate"]; !e.is_null())
+        out += fmt::format("  estimate of {} from camera {}: {} frames passed over; {}",
+                           e["target"].get<std::string>(), e["camera"].get<std::string>(), number(e, "passed_over"),
+                           estimates_in_words(e["summary"]));
     if (const json& b = r["can"]; !b.is_null()) {
         out += fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", b["bus"].get<std::string>(),
                            number(b, "commands_taken"), number(b, "commands_missed"), non_zero(b["rejected"]));

@@ -27,6 +27,7 @@ Command add_render(CLI::App& app);
 Command add_scan(CLI::App& app);
 Command add_bench(CLI::App& app);
 Command add_replay(CLI::App& app);
+Command add_estimate(CLI::App& app);
 
 /// Words for people, on standard error.
 void say(std::string_view text);

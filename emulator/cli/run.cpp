@@ -6,6 +6,7 @@
 
 #include "emulator/cli/budget_options.h"
 #include "emulator/cli/cli.h"
+#include "emulator/cli/tracker_options.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/report.h"
@@ -18,6 +19,8 @@ struct Options {
     std::vector<std::string> video, lidar;
     std::string cpus;
     BudgetOptions budget;
+    bool estimates = false;
+    TrackerFlags estimator;
     RunOptions run;
 };
 
@@ -52,6 +55,11 @@ Outcome run(const Options& options) {
         if (!cpus) return cpus.error();
         o.cpus = *std::move(cpus);
     }
+    if (options.estimates) {
+        auto estimator = options.estimator.options();
+        if (!estimator) return estimator.error();
+        o.estimate = *estimator;
+    }
     if (!o.lockstep) keep_heap();
     auto scene = load_scene(options.scene);
     if (!scene) return scene.error();
@@ -67,6 +75,9 @@ Outcome run(const Options& options) {
     for (const auto& feed : (*emulator)->lidars())
         for (const auto& sink : feed->sinks())
             say(fmt::format("lidar {} -> {}", feed->unit().lidar().name, sink->description()));
+
+    if (const EstimateFeed* estimates = (*emulator)->estimates())
+        say(fmt::format("pose of {} from camera {}", estimates->target(), estimates->camera().name));
 
     StopFlag done{false};
     std::thread progress([&] { show_progress(**emulator, done); });
@@ -99,13 +110,22 @@ Command add_run(CLI::App& app) {
     c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         ->check(CLI::Range(0.0, 9e9));
     c->add_option("--log", o->run.log_folder, "Folder for run.json, truth, ledger, CAN log and contact sheet");
+    CLI::Option* estimate =
+        c->add_option(
+             "--estimate", o->run.estimate_camera,
+             "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
+            ->expected(0, 1);
+    o->estimator.add_to(*c, "estimate-");
     o->budget.add_to(*c);
     c->add_option("--cpus", o->cpus,
                   "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
         ->excludes(lockstep);
     c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
         ->check(CLI::Range(0, 1024));
-    return [o] { return run(*o); };
+    return [o, estimate] {
+        o->estimates = estimate->count() > 0;
+        return run(*o);
+    };
 }
 
 }  // namespace narpa::cli

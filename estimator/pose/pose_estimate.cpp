@@ -55,4 +55,13 @@ Matrix6 covariance_of_product(const Rigid3& T_a_b, const Matrix6& covariance_of_
     return J * covariance_of_a_b * J.transpose();
 }
 
+Matrix6 covariance_in_other_axes(const Quat& q_a_c, const Matrix6& covariance) {
+    // q_ab = q_ac q_cb and t_ab = q_ac t_cb + t_ac: both errors only turn.
+    const Eigen::Matrix3d R = matrix(q_a_c);
+    Matrix6 J = Matrix6::Zero();
+    J.topLeftCorner<3, 3>() = R;
+    J.bottomRightCorner<3, 3>() = R;
+    return J * covariance * J.transpose();
+}
+
 }  // namespace narpa

@@ -60,6 +60,12 @@ TEST(PoseError, CovarianceFollowsAProduct) {
     EXPECT_LT((covariance_of_product(kPose, C, kOffset) - expected).norm(), 1e-7 * expected.norm());
 }
 
+TEST(PoseError, CovarianceTurnsWithTheAxes) {
+    const Matrix6 J = numeric_jacobian([](const Rigid3& T) { return kOffset * T; });
+    const Matrix6 C = some_covariance(), expected = J * C * J.transpose();
+    EXPECT_LT((covariance_in_other_axes(kOffset.q, C) - expected).norm(), 1e-7 * expected.norm());
+}
+
 TEST(PoseError, NormalisedSquaresAreChiSquare) {
     const Matrix6 C = some_covariance(), L = Eigen::LLT<Matrix6>(C).matrixL();
     std::mt19937_64 random(7);

@@ -1,0 +1,181 @@
+#include "emulator/frame_tracker.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <random>
+
+#include "estimator/features/feature_alignment.h"
+
+namespace narpa {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double kDegree = 3.14159265358979323846 / 180;
+/// Of what is known about velocity and rate before a second frame has been seen.
+constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
+/// So many measurements in a row that contradict the filter are right, and it is wrong.
+constexpr std::uint64_t kContradictions = 5;
+
+Result<std::size_t> target_of(const World& world, const Camera& camera, const std::string& name) {
+    const auto& bodies = world.scene().bodies;
+    if (!name.empty()) {
+        if (const auto body = world.body_named(name)) {
+            if (static_cast<int>(*body) != camera.mount) return *body;
+            return Error{
+                fmt::format("target \"{}\" carries the camera \"{}\", expected another body", name, camera.name),
+                world.scene().file};
+        }
+        std::string names;
+        for (const Body& b : bodies) names += (names.empty() ? "" : ", ") + b.name;
+        return Error{fmt::format("no body named \"{}\" to estimate the pose of, expected one of: {}", name, names),
+                     world.scene().file};
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (static_cast<int>(i) != camera.mount && std::holds_alternative<int>(bodies[i].shape)) return i;
+    return Error{fmt::format("no body with a mesh but what carries the camera \"{}\": expected one to estimate the "
+                             "pose of, or its name",
+                             camera.name),
+                 world.scene().file};
+}
+
+/// Off the truth by an angle and by a part of the range, each in a direction drawn at random.
+Rigid3 off(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
+    std::normal_distribution<double> normal;
+    const auto direction = [&] {
+        const double x = normal(random), y = normal(random), z = normal(random);
+        return normalized(Vec3{x, y, z});
+    };
+    const Vec3 turn = o.start_deg * kDegree * direction(),
+               shift = 0.01 * o.start_percent * norm(truth.t) * direction();
+    Vector6 error;
+    error << to_eigen(turn), to_eigen(shift);
+    return displaced(truth, error);
+}
+
+}  // namespace
+
+EstimateReport TrackedFrame::report(std::uint8_t camera) const {
+    const auto deviation = [&](int i) { return std::sqrt(filtered_covariance(i, i)); };
+    return {frame,
+            camera,
+            state,
+            t_ns,
+            filtered,
+            {deviation(0), deviation(1), deviation(2)},
+            {deviation(3), deviation(4), deviation(5)}};
+}
+
+struct FrameTracker::Impl {
+    Impl(const World& w, const Camera& c, std::size_t body, const TrackerOptions& o)
+        : world(w), camera(c), target(body), options(o), random(o.seed) {}
+
+    /// What one frame says, from a guess.
+    void measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
+    void fuse(const PoseMeasurement& measurement, TrackedFrame& out);
+    /// The chaser is the body that carries the camera, or the camera itself.
+    [[nodiscard]] Rigid3 T_chaser_camera() const { return camera.mount < 0 ? Rigid3{} : camera.T_mount_camera; }
+
+    const World& world;
+    const Camera camera;
+    std::size_t target;
+    TrackerOptions options;
+    std::mt19937_64 random;
+    std::optional<FeatureAlignment> by_points;
+    std::optional<PoseFilter> filter;
+};
+
+Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, std::size_t camera_index,
+                                                           const TrackerOptions& options) {
+    const Camera& camera = world.scene().cameras[camera_index];
+    const auto target = target_of(world, camera, options.target);
+    if (!target) return target.error();
+    auto impl = std::make_unique<Impl>(world, camera, *target, options);
+    FeatureSettings features;
+    features.spp = options.spp;
+    features.seed = options.seed;
+    impl->by_points.emplace(world.tracer(), camera, *target, Placement(world.scene().bodies.size()), features);
+    return std::unique_ptr<FrameTracker>(new FrameTracker(std::move(impl)));
+}
+
+FrameTracker::FrameTracker(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+FrameTracker::~FrameTracker() = default;
+
+std::size_t FrameTracker::target() const noexcept {
+    return impl_->target;
+}
+const TrackerOptions& FrameTracker::options() const noexcept {
+    return impl_->options;
+}
+
+TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
+                                const Placement& at) {
+    Impl& m = *impl_;
+    const auto start = Clock::now();
+    TrackedFrame out;
+    out.frame = frame;
+    out.t_ns = t_ns;
+    const Rigid3 T_world_camera = m.world.sensor_pose(m.camera.mount, m.camera.T_mount_camera, at);
+    out.truth = inverse(T_world_camera) * at.T_world_body[m.target];
+    const Quat q_frame_chaser = (T_world_camera * inverse(m.T_chaser_camera())).q;
+    if (m.filter) {
+        m.filter->predict(t_ns);
+        out.guess = inverse(m.T_chaser_camera()) * m.filter->pose(q_frame_chaser).T_chaser_target;
+    } else {
+        out.guess = off(out.truth, m.options, m.random);
+    }
+    if (const auto image = measured_image(m.camera, bytes)) {
+        m.measure_by_points(*image, at, out);
+    } else {
+        out.why = image.error().what;
+    }
+    if (out.measured) m.fuse({t_ns, *out.measured, out.covariance, m.T_chaser_camera(), q_frame_chaser}, out);
+    if (m.filter) {
+        // Chaser axes to camera axes: the mounting is exact.
+        const PoseFilter::Pose known = m.filter->pose(q_frame_chaser);
+        const Rigid3 T_camera_chaser = inverse(m.T_chaser_camera());
+        out.filtered = T_camera_chaser * known.T_chaser_target;
+        out.filtered_covariance = covariance_in_other_axes(T_camera_chaser.q, known.covariance);
+        if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
+    }
+    out.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    return out;
+}
+
+void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
+    const FeatureEstimate e = by_points->align(image, at, out.guess);
+    out.matches = e.agreeing;
+    out.renders = static_cast<int>(e.rounds.size());
+    if (!e.ok()) {
+        out.why = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
+        return;
+    }
+    out.measured = e.T_camera_target;
+    out.covariance = e.covariance;
+    out.bound = e.bound;
+}
+
+void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& out) {
+    if (filter) {
+        const UpdateResult update = filter->update(measurement);
+        out.nis = update.nis;
+        if (update.outcome == UpdateOutcome::taken) {
+            out.state = EstimateState::measured;
+            return;
+        }
+        out.why = update.why;
+        if (filter->counts().gated_in_a_row < kContradictions) return;
+    }
+    FilterSettings settings;
+    settings.motion.acceleration_psd = options.acceleration_psd;
+    settings.motion.angular_acceleration_psd = options.angular_acceleration_psd;
+    auto made = PoseFilter::create(settings, measurement, kFirstVelocity_m_s, kFirstRate_rad_s);
+    if (!made) {
+        out.why = made.error().what;
+        return;
+    }
+    filter.emplace(*std::move(made));
+    out.state = EstimateState::measured;
+}
+
+}  // namespace narpa

@@ -1,0 +1,80 @@
+/// emulator/frame_tracker.h - the pose of a target from frame to frame, as a navigation computer would know it,
+/// with the truth beside it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "emulator/world.h"
+#include "estimator/filter/pose_filter.h"
+#include "protocols/estimate.h"
+
+namespace narpa {
+
+enum class EstimateMethod : std::uint8_t {
+    features,  ///< points of the frame and of a render at the guess (estimator/features)
+    dense,     ///< all pixels (estimator/dense), from where the points lead
+};
+inline constexpr std::array<std::string_view, 2> kEstimateMethods{"features", "dense"};
+
+struct TrackerOptions {
+    std::string target;  ///< name of the body; empty: the first with a mesh that the camera does not ride on
+    EstimateMethod method = EstimateMethod::features;
+    double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
+    std::uint64_t seed = 1;                   ///< of the first guess's direction
+    int spp = 4;                              ///< of the renders that frames are compared with
+    /// What drives the relative motion beyond a constant velocity and rate: power spectral densities, m^2 s^-3 and
+    /// rad^2 s^-3. As a chaser's that brakes with some cm s^-2.
+    double acceleration_psd = 1e-3, angular_acceleration_psd = 1e-5;
+};
+
+/// What one frame told. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
+struct TrackedFrame {
+    std::uint32_t frame = 0;
+    std::int64_t t_ns = 0;
+    EstimateState state = EstimateState::lost;
+    std::string why;  ///< where the frame gave no pose: what was missing
+    Rigid3 truth{};
+    Rigid3 guess{};                        ///< from where the frame was looked at
+    std::optional<Rigid3> measured;        ///< by this frame alone
+    Matrix6 covariance = Matrix6::Zero();  ///< of `measured`
+    Matrix6 bound = Matrix6::Zero();       ///< Cramer-Rao, for the sensor's noise and what the method looks at
+    Rigid3 filtered{};                     ///< by all frames so far; where the state is not lost
+    Matrix6 filtered_covariance = Matrix6::Zero();
+    double nis = 0;   ///< normalised innovation squared of `measured`; 0 for the first
+    double ms = 0;    ///< wall time that the frame took
+    int matches = 0;  ///< points, or pixels
+    int renders = 0;  ///< of the model
+
+    [[nodiscard]] EstimateReport report(std::uint8_t camera) const;
+};
+
+class FrameTracker {
+public:
+    /// `world` outlives it. Errors: no such target, no body to look for, options.
+    static Result<std::unique_ptr<FrameTracker>> create(const World& world, std::size_t camera,
+                                                        const TrackerOptions& options);
+    ~FrameTracker();
+
+    [[nodiscard]] std::size_t target() const noexcept;
+    [[nodiscard]] const TrackerOptions& options() const noexcept;
+
+    /// Takes a frame as the camera put it out. `at`: where the bodies were; of it only the light on the target, the
+    /// bodies beside it, the camera's own attitude, and the truth that errors are told against are used. The first
+    /// guess, and the next after the track was lost, lie off the truth as the options say. Runs on the calling
+    /// thread's TBB arena.
+    TrackedFrame take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
+                      const Placement& at);
+
+private:
+    struct Impl;
+    explicit FrameTracker(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace narpa

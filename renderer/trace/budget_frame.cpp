@@ -110,9 +110,10 @@ private:
         }
         if (instead) {
             account_.rays_discarded += account_.rays;
-            account_.rays = account_.samples = 0;
+            account_.rays = account_.samples = path_rays_ = 0;
         }
         rays_ += pass.rays;
+        path_rays_ += pass.path_rays;
         account_.rays += pass.rays;
         account_.samples += pass.samples;
         return true;
@@ -227,12 +228,13 @@ private:
         SamplePlan::Stage stage;
         // Middles that met nothing took one ray; samples go elsewhere.
         const std::uint64_t met = std::min(std::max<std::uint64_t>(plan.met(), 1), account_.samples);
-        double rays_each = middle_.quick ? 2
-                                         : static_cast<double>(account_.rays - (account_.samples - met)) /
-                                               static_cast<double>(met);
+        RaysEach each{2, 0};
+        if (!middle_.quick)
+            each = {static_cast<double>(account_.rays - path_rays_ - (account_.samples - met)) /
+                        static_cast<double>(met),
+                    static_cast<double>(path_rays_) / static_cast<double>(met)};
         for (std::size_t i = 0; i < kMaxPasses; ++i) {
-            constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
-            const SamplePlan::Stage next = plan.reach(stage, std::min(wanted(i, rays_each), kMost));
+            const SamplePlan::Stage next = wanted(i, stage, each);
             const std::uint64_t samples = plan.total(next) - plan.total(stage);
             if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.doubt(Of::samples);
             if (samples == 0) return;
@@ -245,22 +247,30 @@ private:
             account_.passes[i] = static_cast<std::uint32_t>(samples);
             to_show_ = ToShow::means;
             stage = next;
-            rays_each = static_cast<double>(pass.rays) / static_cast<double>(pass.samples);
+            each.sample = static_cast<double>(pass.rays - pass.path_rays) / static_cast<double>(samples);
+            if (pass.paths > 0) each.path = static_cast<double>(pass.path_rays) / static_cast<double>(pass.paths);
         }
     }
 
-    /// How many samples the next pass shall have; 0: there is none.
-    [[nodiscard]] std::uint64_t wanted(std::size_t pass, double rays_each) const {
-        if (budget_.kind == Kind::passes) return step_told() == FrameStep::refined ? budget_.passes[pass] : 0;
+    struct RaysEach {
+        double sample, path;
+    };
+    /// Where the next pass shall lead; as far as the last: there is none.
+    [[nodiscard]] SamplePlan::Stage wanted(std::size_t pass, SamplePlan::Stage from, const RaysEach& each) const {
+        constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
+        const SamplePlan& plan = passes_.plan();
+        if (budget_.kind == Kind::passes)
+            return step_told() == FrameStep::refined ? plan.reach(from, budget_.passes[pass]) : from;
         if (budget_.kind == Kind::rays) {
             const auto left = static_cast<double>(rays_left());
-            if (left < kRest * static_cast<double>(budget_.rays)) return 0;
+            if (left < kRest * static_cast<double>(budget_.rays)) return from;
             const double part = middle_.quick ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
-            return static_cast<std::uint64_t>(part * left / rays_each);
+            return plan.reach(from, std::min(part * left, static_cast<double>(kMost)), each.sample, each.path);
         }
-        if (!worth_a_pass()) return 0;
-        return static_cast<std::uint64_t>((pass == 0 ? kFirstPart : kNextPart) *
-                                          static_cast<double>(costs_.fitting(Of::samples, ns_left())));
+        if (!worth_a_pass()) return from;
+        const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_left()));
+        return plan.reach(
+            from, std::min(static_cast<std::uint64_t>((pass == 0 ? kFirstPart : kNextPart) * fitting), kMost));
     }
     [[nodiscard]] bool worth_a_pass() const {
         return static_cast<double>(ns_left()) >= kRest * static_cast<double>(time_given());
@@ -298,6 +308,7 @@ private:
     FrameAccount account_;
     const Frame* frame_ = nullptr;  ///< whose middles are taken
     std::uint64_t rays_ = 0;        ///< that the budget is charged
+    std::uint64_t path_rays_ = 0;   ///< of those that the account has
     ToShow to_show_ = ToShow::nothing;
     int stride_ = 1;
 };

@@ -23,9 +23,9 @@ public:
     /// A tile whose pixels show their middles, and that stands for so many.
     void add_middles(const TileContrast& contrast, double tiles = 1) noexcept;
     /// A tile whose pixels have samples, as many as each has; where it has none, it shows its middle.
-    void add_tile(const TileContrast& contrast, const PerPixel<PixelMean>& means) noexcept;
+    void add_tile(const TileContrast& contrast, const PerPixel<PixelMeans>& means) noexcept;
     /// A pixel of two samples or more.
-    void add(const PixelMean& mean) noexcept;
+    void add(const PixelMeans& means) noexcept;
     FrameError& operator+=(const FrameError& b) noexcept;
 
     /// Of the mean band, root mean square over this many pixels; those that were not added have none.
@@ -37,10 +37,19 @@ private:
         double last = 0, before = 0;  ///< squared
     };
 
+    /// Of one part of the light.
+    struct Part {
+        std::array<Steps, kDoublings> steps{};
+        std::array<double, kDoublings> shares{};  ///< of the last power of two in the number of samples, summed
+        std::array<std::uint64_t, kDoublings> pixels{};
+
+        void add(const PixelMean& mean) noexcept;
+        Part& operator+=(const Part& b) noexcept;
+        [[nodiscard]] double squared_error() const noexcept;
+    };
+
     double middles_ = 0;  ///< squared errors
-    std::array<Steps, kDoublings> steps_{};
-    std::array<double, kDoublings> shares_{};  ///< of the last power of two in the number of samples, summed
-    std::array<std::uint64_t, kDoublings> pixels_{};
+    Part first_, by_paths_;
 };
 
 }  // namespace narpa

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/each_isa.h"
@@ -12,6 +13,10 @@
 
 namespace narpa {
 namespace {
+
+/// Part of the paths that set out where edges are what counts: in frames of one sample a pixel, and where paths
+/// follow all samples.
+constexpr float kSomeSetOut = 0.5f;
 
 /// What the rays see, lane by lane: Lambert's and Phong's materials, which take most of a scene.
 struct SurfacesSeen {
@@ -221,9 +226,7 @@ NARPA_EACH_ISA std::uint32_t lit_by_sun_alone(const HitPacket& hits, const Surfa
 }
 
 /// The Sun's light and emission of first surfaces, where it is as simple as in direct light.
-void first_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
-    p.lit = p.first.lit = 0;
-    if (p.hits.met == 0 || !f.sun_first) return;
+void light_first_surfaces(const Frame& f, Packet& p, RgbPerRay& radiance) {
     PhaseClock clock(p.times);
     SurfacesSeen seen;
     Sunlight sunlight;
@@ -238,6 +241,56 @@ void first_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
     add_sun(f, p, sunlight, clock, radiance);
 }
 
+/// All that is known without a path, where the Sun comes first.
+void first_light(const Frame& f, Packet& p, RgbPerRay& radiance) {
+    p.lit = p.first.lit = 0;
+    radiance.fill({});
+    if (!f.sun_first) return;
+    if (p.hits.met != 0) light_first_surfaces(f, p, radiance);
+    for_each_lane(lanes_below(p.rays.n) & ~p.hits.met,
+                  [&](std::size_t i) { radiance.put(i, sky_along(f.tracer, p.rays.direction[i])); });
+}
+
+/// A sample of a pixel.
+struct SamplePlace {
+    std::uint8_t packet, lane;
+};
+
+/// By paths that share what they find, of one sample of each of some pixels.
+void light_together(const Frame& f, std::span<Packet> packets, std::span<const SamplePlace> places,
+                    std::span<PacketLight> light) {
+    std::array<SamplePlace, kSharing> from;
+    std::array<FirstSurface, kSharing> first;
+    std::array<Rgb, kSharing> radiance;
+    std::array<float, kSharing> variance;
+    std::size_t n = 0;
+    // As on a chessboard, first one colour, then the other: those that share are to lie between one another.
+    for (std::size_t colour = 0; colour < 2; ++colour)
+        for (std::size_t i = 0; i < places.size(); ++i) {
+            if (((i ^ i >> 2) & 1) != colour) continue;
+            const auto [packet, lane] = places[i];
+            const Packet& p = packets[packet];
+            if (f.sun_first && !is_set(p.hits.met, lane)) continue;
+            from[n] = places[i];
+            first[n++] = {&p.rays,
+                          &p.hits,
+                          &p.first,
+                          lane,
+                          p.number[lane],
+                          p.sample[lane],
+                          light[packet].first[lane] != Rgb{}};
+        }
+    const std::uint64_t rays =
+        shared_path_radiance(f.tracer, f.at, f.path, std::span(first).first(n), f.settings.seed, f.settings.frame,
+                             std::span(radiance).first(n), std::span(variance).first(n));
+    packets.front().rays_traced += rays;
+    packets.front().path_rays += rays;
+    for (std::size_t i = 0; i < n; ++i) {
+        light[from[i].packet].by_paths.put(from[i].lane, radiance[i]);
+        packets[from[i].packet].variance[from[i].lane] = variance[i];
+    }
+}
+
 }  // namespace
 
 Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
@@ -248,6 +301,7 @@ Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera
     const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
     const bool guided = !direct && Guide::may_help(tracer, at);
+    const bool sun_first = !direct && sun_alone_lights_first_surfaces(tracer) && !guided;
     return {tracer,
             at,
             camera,
@@ -256,8 +310,9 @@ Frame make_frame(const Tracer& tracer, const Placement& at, const Camera& camera
             lens,
             scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
             direct && !tracer.lights().beyond_the_sun(),
-            !direct && sun_alone_lights_first_surfaces(tracer) && !guided,
-            {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, guided},
+            sun_first,
+            {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, guided,
+             sun_first && settings.spp > 1 ? 1 : kSomeSetOut},
             TinyBodies(tracer, at, camera, T_world_camera, lens)};
 }
 
@@ -280,53 +335,31 @@ void light_along(const Frame& f, Packet& p, RgbPerRay& radiance) {
     clock.ends(Phase::indirect);
 }
 
-void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay> radiance) {
+void light_along(const Frame& f, std::span<Packet> packets, std::span<PacketLight> light) {
     if (f.quick) {
-        for (std::size_t k = 0; k < packets.size(); ++k) direct_light(f, packets[k], radiance[k]);
+        for (std::size_t k = 0; k < packets.size(); ++k) direct_light(f, packets[k], light[k].first);
         return;
     }
-    for (std::size_t k = 0; k < packets.size(); ++k) first_light(f, packets[k], radiance[k]);
+    for (std::size_t k = 0; k < packets.size(); ++k) {
+        first_light(f, packets[k], light[k].first);
+        light[k].by_paths.fill({});
+        packets[k].variance.fill(0);
+    }
     if (packets.empty()) return;
     PhaseClock clock(packets.front().times);
     // One sample of each pixel together, then the next of each: those of a pixel stay independent.
-    struct Place {
-        std::uint8_t packet, lane;
-    };
-    std::array<std::array<Place, kSharing>, kOfAPixel> places;
+    std::array<std::array<SamplePlace, kSharing>, kOfAPixel> places;
     std::array<std::size_t, kOfAPixel> n{};
     std::size_t rank = 0;
-    std::uint32_t pixel = 0;
+    std::uint32_t pixel = std::numeric_limits<std::uint32_t>::max();
     for (std::size_t k = 0; k < packets.size(); ++k)
-        for (std::size_t i = 0; i < packets[k].rays.n; ++i) {
-            rank = k + i > 0 && packets[k].number[i] == pixel ? rank + 1 : 0;
+        for_each_lane(packets[k].by_paths & lanes_below(packets[k].rays.n), [&](std::size_t i) {
+            rank = packets[k].number[i] == pixel ? rank + 1 : 0;
             pixel = packets[k].number[i];
             places[rank][n[rank]++] = {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(i)};
-        }
-    std::array<FirstSurface, kSharing> first;
-    std::array<Rgb, kSharing> light;
-    std::array<float, kSharing> variance;
-    std::array<Place, kSharing> of_rank;
-    for (std::size_t r = 0; r < kOfAPixel && n[r] > 0; ++r) {
-        // Every other pixel of every other row, then the next such: packets share, and are to lie between one
-        // another.
-        std::size_t put = 0;
-        for (std::size_t c = 0; c < 4; ++c)
-            for (std::size_t i = 0; i < n[r]; ++i)
-                if (((i & 1) | (i >> 1 & 2)) == c) of_rank[put++] = places[r][i];
-        for (std::size_t i = 0; i < n[r]; ++i) {
-            const Packet& p = packets[of_rank[i].packet];
-            const std::size_t lane = of_rank[i].lane;
-            first[i] = {&p.rays, &p.hits, &p.first, lane, p.number[lane], p.sample[lane]};
-            light[i] = radiance[of_rank[i].packet][lane];
-        }
-        packets.front().rays_traced +=
-            shared_path_radiance(f.tracer, f.at, f.path, std::span(first).first(n[r]), f.settings.seed,
-                                 f.settings.frame, std::span(light).first(n[r]), std::span(variance).first(n[r]));
-        for (std::size_t i = 0; i < n[r]; ++i) {
-            radiance[of_rank[i].packet].put(of_rank[i].lane, light[i]);
-            packets[of_rank[i].packet].variance[of_rank[i].lane] = variance[i];
-        }
-    }
+        });
+    for (std::size_t r = 0; r < kOfAPixel && n[r] > 0; ++r)
+        light_together(f, packets, std::span(places[r]).first(n[r]), light);
     clock.ends(Phase::indirect);
 }
 

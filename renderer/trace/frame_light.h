@@ -46,10 +46,12 @@ struct Packet {
     // Where it is not: which random numbers each takes.
     Lanes<std::uint32_t> number{};  ///< its PixelSampler's "pixel"
     Lanes<std::uint32_t> sample{};
-    FirstSurfaces first;    ///< out: where the Sun comes first
-    Lanes<float> variance;  ///< out: of the mean band of light that paths share
+    std::uint32_t by_paths = 0;  ///< those that paths follow, where there are packets of them
+    FirstSurfaces first;         ///< out: where the Sun comes first
+    Lanes<float> variance;       ///< out: of the mean band of light that paths share
     // Counted on from packet to packet:
     std::uint64_t rays_traced = 0;  ///< of all kinds
+    std::uint64_t path_rays = 0;    ///< of them those of paths that share
     PhaseTimes* times = nullptr;    ///< null: nobody looks
 };
 
@@ -78,9 +80,19 @@ private:
 /// Radiance that comes back along each ray.
 void light_along(const Frame& f, Packet& packet, RgbPerRay& radiance);
 
+/// In two parts, of which a pixel may take different numbers of samples.
+struct PacketLight {
+    RgbPerRay first;     ///< of quick frames all; else what the Sun sends by first surfaces, where it comes first
+    RgbPerRay by_paths;  ///< else the rest, of the samples that paths follow
+
+    [[nodiscard]] Rgb operator()(const Frame& f, std::size_t i) const noexcept {
+        return f.quick ? first[i] : first[i] + by_paths[i];
+    }
+};
+
 /// The same of many packets, whose paths share what they find: of up to kSharing pixels, pixel by pixel up to
 /// kOfAPixel samples each.
 inline constexpr std::size_t kOfAPixel = 16, kTogether = kSharing * kOfAPixel / kPacket;
-void light_along(const Frame& f, std::span<Packet> packets, std::span<RgbPerRay> radiance);
+void light_along(const Frame& f, std::span<Packet> packets, std::span<PacketLight> light);
 
 }  // namespace narpa

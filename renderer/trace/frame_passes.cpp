@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 
@@ -25,6 +26,9 @@ constexpr std::uint32_t kPacketsPerLook = 16;
 constexpr std::uint32_t kFirstMiddle = 0x40000000u;
 constexpr std::size_t kManyTiles = 4096;
 constexpr int kBlock = 4;
+/// In a frame of a fixed number of samples, one of so many is followed by paths: the others show edges. At least
+/// two are.
+constexpr std::uint32_t kSamplesOfAPath = 2;
 
 /// The first pixel but one stands for the others of a square of `stride`; at the image's edges the last one.
 bool stands_for(int x, int width, int stride) {
@@ -94,7 +98,10 @@ struct FramePasses::Worker {
     /// Samples that have been traced together.
     struct Batch {
         CameraSamples samples;
-        Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
+        Lanes<std::uint8_t> place;              ///< of each sample's pixel in the tile
+        std::uint32_t first = 0, by_paths = 0;  ///< those that count for this part of the light (PacketLight)
+
+        void clear() { samples.n = 0, first = by_paths = 0; }
     };
     /// For packets that are lit together.
     template <std::size_t N>
@@ -116,23 +123,29 @@ struct FramePasses::Worker {
     std::atomic<bool>& given_up;  ///< the pass: looked at often, as a tile may hold many samples
     const std::span<Packet> packets;
     const std::span<Batch> batches;
-    std::size_t full = 0;      ///< of these
-    std::uint64_t traced = 0;  ///< samples
-    std::uint32_t lit = 0;     ///< packets
+    std::size_t full = 0;                    ///< of these
+    std::uint64_t traced = 0, followed = 0;  ///< samples
+    std::uint32_t lit = 0;                   ///< packets
     FrameError error;
 
-    [[nodiscard]] std::uint64_t rays_traced() const {
+    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t Packet::*of = &Packet::rays_traced) const {
         std::uint64_t sum = 0;
-        for (const Packet& p : packets) sum += p.rays_traced;
+        for (const Packet& p : packets) sum += p.*of;
         return sum;
     }
 
-    /// `sink(batch, packet, radiance)` is told of the samples, in order.
+    /// For which parts of the light a sample counts.
+    struct Counts {
+        bool first, by_paths;
+    };
+    /// `sink(batch, packet, light)` is told of the samples, in order.
     template <class Sink>
     void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
-             Sink&& sink) {
+             Counts counts, Sink&& sink) {
         Batch& b = batches[full];
         const std::size_t i = b.samples.n++;
+        b.first |= static_cast<std::uint32_t>(counts.first) << i;
+        b.by_paths |= static_cast<std::uint32_t>(counts.by_paths) << i;
         b.samples.x[i] = x, b.samples.y[i] = y;
         b.samples.number[i] = number, b.samples.sample[i] = sample;
         b.place[i] = static_cast<std::uint8_t>(at);
@@ -142,19 +155,21 @@ struct FramePasses::Worker {
     }
     void trace(const Tile& tile) {
         Batch& b = batches[full];
-        if (given_up.load(std::memory_order_relaxed)) b.samples.n = 0;
+        if (given_up.load(std::memory_order_relaxed)) b.clear();
         if (b.samples.n == 0) return;
         trace_rays(f, b.samples, tile.bodies, packets[full]);
+        packets[full].by_paths = b.by_paths;
         ++full;
     }
     template <class Sink>
     void light(Sink&& sink) {
-        std::array<RgbPerRay, kTogether> radiance;
-        if (full > 0) light_along(f, packets.first(full), radiance);
+        std::array<PacketLight, kTogether> lights;
+        if (full > 0) light_along(f, packets.first(full), lights);
         for (std::size_t k = 0; k < full; ++k) {
-            sink(batches[k], packets[k], radiance[k]);
+            sink(batches[k], packets[k], lights[k]);
             traced += batches[k].samples.n;
-            batches[k].samples.n = 0;
+            followed += static_cast<std::uint64_t>(std::popcount(batches[k].by_paths));
+            batches[k].clear();
             if (++lit % kPacketsPerLook == 0) look_at_clock();
         }
         full = 0;
@@ -173,8 +188,8 @@ struct FramePasses::Worker {
             given_up.store(true, std::memory_order_relaxed);
     }
     void middles(const Tile& tile, int width, int height, int stride, int made, PixelLooks& looks) {
-        middles(tile, width, height, stride, made, [&](const Batch& b, const Packet& p, const RgbPerRay& radiance) {
-            looks.store(f, p, radiance, b.place, tile.index);
+        middles(tile, width, height, stride, made, [&](const Batch& b, const Packet& p, const PacketLight& light_) {
+            looks.store(f, p, light_, b.place, tile.index);
         });
     }
     template <class Store>
@@ -193,7 +208,7 @@ struct FramePasses::Worker {
         tile.each_pixel([&](int x, int y, std::size_t at) {
             if (!stands_for(x, width, stride) || !stands_for(y, height, stride)) return;
             if (made > 0 && stands_for(x, width, made) && stands_for(y, height, made)) return;
-            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, store);
+            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, {true, true}, store);
         });
         finish(tile, store);
     }
@@ -211,6 +226,7 @@ private:
             b.place[lane] = static_cast<std::uint8_t>(block * static_cast<int>(kPacket) + i);
         }
         b.samples.n = kPacket;
+        b.first = b.by_paths = lanes_below(kPacket);
     }
 };
 
@@ -238,7 +254,7 @@ template <class Work>
 PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work) {
     const std::int64_t start = now_ns();
     std::atomic<bool> given_up{false};
-    std::atomic<std::uint64_t> samples{0}, rays{0};
+    std::atomic<std::uint64_t> samples{0}, rays{0}, paths{0}, path_rays{0};
     const auto over_chunk = [&](std::size_t chunk, auto&& room) {
         const std::int64_t begun = f.settings.times ? now_ns() : 0;
         PhaseTimes times{};
@@ -252,6 +268,8 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
             work(w, tile(tiles_[i]));
         }
         samples.fetch_add(w.traced, std::memory_order_relaxed);
+        paths.fetch_add(w.followed, std::memory_order_relaxed);
+        path_rays.fetch_add(w.rays_traced(&Packet::path_rays), std::memory_order_relaxed);
         if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
             given_up.store(true, std::memory_order_relaxed);
         if (sums == Sums::errors) errors_[chunk] = w.error;
@@ -273,7 +291,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
                 over_chunk(one.begin(), Worker::Room<kTogether>());
         },
         tbb::simple_partitioner());
-    return {!given_up, samples, rays, now_ns() - start};
+    return {!given_up, samples, rays, paths, path_rays, now_ns() - start};
 }
 
 void FramePasses::begin(const Frame& f, const Lens* lens) {
@@ -351,31 +369,39 @@ void add_tiny(const Frame& f, const Tile& t, RadianceImage& out, std::vector<flo
 
 /// Of each pixel's mean, block by block.
 template <class Tile>
-void put_variances(const Tile& t, const PerPixel<PixelSamples>& samples, int image_width,
-                   std::vector<float>& variance) {
+void put_variances(const Tile& t, const PerPixel<PixelSamples>& first, const PerPixel<PixelSamples>& by_paths,
+                   int image_width, std::vector<float>& variance) {
     for (int by = 0; by < t.height; by += kBlock)
         for (int bx = 0; bx < t.width; bx += kBlock) {
             const PixelBlock block = block_of(t, bx, by);
-            Lanes<PixelSamples> of_block;
-            Lanes<double> of_means;
-            for (std::size_t i = 0; i < block.n; ++i)
-                of_block[i] = samples[place_in_tile(block.x[i] - t.x, block.y[i] - t.y)];
-            variances_of_means(std::span(of_block).first(block.n), of_means);
-            for (std::size_t i = 0; i < block.n; ++i)
-                variance[block.index(i, image_width)] = static_cast<float>(of_means[i]);
+            for (std::size_t i = 0; i < block.n; ++i) variance[block.index(i, image_width)] = 0;
+            for (const auto* part : {&first, &by_paths}) {
+                Lanes<PixelSamples> of_block;
+                Lanes<double> of_means;
+                for (std::size_t i = 0; i < block.n; ++i)
+                    of_block[i] = (*part)[place_in_tile(block.x[i] - t.x, block.y[i] - t.y)];
+                if (of_block[0].count() == 0) continue;
+                variances_of_means(std::span(of_block).first(block.n), of_means);
+                for (std::size_t i = 0; i < block.n; ++i)
+                    variance[block.index(i, image_width)] += static_cast<float>(of_means[i]);
+            }
         }
 }
 
 /// The same where pixels have as many samples as they need.
 template <class Tile>
-void put_variances(const Tile& t, const PerPixel<PixelMean>& means, const TileContrast& contrast, int image_width,
+void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, int image_width,
                    std::vector<float>& variance) {
+    const auto at_least = [](const PixelMean& mean, float one) {
+        return mean.count() == 0 ? 0 : std::max(mean.step() * mean.step(), one / static_cast<float>(mean.count()));
+    };
     t.each_pixel([&](int x, int y, std::size_t at) {
-        const std::uint32_t n = means[at].count();
-        const float one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f) + contrast.shared[at];
+        const auto& [first, by_paths] = means[at];
+        const float paths = contrast.shared[at], one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f);
+        const bool alone = first.count() == 0;
         variance[index_of(x, y, image_width)] =
-            n == 0 ? contrast.middle[at]
-                   : std::max(means[at].step() * means[at].step(), one / static_cast<float>(n));
+            means[at].any() ? at_least(first, one) + at_least(by_paths, alone ? one + paths : paths)
+                            : contrast.middle[at];
     });
 }
 
@@ -383,27 +409,38 @@ Rgb look_at(const TileLooks& looks, std::size_t place) {
     return {looks.r[place], looks.g[place], looks.b[place]};
 }
 
+/// Samples of a pixel in the order of its sequence; paths follow the first of them.
 struct SampleRange {
-    std::uint32_t begin, end;
+    std::uint32_t begin, end, paths;
 };
 
 /// All samples of a tile, pixel by pixel; where paths share what they find so many of each pixel, then the next.
 template <class Worker, class Tile, class Samples, class Sink>
 void sample_tile(Worker& w, const Tile& t, int image_width, Samples&& samples, Sink&& sink) {
     w.begin(false);
+    const bool first_part = w.f.quick || w.f.sun_first, all_by_paths = !first_part;
     const std::uint32_t most = w.f.quick ? std::numeric_limits<std::uint32_t>::max() : kOfAPixel;
     std::uint32_t left = 1;
     for (std::uint32_t done = 0; left > 0; done += most) {
         left = 0;
         t.each_pixel([&](int x, int y, std::size_t at) {
             const auto number = static_cast<std::uint32_t>(index_of(x, y, image_width));
-            const auto [begin, end] = samples(at);
+            const auto [begin, end, paths] = samples(at);
             const std::uint32_t from = begin + std::min(done, end - begin), to = from + std::min(most, end - from);
             left = std::max(left, end - to);
-            for (std::uint32_t s = from; s < to; ++s) w.add(t, x, y, at, number, s, sink);
+            for (std::uint32_t s = from; s < to; ++s)
+                w.add(t, x, y, at, number, s, {first_part, !w.f.quick && (all_by_paths || s - begin < paths)},
+                      sink);
         });
         w.finish(t, sink);
     }
+}
+
+/// Adds the samples of a packet to their pixels.
+template <class Batch>
+void add_samples(const Batch& b, const PacketLight& light, PerPixel<PixelMeans>& means) {
+    for_each_lane(b.first, [&](std::size_t i) { means[b.place[i]].first.add(light.first[i]); });
+    for_each_lane(b.by_paths, [&](std::size_t i) { means[b.place[i]].by_paths.add(light.by_paths[i]); });
 }
 
 }  // namespace
@@ -415,24 +452,27 @@ PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<f
         if (f.one_sample()) {
             show_one_sample(w, t, out);
         } else {
-            PerPixel<PixelMean> means{};
-            PerPixel<PixelSamples> spread;
-            const auto store = [&](const Worker::Batch& b, const Packet&, const RgbPerRay& radiance) {
-                for (std::size_t i = 0; i < b.samples.n; ++i) means[b.place[i]].add(radiance[i]);
+            PerPixel<PixelMeans> means{};
+            PerPixel<PixelSamples> spread, spread_by_paths;
+            const auto store = [&](const Worker::Batch& b, const Packet&, const PacketLight& light) {
+                add_samples(b, light, means);
                 if (variance == nullptr) return;
-                for (std::size_t i = 0; i < b.samples.n; ++i) spread[b.place[i]].add(radiance[i]);
+                for_each_lane(b.first, [&](std::size_t i) { spread[b.place[i]].add(light.first[i]); });
+                for_each_lane(b.by_paths,
+                              [&](std::size_t i) { spread_by_paths[b.place[i]].add(light.by_paths[i]); });
             };
+            const std::uint32_t paths = std::max((spp + kSamplesOfAPath - 1) / kSamplesOfAPath, 2u);
             sample_tile(
                 w, t, out.width,
                 [&](std::size_t) {
-                    return SampleRange{0, spp};
+                    return SampleRange{0, spp, paths};
                 },
                 store);
             t.each_pixel([&](int x, int y, std::size_t at) {
                 out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
                 w.error.add(means[at]);
             });
-            if (variance != nullptr) put_variances(t, spread, out.width, *variance);
+            if (variance != nullptr) put_variances(t, spread, spread_by_paths, out.width, *variance);
         }
         add_tiny(f, t, out, variance);
         if (f.settings.pixels_done != nullptr)
@@ -446,12 +486,13 @@ PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<f
 }
 
 void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) {
+    const Frame& f = w.f;
     const auto row = [&](int y) { return &out.pixels[index_of(t.x, y, out.width)]; };
     if (!looks_serve(t.index)) {
         w.middles(t, out.width, out.height, 1, 0,
-                  [&](const Worker::Batch& b, const Packet&, const RgbPerRay& light) {
+                  [&](const Worker::Batch& b, const Packet&, const PacketLight& light) {
                       for (std::size_t i = 0; i < b.samples.n; ++i)
-                          row(b.samples.y[i])[b.samples.x[i] - t.x] = light[i];
+                          row(b.samples.y[i])[b.samples.x[i] - t.x] = light(f, i);
                   });
         return;
     }
@@ -519,15 +560,21 @@ void FramePasses::make_plan(const Frame& f) {
 PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to,
                               const PassLimit& limit) {
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
-        PerPixel<PixelMean>& means = means_[t.index];
-        const auto store = [&](const Worker::Batch& b, const Packet&, const RgbPerRay& radiance) {
-            for (std::size_t i = 0; i < b.samples.n; ++i) means[b.place[i]].add(radiance[i]);
+        PerPixel<PixelMeans>& means = means_[t.index];
+        const auto store = [&](const Worker::Batch& b, const Packet&, const PacketLight& light) {
+            add_samples(b, light, means);
         };
+        const TileLooks& looks = looks_.tile(t.index);
         t.each_pixel([&](int, int, std::size_t at) {
-            if (from == SamplePlan::Stage{}) means[at] = {};
+            if (plan_->count(t.index, at, from) > 0) return;
+            means[at] = {};
+            // Of paths the middle counts as well: it had no say in what its pixel gets.
+            if (f.sun_first && plan_->count(t.index, at, to) > 0)
+                means[at].by_paths.add({looks.paths_r[at], looks.paths_g[at], looks.paths_b[at]});
         });
         const auto samples = [&](std::size_t at) {
-            return SampleRange{plan_->count(t.index, at, from), plan_->count(t.index, at, to)};
+            return SampleRange{plan_->count(t.index, at, from), plan_->count(t.index, at, to),
+                               plan_->paths(t.index, at, to) - plan_->paths(t.index, at, from)};
         };
         sample_tile(w, t, camera_.width, samples, store);
     });
@@ -537,10 +584,10 @@ void FramePasses::show_means(const Frame& f, RadianceImage& out, std::vector<flo
     fill_background(out);
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         const TileLooks& looks = looks_.tile(t.index);
-        const PerPixel<PixelMean>& means = means_[t.index];
+        const PerPixel<PixelMeans>& means = means_[t.index];
         t.each_pixel([&](int x, int y, std::size_t at) {
             out.pixels[index_of(x, y, out.width)] =
-                means[at].count() > 0 ? vec_cast<float>(means[at].mean()) : look_at(looks, at);
+                means[at].any() ? vec_cast<float>(means[at].mean()) : look_at(looks, at);
         });
         w.error.add_tile(plan_->contrast(t.index), means);
         if (variance != nullptr) put_variances(t, means, plan_->contrast(t.index), out.width, *variance);

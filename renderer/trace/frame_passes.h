@@ -26,6 +26,7 @@ struct PassLimit {
 struct PassCount {
     bool complete = true;
     std::uint64_t samples = 0, rays = 0;
+    std::uint64_t paths = 0, path_rays = 0;  ///< samples of these that paths follow; rays beyond first surfaces
     std::int64_t wall_ns = 0;
 };
 
@@ -86,7 +87,7 @@ private:
     std::vector<FrameError> errors_;  ///< of each chunk of tiles
 
     std::optional<SamplePlan> plan_;  ///< made when a frame first needs it, as are:
-    std::vector<PerPixel<PixelMean>> means_;
+    std::vector<PerPixel<PixelMeans>> means_;
 
     // Tiles that still have the background in the image that was last written, and which that was.
     std::vector<std::uint8_t> blank_;

@@ -21,8 +21,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// as the rest seldom adds much; without any, as on night sides, only behind so many surfaces.
 constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;
 constexpr int kSurfacesInTheDark = 4;
-/// Where paths share what they find, so many suffice.
-constexpr float kSetOut = 0.5f;
 /// Random numbers: two groups for each surface of the longest path, then the roulette's, four surfaces a group,
 /// then the choice of what is shared.
 constexpr std::uint32_t kRouletteGroup = 1 + 2 * 40, kSharingGroup = kRouletteGroup + 40 / 4 + 1;
@@ -110,7 +108,7 @@ private:
             for (std::size_t k = 0; k < some.size(); ++k) {
                 const std::size_t ray = from + k;
                 const FirstSurface& f = some[k];
-                if (!f.lit()) radiance_[ray] = {};
+                radiance_[ray] = {};
                 if (!f.met() && !lights_.any_with_extent()) {
                     radiance_[ray] = sky({}, f.rays->direction[f.lane]);
                     continue;
@@ -120,7 +118,7 @@ private:
                 if (f.lit()) {
                     if (!shared_) continue;
                     const Rgb albedo = f.surfaces->diffuse[f.lane] + f.surfaces->specular[f.lane];
-                    chance = chance_to_set_out(albedo, radiance_[ray]);
+                    chance = chance_to_set_out(albedo, !f.sunlit);
                     number = starts_.add(at_, f, ray, chance);
                     if (chance < 1 && roulette[0][k] >= static_cast<double>(chance)) continue;
                 }
@@ -130,6 +128,7 @@ private:
                 path.to = &radiance_[ray];
                 path.shares = number;
                 path.lit = path.sun_asked = f.lit();
+                path.sunlit = f.lit() && f.sunlit;
                 path.throughput = Rgb{1, 1, 1} / chance;
                 if (receivers_) path.start = receiver_at(f.rays->origin[f.lane]);
                 hits_[n_] = (*f.hits)[f.lane];
@@ -405,7 +404,7 @@ private:
                 };
                 const bool sets_out = met == 0 && shared_ && !points_[i].specular();
                 if (sets_out && !path.lit) {
-                    const float goes_on = chance_to_set_out(points_[i].surface(), radiance_[path.ray]);
+                    const float goes_on = chance_to_set_out(points_[i].surface(), radiance_[path.ray] == Rgb{});
                     path.shares = starts_.add(at_, hits_[i], points_[i], path, goes_on);
                     if (!survives(goes_on)) continue;
                 }
@@ -460,20 +459,21 @@ private:
     }
 
     /// Probability with which a path that is shared leaves its first surface, before its direction is known.
-    [[nodiscard]] float chance_to_set_out(const Surface& surface, const Rgb& light) const {
+    [[nodiscard]] float chance_to_set_out(const Surface& surface, bool in_the_dark) const {
         const bool plain = surface.material->kind <= Material::Kind::phong;
-        return chance_to_set_out(plain ? surface.diffuse + surface.specular : Rgb{1, 1, 1}, light);
+        return chance_to_set_out(plain ? surface.diffuse + surface.specular : Rgb{1, 1, 1}, in_the_dark);
     }
-    [[nodiscard]] float chance_to_set_out(const Rgb& albedo, const Rgb& light) const {
+    [[nodiscard]] float chance_to_set_out(const Rgb& albedo, bool in_the_dark) const {
         if (finds_alone_) return 1;
         const float brings = std::max({albedo.x, albedo.y, albedo.z});
-        return kSetOut * std::min(1.0f, brings / (light == Rgb{} ? kFaintInTheDark : kFaint));
+        return settings_.sets_out * std::min(1.0f, brings / (in_the_dark ? kFaintInTheDark : kFaint));
     }
 
     /// Probability with which a path goes on behind so many surfaces; it then carries the share of those that end.
     [[nodiscard]] float chance(const Path& path, int surfaces) const {
         // What a wide Sun sends comes by two ways that make up for each other: neither is left to chance.
-        const bool in_the_dark = radiance_[path.ray] == Rgb{} || (sun_has_extent_ && !narrow_sun_);
+        const bool nothing_yet = radiance_[path.ray] == Rgb{} && !path.sunlit;
+        const bool in_the_dark = nothing_yet || (sun_has_extent_ && !narrow_sun_);
         if (in_the_dark && surfaces < kSurfacesInTheDark) return 1;
         const Rgb& t = path.throughput;
         const float brings = std::max({t.x, t.y, t.z}) / path.radiance_scale;
@@ -536,6 +536,13 @@ std::uint64_t path_radiance(const Tracer& tracer, const Placement& at, const Pat
         traced += stream.rays_traced();
     }
     return traced;
+}
+
+Rgb sky_along(const Tracer& tracer, const Vec3& direction) noexcept {
+    const Rgb& ambient = tracer.scene().ambient;
+    const std::optional<SunDisc>& sun = tracer.lights().sun();
+    if (!sun || sun->is_point() || sun->pdf(direction) == 0) return ambient;
+    return ambient + Rgb{sun->radiance(), sun->radiance(), sun->radiance()};
 }
 
 bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept {

@@ -27,6 +27,8 @@ struct PathSettings {
     bool direct = false;
     /// Guide::may_help at this placement; false where it may not: nobody asks further.
     bool guided = true;
+    /// Of paths that share what they find: the part of them that sets out.
+    float sets_out = 1;
 };
 
 /// Which random numbers each ray takes: PixelSampler(seed, frame, pixel), and the place in its sequence. The first
@@ -58,6 +60,7 @@ struct FirstSurface {
     const FirstSurfaces* surfaces;
     std::size_t lane;
     std::uint32_t pixel, sample;  ///< as of PathNumbers
+    bool sunlit = false;          ///< of lit ones: there is some of that light
 
     [[nodiscard]] bool met() const noexcept { return is_set(hits->met, lane); }
     [[nodiscard]] bool lit() const noexcept { return is_set(surfaces->lit, lane); }
@@ -68,11 +71,13 @@ inline constexpr std::size_t kSharing = 64;
 inline constexpr float kSharpLobe = 1000;
 /// May the Sun's light on first surfaces be taken as above?
 [[nodiscard]] bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept;
+/// What a ray brings that meets nothing and that nobody else speaks for: the sky, and the Sun's disc in it.
+[[nodiscard]] Rgb sky_along(const Tracer& tracer, const Vec3& direction) noexcept;
 
 /// The same of up to kSharing rays, but what one path finds lights the first surfaces of all (shared_bounces.h), so
 /// that the result of each ray depends on the others. No two should be the same pixel's: what they find by the same
-/// path is not independent. `radiance`: of lit surfaces the light that they have, and all of it after. `variance`:
-/// out, of the mean band of what is shared, roughly.
+/// path is not independent. `radiance`: out, but for the light that lit surfaces have. `variance`: out, of the mean
+/// band of what is shared, roughly.
 std::uint64_t shared_path_radiance(const Tracer& tracer, const Placement& at, const PathSettings& settings,
                                    std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
                                    std::span<Rgb> radiance, std::span<float> variance) noexcept;

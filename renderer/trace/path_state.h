@@ -33,6 +33,7 @@ private:
 struct Path {
     std::uint32_t ray = 0;     ///< the one from the camera that it began with
     bool lit = false;          ///< its first surface has its light, and it has survived there
+    bool sunlit = false;       ///< that is some
     int shares = -1;           ///< number of its first surface among the Starts; -1: it is none
     int bounce = -1;           ///< index of what it has found for all (shared_bounces.h); -1: nothing
     float radiance_scale = 1;  ///< the part of the throughput that leaving a dense medium undoes, or that is no

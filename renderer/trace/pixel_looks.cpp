@@ -82,17 +82,17 @@ NARPA_EACH_ISA void look(const Packet& p, const Vec3& axis, std::uint32_t lit, L
 
 }  // namespace
 
-bool PixelLooks::shows_background(const Packet& p, const RgbPerRay& radiance) const noexcept {
+bool PixelLooks::shows_background(const Frame& f, const Packet& p, const PacketLight& light) const noexcept {
     if (p.hits.met != 0) return false;
     for (std::size_t i = 0; i < p.rays.n; ++i)
-        if (radiance[i] != background_) return false;
+        if (light(f, i) != background_) return false;
     return true;
 }
 
-void PixelLooks::store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
+void PixelLooks::store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
                        std::size_t tile_index) noexcept {
     TileLooks& tile = looks_[tile_index];
-    if (!shows_background(p, radiance)) known_[tile_index] = Known::something;
+    if (!shows_background(f, p, light)) known_[tile_index] = Known::something;
     LooksPerRay seen;
     if (p.hits.met != 0)
         look(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.quick ? p.lit : 0, seen);
@@ -106,7 +106,15 @@ void PixelLooks::store(const Frame& f, const Packet& p, const RgbPerRay& radianc
         else
             for (std::size_t i = 0; i < p.rays.n; ++i) to[place[i]] = from[i];
     };
-    put(radiance.r, tile.r), put(radiance.g, tile.g), put(radiance.b, tile.b);
+    if (f.quick) {
+        put(light.first.r, tile.r), put(light.first.g, tile.g), put(light.first.b, tile.b);
+    } else {
+        RgbPerRay whole;
+        for (std::size_t i = 0; i < p.rays.n; ++i) whole.put(i, light(f, i));
+        put(whole.r, tile.r), put(whole.g, tile.g), put(whole.b, tile.b);
+        const RgbPerRay& of_paths = light.by_paths;
+        put(of_paths.r, tile.paths_r), put(of_paths.g, tile.paths_g), put(of_paths.b, tile.paths_b);
+    }
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
     if (!f.quick) put(p.variance, tile.shared);

@@ -44,8 +44,9 @@ using PerPixel = std::array<T, kTilePixels>;
 
 /// The middles of a tile.
 struct alignas(64) TileLooks {
-    PerPixel<float> r, g, b;     ///< radiance
-    PerPixel<float> nx, ny, nz;  ///< normal, world
+    PerPixel<float> r, g, b;                    ///< radiance
+    PerPixel<float> paths_r, paths_g, paths_b;  ///< of it what paths brought, where the light has two parts
+    PerPixel<float> nx, ny, nz;                 ///< normal, world
     PerPixel<float> depth_m;
     PerPixel<float> shared;           ///< variance of light that paths share, which neighbours do not show
     PerPixel<std::uint32_t> surface;  ///< of body, material and sunlight; 0: background
@@ -79,7 +80,7 @@ public:
     [[nodiscard]] bool looked_at(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
 
     /// Puts down what a packet of middles has met. `place`: of each lane in the tile.
-    void store(const Frame& f, const Packet& p, const RgbPerRay& radiance, const Lanes<std::uint8_t>& place,
+    void store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
                std::size_t tile) noexcept;
 
     /// What a tile and its neighbours say of its pixels.
@@ -90,7 +91,7 @@ public:
 
 private:
     void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
-    [[nodiscard]] bool shows_background(const Packet& p, const RgbPerRay& radiance) const noexcept;
+    [[nodiscard]] bool shows_background(const Frame& f, const Packet& p, const PacketLight& light) const noexcept;
     [[nodiscard]] bool in_empty_space(std::size_t tile) const noexcept;
 
     int width_, height_, tiles_x_, tiles_y_;

@@ -58,6 +58,17 @@ private:
     float at_power_ = 0, step_ = 0, step_before_ = 0;
 };
 
+/// Of light in two parts (PacketLight), each with samples of its own number.
+struct PixelMeans {
+    PixelMean first, by_paths;
+
+    [[nodiscard]] bool any() const { return first.count() > 0 || by_paths.count() > 0; }
+    [[nodiscard]] Vec3 mean() const {
+        if (by_paths.count() == 0) return first.mean();
+        return first.count() == 0 ? by_paths.mean() : first.mean() + by_paths.mean();
+    }
+};
+
 /// Samples that the neighbours' common variance counts for in a pixel's own.
 inline constexpr double kPriorCount = 64;
 

@@ -61,7 +61,8 @@ float at_sides(const Grid& g, int x, int y) {
 
 }  // namespace
 
-SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), sums_(tiles) {}
+SamplePlan::SamplePlan(std::size_t tiles)
+    : contrasts_(tiles), weights_(tiles), path_weights_(tiles), sums_(tiles) {}
 
 void SamplePlan::weigh(const Frame& f, const PixelLooks& looks, std::span<const std::uint32_t> tiles) {
     constexpr std::size_t kGrain = 16;
@@ -81,15 +82,18 @@ void SamplePlan::weigh(const Frame& f, const PixelLooks& looks, std::span<const 
     met_ = all.met;
     first_ = std::countr_zero(f.quick ? kFewest : kFewestOfPaths) * kPerDoubling;
     const double typical = all.variance > 0 ? all.variance / all.deviation : 1;
-    for (auto& bin : histogram_) bin.store(0, std::memory_order_relaxed);
+    for (auto* const histogram : {&histogram_, &path_histogram_})
+        for (auto& bin : *histogram) bin.store(0, std::memory_order_relaxed);
     tbb::parallel_for(
         Range(0, tiles.size(), kGrain),
         [&](const Range& range) {
-            std::array<std::uint32_t, kWeights> histogram{};
+            Histogram histogram{}, of_paths{};
             for (std::size_t i = range.begin(); i != range.end(); ++i)
-                weigh_tile(f, looks, tiles[i], typical * typical, histogram);
-            for (std::size_t w = 0; w < histogram.size(); ++w)
+                weigh_tile(f, looks, tiles[i], typical * typical, histogram, of_paths);
+            for (std::size_t w = 0; w < histogram.size(); ++w) {
                 if (histogram[w] > 0) histogram_[w].fetch_add(histogram[w], std::memory_order_relaxed);
+                if (of_paths[w] > 0) path_histogram_[w].fetch_add(of_paths[w], std::memory_order_relaxed);
+            }
         },
         tbb::simple_partitioner());
 }
@@ -101,6 +105,7 @@ void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::siz
     for (std::size_t i = 0; i < kTilePixels; ++i) {
         const double variance = static_cast<double>(c.edge[i] + std::max(c.noise[i], 0.0f));
         sums.shared += static_cast<double>(c.shared[i]);
+        sums.paths += static_cast<double>(c.shared[i] + std::max(c.noise[i], 0.0f));
         sums.variance += variance;
         sums.deviation += std::sqrt(variance);
         sums.met += looks.tile(tile).surface[i] != 0;
@@ -108,24 +113,41 @@ void SamplePlan::contrast_tile(const Frame& f, const PixelLooks& looks, std::siz
     sums_[tile] = sums;
 }
 
-float SamplePlan::shared_around(const PixelLooks& looks, std::size_t tile) const noexcept {
+float SamplePlan::around(const PixelLooks& looks, std::size_t tile, double Sums::*variance) const noexcept {
     const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
     double sum = 0, met = 0;
     for (int y = std::max(ty - 1, 0); y <= std::min(ty + 1, looks.tiles_y() - 1); ++y)
         for (int x = std::max(tx - 1, 0); x <= std::min(tx + 1, looks.tiles_x() - 1); ++x) {
             const auto from = static_cast<std::size_t>(y * looks.tiles_x() + x);
             if (from == tile || !looks.looked_at(from)) continue;
-            sum += sums_[from].shared;
+            sum += sums_[from].*variance;
             met += static_cast<double>(sums_[from].met);
         }
     return met > 0 ? static_cast<float>(sum / met) : 0;
 }
 
+int SamplePlan::in_step(int weight, int even, int of_paths, bool sees) noexcept {
+    if (weight - even < kPerDoubling) return sees || weight > of_paths ? of_paths : weight;
+    return of_paths + (weight - even) / kPerDoubling * kPerDoubling;
+}
+
 void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
-                            std::span<std::uint32_t, kWeights> histogram) noexcept {
+                            Histogram& histogram, Histogram& of_paths) noexcept {
     const int tx = static_cast<int>(tile) % looks.tiles_x(), ty = static_cast<int>(tile) / looks.tiles_x();
     const Weighing& w = f.quick ? kByDirectLight : kByPaths;
-    const float around = f.quick ? 0 : shared_around(looks, tile);
+    const float shared_around = f.quick ? 0 : around(looks, tile, &Sums::shared);
+    const auto doublings_of = [&](double variance) {
+        return std::log2(std::max(std::sqrt(variance), w.least) / w.least);
+    };
+    int even = 0;  ///< weight of paths, but for the hash
+    path_weights_[tile] = f.quick ? 0 : kWeights - 1;
+    if (f.sun_first) {
+        const double variance = static_cast<double>(around(looks, tile, &Sums::paths)) / typical_variance;
+        const auto hash = static_cast<int>(sampler_detail::mix(tile) % kPerDoubling);
+        const double doublings = doublings_of(variance);
+        even = kEventful + static_cast<int>(kPerDoubling * doublings);
+        path_weights_[tile] = static_cast<Weight>(std::min(even + hash, kWeights - 1));
+    }
     Grid edge{}, noise{}, known{};
     const float unseen = kUnseen / 12 * static_cast<float>(typical_variance);
     for (int y = 0; y < kSide; ++y)
@@ -172,17 +194,19 @@ void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t
             const float noisy =
                 neighbours > 0 ? std::max(fold(2, column(noises), plus) - at_cross(noise, x, y), 0.0f) / neighbours
                                : 0.0f;
-            const float shared = looks.tile(tile).surface[place] != 0 ? around : 0;
+            const float shared = looks.tile(tile).surface[place] != 0 ? shared_around : 0;
             const double variance = std::pow(static_cast<double>(edges) / typical_variance, kEdgePower) +
                                     static_cast<double>(noisy + shared) / typical_variance;
-            const double doublings = std::log2(std::max(std::sqrt(variance), w.least) / w.least);
+            const double doublings = doublings_of(variance);
             const auto hash = sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling;
             const bool empty = looks.tile(tile).surface[place] == 0;
             const int event = std::max(variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0,
                                        empty ? kEventful + w.empty * kPerDoubling : 0);
-            const int weight = event + static_cast<int>(hash);
+            int weight = event + static_cast<int>(hash);
+            if (f.sun_first) weight = in_step(weight, even, path_weights_[tile], !empty);
             weights_[tile][place] = static_cast<Weight>(std::min(weight, kWeights - 1));
             ++histogram[static_cast<std::size_t>(weights_[tile][place])];
+            ++of_paths[static_cast<std::size_t>(std::min(weights_[tile][place], path_weights_[tile]))];
         }
 }
 
@@ -194,14 +218,39 @@ std::uint64_t SamplePlan::total(Stage stage) const noexcept {
     return sum;
 }
 
-SamplePlan::Stage SamplePlan::reach(Stage from, std::uint64_t samples) const noexcept {
-    const std::uint64_t most = total(from) + samples;
+std::uint64_t SamplePlan::total_paths(Stage stage) const noexcept {
+    std::uint64_t sum = 0;
+    for (int w = 0; w < kWeights; ++w) {
+        const auto bin = static_cast<std::size_t>(w);
+        const std::uint32_t n = count(static_cast<Weight>(w), stage);
+        sum += std::uint64_t{histogram_[bin].load(std::memory_order_relaxed)} * paths(n, 0) +
+               std::uint64_t{path_histogram_[bin].load(std::memory_order_relaxed)} * (n - paths(n, 0));
+    }
+    return sum;
+}
+
+template <class Fits>
+SamplePlan::Stage SamplePlan::furthest(Stage from, Fits&& fits) noexcept {
     int within = std::max(from.level, -kWeights), beyond = kFull + 1;
     while (within + 1 < beyond) {
         const int middle = within + (beyond - within) / 2;
-        (total({middle}) <= most ? within : beyond) = middle;
+        (fits(Stage{middle}) ? within : beyond) = middle;
     }
     return {within};
+}
+
+SamplePlan::Stage SamplePlan::reach(Stage from, std::uint64_t samples) const noexcept {
+    const std::uint64_t most = total(from) + samples;
+    return furthest(from, [&](Stage stage) { return total(stage) <= most; });
+}
+
+SamplePlan::Stage SamplePlan::reach(Stage from, double rays, double each_sample, double each_path) const noexcept {
+    const auto rays_of = [&](Stage stage) {
+        return each_sample * static_cast<double>(total(stage)) +
+               each_path * static_cast<double>(total_paths(stage));
+    };
+    const double most = rays_of(from) + rays;
+    return furthest(from, [&](Stage stage) { return rays_of(stage) <= most; });
 }
 
 }  // namespace narpa

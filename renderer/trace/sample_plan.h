@@ -16,6 +16,7 @@
 /// that happen to be bright would be thrown away more often than others, and the image would lose light.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -46,10 +47,19 @@ public:
     [[nodiscard]] std::uint32_t count(std::size_t tile, std::size_t place, Stage stage) const noexcept {
         return count(weights_[tile][place], stage);
     }
+    /// So many of these are followed by paths, where the light has two parts (PacketLight): as many for all pixels
+    /// of a tile that see something, as its paths share what they find; elsewhere all.
+    [[nodiscard]] std::uint32_t paths(std::size_t tile, std::size_t place, Stage stage) const noexcept {
+        const Weight weight = weights_[tile][place];
+        return paths(count(weight, stage), count(std::min(weight, path_weights_[tile]), stage));
+    }
     /// Of all pixels.
     [[nodiscard]] std::uint64_t total(Stage stage) const noexcept;
+    [[nodiscard]] std::uint64_t total_paths(Stage stage) const noexcept;
     /// The furthest stage that takes no more than this many samples beyond those of `from`.
     [[nodiscard]] Stage reach(Stage from, std::uint64_t samples) const noexcept;
+    /// The same of rays, so many for each sample and for each path.
+    [[nodiscard]] Stage reach(Stage from, double rays, double each_sample, double each_path) const noexcept;
 
     /// Pixels whose middle met something.
     [[nodiscard]] std::uint64_t met() const noexcept { return met_; }
@@ -63,7 +73,8 @@ private:
     static constexpr int kFull = std::countr_zero(kMostSamples) * kPerDoubling;  ///< kMostSamples everywhere
     struct Sums {
         double variance = 0, deviation = 0;
-        double shared = 0;  ///< variance of light that is shared, of all that met something
+        double paths = 0;   ///< variance of the light of paths, of all that met something
+        double shared = 0;  ///< of it that of light that is shared
         std::uint64_t met = 0;
     };
 
@@ -72,19 +83,31 @@ private:
         if (weight < 0 || doublings < first_) return 0;
         return doublings < kFull ? 1u << (doublings / kPerDoubling) : kMostSamples;
     }
+    /// A pixel that has samples has one at least that a path follows.
+    [[nodiscard]] static std::uint32_t paths(std::uint32_t samples, std::uint32_t wanted) noexcept {
+        return std::max(wanted, std::min(samples, 1u));
+    }
+    /// A pixel's weight, a whole number of doublings above that of its tile's paths: whenever it gets more paths,
+    /// it gets more samples. `even`: the latter, but for its hash. What sees something has as many samples as
+    /// paths.
+    [[nodiscard]] static int in_step(int weight, int even, int of_paths, bool sees) noexcept;
+    template <class Fits>
+    [[nodiscard]] static Stage furthest(Stage from, Fits&& fits) noexcept;
     void contrast_tile(const Frame& f, const PixelLooks& looks, std::size_t tile) noexcept;
-    /// Variance of the light that is shared, by the tiles around alone: what a tile's own paths found by chance
-    /// must not decide which of its middles stay.
-    [[nodiscard]] float shared_around(const PixelLooks& looks, std::size_t tile) const noexcept;
+    /// Variance of light by the tiles around alone: what a tile's own paths found by chance must not decide which
+    /// of its middles stay.
+    [[nodiscard]] float around(const PixelLooks& looks, std::size_t tile, double Sums::*variance) const noexcept;
+    using Histogram = std::array<std::uint32_t, kWeights>;  ///< pixels of each weight
     void weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t tile, double typical_variance,
-                    std::span<std::uint32_t, kWeights> histogram) noexcept;
+                    Histogram& histogram, Histogram& of_paths) noexcept;
 
     std::vector<TileContrast> contrasts_;
     std::vector<PerPixel<Weight>> weights_;
-    std::vector<Sums> sums_;  ///< of each tile
+    std::vector<Weight> path_weights_;  ///< of each tile
+    std::vector<Sums> sums_;            ///< of each tile
     std::uint64_t met_ = 0;
     int first_ = 0;  ///< doublings of the fewest samples
-    std::array<std::atomic<std::uint32_t>, kWeights> histogram_{};
+    std::array<std::atomic<std::uint32_t>, kWeights> histogram_{}, path_histogram_{};
 };
 
 }  // namespace narpa

@@ -12,7 +12,10 @@ namespace {
 /// As for lights (lights.cpp): rounding in single precision, where meshes are, and in double.
 constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;
 /// Bounces that are joined, on average; of more the brightest are likeliest.
-constexpr double kBounces = 32;
+constexpr double kBounces = 16;
+/// Starts that share, in blocks of sixteen. Light from far off, on which all of a group agree, wants large ones;
+/// light from close by, and the rays that ask what they see of it, small ones.
+constexpr std::size_t kBlocksOfAGroup = 2;
 /// A ray along a surface cannot tell where it ends within so many times that.
 constexpr double kGrazing = 1e-3;
 constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
@@ -123,45 +126,63 @@ NARPA_EACH_ISA void Starts::join(const Block& b, const Bounce& bounce, Join& __r
     j.lit = bits_of(faces);
 }
 
-std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
-                             std::span<Rgb> radiance) noexcept {
-    const std::size_t k = bounce.found_from / kPacket;
-    const Block& b = block_[k];
-    Join j;
+/// Those of a block that see the bounce. Returns the number of rays that it took.
+std::uint64_t Starts::join_seen(const Tracer& tracer, const Placement& at, std::size_t block, const Bounce& bounce,
+                                Join& j) const noexcept {
+    const Block& b = block_[block];
+    const std::size_t first = block * kPacket;
     join(b, bounce, j);
-    j.lit &= lanes_below(std::min(kPacket, n_ - k * kPacket));
+    j.lit &= lanes_below(std::min(kPacket, n_ - first));
     for_each_lane(j.lit & b.special, [&](std::size_t i) {
-        const PathPoint::Response r = points_[k * kPacket + i].respond(j.direction[i]);
+        const PathPoint::Response r = points_[first + i].respond(j.direction[i]);
         j.density[i] = r.pdf;
         j.reflected.put(i, r.f_cos);
     });
     for_each_lane(j.lit & b.guided, [&](std::size_t i) {
-        const Path& path = paths_[k * kPacket + i];
+        const Path& path = paths_[first + i];
         const double share = path.guide.share();
         j.density[i] = (1 - share) * j.density[i] + share * path.guide.pdf(tracer, at, path.start, j.direction[i]);
     });
-    std::uint32_t asked = j.lit & ~(1u << bounce.found_from % kPacket);
+    std::uint32_t asked = j.lit;
+    if (bounce.found_from / kPacket == block) asked &= ~(1u << bounce.found_from % kPacket);
     for_each_lane(asked, [&](std::size_t i) {
         if (!(j.range_m[i] > 0)) asked &= ~(1u << i);  // they touch
     });
     j.lit &= ~tracer.occluded(at, b.hits, j.direction, j.range_m, asked);
+    return static_cast<std::uint64_t>(std::popcount(asked));
+}
+
+std::uint64_t Starts::gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
+                             std::span<Rgb> radiance) noexcept {
+    const std::size_t group = bounce.found_from / kPacket / kBlocksOfAGroup * kBlocksOfAGroup;
+    const std::size_t n = std::min(kBlocksOfAGroup, blocks() - group);
+    std::array<Join, kBlocksOfAGroup> joins;
     double density = 0;
-    for_each_lane(
-        j.lit, [&](std::size_t i) { density += j.density[i] * j.geometry[i] * static_cast<double>(b.chance[i]); });
-    const auto rays = static_cast<std::uint64_t>(std::popcount(asked));
+    std::uint64_t rays = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+        const Block& b = block_[group + k];
+        Join& j = joins[k];
+        rays += join_seen(tracer, at, group + k, bounce, j);
+        for_each_lane(j.lit, [&](std::size_t i) {
+            density += j.density[i] * j.geometry[i] * static_cast<double>(b.chance[i]);
+        });
+    }
     if (!(density > 0)) return rays;
     const bool even = bounce.point.plain();
     const Rgb light = even ? bounce.towards(bounce.point.plane()) : Rgb{};
     const double per_density = static_cast<double>(scale) / density;
-    for_each_lane(j.lit, [&](std::size_t i) {
-        const Rgb f = j.reflected[i] * static_cast<float>(j.geometry[i] * per_density);
-        const std::size_t number = k * kPacket + i;
-        const Rgb sent = f * (even ? light : bounce.towards(-j.direction[i]));
-        const float mean = mean_band(sent);
-        radiance[ray_[number]] += sent;
-        sum_[number] += mean;
-        squares_[number] += mean * mean;
-    });
+    for (std::size_t k = 0; k < n; ++k) {
+        const Join& j = joins[k];
+        for_each_lane(j.lit, [&](std::size_t i) {
+            const Rgb f = j.reflected[i] * static_cast<float>(j.geometry[i] * per_density);
+            const std::size_t number = (group + k) * kPacket + i;
+            const Rgb sent = f * (even ? light : bounce.towards(-j.direction[i]));
+            const float mean = mean_band(sent);
+            radiance[ray_[number]] += sent;
+            sum_[number] += mean;
+            squares_[number] += mean * mean;
+        });
+    }
     return rays;
 }
 

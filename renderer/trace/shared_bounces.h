@@ -1,11 +1,12 @@
 /// renderer/trace/shared_bounces.h - light that one path has found lights the points of its neighbours as well.
 ///
 /// Most rays that leave a spacecraft's surfaces meet nothing, and the few that meet a sunlit part of it bring all
-/// that its other parts send. So the points that those few find are joined to sixteen points from which paths set
-/// out, their own among them, by rays that ask for visibility alone, and each such point stands for all of them:
-/// multiple importance sampling by the balance heuristic over the points that could have found it (P. Bekaert, M.
-/// Sbert, J. Halton, "Accelerating path tracing by re-using paths", EGWR 2002). Nothing is biased, as visibility is
-/// known for every pair; a point's own find never weighs more than its albedo, so corners send no fireflies.
+/// that its other parts send. So the points that those few find are joined to thirty-two points from which paths
+/// set out, their own among them, by rays that ask for visibility alone, and each such point stands for all of
+/// them: multiple importance sampling by the balance heuristic over the points that could have found it (P.
+/// Bekaert, M. Sbert, J. Halton, "Accelerating path tracing by re-using paths", EGWR 2002). Nothing is biased, as
+/// visibility is known for every pair; a point's own find never weighs more than its albedo, so corners send no
+/// fireflies.
 #pragma once
 
 #include <array>
@@ -77,6 +78,8 @@ private:
     void make_points(const Tracer& tracer, const Placement& at, double pixel_angle_rad) noexcept;
     [[nodiscard]] std::size_t blocks() const noexcept { return (n_ + kPacket - 1) / kPacket; }
     static void join(const Block& b, const Bounce& bounce, Join& j) noexcept;
+    std::uint64_t join_seen(const Tracer& tracer, const Placement& at, std::size_t block, const Bounce& bounce,
+                            Join& j) const noexcept;
     std::uint64_t gather(const Tracer& tracer, const Placement& at, const Bounce& bounce, float scale,
                          std::span<Rgb> radiance) noexcept;
 

@@ -23,17 +23,18 @@ struct Standing {
     bool loop;              ///< can the plain loop render it?
     double speed_up_least;  ///< over the plain loop at equal error; 0: not judged
     int size;               ///< px, the longer side
+    bool far = false;       ///< on to 64 samples a pixel, as pictures converge
 };
 using Method = RenderSettings::Method;
 constexpr std::array<Standing, 5> kStanding{{
     {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, true, 2, 512},
-    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 256},  // four bounces
+    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 256, true},  // four bounces
     {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, false, 0, 320},
     {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, false, 0, 320},
     {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, true, 0, 128},
 }};
 
-constexpr int kReferenceSpp = 4096;
+constexpr int kReferenceSpp = 4096, kFarReferenceSpp = 16384;
 /// Medians of times are of so many frames; quick: to see that all runs.
 constexpr int kLadderFrames = 9, kRatioFrames = 15, kLoads = 7, kQuick = 2;
 static_assert(std::min({kLadderFrames, kRatioFrames, kLoads}) >= 7);
@@ -62,7 +63,7 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     SceneLadder l;
     l.scene = s.name;
     l.speed_up_least = s.speed_up_least;
-    l.reference_spp = o.quick ? 256 : kReferenceSpp;
+    l.reference_spp = o.quick ? 256 : s.far ? kFarReferenceSpp : kReferenceSpp;
     std::size_t camera = 0;
     auto world = world_of(s, o.quick ? 48 : s.size, camera);
     if (!world) return world.error();
@@ -73,6 +74,11 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     settings.reference_spp = l.reference_spp;
     settings.t_ns = static_cast<std::int64_t>(std::max(0.0, s.at_s) * 1e9);
     settings.frames = o.quick ? kQuick : kLadderFrames;
+    if (s.far && !o.quick) {
+        settings.spp.push_back(64);
+        settings.rays_per_pixel.push_back(64);
+        settings.loop_spp.push_back(1024);
+    }
     std::optional<ReferenceLoop> loop;
     if (s.loop) {
         Placement at((*world)->scene().bodies.size());

@@ -33,6 +33,9 @@ constexpr float kUnseen = 0.02f;
 /// the variances of one sample, weights of 2/5 and of 1/2.
 constexpr double kEdgePower = 0.8;
 
+/// Paths are dear: so many doublings fewer than their noise asks for beside edges.
+constexpr double kFewerPaths = 0.5;
+
 constexpr int kRim = 2;
 constexpr int kSide = kTile + 2 * kRim;
 using Grid = std::array<std::array<float, kSide>, kSide>;
@@ -145,7 +148,7 @@ void SamplePlan::weigh_tile(const Frame& f, const PixelLooks& looks, std::size_t
         const double variance = static_cast<double>(around(looks, tile, &Sums::paths)) / typical_variance;
         const auto hash = static_cast<int>(sampler_detail::mix(tile) % kPerDoubling);
         const double doublings = doublings_of(variance);
-        even = kEventful + static_cast<int>(kPerDoubling * doublings);
+        even = kEventful + static_cast<int>(kPerDoubling * std::max(0.0, doublings - kFewerPaths));
         path_weights_[tile] = static_cast<Weight>(std::min(even + hash, kWeights - 1));
     }
     Grid edge{}, noise{}, known{};

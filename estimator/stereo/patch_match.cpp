@@ -15,15 +15,13 @@ using Eigen::Vector3d;
 using Vector = Eigen::Matrix<double, 9, 1>;
 using Matrix = Eigen::Matrix<double, 9, 9>;
 
-using Relief = Eigen::Matrix<double, 5, 1>;
-
 constexpr int kIterationsMax = 20;
 constexpr double kSettled_px = 1e-4, kFarthest_px = 1.5;
 /// What neither plane nor curvature describes of where a pixel lies in the other picture, interpolation and its
 /// aliases among it: each pixel for itself. Measured on scenes/descent, where it makes the scatter across epipolar
-/// lines (which relief does not touch) the predicted one at four levels of noise.
+/// lines, which relief does not touch, the predicted one at a quarter to twice the exposure.
 constexpr double kUnexplained_px = 0.06;
-/// How far the ground bends the picture of a patch's edge beyond a plane's.
+/// How far ground that is no plane may move the picture of a patch's edge: craters of scenes/descent do.
 constexpr double kCurvature_px = 0.1;
 /// Weights of a picture's pixel and its neighbours each way before it is interpolated: they take the frequencies
 /// that a step between two pixels has aliased, and this part of the variance of noise.
@@ -35,11 +33,14 @@ constexpr double kAlike = 1e-3;
 /// Pixels nearer to the top than this are taken as full.
 constexpr double kFull = 0.98;
 
-template <class Visit>  // (Vector2d offset, double dn)
-void for_each_pixel(const Patch& patch, Visit visit) {
+/// False as soon as a visit is.
+template <class Visit>  // bool(Vector2d offset, double dn)
+bool for_each_pixel(const Patch& patch, Visit visit) {
     const double* dn = patch.dn.data();
     for (int y = -patch.radius_px; y <= patch.radius_px; ++y)
-        for (int x = -patch.radius_px; x <= patch.radius_px; ++x) visit(Vector2d(x, y), *dn++);
+        for (int x = -patch.radius_px; x <= patch.radius_px; ++x)
+            if (!visit(Vector2d(x, y), *dn++)) return false;
+    return true;
 }
 
 class Correlation {
@@ -58,32 +59,90 @@ private:
 std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
                                   double inverse_depth, const Vector2d& shift) {
     Correlation c;
-    bool inside = true;
-    for_each_pixel(patch, [&](const Vector2d& offset, double dn) {
-        if (!inside) return;
+    const bool inside = for_each_pixel(patch, [&](const Vector2d& offset, double dn) {
         const Vector3d ray = warp.ray(patch.centre_px() + offset);
-        if (!warp.is_before(ray, inverse_depth)) return void(inside = false);
+        if (!warp.is_before(ray, inverse_depth)) return false;
         const Vector2d px = warp.px(ray, inverse_depth) + shift;
-        if (!there.spline.holds(px)) return void(inside = false);
+        if (!there.spline.holds(px)) return false;
         c.add(dn, there.spline.dn(px));
+        return true;
     });
     if (!inside) return {};
     return c.value();
 }
 
-/// The weight of a pixel, less towards the patch's edge.
-double window(const Patch& patch, const Vector2d& offset) {
-    const double sigma = 0.5 * (patch.radius_px + 0.5);
-    return std::exp(-offset.squaredNorm() / (2 * sigma * sigma));
-}
-
 /// Sums of a step of the fit.
 struct Normal {
     Matrix H = Matrix::Zero();      ///< weighted by window and noise
-    Matrix noise = Matrix::Zero();  ///< covariance of `b`, from the sensors' noise
+    Matrix noise = Matrix::Zero();  ///< covariance of `b`
     Vector b = Vector::Zero();
-    double squares = 0, expected_squares = 0;
+    double squares = 0, expected_squares = 0;  ///< of the residuals
     Correlation correlation;
+};
+
+class PatchFit {
+public:
+    PatchFit(const Patch& patch, const StereoView& here, const EpipolarWarp& warp, const StereoView& there,
+             double inverse_depth)
+        : patch_(patch),
+          here_(here),
+          warp_(warp),
+          there_(there),
+          inverse_depth_(inverse_depth),
+          per_px_(1 / warp.px_slope(warp.ray(patch.centre_px()), inverse_depth).norm()) {}
+
+    /// Where the middle lies without a shift.
+    [[nodiscard]] Vector2d start_px() const { return warp_.px(warp_.ray(patch_.centre_px()), inverse_depth_); }
+
+    /// Nothing where the patch leaves the other picture.
+    [[nodiscard]] std::optional<Normal> linearise(const Vector& p) const {
+        Normal n;
+        if (!for_each_pixel(patch_, [&](const Vector2d& offset, double dn) { return add(offset, dn, p, n); }))
+            return {};
+        const Eigen::Vector3d information = Eigen::Vector3d::Constant(1 / (kCurvature_px * kCurvature_px));
+        n.H.diagonal().segment<3>(4) += information;
+        n.noise.diagonal().segment<3>(4) += information;
+        n.b.segment<3>(4) -= information.cwiseProduct(p.segment<3>(4));
+        return n;
+    }
+
+private:
+    bool add(const Vector2d& offset, double dn, const Vector& p, Normal& n) const {
+        const Vector3d ray = warp_.ray(patch_.centre_px() + offset);
+        const Vector2d at = offset / patch_.radius_px;
+        Eigen::Matrix<double, 5, 1> relief;  // in pixels at the patch's edge
+        relief << at, at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
+        const double inverse_depth = inverse_depth_ + per_px_ * p.segment<5>(2).dot(relief);
+        if (!warp_.is_before(ray, inverse_depth)) return false;
+        const Vector2d px = warp_.px(ray, inverse_depth) + p.head<2>();
+        if (!there_.spline.holds(px)) return false;
+
+        const auto s = there_.spline.sample(px);
+        const double gain = p[7], residual = gain * dn + p[8] - s.dn;
+        Vector J;
+        J << s.gradient, per_px_ * s.gradient.dot(warp_.px_slope(ray, inverse_depth)) * relief, -dn, -1;
+        const double noise = there_.sensor.variance_dn2(s.dn) + gain * gain * here_.sensor.variance_dn2(dn);
+        const double unexplained = kUnexplained_px * kUnexplained_px * s.gradient.squaredNorm();
+        const double w = window(offset), weight = w / (noise + unexplained);
+        n.H += weight * J * J.transpose();
+        n.noise += w * weight * J * J.transpose();
+        n.b += weight * residual * J;
+        n.squares += weight * residual * residual;
+        n.expected_squares += weight * (kSoftNoise * noise + unexplained);
+        n.correlation.add(dn, s.dn);
+        return true;
+    }
+    /// A pixel's weight, less towards the patch's edge.
+    [[nodiscard]] double window(const Vector2d& offset) const {
+        const double sigma = 0.5 * (patch_.radius_px + 0.5);
+        return std::exp(-offset.squaredNorm() / (2 * sigma * sigma));
+    }
+
+    const Patch& patch_;
+    const StereoView& here_;
+    const EpipolarWarp& warp_;
+    const StereoView& there_;
+    double inverse_depth_, per_px_;
 };
 
 MeasuredImage softened(const MeasuredImage& image) {
@@ -158,59 +217,27 @@ std::optional<WholePixelMatch> search_line(const Patch& patch, const EpipolarWar
 
 std::optional<SubPixelMatch> fit_patch(const Patch& patch, const StereoView& here, const EpipolarWarp& warp,
                                        const StereoView& there, const WholePixelMatch& start) {
-    const Vector3d middle = warp.ray(patch.centre_px());
-    const double rho0 = start.inverse_depth;
-    const Vector2d px0 = warp.px(middle, rho0);
-    // Slopes and curvatures in pixels of shift at the patch's edge.
-    const double per_px = 1 / warp.px_slope(middle, rho0).norm();
-    Matrix prior = Matrix::Zero();
-    prior.diagonal().segment<3>(4).setConstant(1 / (kCurvature_px * kCurvature_px));
+    const PatchFit fit(patch, here, warp, there, start.inverse_depth);
+    const Vector2d px0 = fit.start_px();
     Vector p = Vector::Zero();
     p.head<2>() = start.px - px0, p[7] = 1;
-    Normal n;
-    for (int iteration = 0;; ++iteration) {
-        n = {};
-        bool inside = true;
-        for_each_pixel(patch, [&](const Vector2d& offset, double dn) {
-            if (!inside) return;
-            const Vector3d ray = warp.ray(patch.centre_px() + offset);
-            const Vector2d at = offset / patch.radius_px;
-            Relief relief;
-            relief << at, at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
-            const double rho = rho0 + per_px * p.segment<5>(2).dot(relief);
-            if (!warp.is_before(ray, rho)) return void(inside = false);
-            const Vector2d px = warp.px(ray, rho) + p.head<2>();
-            if (!there.spline.holds(px)) return void(inside = false);
-            const auto s = there.spline.sample(px);
-            Vector J;
-            J << s.gradient, per_px * s.gradient.dot(warp.px_slope(ray, rho)) * relief, -dn, -1;
-            const double residual = p[7] * dn + p[8] - s.dn;
-            const double noise = there.sensor.variance_dn2(s.dn) + p[7] * p[7] * here.sensor.variance_dn2(dn);
-            const double unexplained = kUnexplained_px * kUnexplained_px * s.gradient.squaredNorm();
-            const double w = window(patch, offset), weight = w / (noise + unexplained);
-            n.H += weight * J * J.transpose();
-            n.noise += w * weight * J * J.transpose();
-            n.b += weight * residual * J;
-            n.squares += weight * residual * residual;
-            n.expected_squares += weight * (kSoftNoise * noise + unexplained);
-            n.correlation.add(dn, s.dn);
-        });
-        if (!inside) return {};
-        n.H += prior, n.noise += prior, n.b -= prior * p;
-        const Eigen::LDLT<Matrix> factors(n.H);
+    for (int iteration = 0; iteration <= kIterationsMax; ++iteration) {
+        const auto n = fit.linearise(p);
+        if (!n) return {};
+        const Eigen::LDLT<Matrix> factors(n->H);
         if (!factors.isPositive()) return {};
-        const Vector step = factors.solve(n.b);
+        const Vector step = factors.solve(n->b);
         if (!step.allFinite()) return {};
         if (step.head<2>().norm() < kSettled_px) {
-            const Matrix C = factors.solve(factors.solve(n.noise).transpose());
-            const double misfit = n.squares / n.expected_squares;
+            const Matrix C = factors.solve(factors.solve(n->noise).transpose());
+            const double misfit = n->squares / n->expected_squares;
             return SubPixelMatch{px0 + p.head<2>(), std::max(1.0, misfit) * C.topLeftCorner<2, 2>(),
-                                 n.correlation.value(), misfit};
+                                 n->correlation.value(), misfit};
         }
-        if (iteration == kIterationsMax) return {};
         p += step;
         if ((px0 + p.head<2>() - start.px).norm() > kFarthest_px) return {};
     }
+    return {};
 }
 
 }  // namespace narpa

@@ -191,6 +191,25 @@ TEST(StereoMatcher, FindsNothingInNoiseOrInWhatIsFull) {
     EXPECT_GT(found->counts.cut_off, 50);
 }
 
+TEST(StereoMatcher, WhatNeitherNoiseNorReliefExplainsShowsInTheCovariance) {
+    // The right frame is three times as noisy as its detector is.
+    Views v = views(kDown, waves());
+    add_noise(v.pair.left, 1, v.left);
+    for (std::uint64_t seed = 2; seed < 11; ++seed) add_noise(v.pair.right, seed, v.right);
+    const auto found = match_stereo(v.pair, v.left, v.right, settings());
+    ASSERT_TRUE(found);
+    const auto n = static_cast<double>(found->points.size());
+    ASSERT_GE(n, 60);
+    double misfit = 0, squared = 0;
+    for (const StereoPoint& p : found->points) {
+        const double e = p.point.point_m.z() - truth(v.pair.left, {}, p.left_px).z();
+        misfit += p.match.misfit / n;
+        squared += e * e / p.point.covariance_m2(2, 2) / n;
+    }
+    EXPECT_GT(misfit, 2);
+    EXPECT_NEAR(squared, 1, 3 * std::sqrt(2 / n));
+}
+
 TEST(StereoMatcher, GainAndOffsetDoNotMatter) {
     Views v = views(kDown, waves());
     for (float& dn : v.right.dn) dn = 0.6f * dn + 200;

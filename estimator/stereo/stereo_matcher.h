@@ -3,6 +3,11 @@
 /// Corners of the left frame (Shi and Tomasi 1994) are looked for along their epipolar lines in the right one,
 /// first to the whole pixel, as the paper's section V does, then between pixels. A point is the middle of the left
 /// pixel that its corner was found in, so that the left pixel is exact and the whole error is the match's.
+///
+/// The errors of matches, as scenes/descent shows them (200 points, 500 x 500 pixels, detector noise of about a
+/// seventieth of the signal): 0.026 px along the epipolar line and 0.016 px across it, as predicted within a tenth;
+/// without noise 0.029 and 0.015, where the prediction is 1.5 times too small in variance. So noise is not what
+/// limits them there, but relief within a patch, along the line, and what a frame's pixels have aliased.
 #pragma once
 
 #include <vector>

@@ -229,7 +229,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
 FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placement& at, const Rigid3& guess) {
     FeatureEstimate estimate;
     estimate.T_camera_target = guess;
-    view_.set_world(at);
+    view_.place_bodies(at);
     const Camera& camera = view_.camera();
     const ToneScale tones(frame, sensor_);
     const TonedImage toned_frame = tones.toned(frame);

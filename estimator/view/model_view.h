@@ -16,8 +16,8 @@ public:
     /// time of the frame; the target's attitude there tells how the light falls on it.
     ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at);
 
-    /// Another time: where every body is then.
-    void set_world(const Placement& at) { at_.T_world_body = at.T_world_body; }
+    /// Where every body is from now on: at another frame's time.
+    void place_bodies(const Placement& at) { at_ = at; }
 
     /// Renders the view at this pose; `aovs` tells whether depth, position, normal and body are wanted too. The
     /// budget of the settings is obeyed. Allocates nothing after the first call of a kind.

@@ -1,0 +1,52 @@
+/// estimator/dense/level_view.h - one level of the pyramid: the part of the image about the target, measured and
+/// expected.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "estimator/dense/photometric_fit.h"
+
+namespace narpa {
+
+/// Pixels x .. x + width - 1, y .. y + height - 1.
+struct Window {
+    int x = 0, y = 0, width = 0, height = 0;
+    friend bool operator==(const Window&, const Window&) = default;
+};
+
+/// Where the target's bounds lie in the image at this pose, with room around; nothing where they do not meet it or
+/// lie behind the camera.
+[[nodiscard]] std::optional<Window> window_about(const Tracer& tracer, const Camera& camera, std::size_t target,
+                                                 const Rigid3& T_camera_target);
+/// Longest side of the target's bounds in the image, px; the image's own where they reach beyond it.
+[[nodiscard]] double extent_px(const Window& window);
+
+[[nodiscard]] Camera window_camera(const Camera& camera, const Window& window);
+
+/// Signal and derivative in a window of the camera.
+class LevelView {
+public:
+    LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
+              const Placement& at, int fineness);
+
+    [[nodiscard]] const Window& window() const noexcept { return window_; }
+    /// As ModelView has it.
+    void place_bodies(const Placement& at);
+    /// Takes the measured image (of the level's whole camera) and variance (or none) into the window.
+    void measure(const MeasuredImage& image, std::span<const float> variance);
+    void render(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);
+    void differentiate(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);
+    /// The images as they were last made.
+    [[nodiscard]] PhotometricImages images(double pixels_averaged) const;
+
+private:
+    Window window_;
+    ModelView view_;
+    ImageDerivative derivative_;
+    std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
+    std::span<const PixelDerivative> columns_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,206 @@
+#include "estimator/dense/photometric_fit.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace narpa {
+namespace {
+
+/// A sigma of zero: so sure that nothing moves it.
+constexpr double kSure = 1e12;
+
+double precision(double sigma) {
+    return sigma > 0 ? 1 / (sigma * sigma) : kSure;
+}
+
+struct Residual {
+    double r = 0;          ///< in units of s
+    double inverse_s = 0;  ///< 1 / DN
+    bool counts = false, tells = false;
+};
+
+class Residuals {
+public:
+    Residuals(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
+              double model_dn2)
+        : i_(images), sensor_(sensor), e_(exposure), model_dn2_(model_dn2) {}
+
+    [[nodiscard]] Residual at(int x, int y) const {
+        const auto p =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x);
+        const auto at_p = [p](std::span<const float> v) { return v.empty() ? 0.0 : static_cast<double>(v[p]); };
+        const double signal = at_p(i_.signal), measured = at_p(i_.measured);
+        const double expected = sensor_.black_dn + e_.gain * signal + e_.offset_dn;
+        Residual out;
+        // Where either is clipped the other tells nothing but that it is bright.
+        if (expected >= sensor_.top_dn || measured >= sensor_.top_dn) return out;
+        const double variance = sensor_.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
+                                model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance);
+        out.counts = variance > 0;
+        if (!out.counts) return out;
+        out.inverse_s = 1 / std::sqrt(variance);
+        out.r = (measured - expected) * out.inverse_s;
+        out.tells = signal > 0 || (!i_.derivative.empty() && !i_.derivative[p].isZero(0));
+        return out;
+    }
+    /// The outermost pixels have no derivative.
+    template <class Do>
+    void each(int y, Do&& act) const {
+        for (int x = 1; x < i_.width - 1; ++x)
+            if (const Residual r = at(x, y); r.counts)
+                act(r,
+                    static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x));
+    }
+
+private:
+    const PhotometricImages& i_;
+    const SensorModel& sensor_;
+    const Exposure& e_;
+    const double model_dn2_;
+};
+
+/// Row by row, so that the threads have no say in the sums.
+template <class Sum, class Add>
+Sum sum_rows(const PhotometricImages& images, Add&& add) {
+    std::vector<Sum> rows(static_cast<std::size_t>(std::max(images.height, 0)));
+    tbb::parallel_for(1, std::max(images.height - 1, 1), [&](int y) { add(y, rows[static_cast<std::size_t>(y)]); });
+    Sum sum;
+    for (const Sum& row : rows) sum += row;
+    return sum;
+}
+
+struct CostSum {
+    double robust = 0, chi2 = 0;
+    std::size_t pixels = 0;
+    CostSum& operator+=(const CostSum& b) {
+        robust += b.robust, chi2 += b.chi2, pixels += b.pixels;
+        return *this;
+    }
+};
+
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
+using Vector8 = Eigen::Matrix<double, 8, 1>;
+struct EquationSum {
+    Matrix8 information = Matrix8::Zero();
+    Vector8 gradient = Vector8::Zero();
+    EquationSum& operator+=(const EquationSum& b) {
+        information += b.information, gradient += b.gradient;
+        return *this;
+    }
+};
+
+}  // namespace
+
+double residual_scale(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
+                      double model_dn2) {
+    const Residuals residuals(images, sensor, exposure, model_dn2);
+    std::vector<float> size;
+    for (int y = 1; y < images.height - 1; ++y)
+        residuals.each(y, [&](const Residual& r, std::size_t) {
+            if (r.tells) size.push_back(static_cast<float>(std::abs(r.r)));
+        });
+    if (size.empty()) return 1;
+    const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+    std::nth_element(size.begin(), middle, size.end());
+    return std::max(1.0, 1.4826 * static_cast<double>(*middle));
+}
+
+double signal_power(const PhotometricImages& images) {
+    double sum = 0;
+    std::size_t lit = 0;
+    for (const float v : images.signal) {
+        sum += static_cast<double>(v) * static_cast<double>(v);
+        lit += v > 0 ? 1 : 0;
+    }
+    return sum / static_cast<double>(std::max<std::size_t>(lit, 1));
+}
+
+std::array<int, 2> best_shift(const PhotometricImages& images, const SensorModel& sensor, int most) {
+    const int side = 2 * most + 1;
+    std::vector<double> sums(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
+    tbb::parallel_for(0, side * side, [&](int shift) {
+        const int dx = shift % side - most, dy = shift / side - most;
+        double sum = 0;
+        for (int y = 0; y < images.height; ++y)
+            for (int x = 0; x < images.width; ++x) {
+                const auto p = static_cast<std::size_t>(y * images.width + x);
+                const int from_x = x - dx, from_y = y - dy;
+                const bool inside = from_x >= 0 && from_x < images.width && from_y >= 0 && from_y < images.height;
+                const auto from = static_cast<std::size_t>(inside ? from_y * images.width + from_x : 0);
+                const double expected = sensor.black_dn + (inside ? static_cast<double>(images.signal[from]) : 0);
+                const double r = static_cast<double>(images.measured[p]) - std::min(expected, sensor.top_dn);
+                sum += r * r;
+            }
+        sums[static_cast<std::size_t>(shift)] = sum;
+    });
+    const int best = static_cast<int>(std::min_element(sums.begin(), sums.end()) - sums.begin());
+    return {best % side - most, best / side - most};
+}
+
+PhotometricCost cost(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
+                     const ExposurePrior& prior, const Robustness& robust) {
+    const Residuals residuals(images, sensor, exposure, robust.model_dn2);
+    const double k = robust.cauchy * robust.scale;
+    const auto sum = sum_rows<CostSum>(images, [&](int y, CostSum& row) {
+        residuals.each(y, [&](const Residual& r, std::size_t) {
+            const double square = r.r * r.r;
+            row.robust += std::isfinite(k) ? k * k * std::log1p(square / (k * k)) : square;
+            if (!r.tells) return;
+            row.chi2 += square;
+            ++row.pixels;
+        });
+    });
+    const double off = exposure.gain - 1;
+    const double known = off * off * precision(prior.gain_sigma) +
+                         exposure.offset_dn * exposure.offset_dn * precision(prior.offset_sigma_dn);
+    return {sum.robust + robust.scale * robust.scale * known, sum.chi2, sum.pixels};
+}
+
+PhotometricEquations equations(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
+                               const ExposurePrior& prior, const Robustness& robust) {
+    const Residuals residuals(images, sensor, exposure, robust.model_dn2);
+    const double k = robust.cauchy * robust.scale;
+    const auto sum = sum_rows<EquationSum>(images, [&](int y, EquationSum& row) {
+        residuals.each(y, [&](const Residual& r, std::size_t p) {
+            const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
+            Vector8 J;
+            J << exposure.gain * images.derivative[p].cast<double>(), static_cast<double>(images.signal[p]), 1;
+            J *= r.inverse_s;
+            row.information.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
+            row.gradient += weight * r.r * J;
+        });
+    });
+    PhotometricEquations out;
+    out.information = sum.information.selfadjointView<Eigen::Lower>();
+    out.gradient = sum.gradient;
+    // The prior in the units of residuals that are `scale` times their noise.
+    const double unit = robust.scale * robust.scale;
+    const double gain = unit * precision(prior.gain_sigma), offset = unit * precision(prior.offset_sigma_dn);
+    out.information(6, 6) += gain;
+    out.information(7, 7) += offset;
+    out.gradient[6] -= gain * (exposure.gain - 1);
+    out.gradient[7] -= offset * exposure.offset_dn;
+    return out;
+}
+
+Matrix6 PhotometricEquations::pose_information() const {
+    const Eigen::Matrix2d of_exposure = information.bottomRightCorner<2, 2>().inverse();
+    return information.topLeftCorner<6, 6>() -
+           information.topRightCorner<6, 2>() * of_exposure * information.bottomLeftCorner<2, 6>();
+}
+
+Vector6 PhotometricEquations::pose_gradient() const {
+    const Eigen::Matrix2d of_exposure = information.bottomRightCorner<2, 2>().inverse();
+    return gradient.head<6>() - information.topRightCorner<6, 2>() * of_exposure * gradient.tail<2>();
+}
+
+Eigen::Vector2d PhotometricEquations::exposure_step(const Vector6& pose_step) const {
+    return information.bottomRightCorner<2, 2>().inverse() *
+           (gradient.tail<2>() - information.bottomLeftCorner<2, 6>() * pose_step);
+}
+
+}  // namespace narpa

@@ -1,0 +1,115 @@
+// Render and compare, dense: from five degrees and five per cent off to the pose of a frame.
+#include "estimator/dense/dense_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "renderer/scene/scene_file.h"
+#include "renderer/sensor/detector.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kDegree = 0.017453292519943295;
+
+/// The docking scene with the navigation camera at 160 x 120, 25 m before the port.
+class DockingFrame : public testing::Test {
+protected:
+    void SetUp() override {
+        auto read = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+        ASSERT_TRUE(read) << read.error().text();
+        scene = std::move(*read);
+        camera = coarser_camera(scene.cameras[0], 4);
+        camera.format = PixelFormat::y16;
+        auto made = Tracer::create(scene);
+        ASSERT_TRUE(made);
+        tracer.emplace(std::move(*made));
+        for (std::size_t b = 0; b < at.T_world_body.size(); ++b) at.set(b, scene.bodies[b].initial.T_world_body);
+        at.T_world_body[1].t = {25, 1.2, -0.8};
+        truth = inverse(at.T_world_body[1] * camera.T_mount_camera) * at.T_world_body[0];
+    }
+    MeasuredImage frame_at(const Rigid3& pose, bool noise) {
+        ModelView view(*tracer, camera, 0, at);
+        FrameSettings s;
+        s.seed = 99;
+        s.budget.kind = FrameBudget::Kind::rays;
+        s.budget.rays = 2'000'000;
+        view.render(pose, s, false);
+        Camera exposing = camera;
+        if (!noise) exposing.detector->shot_noise = false, exposing.detector->read_noise_e = 0;
+        std::vector<std::uint8_t> bytes(
+            frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
+        expose(exposing, view.radiance(), 3, 1, bytes);
+        auto image = measured_image(camera, bytes);
+        EXPECT_TRUE(image);
+        return std::move(*image);
+    }
+
+    Scene scene;
+    Camera camera;
+    std::optional<Tracer> tracer;
+    Placement at{2};
+    Rigid3 truth;
+};
+
+Vector6 off_by(double degrees, double part, double range_m) {
+    Vector6 e;
+    e << degrees * kDegree * Eigen::Vector3d(0.6, -0.5, 0.62).normalized(),
+        part * range_m * Eigen::Vector3d(-0.5, 0.4, 0.7).normalized();
+    return e;
+}
+
+TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
+    const MeasuredImage frame = frame_at(truth, false);
+    DenseAlignment dense(*tracer, camera, 0);
+    DenseOptions o;
+    o.fineness = 4;
+    o.rays_per_pixel = 50;
+    const auto e = dense.align(frame, at, displaced(truth, off_by(5, 0.05, norm(truth.t))), o);
+    ASSERT_TRUE(e) << e.error().text();
+    EXPECT_EQ(e->status, DenseStatus::converged) << name(e->status);
+    const Vector6 error = error_between(truth, e->T_camera_body);
+    EXPECT_LT(error.head<3>().norm(), 0.02 * kDegree);
+    EXPECT_LT(error.tail<3>().norm(), 1e-3 * norm(truth.t));
+}
+
+TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
+    const MeasuredImage frame = frame_at(truth, false);
+    DenseAlignment dense(*tracer, camera, 0);
+    const auto says = [&](const MeasuredImage& f, const Rigid3& guess, const DenseOptions& o,
+                          std::span<const float> variance, const char* words) {
+        const auto e = dense.align(f, at, guess, o, variance);
+        ASSERT_FALSE(e) << words;
+        EXPECT_NE(e.error().what.find(words), std::string::npos) << e.error().what;
+    };
+    MeasuredImage bad = frame;
+    bad.dn[77] = std::numeric_limits<float>::quiet_NaN();
+    says(bad, truth, {}, {}, "not finite");
+    says({3, 3, std::vector<float>(9)}, truth, {}, {}, "expected the camera's 160 x 120");
+    says(frame, {Quat{2, 0, 0, 0}, {}}, {}, {}, "quaternion of norm 1");
+    says(frame, truth, {}, std::vector<float>(5), "variances of 5 pixels");
+    says(frame, truth, {}, std::vector<float>(frame.dn.size(), -1), "negative");
+    DenseOptions o;
+    o.coarsest = 3;
+    says(frame, truth, o, {}, "coarsest");
+    o = {};
+    o.rays_per_pixel = std::numeric_limits<double>::quiet_NaN();
+    says(frame, truth, o, {}, "rays_per_pixel");
+}
+
+TEST_F(DockingFrame, SaysThatTheTargetIsNotInThePicture) {
+    const MeasuredImage frame = frame_at(truth, false);
+    DenseAlignment dense(*tracer, camera, 0);
+    for (const Vec3& place : {Vec3{500, 0, 60}, Vec3{0, 0, -60}}) {
+        const auto e = dense.align(frame, at, {truth.q, place}, {});
+        ASSERT_TRUE(e);
+        EXPECT_EQ(e->status, DenseStatus::left_the_picture);
+        EXPECT_FALSE(dense.bound(at, {truth.q, place}, {}));
+    }
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,0 +1,129 @@
+// The derivative of rendered images with respect to the pose, against differences of converged renders.
+//
+// The difference of two images is the integral of the derivative along the way between their poses, exactly and
+// however far apart these are: so the poses can be so far apart that the noise of the renders does not matter.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "estimator/dense/image_derivative.h"
+
+namespace narpa {
+namespace {
+
+constexpr int kNodes = 4;  ///< of the integral, at the middles of as many parts
+
+Camera pinhole(int size, double f) {
+    Camera c;
+    c.width = c.height = size;
+    c.fx = c.fy = f;
+    c.cx = c.cy = 0.5 * (size - 1);
+    return c;
+}
+
+SensorModel unit_sensor() {
+    SensorModel s;
+    s.dn_per_radiance = {1, 1, 1};
+    s.top_dn = 1e9;
+    return s;
+}
+
+Placement placement_of(const Scene& scene) {
+    Placement at(scene.bodies.size());
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) at.set(b, scene.bodies[b].initial.T_world_body);
+    return at;
+}
+
+struct Renders {
+    int fineness = 8;
+    double rays_per_pixel = 300;
+    double half_rad = 0, half_m = 0;  ///< way to either side
+};
+
+/// Of each column: RMS over the pixels of (integral of the derivative - difference of the images), over the RMS of
+/// the difference.
+std::array<double, 6> relative_errors(const Tracer& tracer, const Camera& camera, std::size_t target,
+                                      const Rigid3& pose, const Renders& r) {
+    const Placement at = placement_of(tracer.scene());
+    const SensorModel sensor = unit_sensor();
+    ImageDerivative derivative(tracer, camera, target, at, r.fineness);
+    ModelView view(tracer, camera, target, at);
+    FrameSettings many;
+    many.budget.kind = FrameBudget::Kind::rays;
+    many.budget.rays = static_cast<std::uint64_t>(r.rays_per_pixel * camera.width * camera.height);
+    std::array<double, 6> out{};
+    for (int k = 0; k < 6; ++k) {
+        const double half = k < 3 ? r.half_rad : r.half_m;
+        view.render(displaced(pose, half * Vector6::Unit(k)), many, false);
+        const auto ahead = view.radiance().pixels;
+        view.render(displaced(pose, -half * Vector6::Unit(k)), many, false);
+        const auto& behind = view.radiance().pixels;
+        std::vector<double> integral(ahead.size());
+        for (int i = 0; i < kNodes; ++i) {
+            const double place = (2 * i + 1.0) / kNodes - 1;
+            const auto J = derivative.at(displaced(pose, place * half * Vector6::Unit(k)), sensor, {});
+            for (std::size_t p = 0; p < integral.size(); ++p)
+                integral[p] += 2 * half / kNodes * static_cast<double>(J[p][k]);
+        }
+        double error2 = 0, size2 = 0;
+        for (int y = 1; y < camera.height - 1; ++y)
+            for (int x = 1; x < camera.width - 1; ++x) {
+                const auto p = static_cast<std::size_t>(y * camera.width + x);
+                const Rgb d = ahead[p] - behind[p];
+                const double difference = static_cast<double>(d.x + d.y + d.z);
+                error2 += std::pow(integral[p] - difference, 2);
+                size2 += difference * difference;
+            }
+        out[static_cast<std::size_t>(k)] = std::sqrt(error2 / size2);
+    }
+    return out;
+}
+
+Scene ellipsoid_of(const Material& material) {
+    Scene s;
+    s.sun = Sun{normalized(Vec3{0.6, -0.3, -0.7}), 1361, 0.0093};
+    s.ambient = {20, 20, 20};
+    s.materials.push_back(material);
+    s.bodies.push_back({"ball", Ellipsoid{{1, 1.4, 0.8}, 0}, {}, {}});
+    return s;
+}
+
+const Rigid3 kTenMetresAhead{normalized(Quat{0.9, 0.2, -0.3, 0.1}), {0.1, -0.05, 10}};
+
+void expect_right(const Material& material, double tolerance) {
+    const Scene scene = ellipsoid_of(material);
+    const auto tracer = Tracer::create(scene);
+    ASSERT_TRUE(tracer);
+    Renders r;
+    r.half_rad = 1.6e-2, r.half_m = 3.2e-2;  // half a pixel
+    const auto errors = relative_errors(*tracer, pinhole(48, 150), 0, kTenMetresAhead, r);
+    for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], tolerance) << "column " << k;
+}
+
+TEST(ImageDerivative, OfALambertEllipsoid) {
+    Material m;
+    m.diffuse = {0.6f, 0.6f, 0.6f};
+    expect_right(m, 0.08);  // most of it is the rim
+}
+
+TEST(ImageDerivative, OfALobeThatFollowsTheViewer) {
+    Material m;
+    m.kind = Material::Kind::phong;
+    m.diffuse = {0.2f, 0.2f, 0.2f};
+    m.specular = {0.6f, 0.6f, 0.6f};
+    m.exponent = 12;
+    expect_right(m, 0.05);
+}
+
+TEST(ImageDerivative, OfRoughMetal) {
+    Material m;
+    m.kind = Material::Kind::ggx;
+    m.diffuse = {0.8f, 0.8f, 0.8f};
+    m.metallic = 1;
+    m.roughness = 0.6f;
+    expect_right(m, 0.05);
+}
+
+}  // namespace
+}  // namespace narpa

@@ -33,13 +33,12 @@ constexpr double kShrinking = 0.9;
 constexpr double kStillSmall = 10;
 /// The noise of the render's samples may make a good step look worse by so much of the cost.
 constexpr double kSlack = 1e-3;
-/// The rays of a derivative, so that its memory stays bounded.
-constexpr double kMostFineRays = 2e6;
 constexpr std::size_t kFewestPixels = 12;
 /// Least eigenvalue of the pose's information, scaled to ones on its diagonal.
 constexpr double kLeastInformation = 1e-10;
 /// Part of the rays with which the pose is found, so far, before all of them tell it exactly.
 constexpr double kCoarseRays = 0.125, kDraftSigmas = 1;
+constexpr int kCoarseFineness = 3;
 /// Of a window that the target is taken to fill before it is known.
 constexpr double kFirstPart = 0.25;
 constexpr int kMostShift_px = 12;
@@ -93,7 +92,7 @@ Status check(const DenseOptions& o) {
         return wrong("finest", o.finest, "a power of two from 1 to coarsest");
     if (!(o.rays_per_pixel >= 2 && o.rays_per_pixel <= 1e4))
         return wrong("rays_per_pixel", o.rays_per_pixel, "2 to 10000");
-    if (o.fineness < 1 || o.fineness > 16) return wrong("fineness", o.fineness, "1 to 16");
+    if (o.fineness < 1 || o.fineness > 32) return wrong("fineness", o.fineness, "1 to 32");
     if (!(o.exposure.gain_sigma >= 0)) return wrong("gain_sigma", o.exposure.gain_sigma, "0 or more");
     if (!(o.exposure.offset_sigma_dn >= 0))
         return wrong("offset_sigma_dn", o.exposure.offset_sigma_dn, "0 DN or more");
@@ -121,27 +120,18 @@ struct DenseAlignment::Impl {
         }
     }
 
-    LevelView& view_of(int factor, const Camera& level_camera, const Window& window, const Placement& at,
-                       int fineness) {
+    LevelView& view_of(int factor, const Camera& level_camera, const Window& window, const Placement& at) {
         auto& kept = levels[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
-        if (!kept.view || kept.view->window() != window || kept.fineness != fineness) {
-            kept.view.emplace(tracer, level_camera, window, target, at, fineness);
-            kept.fineness = fineness;
-        }
-        kept.view->place_bodies(at);
-        return *kept.view;
+        if (!kept || kept->window() != window) kept.emplace(tracer, level_camera, window, target, at);
+        kept->place_bodies(at);
+        return *kept;
     }
-
-    struct Kept {
-        std::optional<LevelView> view;
-        int fineness = 0;
-    };
 
     const Tracer& tracer;
     Camera camera;
     const std::size_t target;
     const SensorModel sensor;
-    std::array<Kept, 7> levels{};  ///< by the logarithm of their factor
+    std::array<std::optional<LevelView>, 7> levels{};  ///< by the logarithm of their factor
 };
 
 namespace {
@@ -197,11 +187,14 @@ public:
     /// The same with all the rays there are: what is left are steps of the noise that fewer rays have.
     DenseStatus polish() {
         rays_ = o_.rays_per_pixel;
+        fineness_ = o_.fineness;
         return run(false);
     }
 
     /// With the sensor's noise alone.
     Result<Matrix6> bound() {
+        rays_ = o_.rays_per_pixel;
+        fineness_ = o_.fineness;
         render(e_.T_camera_body);
         differentiate();
         PhotometricImages images = view_.images(pixels_averaged());
@@ -264,7 +257,7 @@ private:
     }
     void differentiate() {
         const Stopwatch watch(e_.derivative_ms);
-        view_.differentiate(e_.T_camera_body, sensor_, settings_);
+        view_.differentiate(e_.T_camera_body, sensor_, settings_, fineness_);
     }
     /// False where not all of the pose follows from the image.
     bool linearise() {
@@ -333,7 +326,8 @@ private:
     DenseEstimate& e_;
     FrameSettings settings_;
     double rays_ = kCoarseRays * o_.rays_per_pixel;  ///< for each pixel of the target
-    double target_px_ = 0;                           ///< pixels that tell of the target; 0: not known yet
+    int fineness_ = std::max(1, o_.fineness / kCoarseFineness);
+    double target_px_ = 0;  ///< pixels that tell of the target; 0: not known yet
 
     Robustness robust_{};
     PhotometricCost cost_{};
@@ -346,11 +340,6 @@ std::vector<float> coarser_variance(std::span<const float> variance, const Camer
     MeasuredImage mean = coarser_image({camera.width, camera.height, {variance.begin(), variance.end()}}, factor);
     for (float& v : mean.dn) v /= static_cast<float>(factor * factor);
     return std::move(mean.dn);
-}
-
-int fineness_of(const DenseOptions& o, const Window& window) {
-    const double pixels = static_cast<double>(window.width) * window.height;
-    return std::max(1, std::min(o.fineness, static_cast<int>(std::sqrt(kMostFineRays / pixels))));
 }
 
 Status check_input(const Camera& camera, const MeasuredImage& frame, std::span<const float> frame_variance,
@@ -408,7 +397,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Pl
         }
         // From a guess the target may have far to go.
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
-        LevelView& view = i.view_of(factor, camera, *window, at, fineness_of(options, *window));
+        LevelView& view = i.view_of(factor, camera, *window, at);
         view.measure(coarser_image(frame, factor), coarser_variance(frame_variance, i.camera, factor));
         Descent descent(camera, i.sensor, i.tracer, i.target, factor, view, options, e);
         e.status = descent.run(first);
@@ -433,7 +422,7 @@ Result<Matrix6> DenseAlignment::bound(const Placement& at, const Rigid3& T_camer
     const Camera camera = coarser_camera(i.camera, factor);
     const std::optional<Window> window = window_about(i.tracer, camera, i.target, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
-    LevelView& view = i.view_of(factor, camera, *window, at, fineness_of(options, *window));
+    LevelView& view = i.view_of(factor, camera, *window, at);
     view.measure(coarser_image(none, factor), {});
     DenseEstimate e;
     e.T_camera_body = T_camera_body;

@@ -25,7 +25,7 @@ struct DenseOptions {
     int iterations = 12;           ///< at most, on each level
     int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
     double rays_per_pixel = 160;   ///< of the last images compared, on average over those that show the target
-    int fineness = 8;              ///< of the derivative: rays each way in a pixel
+    int fineness = 12;             ///< of the last derivative: rays each way in a pixel where the light changes
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;

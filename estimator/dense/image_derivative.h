@@ -6,14 +6,14 @@
 ///
 ///   dT/dpose = - mean(v . grad L) + sum over edges of (L_near - L_far) (v_near . n) length / area + mean(dL/dview)
 ///
-/// The first two are one: L is taken on a grid of `fineness` x `fineness` rays a pixel, and each side between two
-/// neighbours is an edge across which L jumps and which moves with the nearer of the two surfaces. So textures,
-/// creases, shadows' edges and silhouettes are all counted, none twice; the sums over a staircase of sides are
-/// those over the edge itself, as n length sums to the same. Where the sides lie in depth beside each other but not
-/// on one surface, the edge is an occluding contour: rays find its place between the two, and so the pixel that
-/// it belongs to, and the depth of the nearer surface at the contour, where a round body's rim stands. (T.-M. Li et
-/// al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans. Graph. 37(6), 2018, choose
-/// points of the edges at random; here they are on a grid.)
+/// The first two are one: L is taken on a grid of rays in each pixel, finer where it changes much, and each side
+/// between two neighbours is an edge across which L jumps and which moves with the nearer of the two surfaces. So
+/// textures, creases, shadows' edges and silhouettes are all counted, none twice; the sums over a staircase of
+/// sides are those over the edge itself, as n length sums to the same. Where the sides lie in depth beside each
+/// other but not on one surface, the edge is an occluding contour: rays find its place between the two, and so the
+/// pixel that it belongs to, and the depth of the nearer surface at the contour, where a round body's rim stands.
+/// (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans. Graph. 37(6), 2018,
+/// choose points of the edges at random; here they are on a grid.)
 ///
 /// The light falls on the target as the world has it and does not change with the pose (ModelView): shadows lie
 /// still on the surface and move with it, a Lambert surface's shine is constant, and of the others the Sun's direct
@@ -28,7 +28,7 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/view/measured_image.h"
-#include "estimator/view/model_view.h"
+#include "renderer/trace/camera_image.h"
 
 namespace narpa {
 
@@ -37,40 +37,24 @@ using PixelDerivative = Eigen::Matrix<float, 6, 1>;
 
 class ImageDerivative {
 public:
-    /// `camera` is that of the image; `fineness` >= 1 rays each way in a pixel. `tracer` outlives it.
-    ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at,
-                    int fineness);
+    /// `camera` is that of the image. `tracer` outlives it.
+    ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at);
 
     /// As ModelView has it.
-    void place_bodies(const Placement& at) { fine_.place_bodies(at); }
+    void place_bodies(const Placement& at) { at_ = at; }
 
     /// Of the expected DN, but for clipping, at this pose. Row-major; the outermost pixels, beside which nothing is
-    /// known, are zero. Runs on the calling thread's TBB arena; the same on any number of threads.
+    /// known, are zero. `fineness` >= 1: rays each way in a pixel where the light changes much. Runs on the calling
+    /// thread's TBB arena; the same on any number of threads.
     std::span<const PixelDerivative> at(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                        const FrameSettings& settings);
+                                        const FrameSettings& settings, int fineness);
 
 private:
-    struct Side;
-    using Row = Eigen::Matrix<double, 6, 1>;
-
-    [[nodiscard]] std::size_t fine_index(int x, int y) const {
-        return static_cast<std::size_t>(y) * static_cast<std::size_t>(fine_.camera().width) +
-               static_cast<std::size_t>(x);
-    }
-    void find_signal(const SensorModel& sensor);
-    void sum_pixels(int y);
-    void add_side(int xa, int ya, int xb, int yb, double& share_a, Row& flux) const;
-    [[nodiscard]] bool is_contour(std::size_t a, std::size_t b, const Vec3& ray_a, const Vec3& ray_b) const;
-    void find_contour(int xa, int ya, int xb, int yb, std::size_t near, double& along, double& depth_m) const;
-    [[nodiscard]] Row velocity(double x, double y, double depth_m, bool horizontal) const;
-    [[nodiscard]] Row shading(int x, int y, const SensorModel& sensor) const;
-
-    Camera camera_;
-    int fineness_;
-    ModelView fine_;
-    Vec3 t_camera_target_{};
+    const Tracer& tracer_;
+    const Camera camera_;
+    const std::size_t target_;
+    Placement at_;
     bool view_dependent_ = false;  ///< any material
-    std::vector<float> signal_;    ///< DN above black at each point of the fine grid
     std::vector<PixelDerivative> derivative_;
 };
 

@@ -68,10 +68,10 @@ Camera window_camera(const Camera& camera, const Window& window) {
 }
 
 LevelView::LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
-                     const Placement& at, int fineness)
+                     const Placement& at)
     : window_(window),
       view_(tracer, window_camera(camera, window), target, at),
-      derivative_(tracer, window_camera(camera, window), target, at, fineness) {
+      derivative_(tracer, window_camera(camera, window), target, at) {
     const std::size_t n = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
     measured_.resize(n);
     signal_.resize(n);
@@ -107,8 +107,8 @@ void LevelView::render(const Rigid3& T_camera_target, const SensorModel& sensor,
 }
 
 void LevelView::differentiate(const Rigid3& T_camera_target, const SensorModel& sensor,
-                              const FrameSettings& settings) {
-    columns_ = derivative_.at(T_camera_target, sensor, settings);
+                              const FrameSettings& settings, int fineness) {
+    columns_ = derivative_.at(T_camera_target, sensor, settings, fineness);
 }
 
 PhotometricImages LevelView::images(double pixels_averaged) const {

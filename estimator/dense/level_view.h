@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/dense/photometric_fit.h"
+#include "estimator/view/model_view.h"
 
 namespace narpa {
 
@@ -29,7 +30,7 @@ struct Window {
 class LevelView {
 public:
     LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
-              const Placement& at, int fineness);
+              const Placement& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
     /// As ModelView has it.
@@ -37,7 +38,8 @@ public:
     /// Takes the measured image (of the level's whole camera) and variance (or none) into the window.
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);
-    void differentiate(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);
+    void differentiate(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
+                       int fineness);
     /// The images as they were last made.
     [[nodiscard]] PhotometricImages images(double pixels_averaged) const;
 

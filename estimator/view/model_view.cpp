@@ -4,6 +4,13 @@
 
 namespace narpa {
 
+Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, Placement& at) {
+    const Rigid3 T_world_camera = at.T_world_body[target] * inverse(T_camera_target);
+    if (camera.mount >= 0)
+        at.set(static_cast<std::size_t>(camera.mount), T_world_camera * inverse(camera.T_mount_camera));
+    return T_world_camera;
+}
+
 ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at)
     : tracer_(tracer),
       camera_(camera),
@@ -13,9 +20,7 @@ ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t tar
       radiance_(camera.width, camera.height) {}
 
 void ModelView::place(const Rigid3& T_camera_target) {
-    T_world_camera_ = T_world_target() * inverse(T_camera_target);
-    if (camera_.mount >= 0)
-        at_.set(static_cast<std::size_t>(camera_.mount), T_world_camera_ * inverse(camera_.T_mount_camera));
+    T_world_camera_ = place_camera(T_camera_target, camera_, target_, at_);
 }
 
 void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {

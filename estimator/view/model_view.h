@@ -10,6 +10,11 @@
 
 namespace narpa {
 
+/// Where the camera is if the target, which stays where `at` has it, has this pose. The body that carries the
+/// camera is put there with it.
+[[nodiscard]] Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target,
+                                  Placement& at);
+
 class ModelView {
 public:
     /// `tracer` outlives it. `target`: index of the body whose pose is looked for. `at`: where every body is at the

@@ -1,5 +1,6 @@
 // Render and compare, dense: from five degrees and five per cent off to the pose of a frame.
 #include "estimator/dense/dense_alignment.h"
+#include "estimator/view/model_view.h"
 
 #include <gtest/gtest.h>
 

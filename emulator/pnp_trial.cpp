@@ -45,7 +45,7 @@ Vec3 half_box_m(const PnpSetting& s) {
         case PnpScene::plane:
         case PnpScene::plane_facing: return {half, half, 0};
         case PnpScene::line: return {half, 0.03 * half, 0.03 * half};
-        case PnpScene::tiny: return {0.35, 0.35, 0.35};
+        case PnpScene::tiny: return {0.7, 0.7, 0.7};
         // Along the line of sight almost to the camera.
         case PnpScene::camera_plane: return {0.02 * s.range_m, 0.02 * s.range_m, 0.95 * s.range_m};
         default: return {half, half, half};

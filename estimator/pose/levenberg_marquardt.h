@@ -6,7 +6,6 @@
 /// damping cannot return to where it was and cycle. Allocates nothing.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,7 +13,7 @@
 #include <limits>
 #include <span>
 
-#include "estimator/pose/pose_estimate.h"
+#include "estimator/pose/cholesky6.h"
 
 namespace narpa {
 
@@ -37,28 +36,24 @@ struct DampedStep {
 /// h = (A + lambda D)^-1 g.
 [[nodiscard]] inline DampedStep damped_step(const NormalEquations& eq, double lambda,
                                             Damping damping = Damping::diagonal) {
-    const Vector6 D = damping == Damping::diagonal ? Vector6(eq.A.diagonal()) : Vector6(Vector6::Ones());
     Matrix6 M = eq.A;
+    const Vector6 D = damping == Damping::diagonal ? Vector6(eq.A.diagonal()) : Vector6(Vector6::Ones());
     M.diagonal() += lambda * D;
-    const Eigen::LLT<Matrix6> factor(M);
+    const Cholesky6 factor(M);
     DampedStep step;
-    if (factor.info() != Eigen::Success) return step;
+    if (!factor.positive_definite()) return step;
     step.h = factor.solve(eq.g);
     step.predicted_reduction = step.h.dot(lambda * D.cwiseProduct(step.h) + eq.g);
     step.solved = std::isfinite(step.predicted_reduction);
     return step;
 }
 
-/// A^-1, by the equations scaled to a unit diagonal. False where A has no rank of six within rounding: some
-/// direction is not seen.
+/// A^-1. False where A has no rank of six within rounding: some direction is not seen.
 [[nodiscard]] inline bool invert_information(const Matrix6& A, Matrix6& inverse) {
-    const Vector6 scale = A.diagonal().cwiseSqrt().cwiseInverse();
-    if (!scale.allFinite()) return false;
-    const Eigen::LLT<Matrix6> factor(Matrix6(scale.asDiagonal() * A * scale.asDiagonal()));
-    if (factor.info() != Eigen::Success) return false;
-    constexpr double kSmallestPivot = 1e-6;  // squared: 1e-12 of the row's own information is left over
-    if (!(Matrix6(factor.matrixL()).diagonal().minCoeff() > kSmallestPivot)) return false;
-    inverse = scale.asDiagonal() * factor.solve(Matrix6::Identity()) * scale.asDiagonal();
+    constexpr double kSmallestPivot = 1e-12;
+    const Cholesky6 factor(A);
+    if (!factor.positive_definite() || !(factor.smallest_pivot() > kSmallestPivot)) return false;
+    inverse = factor.inverse();
     return inverse.allFinite();
 }
 

@@ -81,15 +81,36 @@ void PnpSolver::solve_all(const PnpInput& input, const PnpOptions& options) {
         return;
     }
     const double depth = depth_in_sigma(input, gathered_, spread);
+    const bool few = points_.size() < kSurePoints;
     const Starts starts = orthographic_starts(gathered_, spread, depth < kFlatSigma);
     for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i], options);
-    const bool sure = fits_the_noise() && points_.size() >= kSurePoints;
-    if (!sure) {
+    if (few) consider_triples(options);
+    if (!fits_the_noise()) {
         starts_.clear();
         opencv_starts(input, depth < kFlatSigma, starts_);
         for (const Rigid3& T : starts_) consider(T, options);
     }
-    if (!sure || depth < kReversibleSigma) consider_reversed(spread, options);
+    if (few || depth < kReversibleSigma || !fits_the_noise()) consider_reversed(spread, options);
+}
+
+// Four or five points fit several poses within the noise: those that three of them allow, too, are tried.
+void PnpSolver::consider_triples(const PnpOptions& options) {
+    constexpr std::size_t kTriples = 4, kRefined = 3;
+    std::array<std::pair<double, CentredPose>, 2 * kTriples> tried;
+    std::size_t count = 0;
+    for (std::size_t left_out = 0; left_out < kTriples; ++left_out) {
+        std::array<BodyPoint, 3> triple;
+        for (std::size_t k = 0, i = 0; k < 3; ++i)
+            if (i != left_out) triple[k++] = gathered_[i];
+        const Starts starts = triple_starts(triple);
+        for (std::size_t i = 0; i < starts.count; ++i)
+            tried[count++] = {points_.truncated_cost(starts.pose[i], std::numeric_limits<double>::infinity()),
+                              starts.pose[i]};
+    }
+    const std::size_t refined = std::min(count, kRefined);
+    std::partial_sort(tried.begin(), tried.begin() + refined, tried.begin() + count,
+                      [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (std::size_t i = 0; i < refined; ++i) consider(tried[i].second, options);
 }
 
 void PnpSolver::gather() {

@@ -54,6 +54,7 @@ private:
     void gather();
     void consider(const CentredPose& start, const PnpOptions& options);
     void consider(const Rigid3& start, const PnpOptions& options);
+    void consider_triples(const PnpOptions& options);
     void consider_reversed(const Spread& spread, const PnpOptions& options);
     [[nodiscard]] bool fits_the_noise() const;
     [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);

@@ -5,6 +5,7 @@
 #include <ceres/tiny_solver.h>
 #include <ceres/tiny_solver_autodiff_function.h>
 
+#include <Eigen/Cholesky>
 #include <memory>
 
 namespace narpa {

@@ -87,17 +87,9 @@ bool PnpSolver::find_consensus(const PnpInput& input, const PnpOptions& options,
 
 void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
     std::array<BodyPoint, 3> sample;
-    Vec3 mean{};
-    for (std::size_t k = 0; k < 3; ++k) {
-        sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
-        mean += sample[k].body_m * (1.0 / 3);
-    }
-    for (BodyPoint& p : sample) p.body_m -= mean;
-    const Starts starts = orthographic_starts(sample, spread_of(sample), true);
-    for (std::size_t i = 0; i < starts.count; ++i) {
-        const CentredPose& s = starts.pose[i];
-        try_hypothesis({s.q, s.centroid_m - s.q * mean}, options);
-    }
+    for (std::size_t k = 0; k < 3; ++k) sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
+    const Starts starts = triple_starts(sample);
+    for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i], options);
 }
 
 void PnpSolver::try_p3p(const PnpInput& input, const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {

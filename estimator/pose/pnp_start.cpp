@@ -106,6 +106,14 @@ Starts orthographic_starts(std::span<const BodyPoint> points, const Spread& spre
     return starts;
 }
 
+Starts triple_starts(std::array<BodyPoint, 3> points) {
+    const Vec3 mean = (points[0].body_m + points[1].body_m + points[2].body_m) / 3.0;
+    for (BodyPoint& p : points) p.body_m -= mean;
+    Starts starts = orthographic_starts(points, spread_of(points), true);
+    for (std::size_t i = 0; i < starts.count; ++i) starts.pose[i].centroid_m -= starts.pose[i].q * mean;
+    return starts;
+}
+
 CentredPose depth_reversed(const CentredPose& pose, const Spread& spread) {
     // Two reflections are a rotation by half a turn about each normal: q' = (0, sight) q (0, normal).
     const Vec3 sight = normalized(pose.centroid_m), normal = spread.axis[2];

@@ -34,6 +34,9 @@ struct Starts {
 /// tell apart come out. Three points are flat.
 [[nodiscard]] Starts orthographic_starts(std::span<const BodyPoint> points, const Spread& spread, bool flat);
 
+/// Of three points, whose mean need not be 0; the poses are about the origin.
+[[nodiscard]] Starts triple_starts(std::array<BodyPoint, 3> points);
+
 /// The same image in scaled orthography: mirrored in the plane across the line of sight and in the body's plane of
 /// widest spread.
 [[nodiscard]] CentredPose depth_reversed(const CentredPose& pose, const Spread& spread);

@@ -58,12 +58,17 @@ struct DampedStep {
 }
 
 inline constexpr std::size_t kLmIterationsMax = 200;
+inline constexpr int kLmPatience = 6;
 
+/// Converged: the undamped step is shorter than step_sigma; or, in a valley that the linear model does not follow,
+/// a step was taken and chi2 fell by less than chi2_settled over the last kLmPatience: no noise tells that from its
+/// minimum.
 struct LmOptions {
     double lambda = 1e-3;      ///< at the start
     double gain_min = 1e-3;    ///< a step is taken where the gain ratio exceeds this
-    double step_sigma = 1e-4;  ///< converged: the undamped step is shorter than this, in standard deviations
-    int iterations_max = 50;   ///< steps tried, taken or not; at most kLmIterationsMax
+    double step_sigma = 1e-4;  ///< standard deviations
+    double chi2_settled = 3e-3;
+    int iterations_max = 100;  ///< steps tried, taken or not; at most kLmIterationsMax
     Damping damping = Damping::diagonal;
     double up = 11, down = 9;  ///< lambda *= up where a step is rejected, /= down where it is taken
 };
@@ -120,6 +125,11 @@ void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& 
             if (taken) state = candidate, now = there;
         }
         summary.chi2_at[static_cast<std::size_t>(i)] = now.chi2;
+        if (taken && i >= kLmPatience &&
+            summary.chi2_at[static_cast<std::size_t>(i - kLmPatience)] - now.chi2 < o.chi2_settled) {
+            summary.status = LmStatus::converged;
+            return;
+        }
         if (!taken && lambda >= kLambdaMax) return;
         lambda = taken ? std::max(lambda / o.down, kLambdaMin) : std::min(lambda * o.up, kLambdaMax);
     }

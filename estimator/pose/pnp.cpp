@@ -65,21 +65,21 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& opt
         return solution_;
     }
     solution_.inlier.assign(input.body_m.size(), 1);
-    options.outliers ? solve_with_outliers(input, options) : solve_all(input, options);
+    points_.assign(input);
+    gather();
+    const Spread spread = spread_of(gathered_);
+    if (is_a_line(spread)) {
+        solution_.status = PnpStatus::degenerate;
+        return solution_;
+    }
+    options.outliers ? solve_with_outliers(input, options) : solve_all(input, spread, options);
     if (solution_.status != PnpStatus::converged) return solution_;
     solution_.status = solution_.fit.status;
     solution_.imprecise = solution_.fit.ok() && !(solution_.fit.relative_position_sigma() <= kImpreciseSigma);
     return solution_;
 }
 
-void PnpSolver::solve_all(const PnpInput& input, const PnpOptions& options) {
-    points_.assign(input);
-    gather();
-    const Spread spread = spread_of(gathered_);
-    if (is_a_line(spread)) {
-        solution_.status = PnpStatus::degenerate;
-        return;
-    }
+void PnpSolver::solve_all(const PnpInput& input, const Spread& spread, const PnpOptions& options) {
     const double depth = depth_in_sigma(input, gathered_, spread);
     const bool few = points_.size() < kSurePoints;
     const Starts starts = orthographic_starts(gathered_, spread, depth < kFlatSigma);

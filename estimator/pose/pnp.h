@@ -49,7 +49,7 @@ public:
     const PnpSolution& solve(const PnpInput& input, const PnpOptions& options = {});
 
 private:
-    void solve_all(const PnpInput& input, const PnpOptions& options);
+    void solve_all(const PnpInput& input, const Spread& spread, const PnpOptions& options);
     void solve_with_outliers(const PnpInput& input, const PnpOptions& options);
     void gather();
     void consider(const CentredPose& start, const PnpOptions& options);

@@ -207,7 +207,7 @@ PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, cons
 
 std::vector<PnpSetting> settings(const PnpBenchOptions& o) {
     std::vector<PnpSetting> all;
-    for (const int n : o.points)
+    for (const int n : o.nominal ? o.points : std::vector<int>{})
         for (const double noise : o.noise_px)
             for (const double range : o.ranges_m) all.push_back({PnpScene::nominal, n, noise, range, 0});
     if (!o.hard_cases) return all;

@@ -17,6 +17,7 @@ struct PnpBenchOptions {
     std::vector<int> points{4, 6, 10, 30, 100};
     std::vector<double> noise_px{0.1, 0.5, 1};
     std::vector<double> ranges_m{2, 10, 30, 100, 200};
+    bool nominal = true;     ///< every number of points with every noise and range
     bool hard_cases = true;  ///< half a turn, planes, lines, far and near bodies, outliers
     std::uint64_t seed = 1;
 };

@@ -79,7 +79,8 @@ Command add_bench_estimate(CLI::App& bench_command) {
     c->add_option("--ranges", o->pnp.ranges_m, "pnp: metres to the body")
         ->delimiter(',')
         ->check(CLI::Range(1.0, 1e6));
-    c->add_flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
+    CLI::Option* nominal = c->add_flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
+    c->add_flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases")->excludes(nominal);
     c->add_option("--seed", o->pnp.seed, "Of all draws")->capture_default_str();
     c->footer("Exit status 1 where an estimator is less exact than it must be, or the bench was interrupted.");
     return [o] { return bench(*o); };

@@ -124,6 +124,8 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
     if (const PnpStatus status = check(input); status != PnpStatus::converged) return refused(status);
     if (!is_usable(start)) return refused(PnpStatus::not_finite);
     const Quat q0 = normalized(start.q);
+    for (const Vec3& p : input.body_m)
+        if (!((q0 * p + start.t).z > 0)) return refused(PnpStatus::behind_camera);
     double q[4] = {q0.w, q0.x, q0.y, q0.z}, t[3] = {start.t.x, start.t.y, start.t.z};
     const std::unique_ptr<ceres::LossFunction> loss_of_all = loss_function(loss);
     ceres::Problem::Options ours;

@@ -8,7 +8,9 @@ namespace narpa {
 namespace {
 
 constexpr int kPerspectiveSteps = 6;
-constexpr double kLine = 1e-5;  // narrower than this part of their length, points lie on a line
+constexpr double kSettled = 1e-3;  // of the depth: the refinement does the rest
+constexpr double kAstray = 0.1;    // of the depth in the last step: perspective is too strong for this
+constexpr double kLine = 1e-5;     // narrower than this part of their length, points lie on a line
 
 /// Scaled orthography of flat points: A / s is the upper left block of a rotation, of singular values 1 and |cos of
 /// the tilt|. `sign` chooses which side is nearer.
@@ -52,6 +54,7 @@ bool posit(std::span<const BodyPoint> points, const Spread& spread, bool flat, d
     };
     Vec3 r3_over_z{};  // perspective: a point's depth is z (1 + r3 . p / z)
     Vec3 r1{}, r2{}, r3{}, t{};
+    double moved = 0;  // in the last step, of the depth
     for (int step = 0; step < kPerspectiveSteps; ++step) {
         Vec3 a1{}, a2{};
         double mean_u = 0, mean_v = 0;
@@ -68,11 +71,11 @@ bool posit(std::span<const BodyPoint> points, const Spread& spread, bool flat, d
         r3 = normalized(cross(rows.r1, rows.r2));
         r1 = rows.r1, r2 = cross(r3, r1);
         t = Vec3{mean_u / n, mean_v / n, 1} / rows.scale;
-        const Vec3 before = r3_over_z;
+        moved = norm(r3 * rows.scale - r3_over_z) * spread.rms_m.x;
         r3_over_z = r3 * rows.scale;
-        constexpr double kSettled = 1e-3;  // of the depth: the refinement does the rest
-        if (norm(r3_over_z - before) * spread.rms_m.x < kSettled) break;
+        if (moved < kSettled) break;
     }
+    if (!(moved < kAstray)) return false;
     const auto to_body = [&](const Vec3& r) {
         return r.x * spread.axis[0] + r.y * spread.axis[1] + r.z * spread.axis[2];
     };

@@ -25,7 +25,7 @@ struct Spread {
 };
 [[nodiscard]] Spread spread_of(std::span<const BodyPoint> points);
 
-/// Up to two poses; none where the points lie on a line, or the iteration leaves the camera's field.
+/// Up to two poses; none where the points lie on a line, or so near that the iteration does not settle.
 struct Starts {
     std::array<CentredPose, 2> pose{};
     std::size_t count = 0;

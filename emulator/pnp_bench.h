@@ -13,7 +13,7 @@
 namespace narpa {
 
 struct PnpBenchOptions {
-    int trials = 1000;  ///< of each cell
+    int trials = 1000;  ///< of each cell; a fifth of it where half the points are outliers
     std::vector<int> points{4, 6, 10, 30, 100};
     std::vector<double> noise_px{0.1, 0.5, 1};
     std::vector<double> ranges_m{2, 10, 30, 100, 200};

@@ -113,7 +113,7 @@ Matrix6 PnpPoints::uncentred(const CentredPose& pose, const Matrix6& covariance)
 namespace {
 
 // Eight numbers side by side. The types stay inside the function that is compiled for each processor.
-using V = double __attribute__((vector_size(64)));
+using V = double __attribute__((vector_size(64), may_alias));
 static_assert(sizeof(V) == sizeof(PnpPoints::Group::Lanes));
 
 struct Sums {

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kFewestBeams = 6;
 constexpr double kTukey = 4.685;        ///< of the biweight: 95 % of the efficiency of least squares
+constexpr double kLastCircle = 0.02;    ///< of the search, in parts of the first
 constexpr double kMadToSigma = 1.4826;  ///< of a normal distribution
 
 /// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
@@ -60,14 +61,15 @@ Status check(const IcpSettings& s) {
         return wrong("noise.range_m", s.noise.range_m, "a standard deviation > 0 m");
     if (!(s.noise.pointing_rad >= 0 && std::isfinite(s.noise.pointing_rad)))
         return wrong("noise.pointing_rad", s.noise.pointing_rad, "a standard deviation >= 0 rad");
-    if (!(s.search_m >= 0 && std::isfinite(s.search_m))) return wrong("search_m", s.search_m, "a distance >= 0 m");
     if (s.search_points < kFewestBeams) return wrong("search_points", static_cast<double>(s.search_points), ">= 6");
-    if (s.search_iterations < 0) return wrong("search_iterations", s.search_iterations, ">= 0");
+    if (s.search_iterations < 2) return wrong("search_iterations", s.search_iterations, ">= 2");
     if (s.iterations < 1) return wrong("iterations", s.iterations, ">= 1");
     if (!(s.grazing_cosine > 0 && s.grazing_cosine < 1)) return wrong("grazing_cosine", s.grazing_cosine, "0 to 1");
     if (!(s.unobserved_below > 0 && s.unobserved_below < 1))
         return wrong("unobserved_below", s.unobserved_below, "0 to 1");
     if (!(s.settled >= 0)) return wrong("settled", s.settled, ">= 0");
+    if (!(s.explained_least >= 0 && s.explained_least <= 1))
+        return wrong("explained_least", s.explained_least, "0 to 1");
     return Ok{};
 }
 
@@ -79,7 +81,7 @@ struct CloudIcp::Pass {
     Matrix6 information = Matrix6::Zero();  ///< sum of J J' / sigma^2 of the points used
     PointSpread spread;
     double scatter = 1;
-    std::size_t met = 0;
+    bool enough = false;  ///< points to solve for a pose
 };
 
 CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
@@ -88,15 +90,14 @@ CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stri
     magnitudes_.clear();
     for (const PointToPlane& p : planes_)
         if (p.fate == BeamFate::met) magnitudes_.push_back(std::abs(p.distance_m) / p.sigma_m);
-    pass.met = magnitudes_.size();
-    if (pass.met < kFewestBeams) return pass;
-    const auto middle = magnitudes_.begin() + static_cast<std::ptrdiff_t>(pass.met / 2);
+    out.points = planes_.size();
+    out.used = out.missed = out.grazing = out.rejected = out.explained = 0;
+    if (magnitudes_.size() < kFewestBeams) return pass;
+    const auto middle = magnitudes_.begin() + static_cast<std::ptrdiff_t>(magnitudes_.size() / 2);
     std::nth_element(magnitudes_.begin(), middle, magnitudes_.end());
     out.scatter = kMadToSigma * *middle;
     pass.scatter = std::max(1.0, out.scatter);
 
-    out.points = planes_.size();
-    out.used = out.missed = out.grazing = out.rejected = out.explained = 0;
     double squares = 0, moment = 0;
     for (std::size_t k = 0; k < planes_.size(); ++k) {
         const PointToPlane& p = planes_[k];
@@ -116,16 +117,19 @@ CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stri
         const Matrix6 JJ = J * J.transpose();
         pass.hessian += robust.weight * JJ;
         pass.gradient -= robust.weight * e * J;
-        pass.slope += robust.slope * JJ;
-        pass.scores += robust.weight * robust.weight * e * e * JJ;
-        pass.information += JJ;
+        if (search_m == 0) {
+            pass.slope += robust.slope * JJ;
+            pass.scores += robust.weight * robust.weight * e * e * JJ;
+            pass.information += JJ;
+        }
         const double weight = robust.weight / (p.sigma_m * p.sigma_m);
         const Vec3 at = T.q * p.surface_m;
         pass.spread.weight += weight;
         pass.spread.centre_m += weight * at;
         moment += weight * dot(at, at);
     }
-    if (out.used < kFewestBeams) return pass;
+    pass.enough = out.used >= kFewestBeams;
+    if (!pass.enough) return pass;
     out.residual_m = std::sqrt(squares / static_cast<double>(out.used));
     pass.spread.centre_m = pass.spread.centre_m / pass.spread.weight;
     const Vec3& c = pass.spread.centre_m;
@@ -134,17 +138,45 @@ CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stri
     return pass;
 }
 
-void CloudIcp::search(Rigid3& T, CloudEstimate& out) {
-    const std::size_t stride = std::max<std::size_t>(1, association_.size() / settings_.search_points);
-    double radius_m = settings_.search_m;
-    for (int i = 0; i < settings_.search_iterations; ++i) {
-        const Pass pass = look(T, radius_m, stride, out);
-        if (pass.met < kFewestBeams || out.used < kFewestBeams) return;
-        const Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points, int circles, CloudEstimate& out) {
+    const std::size_t stride = std::max<std::size_t>(1, association_.size() / points);
+    const double narrower = std::pow(kLastCircle, 1.0 / (circles - 1));
+    Rigid3 T = start;
+    for (int i = 0; i < circles; ++i, search_m *= narrower) {
+        const Pass pass = look(T, search_m, stride, out);
+        if (!pass.enough) break;
+        T = displaced(T, out.observability.solve(pass.hessian, pass.gradient));
+        ++out.iterations;
+    }
+    return T;
+}
+
+CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_t points, int circles) {
+    CloudEstimate out;
+    Rigid3 T = search_m > 0 ? search(start, search_m, points, circles, out) : start;
+    Vector6 last = Vector6::Zero();
+    double damping = 1;
+    for (int i = 0;; ++i) {
+        const Pass pass = look(T, 0, 1, out);
+        if (!pass.enough) break;
+        if (out.settled || i == settings_.iterations) {
+            out.covariance = out.observability.covariance(pass.slope, pass.scores);
+            out.bound = out.observability.covariance(pass.information, pass.information);
+            break;
+        }
+        Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+        // Back and forth between two sets of partners, for ever: it ends between them.
+        if (step.dot(pass.hessian * last) < 0) damping *= 0.5;
+        step *= damping;
         T = displaced(T, step);
         ++out.iterations;
-        radius_m *= 0.75;
+        out.settled = step.dot(pass.hessian * step) < std::pow(settings_.settled * pass.scatter, 2);
+        last = step;
     }
+    out.T_lidar_target = T;
+    out.credible = out.settled && static_cast<double>(out.explained) >=
+                                      settings_.explained_least * static_cast<double>(out.points);
+    return out;
 }
 
 Result<CloudIcp> CloudIcp::create(const Tracer& tracer, std::size_t target, const IcpSettings& settings) {
@@ -156,37 +188,27 @@ Result<CloudIcp> CloudIcp::create(const Tracer& tracer, std::size_t target, cons
 }
 
 Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const SweepMotion& motion,
-                                      const Rigid3& start) {
+                                      const Rigid3& start, double search_m) {
     if (auto good = check(points); !good) return good.error();
     if (auto good = check(start, motion); !good) return good.error();
+    if (!(search_m >= 0 && std::isfinite(search_m)))
+        return Error{"search_m = " + number(search_m) + ": expected a distance >= 0 m"};
     association_.take(points, motion);
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
 
-    CloudEstimate out;
-    Rigid3 T = start;
-    if (settings_.search_m > 0) search(T, out);
-    Pass pass;
-    for (int i = 0;; ++i) {
-        pass = look(T, 0, 1, out);
-        if (pass.met < kFewestBeams || out.used < kFewestBeams)
-            return Error{"only " + std::to_string(pass.met) + " of " + std::to_string(points.size()) +
+    CloudEstimate out = attempt(start, search_m, settings_.search_points, settings_.search_iterations);
+    if (search_m > 0 && !out.credible) {
+        CloudEstimate again =
+            attempt(start, search_m, 4 * settings_.search_points, 3 * settings_.search_iterations / 2);
+        again.iterations += out.iterations;
+        if (again.explained > out.explained) out = again;
+    }
+    if (out.used < kFewestBeams)
+        return Error{.what = "only " + std::to_string(out.used) + " of " + std::to_string(points.size()) +
                              " beams meet the target where it is taken to be, expected at least " +
                              std::to_string(kFewestBeams),
-                         {},
-                         0,
-                         0,
-                         ErrorKind::failed};
-        if (out.settled || i == settings_.iterations) break;
-        const Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
-        T = displaced(T, step);
-        ++out.iterations;
-        const double in_sigmas2 = step.dot(pass.hessian * step) / (pass.scatter * pass.scatter);
-        out.settled = in_sigmas2 < settings_.settled * settings_.settled;
-    }
-    out.T_lidar_target = T;
-    out.covariance = out.observability.covariance(pass.slope, pass.scores);
-    out.bound = out.observability.covariance(pass.information, pass.information);
+                     .kind = ErrorKind::failed};
     return out;
 }
 

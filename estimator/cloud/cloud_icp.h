@@ -19,13 +19,15 @@ namespace narpa {
 
 struct IcpSettings {
     RangeNoise noise{};
-    double search_m = 0;              ///< how far surfaces may be off at the start; 0: no search around beams
-    std::size_t search_points = 400;  ///< of the sweep, about so many are searched for
-    int search_iterations = 15;       ///< at most
+    std::size_t search_points = 100;  ///< of the sweep, about so many are searched for
+    int search_iterations = 10;       ///< circles of the search
     int iterations = 50;              ///< at most, after the search
     double grazing_cosine = 0.05;     ///< beams that meet a surface flatter than this do not count
     double unobserved_below = 1e-3;   ///< normalised eigenvalue (observability.h)
-    double settled = 0.01;            ///< a step of so many standard deviations is the last; 0: take all iterations
+    double settled = 0.05;            ///< a step of so many standard deviations is the last; 0: take all iterations
+    /// Of the points, so many lie on the model where the pose is right: with fewer, what else stands in the LiDAR's
+    /// view apart, it is a false minimum. A search that ends in one is done again with four times the points.
+    double explained_least = 0.9;
 };
 /// An Error names the setting, what it is and what was expected.
 [[nodiscard]] Status check(const IcpSettings& settings);
@@ -40,11 +42,11 @@ struct CloudEstimate {
     Observability observability{};
     int iterations = 0;     ///< with those of the search
     bool settled = false;   ///< the last step was small
+    bool credible = false;  ///< settled, and enough points are explained
     double scatter = 0;     ///< of the residuals, in standard deviations of the noise: 1 where all is as set
     double residual_m = 0;  ///< RMS of the distances of the points used from their planes
     std::size_t points = 0, used = 0, missed = 0, grazing = 0, rejected = 0;  ///< sum: points = the rest
-    /// Of the points, those that lie where the model has them, within four standard deviations of the noise. A pose
-    /// that explains few of them is a false minimum or another target.
+    /// Of the points, those that lie where the model has them, within four standard deviations of the noise.
     std::size_t explained = 0;
 };
 
@@ -53,18 +55,21 @@ public:
     /// `tracer` outlives it. `target`: index of the body whose pose is looked for. Errors: no such body, settings.
     static Result<CloudIcp> create(const Tracer& tracer, std::size_t target, const IcpSettings& settings);
 
-    /// Errors: a point that is not finite or not a range along a unit direction, a motion or a start that is not
-    /// finite, or fewer than six beams that meet the model. Allocates only for more points than ever before, or an
-    /// Error.
+    /// `search_m`: how far surfaces may lie off at the start, some distance * angle + shift; 0: no search around
+    /// the beams. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
+    /// search that is not finite, or fewer than six beams that meet the model. Allocates only for more points than
+    /// ever before, or an Error.
     [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const SweepMotion& motion,
-                                              const Rigid3& start);
+                                              const Rigid3& start, double search_m = 0);
 
 private:
     CloudIcp(const Tracer& tracer, std::size_t target, const IcpSettings& settings)
         : settings_(settings), association_(tracer, target) {}
     struct Pass;  ///< sums over the points at one pose
     [[nodiscard]] Pass look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
-    void search(Rigid3& T, CloudEstimate& out);
+    [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
+    [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,
+                                CloudEstimate& out);
 
     IcpSettings settings_;
     BeamAssociation association_;

@@ -74,15 +74,27 @@ Status check(const IcpSettings& s) {
 }
 
 struct CloudIcp::Pass {
-    Matrix6 hessian = Matrix6::Zero();      ///< sum of weight * J J' / sigma^2
-    Vector6 gradient = Vector6::Zero();     ///< -sum of weight * J distance / sigma^2
-    Matrix6 slope = Matrix6::Zero();        ///< sum of psi' * J J' / sigma^2
-    Matrix6 scores = Matrix6::Zero();       ///< sum of psi^2 * J J' / sigma^2
-    Matrix6 information = Matrix6::Zero();  ///< sum of J J' / sigma^2 of the points used
+    Matrix6 hessian = Matrix6::Zero();            ///< sum of weight * J J' / sigma^2
+    Vector6 gradient = Vector6::Zero();           ///< -sum of weight * J distance / sigma^2
+    Matrix6 information = Matrix6::Zero();        ///< sum of J J' / sigma^2 of the points used
+    double scores2 = 0, slopes = 0, slopes2 = 0;  ///< sums of psi^2, psi', psi'^2 of the points used
     PointSpread spread;
     double scatter = 1;
     bool enough = false;  ///< points to solve for a pose
 };
+
+/// The variance of the robust estimate over that of least squares with the noise as it is set: Huber's, with his
+/// correction for few points. His other form, the sandwich of one term for each point, was tried: where a few
+/// points hold a motion it is too sure, by 1.2 in sigma on a craft of 200,000 triangles.
+double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
+    constexpr double kUnknowns = 6;
+    const auto n = static_cast<double>(used);
+    const double slope = pass.slopes / n, slope_variance = std::max(0.0, pass.slopes2 / n - slope * slope);
+    if (!(n > kUnknowns && slope > 0)) return kUnobservedSigma * kUnobservedSigma;
+    const double correction = 1 + kUnknowns / n * slope_variance / (slope * slope);
+    const double mean_square = pass.scores2 / (n - kUnknowns);
+    return std::pow(correction * pass.scatter / slope, 2) * mean_square;
+}
 
 CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
     association_.associate(T, settings_.noise, settings_.grazing_cosine, search_m, stride, planes_);
@@ -117,11 +129,10 @@ CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stri
         const Matrix6 JJ = J * J.transpose();
         pass.hessian += robust.weight * JJ;
         pass.gradient -= robust.weight * e * J;
-        if (search_m == 0) {
-            pass.slope += robust.slope * JJ;
-            pass.scores += robust.weight * robust.weight * e * e * JJ;
-            pass.information += JJ;
-        }
+        pass.information += JJ;
+        pass.scores2 += std::pow(robust.weight * u, 2);
+        pass.slopes += robust.slope;
+        pass.slopes2 += robust.slope * robust.slope;
         const double weight = robust.weight / (p.sigma_m * p.sigma_m);
         const Vec3 at = T.q * p.surface_m;
         pass.spread.weight += weight;
@@ -160,8 +171,8 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         const Pass pass = look(T, 0, 1, out);
         if (!pass.enough) break;
         if (out.settled || i == settings_.iterations) {
-            out.covariance = out.observability.covariance(pass.slope, pass.scores);
-            out.bound = out.observability.covariance(pass.information, pass.information);
+            out.bound = out.observability.covariance(pass.information, 1);
+            out.covariance = out.observability.covariance(pass.information, variance_factor(pass, out.used));
             break;
         }
         Vector6 step = out.observability.solve(pass.hessian, pass.gradient);

@@ -34,8 +34,8 @@ struct IcpSettings {
 
 struct CloudEstimate {
     Rigid3 T_lidar_target{};
-    /// Of the pose's error (pose_estimate.h). Of the robust estimate as it is: the sandwich of P. Huber, Robust
-    /// Statistics (1981), section 7.6, for the scatter that the residuals show, at least that of the noise.
+    /// Of the pose's error (pose_estimate.h): of the robust estimate as it is (P. Huber, Robust Statistics, 1981,
+    /// section 7.6), for the scatter that the residuals show, at least that of the noise.
     Matrix6 covariance = Matrix6::Zero();
     /// Cramer-Rao: the least covariance there can be for the points that were used, with the noise as it is set.
     Matrix6 bound = Matrix6::Zero();
@@ -66,6 +66,7 @@ private:
     CloudIcp(const Tracer& tracer, std::size_t target, const IcpSettings& settings)
         : settings_(settings), association_(tracer, target) {}
     struct Pass;  ///< sums over the points at one pose
+    [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
     [[nodiscard]] Pass look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
     [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,

@@ -39,9 +39,8 @@ Vector6 Observability::solve(const Matrix6& hessian, const Vector6& gradient) co
     return x;
 }
 
-Matrix6 Observability::covariance(const Matrix6& a, const Matrix6& b) const {
-    const Matrix6 a_inverse = restricted_inverse(a, motions, unobserved);
-    Matrix6 c = a_inverse * b * a_inverse;
+Matrix6 Observability::covariance(const Matrix6& information, double factor) const {
+    Matrix6 c = factor * restricted_inverse(information, motions, unobserved);
     for (int i = 0; i < unobserved; ++i)
         c += kUnobservedSigma * kUnobservedSigma * motions.col(i) * motions.col(i).transpose();
     return 0.5 * (c + c.transpose());

@@ -34,9 +34,9 @@ struct Observability {
     /// The motion x that solves H x = gradient, without any part along what is not observed. `hessian`: that of
     /// which this was made.
     [[nodiscard]] Vector6 solve(const Matrix6& hessian, const Vector6& gradient) const;
-    /// The covariance (A^-1 B A^-1) of what is observed. Along the unobserved motions the standard deviation is put
-    /// at kUnobservedSigma: they are not known at all.
-    [[nodiscard]] Matrix6 covariance(const Matrix6& a, const Matrix6& b) const;
+    /// The covariance of what is observed: `factor` times the inverse of this information. Along the unobserved
+    /// motions the standard deviation is put at kUnobservedSigma: they are not known at all.
+    [[nodiscard]] Matrix6 covariance(const Matrix6& information, double factor) const;
 };
 
 /// Times the motions' metre: enough for whoever weighs the estimate to take nothing from it.

@@ -1,6 +1,7 @@
 #include "emulator/estimate_plots.h"
 
 #include <fmt/format.h>
+#include <array>
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
@@ -106,6 +107,36 @@ Status write_filter_plot(const std::string& path, const std::string& title, cons
     for (int k = 0; k < n; ++k)
         draw_nees(image, {k % 2 * kPanelWidth, kHeader + k / 2 * kPanelHeight}, runs[static_cast<std::size_t>(k)]);
     return write_png(path, image);
+}
+
+Status write_time_plot(const std::string& path, const std::vector<TimeAndError>& estimators) {
+    static const std::array<cv::Scalar, 6> kFamilies{cv::Scalar{180, 90, 20},  cv::Scalar{40, 120, 40},
+                                                     cv::Scalar{40, 40, 190},  cv::Scalar{160, 40, 160},
+                                                     cv::Scalar{20, 130, 200}, cv::Scalar{90, 90, 90}};
+    cv::Mat image(720, 1000, CV_8UC3, cv::Scalar(255, 255, 255));
+    std::vector<double> times, errors;
+    std::vector<std::string> families;
+    for (const TimeAndError& e : estimators) {
+        times.push_back(e.ms), errors.push_back(100 * e.position_of_range);
+        if (std::find(families.begin(), families.end(), e.family) == families.end()) families.push_back(e.family);
+    }
+    if (estimators.empty()) return Error{"no estimator was measured, expected one at least", path};
+    const plot::Axis x = plot::logarithmic_axis(times, 90, 960), y = plot::logarithmic_axis(errors, 640, 70);
+    for (const double v : x.ticks()) plot::vertical_tick(image, x, y, v);
+    for (const double v : y.ticks()) plot::horizontal_tick(image, y, x, v, fmt::format("{:g}", v));
+    for (const TimeAndError& e : estimators) {
+        const auto family =
+            static_cast<std::size_t>(std::find(families.begin(), families.end(), e.family) - families.begin());
+        const cv::Scalar& colour = kFamilies[family % kFamilies.size()];
+        const cv::Point2d at(x.at(e.ms), y.at(100 * e.position_of_range));
+        plot::dot(image, at, 5, colour);
+        const bool to_the_left = at.x > 700;
+        plot::text(image, e.name, {static_cast<int>(at.x) + (to_the_left ? -10 : 10), static_cast<int>(at.y) + 5},
+                   plot::kTextSize, to_the_left ? 1 : 0, colour);
+    }
+    plot::text(image, "position error, RMS, % of the range, against time of an estimate, ms", {90, 40},
+               plot::kTitleSize, 0, plot::kInk);
+    return plot::write_png(path, image);
 }
 
 }  // namespace narpa

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <random>
 
+#include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 
 namespace narpa {
@@ -71,7 +72,9 @@ struct FrameTracker::Impl {
         : world(w), camera(c), target(body), options(o), random(o.seed) {}
 
     /// What one frame says, from a guess.
+    void measure(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
     void measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
+    void measure_by_pixels(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
     void fuse(const PoseMeasurement& measurement, TrackedFrame& out);
     /// The chaser is the body that carries the camera, or the camera itself.
     [[nodiscard]] Rigid3 T_chaser_camera() const { return camera.mount < 0 ? Rigid3{} : camera.T_mount_camera; }
@@ -82,6 +85,7 @@ struct FrameTracker::Impl {
     TrackerOptions options;
     std::mt19937_64 random;
     std::optional<FeatureAlignment> by_points;
+    std::optional<DenseAlignment> by_pixels;
     std::optional<PoseFilter> filter;
 };
 
@@ -95,6 +99,7 @@ Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, s
     features.spp = options.spp;
     features.seed = options.seed;
     impl->by_points.emplace(world.tracer(), camera, *target, Placement(world.scene().bodies.size()), features);
+    if (options.method == EstimateMethod::dense) impl->by_pixels.emplace(world.tracer(), camera, *target);
     return std::unique_ptr<FrameTracker>(new FrameTracker(std::move(impl)));
 }
 
@@ -125,7 +130,7 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
         out.guess = off(out.truth, m.options, m.random);
     }
     if (const auto image = measured_image(m.camera, bytes)) {
-        m.measure_by_points(*image, at, out);
+        m.measure(*image, at, out);
     } else {
         out.why = image.error().what;
     }
@@ -142,6 +147,11 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
     return out;
 }
 
+void FrameTracker::Impl::measure(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
+    measure_by_points(image, at, out);
+    if (by_pixels) measure_by_pixels(image, at, out);
+}
+
 void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
     const FeatureEstimate e = by_points->align(image, at, out.guess);
     out.matches = e.agreeing;
@@ -153,6 +163,30 @@ void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Pla
     out.measured = e.T_camera_target;
     out.covariance = e.covariance;
     out.bound = e.bound;
+}
+
+/// From where the points lead; from the guess where they lead nowhere.
+void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
+    DenseOptions dense;
+    dense.seed = options.seed;
+    dense.method = world.scene().render.method;
+    dense.max_depth = world.scene().render.max_depth;
+    if (out.measured) dense.coarsest = 1;
+    const auto e = by_pixels->align(image, at, out.measured.value_or(out.guess), dense);
+    out.measured.reset();
+    if (!e) {
+        out.why = e.error().what;
+        return;
+    }
+    out.matches = static_cast<int>(e->pixels);
+    out.renders += static_cast<int>(e->steps.size());
+    if (e->status != DenseStatus::converged) {
+        out.why = std::string(name(e->status));
+        return;
+    }
+    out.measured = e->T_camera_body;
+    out.covariance = e->covariance;
+    if (const auto bound = by_pixels->bound(at, out.truth, dense)) out.bound = *bound;
 }
 
 void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& out) {

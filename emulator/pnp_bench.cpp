@@ -185,7 +185,8 @@ PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, cons
     std::vector<double> bound_rotation, bound_position;
     // OpenCV takes milliseconds for each of these.
     const int trials = setting.outliers < 0.5 ? options.trials : (options.trials + 4) / 5;
-    for (int done = 0; done < trials && !stop;) {
+    int left = 1000 + 10 * trials;  // so far away that no pose is determined, no draw would do
+    for (int done = 0; done < trials && left > 0 && !stop; --left) {
         const auto trial = draw_trial(setting, random);
         if (!trial) continue;
         const Rigid3 start = tracked_pose(*trial, random);

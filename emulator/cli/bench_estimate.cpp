@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include "emulator/approach_bench.h"
@@ -58,6 +59,10 @@ Outcome bench_pnp(const Options& o, Findings& findings) {
     if (verdict.worst_rms > kWorstRms)
         findings.faults.push_back(
             fmt::format("points: RMS of {:.3f} bounds, expected at most {:g}", verdict.worst_rms, kWorstRms));
+    for (const PnpCell& cell : cells)
+        if (cell.rows.front().trials == 0 && !stop_flag())
+            findings.faults.push_back(fmt::format("points: {} of them at {:g} m and {:g} px determine no pose",
+                                                  cell.points, cell.range_m, cell.noise_px));
     if (verdict.more_failures > 0)
         findings.faults.push_back(
             fmt::format("points: more failures than {} in {} cells", kPnpPeerCold, verdict.more_failures));
@@ -255,6 +260,11 @@ Outcome bench(const Options& o) {
     return document;
 }
 
+/// CLI::Range lets NaN through.
+std::string must_be_finite(const std::string& text) {
+    return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+}
+
 }  // namespace
 
 Command add_bench_estimate(CLI::App& bench_command) {
@@ -273,10 +283,12 @@ Command add_bench_estimate(CLI::App& bench_command) {
     c->add_option("--points", o->pnp.points, "pnp: numbers of points")->delimiter(',')->check(CLI::Range(4, 1000));
     c->add_option("--noise-px", o->pnp.noise_px, "pnp: standard deviations of a pixel")
         ->delimiter(',')
-        ->check(CLI::Range(1e-6, 100.0));
+        ->check(CLI::Range(1e-6, 100.0))
+        ->check(must_be_finite);
     c->add_option("--ranges", o->pnp.ranges_m, "pnp: metres to the body")
         ->delimiter(',')
-        ->check(CLI::Range(1.0, 1e6));
+        ->check(CLI::Range(1.0, 1e6))
+        ->check(must_be_finite);
     CLI::Option* nominal = c->add_flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c->add_flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases")->excludes(nominal);
     c->add_option("--seed", o->pnp.seed, "Of all draws")->capture_default_str();

@@ -86,19 +86,40 @@ TEST(PnpBench, JudgesErrorsFailuresAndTimes) {
     EXPECT_EQ(judge({cell}).more_failures, 0);
 }
 
-TEST(PnpBench, RunsFromTheCommandLine) {
+struct Done {
+    int status = 0;
+    nlohmann::json document;
+};
+
+Done bench(const std::string& arguments) {
     const test::TemporaryFolder folder;
     const std::string out = folder / "out.json";
     const std::string command = std::string("timeout 60 ") + NARPA_BIN +
-                                " bench estimate --only pnp --trials 5 --points 6 --noise-px 0.5 --ranges 10,30 "
-                                "--nominal-only --json > " +
-                                out + " 2> /dev/null";
+                                " bench estimate --only pnp --nominal-only " + arguments + " --json > " + out +
+                                " 2> /dev/null";
     const int status = std::system(command.c_str());
-    ASSERT_TRUE(WIFEXITED(status));
     std::ifstream file(out);
-    const nlohmann::json document = nlohmann::json::parse(file);
-    EXPECT_EQ(document["pnp"]["cells"].size(), 2u);
-    EXPECT_EQ(WEXITSTATUS(status), document["passed"].get<bool>() ? 0 : 1);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, nlohmann::json::parse(file, nullptr, false)};
+}
+
+TEST(PnpBench, RunsFromTheCommandLine) {
+    const Done done = bench("--trials 5 --points 6 --noise-px 0.5 --ranges 10,30");
+    ASSERT_TRUE(done.document.is_object());
+    EXPECT_EQ(done.document["pnp"]["cells"].size(), 2u);
+    EXPECT_EQ(done.status, done.document["passed"].get<bool>() ? 0 : 1);
+}
+
+TEST(PnpBench, RefusesNumbersThatMakeNoTrials) {
+    EXPECT_EQ(bench("--noise-px nan").status, 2);
+    EXPECT_EQ(bench("--ranges inf").status, 2);
+    EXPECT_EQ(bench("--points 3").status, 2);
+    // So far away nothing tells the pose: no trial, and not tried for ever.
+    PnpBenchOptions far;
+    far.trials = 5, far.points = {6}, far.noise_px = {1}, far.ranges_m = {1e12}, far.hard_cases = false;
+    const auto cells = run_pnp_bench(
+        far, [](std::size_t, std::size_t) {}, StopFlag{false});
+    ASSERT_EQ(cells.size(), 1u);
+    EXPECT_EQ(cells[0].rows[0].trials, 0);
 }
 
 }  // namespace

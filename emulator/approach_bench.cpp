@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <random>
 
@@ -141,7 +142,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
     const Camera& camera = world.scene().cameras[camera_index];
     ApproachFrames frames(world, camera, target, o);
     std::vector<ApproachRun> runs;
-    std::vector<Method> methods;
+    std::deque<Method> methods;  // they stay where they are
     for (const EstimateMethod m : o.methods) {
         methods.emplace_back(m, world, camera, target, o);
         runs.push_back({m, {}, {}, {}});

@@ -36,8 +36,8 @@ constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
 /// Least eigenvalue of the pose's information, scaled to ones on its diagonal.
 constexpr double kLeastInformation = 1e-10;
-/// Part of the rays with which the pose is found, so far, before all of them tell it exactly.
-constexpr double kCoarseRays = 0.125, kDraftSigmas = 1;
+/// Coarse levels, whose pixels hold many of the fine ones, take this part of the rays and so much coarser a grid.
+constexpr double kCoarseRays = 0.125;
 constexpr int kCoarseFineness = 3;
 /// Of a window that the target is taken to fill before it is known.
 constexpr double kFirstPart = 0.25;
@@ -155,8 +155,7 @@ public:
     DenseStatus run(bool first) {
         render(e_.T_camera_body);
         if (first) shift();
-        const bool coarse = factor_ > o_.finest;
-        robust_.model_dn2 = coarse ? kCoarseModel * signal_power(view_.images(pixels_averaged())) : 0;
+        robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images(pixels_averaged())) : 0;
         double damping = kFirstDamping, moved_px = std::numeric_limits<double>::infinity();
         double least = std::numeric_limits<double>::infinity();
         int stalled = 0;
@@ -184,17 +183,8 @@ public:
         return least < kStillSmall ? DenseStatus::converged : DenseStatus::out_of_steps;
     }
 
-    /// The same with all the rays there are: what is left are steps of the noise that fewer rays have.
-    DenseStatus polish() {
-        rays_ = o_.rays_per_pixel;
-        fineness_ = o_.fineness;
-        return run(false);
-    }
-
-    /// With the sensor's noise alone.
+    /// Without the noise of the render.
     Result<Matrix6> bound() {
-        rays_ = o_.rays_per_pixel;
-        fineness_ = o_.fineness;
         render(e_.T_camera_body);
         differentiate();
         PhotometricImages images = view_.images(pixels_averaged());
@@ -286,10 +276,8 @@ private:
         s.pose = damped.ldlt().solve(equations_.pose_gradient());
         s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
         s.motion_px = motion_px(s.pose, camera_, e_.T_camera_body, extent_px(view_.window()));
-        const bool coarse = factor_ > o_.finest;
-        const double enough = rays_ < o_.rays_per_pixel ? std::max(kDraftSigmas, o_.sigmas) : o_.sigmas;
-        s.size = coarse ? s.motion_px / kCoarseStep_px : s.sigmas / enough;
-        s.trusted = s.motion_px < (coarse ? kCoarseTrust_px : kFineTrust_px);
+        s.size = coarse_ ? s.motion_px / kCoarseStep_px : s.sigmas / o_.sigmas;
+        s.trusted = s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
         return s;
     }
     /// Takes the step if it is no worse.
@@ -325,8 +313,9 @@ private:
     const DenseOptions& o_;
     DenseEstimate& e_;
     FrameSettings settings_;
-    double rays_ = kCoarseRays * o_.rays_per_pixel;  ///< for each pixel of the target
-    int fineness_ = std::max(1, o_.fineness / kCoarseFineness);
+    const bool coarse_ = factor_ > o_.finest;
+    const double rays_ = o_.rays_per_pixel * (coarse_ ? kCoarseRays : 1);  ///< for each pixel of the target
+    const int fineness_ = coarse_ ? std::max(1, o_.fineness / kCoarseFineness) : o_.fineness;
     double target_px_ = 0;  ///< pixels that tell of the target; 0: not known yet
 
     Robustness robust_{};
@@ -401,21 +390,20 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Pl
         view.measure(coarser_image(frame, factor), coarser_variance(frame_variance, i.camera, factor));
         Descent descent(camera, i.sensor, i.tracer, i.target, factor, view, options, e);
         e.status = descent.run(first);
-        if (factor > options.finest || e.status == DenseStatus::too_few_pixels) continue;
-        e.status = descent.polish();
-        if (e.status == DenseStatus::converged) descent.conclude();
+        if (factor == options.finest && e.status == DenseStatus::converged) descent.conclude();
     }
     return e;
 }
 
-Result<Matrix6> DenseAlignment::bound(const Placement& at, const Rigid3& T_camera_body,
-                                      const DenseOptions& options) {
+Result<Matrix6> DenseAlignment::bound(const Placement& at, const Rigid3& T_camera_body, const DenseOptions& options,
+                                      std::span<const float> frame_variance) {
     Impl& i = *impl_;
     if (const Status good = check(options); !good) return good.error();
     const MeasuredImage none{
         i.camera.width, i.camera.height,
         std::vector<float>(static_cast<std::size_t>(i.camera.width) * static_cast<std::size_t>(i.camera.height))};
-    if (const Status good = check_input(i.camera, none, {}, i.tracer.scene().bodies.size(), at, T_camera_body);
+    if (const Status good =
+            check_input(i.camera, none, frame_variance, i.tracer.scene().bodies.size(), at, T_camera_body);
         !good)
         return good.error();
     const int factor = options.finest;
@@ -423,7 +411,7 @@ Result<Matrix6> DenseAlignment::bound(const Placement& at, const Rigid3& T_camer
     const std::optional<Window> window = window_about(i.tracer, camera, i.target, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
     LevelView& view = i.view_of(factor, camera, *window, at);
-    view.measure(coarser_image(none, factor), {});
+    view.measure(coarser_image(none, factor), coarser_variance(frame_variance, i.camera, factor));
     DenseEstimate e;
     e.T_camera_body = T_camera_body;
     Descent descent(camera, i.sensor, i.tracer, i.target, factor, view, options, e);

@@ -21,11 +21,11 @@ namespace narpa {
 struct DenseOptions {
     ExposurePrior exposure{};
     double cauchy = 3;             ///< in standard deviations, where residuals begin to lose their say
-    double sigmas = 0.1;           ///< converged: the step is less than so many standard deviations of the pose
+    double sigmas = 0.2;           ///< converged: the step is less than so many standard deviations of the pose
     int iterations = 12;           ///< at most, on each level
     int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    double rays_per_pixel = 160;   ///< of the last images compared, on average over those that show the target
-    int fineness = 12;             ///< of the last derivative: rays each way in a pixel where the light changes
+    double rays_per_pixel = 64;    ///< of the last images compared, on average over those that show the target
+    int fineness = 8;              ///< of the last derivative: rays each way in a pixel where the light changes
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
@@ -76,10 +76,11 @@ public:
                                               std::span<const float> frame_variance = {});
 
     /// The least covariance that an unbiased estimate from one frame of this pose can have (Cramer, Rao): the
-    /// inverse of sum g g' / s^2, s^2 the sensor's alone, with the exposure as unknown as the options have it. The
-    /// information in the noise's own strength is left out: it is less by the number of electrons in a pixel.
+    /// inverse of sum g g' / s^2, s^2 the sensor's and the frame's as in `align`, with the exposure as unknown as
+    /// the options have it. The information in the noise's own strength is left out: it is less by the number of
+    /// electrons in a pixel.
     [[nodiscard]] Result<Matrix6> bound(const Placement& at, const Rigid3& T_camera_body,
-                                        const DenseOptions& options);
+                                        const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:
     struct Impl;

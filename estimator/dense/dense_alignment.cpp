@@ -31,6 +31,12 @@ constexpr int kMostStalled = 2;
 constexpr double kShrinking = 0.9;
 /// Steps so many times as large as they should be in the end are put down to that noise too.
 constexpr double kStillSmall = 10;
+/// Part of the cost that a coarse level gains with each step while it gets on.
+constexpr double kCoarseGain = 0.01;
+/// Steps go the same way if the cosine between them is larger.
+constexpr double kSameWay = 0.7, kLongestStride = 8;
+/// Residuals so many times as large as their noise: what is seen is not what is rendered.
+constexpr double kNoFit = 6;
 /// The noise of the render's samples may make a good step look worse by so much of the cost.
 constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
@@ -105,6 +111,7 @@ std::string_view name(DenseStatus status) noexcept {
         case DenseStatus::converged: return "converged";
         case DenseStatus::out_of_steps: return "out of steps";
         case DenseStatus::diverged: return "diverged";
+        case DenseStatus::does_not_fit: return "does not fit";
         case DenseStatus::left_the_picture: return "left the picture";
         case DenseStatus::too_few_pixels: return "too few pixels";
     }
@@ -166,19 +173,24 @@ public:
             }
             if (!linearise()) return DenseStatus::too_few_pixels;
             if (k == 0) note(0, true);
+            const double cost_before = cost_.robust;
             Step step = next_step(damping);
             for (int refused = 0; !try_step(step); ++refused) {
                 if (refused == kMostRefused) return DenseStatus::diverged;
-                damping *= kDampingStep;
+                if (stride_ == 1) damping *= kDampingStep;
+                stride_ = 1;
                 step = next_step(damping);
             }
             if (step.size < 1) return DenseStatus::converged;
             // Noise of the render keeps the pose moving.
-            stalled = step.size < kShrinking * least ? 0 : stalled + 1;
+            const bool shrinks = step.size < kShrinking * least;
+            const bool gains = coarse_ ? cost_.robust < (1 - kCoarseGain) * cost_before : step.size > kStillSmall;
+            stalled = shrinks || gains ? 0 : stalled + 1;
             least = std::min(least, step.size);
             if (step.trusted && stalled == kMostStalled) return DenseStatus::converged;
             moved_px += step.motion_px;
             damping = std::max(damping / kDampingStep, kLeastDamping);
+            lengthen(step);
         }
         return least < kStillSmall ? DenseStatus::converged : DenseStatus::out_of_steps;
     }
@@ -205,6 +217,8 @@ public:
         e_.covariance = robust_.scale * robust_.scale * plain.pose_information().inverse();
         const PhotometricCost now = cost(images, sensor_, e_.exposure, o_.exposure, robust_);
         e_.pixels = now.pixels;
+        e_.residual_scale = robust_.scale;
+        if (robust_.scale > kNoFit) e_.status = DenseStatus::does_not_fit;
         e_.chi2_per_pixel = now.chi2 / static_cast<double>(std::max<std::size_t>(now.pixels, 1));
     }
 
@@ -273,12 +287,22 @@ private:
         Matrix6 damped = information;
         damped.diagonal() *= 1 + damping;
         Step s;
-        s.pose = damped.ldlt().solve(equations_.pose_gradient());
+        s.pose = stride_ * damped.ldlt().solve(equations_.pose_gradient());
         s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
         s.motion_px = motion_px(s.pose, camera_, e_.T_camera_body, extent_px(view_.window()));
         s.size = coarse_ ? s.motion_px / kCoarseStep_px : s.sigmas / o_.sigmas;
-        s.trusted = s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
+        s.trusted = stride_ == 1 && s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
         return s;
+    }
+    /// Where details are further off than they reach, they make steps short that broader features ask for: while
+    /// these go the same way, they are lengthened.
+    void lengthen(const Step& step) {
+        const Matrix6 information = equations_.pose_information();
+        const double along = step.pose.dot(information * last_step_);
+        const double lengths =
+            std::sqrt(step.pose.dot(information * step.pose) * last_step_.dot(information * last_step_));
+        stride_ = coarse_ && along > kSameWay * lengths ? std::min(2 * stride_, kLongestStride) : 1;
+        last_step_ = step.pose;
     }
     /// Takes the step if it is no worse.
     bool try_step(const Step& step) {
@@ -321,6 +345,8 @@ private:
     Robustness robust_{};
     PhotometricCost cost_{};
     PhotometricEquations equations_{};
+    Vector6 last_step_ = Vector6::Zero();
+    double stride_ = 1;  ///< by which steps are lengthened
 };
 
 /// Means over factor x factor pixels have this variance.

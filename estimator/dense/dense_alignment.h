@@ -22,10 +22,10 @@ struct DenseOptions {
     ExposurePrior exposure{};
     double cauchy = 3;             ///< in standard deviations, where residuals begin to lose their say
     double sigmas = 0.2;           ///< converged: the step is less than so many standard deviations of the pose
-    int iterations = 12;           ///< at most, on each level
+    int iterations = 16;           ///< at most, on each level
     int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    double rays_per_pixel = 64;    ///< of the last images compared, on average over those that show the target
-    int fineness = 8;              ///< of the last derivative: rays each way in a pixel where the light changes
+    double rays_per_pixel = 32;    ///< of the last images compared, on average over those that show the target
+    int fineness = 6;              ///< of the last derivative: rays each way in a pixel where the light changes
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
@@ -37,6 +37,7 @@ enum class DenseStatus : std::uint8_t {
     converged,
     out_of_steps,      ///< still moving after the last iteration that was allowed
     diverged,          ///< no step made it better, or the target went behind the camera
+    does_not_fit,      ///< it settled, but residuals are many times their noise: a false minimum or a wrong model
     left_the_picture,  ///< at the guess or at a step the target is not in the image
     too_few_pixels,    ///< what is seen does not tell all six
 };
@@ -55,6 +56,7 @@ struct DenseEstimate {
     Rigid3 T_camera_body{};
     Matrix6 covariance = Matrix6::Zero();  ///< of noise in the frame and in the render; zero unless converged
     Exposure exposure{};
+    double residual_scale = 1;  ///< median residual over what noise makes of it, at least 1
     double chi2_per_pixel = 0;  ///< about 1 where the model holds
     std::size_t pixels = 0;     ///< of the last level that tell of the target
     std::vector<DenseStep> steps;

@@ -208,13 +208,11 @@ public:
         return Matrix6(information.inverse());
     }
 
-    /// Of where the level was linearised last: what noise makes of the pose, as strong as the residuals are.
+    /// What the images tell of the pose where they were rendered last.
     void conclude() {
-        constexpr double kLeastSquares = std::numeric_limits<double>::infinity();
         const Stopwatch watch(e_.solve_ms);
         const PhotometricImages images = view_.images(pixels_averaged());
-        const auto plain = equations(images, sensor_, e_.exposure, o_.exposure, {robust_.scale, kLeastSquares, 0});
-        e_.covariance = robust_.scale * robust_.scale * plain.pose_information().inverse();
+        e_.covariance = equations(images, sensor_, e_.exposure, o_.exposure, robust_).pose_covariance();
         const PhotometricCost now = cost(images, sensor_, e_.exposure, o_.exposure, robust_);
         e_.pixels = now.pixels;
         e_.residual_scale = robust_.scale;

@@ -54,7 +54,7 @@ struct DenseStep {
 struct DenseEstimate {
     DenseStatus status = DenseStatus::converged;
     Rigid3 T_camera_body{};
-    Matrix6 covariance = Matrix6::Zero();  ///< of noise in the frame and in the render; zero unless converged
+    Matrix6 covariance = Matrix6::Zero();  ///< PhotometricEquations::pose_covariance; zero unless it settled
     Exposure exposure{};
     double residual_scale = 1;  ///< median residual over what noise makes of it, at least 1
     double chi2_per_pixel = 0;  ///< about 1 where the model holds

@@ -86,9 +86,10 @@ using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 struct EquationSum {
     Matrix8 information = Matrix8::Zero();
+    Matrix8 scatter = Matrix8::Zero();
     Vector8 gradient = Vector8::Zero();
     EquationSum& operator+=(const EquationSum& b) {
-        information += b.information, gradient += b.gradient;
+        information += b.information, scatter += b.scatter, gradient += b.gradient;
         return *this;
     }
 };
@@ -171,17 +172,21 @@ PhotometricEquations equations(const PhotometricImages& images, const SensorMode
             J << exposure.gain * images.derivative[p].cast<double>(), static_cast<double>(images.signal[p]), 1;
             J *= r.inverse_s;
             row.information.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
+            row.scatter.selfadjointView<Eigen::Lower>().rankUpdate(J, weight * weight * r.r * r.r);
             row.gradient += weight * r.r * J;
         });
     });
     PhotometricEquations out;
     out.information = sum.information.selfadjointView<Eigen::Lower>();
+    out.scatter = sum.scatter.selfadjointView<Eigen::Lower>();
     out.gradient = sum.gradient;
     // The prior in the units of residuals that are `scale` times their noise.
     const double unit = robust.scale * robust.scale;
     const double gain = unit * precision(prior.gain_sigma), offset = unit * precision(prior.offset_sigma_dn);
     out.information(6, 6) += gain;
     out.information(7, 7) += offset;
+    out.scatter(6, 6) += gain;
+    out.scatter(7, 7) += offset;
     out.gradient[6] -= gain * (exposure.gain - 1);
     out.gradient[7] -= offset * exposure.offset_dn;
     return out;
@@ -191,6 +196,12 @@ Matrix6 PhotometricEquations::pose_information() const {
     const Eigen::Matrix2d of_exposure = information.bottomRightCorner<2, 2>().inverse();
     return information.topLeftCorner<6, 6>() -
            information.topRightCorner<6, 2>() * of_exposure * information.bottomLeftCorner<2, 6>();
+}
+
+Matrix6 PhotometricEquations::pose_covariance() const {
+    const Matrix8 inverse = information.inverse();
+    const bool as_expected = (inverse * scatter).trace() <= 8;
+    return (as_expected ? inverse : Matrix8(inverse * scatter * inverse)).topLeftCorner<6, 6>();
 }
 
 Vector6 PhotometricEquations::pose_gradient() const {

@@ -64,10 +64,17 @@ struct Robustness {
 struct PhotometricEquations {
     Eigen::Matrix<double, 8, 8> information = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 1> gradient = Eigen::Matrix<double, 8, 1>::Zero();
+    /// Covariance of the gradient as the residuals themselves tell it, and the prior.
+    Eigen::Matrix<double, 8, 8> scatter = Eigen::Matrix<double, 8, 8>::Zero();
 
     /// What is known of the pose where the exposure is not.
     [[nodiscard]] Matrix6 pose_information() const;
     [[nodiscard]] Vector6 pose_gradient() const;
+    /// What noise makes of the pose: the inverse of the information where residuals are as small as their noise, or
+    /// smaller; else by their own scatter (P. J. Huber, "The behavior of maximum likelihood estimates under
+    /// nonstandard conditions", 5th Berkeley Symposium, 1967), which holds whatever makes them so large as long as
+    /// it is not common to many pixels.
+    [[nodiscard]] Matrix6 pose_covariance() const;
     /// The exposure's step that goes with a step of the pose.
     [[nodiscard]] Eigen::Vector2d exposure_step(const Vector6& pose_step) const;
 };

@@ -37,7 +37,7 @@ protected:
         FrameSettings s;
         s.seed = 99;
         s.budget.kind = FrameBudget::Kind::rays;
-        s.budget.rays = 2'000'000;
+        s.budget.rays = 1'000'000;
         view.render(pose, s, false);
         Camera exposing = camera;
         if (!noise) exposing.detector->shot_noise = false, exposing.detector->read_noise_e = 0;
@@ -68,7 +68,7 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     DenseAlignment dense(*tracer, camera, 0);
     DenseOptions o;
     o.fineness = 4;
-    o.rays_per_pixel = 50;
+    o.rays_per_pixel = 24;
     const auto e = dense.align(frame, at, displaced(truth, off_by(5, 0.05, norm(truth.t))), o);
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_EQ(e->status, DenseStatus::converged) << name(e->status);

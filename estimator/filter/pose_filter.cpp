@@ -134,11 +134,11 @@ Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, const Pose
     return create(settings, first.t_ns, state, 0.5 * (P + P.transpose()));
 }
 
-PoseFilter::Knowledge PoseFilter::moved_on(const Event& from, std::int64_t t_ns) const {
-    Knowledge k = from.after;
-    propagate(settings_.motion, 1e-9 * static_cast<double>(t_ns - from.t_ns), from.acceleration_m_s2, k.state,
-              k.covariance);
-    return k;
+PoseFilter::Knowledge PoseFilter::moved_on(Knowledge from, const Thrust& thrust, std::int64_t by_ns) const {
+    MotionModel motion = settings_.motion;
+    motion.acceleration_psd += thrust.psd;
+    propagate(motion, 1e-9 * static_cast<double>(by_ns), thrust.acceleration_m_s2, from.state, from.covariance);
+    return from;
 }
 
 /// The oldest goes where there is no room.
@@ -153,15 +153,15 @@ void PoseFilter::remember(std::size_t place, const Event& event) {
 
 void PoseFilter::predict(std::int64_t t_ns) {
     if (t_ns <= t_ns_) return;
-    propagate(settings_.motion, 1e-9 * static_cast<double>(t_ns - t_ns_), history_.back().acceleration_m_s2,
-              now_.state, now_.covariance);
+    now_ = moved_on(now_, history_.back().thrust, t_ns - t_ns_);
     t_ns_ = t_ns;
 }
 
-bool PoseFilter::accelerate(const Vec3& acceleration_m_s2) {
-    if (!is_finite(acceleration_m_s2)) return false;
-    if (history_.back().acceleration_m_s2 == acceleration_m_s2) return true;
-    remember(history_.size(), {t_ns_, now_, acceleration_m_s2, false, {}});
+bool PoseFilter::accelerate(const Vec3& acceleration_m_s2, double psd) {
+    if (!is_finite(acceleration_m_s2) || !(psd >= 0 && std::isfinite(psd))) return false;
+    const Thrust thrust{acceleration_m_s2, psd};
+    if (history_.back().thrust == thrust) return true;
+    remember(history_.size(), {t_ns_, now_, thrust, false, {}});
     return true;
 }
 
@@ -177,7 +177,7 @@ UpdateResult PoseFilter::update(const PoseMeasurement& m) {
     const auto later = std::upper_bound(history_.begin(), history_.end(), m.t_ns,
                                         [](std::int64_t t, const Event& e) { return t < e.t_ns; });
     const Event& before = *std::prev(later);
-    Event event{m.t_ns, moved_on(before, m.t_ns), before.acceleration_m_s2, true, m};
+    Event event{m.t_ns, after(before, m.t_ns), before.thrust, true, m};
     const Innovation innovation(event.after.state, event.after.covariance, m);
     if (!(innovation.nis <= settings_.gate)) {
         ++counts_.gated;
@@ -195,13 +195,13 @@ UpdateResult PoseFilter::update(const PoseMeasurement& m) {
     remember(static_cast<std::size_t>(later - history_.begin()), event);
     for (std::size_t i = place + 1; i < history_.size(); ++i) {
         Event& e = history_[i];
-        e.after = moved_on(history_[i - 1], e.t_ns);
+        e.after = after(history_[i - 1], e.t_ns);
         if (e.measured)
             correct(Innovation(e.after.state, e.after.covariance, e.measurement), e.measurement.covariance,
                     e.after.state, e.after.covariance);
     }
     t_ns_ = std::max(t_ns_, m.t_ns);
-    now_ = moved_on(history_.back(), t_ns_);
+    now_ = after(history_.back(), t_ns_);
     return {UpdateOutcome::taken, innovation.nis, ""};
 }
 

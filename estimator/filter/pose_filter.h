@@ -66,8 +66,10 @@ public:
     /// Moves on to t_ns; an earlier time changes nothing.
     void predict(std::int64_t t_ns);
     /// From the filter's time on the target accelerates so relative to the chaser, frame axes, until told
-    /// otherwise: minus what the chaser's thrusters do. Must be finite; else it is not taken and false comes back.
-    bool accelerate(const Vec3& acceleration_m_s2);
+    /// otherwise: minus what the chaser's thrusters do. `psd`: of white noise on each axis, beside the motion
+    /// model's own, for what thrust leaves unsure (m^2 s^-3). Must be finite, psd >= 0; else it is not taken and
+    /// false comes back.
+    bool accelerate(const Vec3& acceleration_m_s2, double psd = 0);
     /// Takes a measurement; moves on to its time where that is later.
     UpdateResult update(const PoseMeasurement& measurement);
 
@@ -89,18 +91,25 @@ private:
         RelativeState state;
         Matrix12 covariance;
     };
+    struct Thrust {
+        Vec3 acceleration_m_s2{};
+        double psd = 0;
+        friend bool operator==(const Thrust&, const Thrust&) = default;
+    };
     /// What happened at a time, and what was known after it.
     struct Event {
         std::int64_t t_ns = 0;
         Knowledge after;
-        Vec3 acceleration_m_s2{};  ///< from then on
+        Thrust thrust;  ///< from then on
         bool measured = false;
         PoseMeasurement measurement;
     };
     explicit PoseFilter(const FilterSettings& settings) : settings_(settings) {}
 
-    /// An event's knowledge, at a later time.
-    [[nodiscard]] Knowledge moved_on(const Event& from, std::int64_t t_ns) const;
+    [[nodiscard]] Knowledge moved_on(Knowledge from, const Thrust& thrust, std::int64_t by_ns) const;
+    [[nodiscard]] Knowledge after(const Event& event, std::int64_t t_ns) const {
+        return moved_on(event.after, event.thrust, t_ns - event.t_ns);
+    }
     void remember(std::size_t place, const Event& event);
 
     FilterSettings settings_;

@@ -346,6 +346,7 @@ TEST(FilterUpdate, RefusesWhatIsNoMeasurement) {
         EXPECT_FALSE(PoseFilter::create({c.motion}, m, 1, 1));
     }
     EXPECT_FALSE(filter.accelerate({kNan, 0, 0}));
+    EXPECT_FALSE(filter.accelerate({}, -1));
     EXPECT_EQ(before, filter.state());
     EXPECT_EQ(filter.update(good).outcome, UpdateOutcome::taken);
 
@@ -357,6 +358,19 @@ TEST(FilterUpdate, RefusesWhatIsNoMeasurement) {
     EXPECT_FALSE(PoseFilter::create(settings, 0, before, r.first_covariance()));
     settings = {c.motion, kNan};
     EXPECT_FALSE(PoseFilter::create(settings, 0, before, r.first_covariance()));
+}
+
+TEST(FilterUpdate, ThrustIsAsUnsureAsItIsSaidToBe) {
+    const Case c = cases()[1];
+    Flight r(c, 10);
+    const Matrix12 P = r.first_covariance();
+    auto filter = *PoseFilter::create({c.motion}, 0, r.truth, P);
+    ASSERT_TRUE(filter.accelerate({0.01, 0, 0}, 3e-4));
+    filter.predict(2 * kSecond);
+    ASSERT_TRUE(filter.accelerate({}));
+    filter.predict(5 * kSecond);
+    EXPECT_NEAR(filter.state().velocity_m_s.x, r.truth.velocity_m_s.x + 0.02, 1e-12);
+    EXPECT_NEAR(filter.covariance()(3, 3), P(3, 3) + 2 * 3e-4 + 5 * c.motion.acceleration_psd, 1e-12);
 }
 
 /// A poor first guess, then many precise measurements: the covariance stays positive definite, and small.

@@ -18,14 +18,15 @@ constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
 /// So many measurements in a row that contradict the filter are right, and it is wrong.
 constexpr std::uint64_t kContradictions = 5;
 
-Result<std::size_t> target_of(const World& world, const Camera& camera, const std::string& name) {
+}  // namespace
+
+Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor, const std::string& name) {
     const auto& bodies = world.scene().bodies;
     if (!name.empty()) {
         if (const auto body = world.body_named(name)) {
-            if (static_cast<int>(*body) != camera.mount) return *body;
-            return Error{
-                fmt::format("target \"{}\" carries the camera \"{}\", expected another body", name, camera.name),
-                world.scene().file};
+            if (static_cast<int>(*body) != mount) return *body;
+            return Error{fmt::format("target \"{}\" carries \"{}\", expected another body", name, sensor),
+                         world.scene().file};
         }
         std::string names;
         for (const Body& b : bodies) names += (names.empty() ? "" : ", ") + b.name;
@@ -33,15 +34,15 @@ Result<std::size_t> target_of(const World& world, const Camera& camera, const st
                      world.scene().file};
     }
     for (std::size_t i = 0; i < bodies.size(); ++i)
-        if (static_cast<int>(i) != camera.mount && std::holds_alternative<int>(bodies[i].shape)) return i;
-    return Error{fmt::format("no body with a mesh but what carries the camera \"{}\": expected one to estimate the "
-                             "pose of, or its name",
-                             camera.name),
-                 world.scene().file};
+        if (static_cast<int>(i) != mount && std::holds_alternative<int>(bodies[i].shape)) return i;
+    return Error{
+        fmt::format(
+            "no body with a mesh but what carries \"{}\": expected one to estimate the pose of, or its name",
+            sensor),
+        world.scene().file};
 }
 
-/// Off the truth by an angle and by a part of the range, each in a direction drawn at random.
-Rigid3 off(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
+Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
     std::normal_distribution<double> normal;
     const auto direction = [&] {
         const double x = normal(random), y = normal(random), z = normal(random);
@@ -53,8 +54,6 @@ Rigid3 off(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random
     error << to_eigen(turn), to_eigen(shift);
     return displaced(truth, error);
 }
-
-}  // namespace
 
 EstimateReport TrackedFrame::report(std::uint8_t camera) const {
     const auto deviation = [&](int i) { return std::sqrt(filtered_covariance(i, i)); };
@@ -92,12 +91,12 @@ struct FrameTracker::Impl {
 Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, std::size_t camera_index,
                                                            const TrackerOptions& options) {
     const Camera& camera = world.scene().cameras[camera_index];
-    const auto target = target_of(world, camera, options.target);
+    const auto target = target_of(world, camera.mount, camera.name, options.target);
     if (!target) return target.error();
     auto impl = std::make_unique<Impl>(world, camera, *target, options);
     FeatureSettings features;
     features.spp = options.spp;
-    features.seed = options.seed;
+    features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
     impl->by_points.emplace(world.tracer(), camera, *target, Placement(world.scene().bodies.size()), features);
     if (options.method == EstimateMethod::dense) impl->by_pixels.emplace(world.tracer(), camera, *target);
     return std::unique_ptr<FrameTracker>(new FrameTracker(std::move(impl)));
@@ -127,7 +126,7 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
         m.filter->predict(t_ns);
         out.guess = inverse(m.T_chaser_camera()) * m.filter->pose(q_frame_chaser).T_chaser_target;
     } else {
-        out.guess = off(out.truth, m.options, m.random);
+        out.guess = off_truth(out.truth, m.options, m.random);
     }
     if (const auto image = measured_image(m.camera, bytes)) {
         m.measure(*image, at, out);
@@ -168,7 +167,7 @@ void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Pla
 /// From where the points lead; from the guess where they lead nowhere.
 void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
     DenseOptions dense;
-    dense.seed = options.seed;
+    dense.seed = ~options.seed;
     dense.method = world.scene().render.method;
     dense.max_depth = world.scene().render.max_depth;
     if (out.measured) dense.coarsest = 1;

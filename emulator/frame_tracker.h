@@ -2,9 +2,11 @@
 /// with the truth beside it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <random>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,6 +34,12 @@ struct TrackerOptions {
     /// rad^2 s^-3. As a chaser's that brakes with some cm s^-2.
     double acceleration_psd = 1e-3, angular_acceleration_psd = 1e-5;
 };
+
+/// The body whose pose is meant, for a sensor that rides on `mount`. Errors list the bodies there are.
+[[nodiscard]] Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor,
+                                            const std::string& name);
+/// Off the truth as the options say, each in a direction drawn at random.
+[[nodiscard]] Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& options, std::mt19937_64& random);
 
 /// What one frame told. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
 struct TrackedFrame {

@@ -99,11 +99,10 @@ Outcome bench_approach(const Options& o, Findings& findings) {
     const Scene& scene = (*world)->scene();
     const auto camera = sensor_named(scene.cameras, o.camera, "camera", scene.file);
     if (!camera) return camera.error();
-    TrackerOptions find;
-    find.target = o.target;
-    auto tracker = FrameTracker::create(**world, *camera, find);  // knows which body is meant
-    if (!tracker) return tracker.error();
-    const std::size_t target = (*tracker)->target();
+    const Camera& looking = scene.cameras[*camera];
+    const auto meant = target_of(**world, looking.mount, looking.name, o.target);
+    if (!meant) return meant.error();
+    const std::size_t target = *meant;
     ApproachOptions options = o.approach;
     if (!o.along.empty()) options.along = {o.along[0], o.along[1], o.along[2]};
     if (!o.up.empty()) options.up = {o.up[0], o.up[1], o.up[2]};

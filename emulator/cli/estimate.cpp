@@ -1,10 +1,13 @@
-// narpa estimate - the pose of the target from the frames of a logged run, with covariance, bound and truth.
+// narpa estimate - the pose of the target from the frames of a logged run, or from one frame or sweep in a file,
+// with covariance, bound and truth.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "emulator/cli/bench_scene.h"
 #include "emulator/cli/cli.h"
+#include "emulator/cli/estimate_one.h"
 #include "emulator/cli/tracker_options.h"
 #include "emulator/estimate_report.h"
 #include "emulator/replay.h"
@@ -14,14 +17,15 @@ namespace narpa::cli {
 namespace {
 
 struct Options {
-    std::string folder, camera, scene, csv, picture;
-    int every = 1, threads = 0;
+    std::string input, camera, scene, csv, picture;
+    int every = 1;
     TrackerFlags tracker;
+    OneOptions one;  ///< of a single file
 };
 
 /// Frames are made again, bit for bit, and looked at one after another as navigation would.
 Result<std::vector<TrackedFrame>> track(const Options& o, Replay& run, FrameTracker& tracker) {
-    TracingThreads threads(o.threads);
+    TracingThreads threads(o.one.threads);
     const Progress progress;
     std::vector<TrackedFrame> tracked;
     for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
@@ -38,7 +42,7 @@ Result<std::vector<TrackedFrame>> track(const Options& o, Replay& run, FrameTrac
                 fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as they "
                             "were",
                             ledger.frame, differs.front()),
-                o.folder + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
+                o.input + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
     }
     return tracked;
 }
@@ -52,12 +56,10 @@ Status write_rows(const std::string& path, const std::vector<TrackedFrame>& trac
     return Ok{};
 }
 
-Outcome estimate(const Options& o) {
-    auto options = o.tracker.options();
-    if (!options) return options.error();
-    auto run = Replay::open(o.folder, o.camera, o.scene);
+Outcome estimate_log(const Options& o, const TrackerOptions& tracker_options) {
+    auto run = Replay::open(o.input, o.camera, o.scene);
     if (!run) return run.error();
-    auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), *options);
+    auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), tracker_options);
     if (!tracker) return tracker.error();
     auto tracked = track(o, **run, **tracker);
     if (!tracked) return tracked.error();
@@ -65,21 +67,37 @@ Outcome estimate(const Options& o) {
     const std::string target = scene.bodies[(*tracker)->target()].name;
     const EstimateSummary summary = summarise(*tracked);
     const nlohmann::json told = to_json(summary);
-    say(fmt::format("{}: camera {}, target {}, by {}: {}", o.folder, (*run)->camera().name, target,
-                    kEstimateMethods[static_cast<std::size_t>(options->method)], estimates_in_words(told)));
+    say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target,
+                    kEstimateMethods[static_cast<std::size_t>(tracker_options.method)], estimates_in_words(told)));
     if (!o.csv.empty())
         if (auto written = write_rows(o.csv, *tracked); !written) return written.error();
     if (!o.picture.empty()) {
         const std::string title = fmt::format("{}: {} seen by {}, by {}", scene.name, target, (*run)->camera().name,
-                                              kEstimateMethods[static_cast<std::size_t>(options->method)]);
+                                              kEstimateMethods[static_cast<std::size_t>(tracker_options.method)]);
         if (auto written = plot_estimates(o.picture, title, *tracked); !written) return written.error();
     }
     return nlohmann::json{{"passed", summary.measured > 0},
-                          {"log", o.folder},
+                          {"log", o.input},
                           {"camera", (*run)->camera().name},
                           {"target", target},
-                          {"method", kEstimateMethods[static_cast<std::size_t>(options->method)]},
+                          {"method", kEstimateMethods[static_cast<std::size_t>(tracker_options.method)]},
                           {"summary", told}};
+}
+
+Outcome estimate(const Options& o) {
+    auto tracker = o.tracker.options();
+    if (!tracker) return tracker.error();
+    std::error_code error;
+    if (std::filesystem::is_directory(o.input, error)) return estimate_log(o, *tracker);
+    OneOptions one = o.one;
+    one.scene = o.input;
+    one.sensor = o.camera;
+    one.tracker = *tracker;
+    if (!std::filesystem::exists(o.input, error))
+        return Error{"is not there, expected the folder of a logged run or a scene file", o.input};
+    if (one.frame.empty() == one.sweep.empty())
+        return Error{"with a scene, expected one of --frame FILE.raw and --sweep FILE.pcap", o.input};
+    return one.frame.empty() ? estimate_sweep(one) : estimate_frame(one);
 }
 
 }  // namespace
@@ -87,13 +105,24 @@ Outcome estimate(const Options& o) {
 Command add_estimate(CLI::App& app) {
     auto o = std::make_shared<Options>();
     CLI::App* c = app.add_subcommand(
-        "estimate", "Estimate the target's pose from the frames of a logged run, beside the truth and the bound");
-    c->add_option("DIR", o->folder, "Folder that `run --log` has written")->required();
-    c->add_option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
+        "estimate",
+        "Estimate the target's pose from a logged run, a frame or a sweep, beside the truth and the bound");
+    c->add_option("INPUT", o->input, "Folder that `run --log` has written, or a scene file with --frame or --sweep")
+        ->required();
+    c->add_option("--camera,--lidar", o->camera, "Name of the camera or LiDAR (default: the first of the scene)");
+    c->add_option("--frame", o->one.frame,
+                  "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
+    c->add_option("--sweep", o->one.sweep, "FILE.pcap: a VLP-16's data packets, from the first on for one turn");
+    c->add_option("--time", o->one.time_s, "Simulation time of the frame or the sweep's first shot, s")
+        ->check(CLI::Range(-9e9, 9e9));
+    c->add_option("--range-noise", o->one.range_noise_m, "Standard deviation of the sweep's ranges, m")
+        ->check(CLI::Range(1e-6, 1e3))
+        ->capture_default_str();
+    o->one.pose.add_to(*c);
     c->add_option("--scene", o->scene, "Scene file (default: the one that the run had)");
     o->tracker.add_to(*c, "");
     c->add_option("--every", o->every, "Look at each so-many-th frame")->check(CLI::Range(1, 1000000));
-    c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
+    c->add_option("--threads", o->one.threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
     c->add_option("--csv", o->csv, "FILE.csv: a row for each frame");
     c->add_option("-o,--output", o->picture,
                   "FILE.png: errors over time, with three standard deviations and bound");

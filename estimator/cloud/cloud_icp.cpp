@@ -93,7 +93,7 @@ double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
     if (!(n > kUnknowns && slope > 0)) return kUnobservedSigma * kUnobservedSigma;
     const double correction = 1 + kUnknowns / n * slope_variance / (slope * slope);
     const double mean_square = pass.scores2 / (n - kUnknowns);
-    return std::pow(correction * pass.scatter / slope, 2) * mean_square;
+    return std::max(1.0, std::pow(correction * pass.scatter / slope, 2) * mean_square);
 }
 
 CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {

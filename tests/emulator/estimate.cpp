@@ -1,0 +1,194 @@
+// Poses estimated beside a run and from its log: what is logged, what goes out on CAN, what the program says.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "emulator/estimate_report.h"
+#include "emulator/trajectory.h"
+#include "tests/emulator/loop_support.h"
+
+namespace narpa::test {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kDocking = NARPA_BUILD_DIR "/scenes/docking/docking.toml";
+
+/// The docking scene, small, over a second of its approach.
+class EstimateTest : public LoopTest {
+protected:
+    Scene docking() {
+        auto read = read_scene(kDocking);
+        if (!read) ADD_FAILURE() << read.error().text();
+        Scene s = *std::move(read);
+        Camera& c = s.cameras[0];
+        c.fx /= 2, c.fy /= 2, c.cx = (c.cx + 0.5) / 2 - 0.5, c.cy = (c.cy + 0.5) / 2 - 0.5;
+        c.width /= 2, c.height /= 2;
+        s.render.spp = 4;
+        return s;
+    }
+    /// The approach's commands from 40 s on, `count` of them, a tenth of a second apart.
+    std::string approach(int count) {
+        const std::string spec = "log:" + (folder_ / "commands.log");
+        auto rows = read_trajectory(NARPA_BUILD_DIR "/scenes/docking/approach.csv");
+        EXPECT_TRUE(rows);
+        auto bus = open_can_bus(spec, CanRole::client);
+        EXPECT_TRUE(bus);
+        int sent = 0;
+        for (const TrajectoryRow& row : *rows) {
+            if (row.t_ns % 100'000'000 != 0 || row.t_ns < 40'000'000'000 || sent >= count) continue;
+            CanFrame frame;
+            EXPECT_TRUE(encode_fd({static_cast<std::uint8_t>(sent), row.t_ns, row.motion}, 0x100, frame));
+            EXPECT_TRUE((*bus)->send(frame));
+            ++sent;
+        }
+        EXPECT_EQ(sent, count);
+        return spec;
+    }
+    std::unique_ptr<Emulator> fly(int commands, const std::string& log) {
+        RunOptions o;
+        o.bus = approach(commands);
+        o.lockstep = true;
+        o.log_folder = log;
+        o.video = {{"nav", "none"}};
+        o.estimate = TrackerOptions{};
+        o.estimate->start_deg = o.estimate->start_percent = 3;
+        auto emulator = Emulator::create(docking(), o);
+        if (!emulator) {
+            ADD_FAILURE() << emulator.error().text();
+            return nullptr;
+        }
+        StopFlag stop{false};
+        const Status status = (*emulator)->run(stop);
+        EXPECT_TRUE(status) << status.error().text();
+        return *std::move(emulator);
+    }
+};
+
+TEST_F(EstimateTest, EveryFrameOfALockstepRunIsLookedAt) {
+    const std::string log = folder_ / "log";
+    const auto emulator = fly(6, log);
+    ASSERT_NE(emulator, nullptr);
+    ASSERT_NE(emulator->estimates(), nullptr);
+    const auto& frames = emulator->estimates()->frames();
+    ASSERT_EQ(frames.size(), emulator->cameras().front()->stats().frames);
+    EXPECT_EQ(emulator->estimates()->passed_over(), 0u);
+    for (const TrackedFrame& f : frames) {
+        ASSERT_EQ(f.state, EstimateState::measured) << f.why;
+        EXPECT_LT(error_between(*f.measured, f.truth).head<3>().norm(), 5e-3);
+        EXPECT_LT(error_between(f.filtered, f.truth).tail<3>().norm(), 2e-3 * norm(f.truth.t));
+    }
+    EXPECT_LT(error_between(frames.back().guess, frames.back().truth).head<3>().norm(),
+              0.2 * error_between(frames.front().guess, frames.front().truth).head<3>().norm())
+        << "the track leads on from what it knows";
+
+    const auto rows = read_rows(log + "/nav.estimate.csv");
+    ASSERT_EQ(rows.size(), frames.size());
+    EXPECT_EQ(rows.back().at("state"), "measured");
+    EXPECT_NEAR(std::stod(rows.back().at("z_m")), frames.back().measured->t.z, 1e-9);
+    EXPECT_TRUE(std::filesystem::exists(log + "/nav.estimate.png"));
+}
+
+TEST_F(EstimateTest, GoesOutOnCan) {
+    const std::string log = folder_ / "log";
+    const auto emulator = fly(4, log);
+    ASSERT_NE(emulator, nullptr);
+    auto bus = open_can_bus("log:" + log + "/can.log", CanRole::hub);
+    ASSERT_TRUE(bus) << bus.error().text();
+    EstimateDecoder decoder;
+    EstimateReport report;
+    std::size_t seen = 0;
+    CanFrame frame;
+    while ((*bus)->receive(frame))
+        if (decoder.accept(frame, 40'000'000'000, report) == DecodeStatus::complete) {
+            const TrackedFrame& told = emulator->estimates()->frames().at(seen++);
+            EXPECT_EQ(report.frame, told.frame);
+            EXPECT_EQ(report.t_ns, told.t_ns);
+            EXPECT_EQ(report.state, told.state);
+            EXPECT_LT(norm(report.T_camera_target.t - told.filtered.t), 1e-6);
+            EXPECT_NEAR(report.sigma_position_m.z, std::sqrt(told.filtered_covariance(5, 5)), 1e-6);
+        }
+    EXPECT_EQ(seen, emulator->estimates()->frames().size());
+}
+
+struct Program {
+    std::string out;
+    int status = -1;
+};
+Program narpa_does(const std::string& arguments) {
+    Program p;
+    FILE* pipe = ::popen((NARPA_BIN " " + arguments + " 2>&1").c_str(), "r");
+    if (pipe == nullptr) return p;
+    std::array<char, 4096> part;
+    while (const std::size_t n = std::fread(part.data(), 1, part.size(), pipe)) p.out.append(part.data(), n);
+    const int status = ::pclose(pipe);
+    p.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return p;
+}
+
+TEST_F(EstimateTest, FromOneFrameAndFromOneSweep) {
+    const std::string frame = folder_ / "frame.raw", sweep = folder_ / "sweep.pcap";
+    const std::string scene = kDocking, where = " --pose chaser=20,0.5,-0.4,0,0,0,1 ";
+    ASSERT_EQ(narpa_does("render " + scene + where + "--spp 4 -o " + frame).status, 0);
+    const Program of_frame = narpa_does("estimate " + scene + where + "--frame " + frame + " --json");
+    ASSERT_EQ(of_frame.status, 0) << of_frame.out;
+    const json told = json::parse(of_frame.out.substr(of_frame.out.find("\n{") + 1));
+    EXPECT_LT(told["error_rotation_rad"].get<double>(), 5e-3);
+    EXPECT_LT(told["error_position_m"].get<double>(), 0.05);
+
+    const Program scanned = narpa_does("scan " + scene + where + "-o " + sweep);
+    ASSERT_EQ(scanned.status, 0) << scanned.out;
+    const Program of_sweep =
+        narpa_does("estimate " + scene + where + "--sweep " + sweep + " --target station --json");
+    ASSERT_EQ(of_sweep.status, 0) << of_sweep.out;
+    const json cloud = json::parse(of_sweep.out.substr(of_sweep.out.find("\n{") + 1));
+    EXPECT_LT(cloud["error_rotation_rad"].get<double>(), 5e-3);
+    EXPECT_LT(cloud["error_position_m"].get<double>(), 0.05);
+    EXPECT_EQ(cloud["unobserved"].get<int>(), 0);
+}
+
+TEST_F(EstimateTest, BadInputIsToldInWords) {
+    const std::string scene = kDocking;
+    const auto refuses = [](const std::string& arguments, const std::string& words) {
+        const Program p = narpa_does("estimate " + arguments);
+        EXPECT_EQ(p.status, 2) << p.out;
+        EXPECT_NE(p.out.find(words), std::string::npos) << p.out;
+    };
+    std::ofstream(folder_ / "short.raw") << "four";
+    refuses(scene + " --frame " + (folder_ / "short.raw"), "expected 307200");
+    refuses(scene + " --frame " + (folder_ / "none.raw"), "none.raw");
+    refuses(scene + " --sweep " + (folder_ / "short.raw"), "short.raw");
+    refuses(scene, "--frame");
+    refuses(scene + " --frame x --target moon", "expected one of: station, chaser");
+    refuses(scene + " --frame x --start 5", "expected DEG,PERCENT");
+    refuses(folder_ / "nowhere", "nowhere");
+}
+
+TEST(EstimateSummary, TellsWhatIsThere) {
+    std::vector<TrackedFrame> frames(3);
+    for (std::size_t i = 0; i < 2; ++i) {
+        TrackedFrame& f = frames[i];
+        f.state = EstimateState::measured;
+        f.truth.t = {0, 0, 10};
+        f.measured = displaced(f.truth, (Vector6() << 0.01, 0, 0, 0, 0, 0.2).finished());
+        f.filtered = *f.measured;
+        f.covariance = f.bound = (Vector6() << 1e-4, 1e-4, 1e-4, 0.04, 0.04, 0.04).finished().asDiagonal();
+    }
+    const EstimateSummary s = summarise(frames);
+    EXPECT_EQ(s.frames, 3u);
+    EXPECT_EQ(s.measured, 2u);
+    EXPECT_NEAR(s.rotation_rms_rad, 0.01, 1e-12);
+    EXPECT_NEAR(s.position_rms_of_range, 0.02, 1e-12);
+    EXPECT_NEAR(s.nees_mean, 2, 1e-9);
+    EXPECT_NEAR(s.position_of_bound, 1 / std::sqrt(3.0), 1e-9);
+    EXPECT_EQ(estimate_row(frames[2]).substr(0, 9), "0,0,lost,");
+    const auto columns = [](const std::string& text) { return std::count(text.begin(), text.end(), ','); };
+    for (const TrackedFrame& f : frames) EXPECT_EQ(columns(estimate_row(f)), columns(std::string(kEstimateHeader)));
+}
+
+}  // namespace
+}  // namespace narpa::test

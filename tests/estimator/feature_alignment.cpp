@@ -1,0 +1,172 @@
+// The pose by rendering and comparing points: convergence, covariance, and saying so where there is nothing to see.
+#include "estimator/features/feature_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "estimator/features/flow_noise.h"
+#include "renderer/scene/scene_file.h"
+#include "renderer/sensor/detector.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr std::size_t kStation = 0, kChaser = 1;
+
+/// The docking scene with its camera at 320 x 240, before the port.
+class FeatureAlignmentTest : public ::testing::Test {
+protected:
+    void SetUp() override {
+        auto read = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+        ASSERT_TRUE(read) << read.error().text();
+        scene_ = *std::move(read);
+        auto made = Tracer::create(scene_);
+        ASSERT_TRUE(made);
+        tracer_.emplace(*std::move(made));
+        camera_ = coarser_camera(scene_.cameras[0], 2);
+    }
+
+    /// A frame from x metres before the port, with the detector's noise.
+    MeasuredImage frame_at(double x_m, std::uint32_t number, int spp = 16) {
+        at_ = Placement(scene_.bodies.size());
+        at_.set(kStation, scene_.bodies[kStation].initial.T_world_body);
+        at_.set(kChaser, {scene_.bodies[kChaser].initial.T_world_body.q, {x_m, 0.03 * x_m, -0.02 * x_m}});
+        const Rigid3 T_world_camera = at_.T_world_body[kChaser] * camera_.T_mount_camera;
+        truth_ = inverse(T_world_camera) * at_.T_world_body[kStation];
+        ModelView view(*tracer_, camera_, kStation, at_);
+        FrameSettings settings;
+        settings.spp = spp;
+        settings.seed = 77;
+        settings.frame = number;
+        view.render(truth_, settings, false);
+        std::vector<std::uint8_t> bytes(
+            frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns}));
+        expose(camera_, view.radiance(), 5, number, bytes);
+        return *measured_image(camera_, bytes);
+    }
+    /// So many degrees and per cent of the range off the truth.
+    Rigid3 off_by(double amount, std::mt19937_64& random) const {
+        std::normal_distribution<double> normal;
+        Vector6 e;
+        for (int i = 0; i < 6; ++i) e[i] = normal(random);
+        e.head<3>() *= amount * kDegree / e.head<3>().norm();
+        e.tail<3>() *= 0.01 * amount * norm(truth_.t) / e.tail<3>().norm();
+        return displaced(truth_, e);
+    }
+
+    Scene scene_;
+    std::optional<Tracer> tracer_;
+    Camera camera_;
+    Placement at_{2};
+    Rigid3 truth_{};
+};
+
+TEST_F(FeatureAlignmentTest, FindsThePoseFromFiveDegreesAndFivePerCentOff) {
+    FeatureAlignment alignment(*tracer_, camera_, kStation, Placement(2));
+    std::mt19937_64 random(3);
+    double nees = 0;
+    int frames = 0;
+    for (const double x_m : {40.0, 20.0, 8.0})
+        for (int trial = 0; trial < 2; ++trial, ++frames) {
+            const MeasuredImage frame = frame_at(x_m, static_cast<std::uint32_t>(trial));
+            const FeatureEstimate e = alignment.align(frame, at_, off_by(5, random));
+            ASSERT_TRUE(e.ok()) << x_m << " m: " << name(e.status);
+            const Vector6 error = error_between(e.T_camera_target, truth_);
+            EXPECT_LT(error.head<3>().norm(), 0.2 * kDegree) << x_m;
+            EXPECT_LT(error.tail<3>().norm(), 2e-3 * norm(truth_.t)) << x_m;
+            EXPECT_GT(e.agreeing, 30);
+            EXPECT_LT(e.rounds.back().after_px, 0.2);
+            EXPECT_LT(e.rounds.back().after_px, 0.1 * e.rounds.front().before_px);
+            nees += normalised_error_squared(error, e.covariance);
+            EXPECT_LT(e.bound.trace(), e.covariance.trace()) << "the sensor's noise is part of it";
+        }
+    // Six degrees of freedom, of few frames: the covariance is not off by more than a factor of three in variance.
+    EXPECT_LT(nees / frames, 18);
+}
+
+TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
+    const MeasuredImage frame = frame_at(20, 1);
+    std::mt19937_64 random(4);
+    const Rigid3 guess = off_by(3, random);
+    FeatureAlignment one(*tracer_, camera_, kStation, Placement(2)),
+        other(*tracer_, camera_, kStation, Placement(2));
+    (void)other.align(frame_at(10, 2), at_, guess);  // what it saw before does not matter
+    const MeasuredImage again = frame_at(20, 1);
+    EXPECT_EQ(frame.dn, again.dn);
+    EXPECT_EQ(one.align(frame, at_, guess).T_camera_target, other.align(frame, at_, guess).T_camera_target);
+}
+
+TEST_F(FeatureAlignmentTest, SaysThatThereIsNothingToMatch) {
+    FeatureAlignment alignment(*tracer_, camera_, kStation, Placement(2));
+    MeasuredImage dark = frame_at(20, 1);
+    std::fill(dark.dn.begin(), dark.dn.end(), 64.f);
+    EXPECT_EQ(alignment.align(dark, at_, truth_).status, FeatureStatus::few_matches);
+    // The guess has the target behind the camera.
+    Rigid3 behind = truth_;
+    behind.t.z = -behind.t.z;
+    EXPECT_EQ(alignment.align(frame_at(20, 1), at_, behind).status, FeatureStatus::few_matches);
+}
+
+TEST_F(FeatureAlignmentTest, EachKindOfFeatureLeadsThere) {
+    const MeasuredImage frame = frame_at(12, 1);
+    std::mt19937_64 random(6);
+    const Rigid3 guess = off_by(1.5, random);
+    for (const FeatureKind kind : {FeatureKind::sift, FeatureKind::akaze, FeatureKind::orb, FeatureKind::corners}) {
+        FeatureSettings settings;
+        settings.kind = kind;
+        settings.renders_max = 4;
+        FeatureAlignment alignment(*tracer_, camera_, kStation, Placement(2), settings);
+        const FeatureEstimate e = alignment.align(frame, at_, guess);
+        ASSERT_TRUE(e.ok()) << name(kind) << ": " << name(e.status);
+        EXPECT_LT(error_between(e.T_camera_target, truth_).head<3>().norm(), 0.5 * kDegree) << name(kind);
+    }
+}
+
+/// A corner of light, followed under noise: its place scatters as predicted.
+TEST(FlowNoise, ScattersAsPredicted) {
+    constexpr int kSize = 64;
+    SensorModel sensor;
+    sensor.top_dn = 4095, sensor.black_dn = 64, sensor.read_dn2 = 16, sensor.shot_dn = 0.2,
+    sensor.rounding_dn2 = 1.0 / 12;
+    const auto light = [](double x, double y) {
+        const auto edge = [](double d) { return 1 / (1 + std::exp(-1.5 * d)); };
+        return 400 + 2000 * edge(x - 31.3) * edge(y - 31.7);
+    };
+    std::mt19937_64 random(8);
+    std::normal_distribution<double> normal;
+    RadianceImage view(kSize, kSize);
+    sensor.dn_per_radiance = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+    for (int y = 0; y < kSize; ++y)
+        for (int x = 0; x < kSize; ++x) {
+            const auto v = static_cast<float>(light(x, y) - sensor.black_dn);
+            view.pixels[static_cast<std::size_t>(y * kSize + x)] = {v, v, v};
+        }
+    FeatureMatcher matcher(FeatureKind::corners, 1);
+    const std::vector<std::uint8_t> everywhere(kSize * kSize, 255);
+    double predicted = 0, measured = 0, mean_u = 0, mean_v = 0;
+    std::vector<FeatureMatch> all;
+    constexpr int kTrials = 300;
+    for (int trial = 0; trial < kTrials; ++trial) {
+        MeasuredImage frame{kSize, kSize, {}};
+        for (int y = 0; y < kSize; ++y)
+            for (int x = 0; x < kSize; ++x) {
+                const double dn = light(x, y);
+                frame.dn.push_back(static_cast<float>(dn + std::sqrt(sensor.variance_dn2(dn)) * normal(random)));
+            }
+        const ToneScale tones(frame, sensor);
+        const TonedImage toned = tones.toned(frame);
+        const auto matches = matcher.match(tones.toned(view), toned, everywhere);
+        ASSERT_EQ(matches.size(), 1u);
+        all.push_back(matches[0]);
+        mean_u += matches[0].frame_u / kTrials, mean_v += matches[0].frame_v / kTrials;
+        predicted += flow_covariance(toned, tones.variance(), matches[0].frame_u, matches[0].frame_v, 10).trace();
+    }
+    for (const FeatureMatch& m : all) measured += std::pow(m.frame_u - mean_u, 2) + std::pow(m.frame_v - mean_v, 2);
+    // The gradients that are used hold noise as well, and the view's tones are rounded.
+    EXPECT_NEAR(measured / predicted, 1, 0.5);
+}
+
+}  // namespace
+}  // namespace narpa

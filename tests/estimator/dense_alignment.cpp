@@ -77,6 +77,18 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     EXPECT_LT(error.tail<3>().norm(), 1e-3 * norm(truth.t));
 }
 
+TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
+    const MeasuredImage frame = frame_at(truth, true);
+    DenseAlignment dense(*tracer, camera, 0);
+    DenseOptions o;
+    o.fineness = 3;
+    o.rays_per_pixel = 6;
+    const auto e = dense.align(frame, at, displaced(truth, off_by(60, 0.1, norm(truth.t))), o);
+    ASSERT_TRUE(e) << e.error().text();
+    EXPECT_NE(e->status, DenseStatus::converged);
+    EXPECT_GT(angle_between(e->T_camera_body.q, truth.q), 10 * kDegree) << "then it may as well converge";
+}
+
 TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
     const MeasuredImage frame = frame_at(truth, false);
     DenseAlignment dense(*tracer, camera, 0);

@@ -1,0 +1,65 @@
+/// estimator/dense/descent.h - Levenberg-Marquardt on one level of one frame.
+#pragma once
+
+#include "estimator/dense/dense_alignment.h"
+#include "estimator/dense/level_view.h"
+
+namespace narpa {
+
+/// Finite, and a rotation.
+[[nodiscard]] bool is_pose(const Rigid3& T);
+
+class Descent {
+public:
+    /// All outlive it. `camera`: of the level, each of whose pixels is `factor` x `factor` of the sensor's.
+    Descent(const Camera& camera, const SensorModel& sensor, const Tracer& tracer, std::size_t target, int factor,
+            LevelView& view, const DenseOptions& options, DenseEstimate& estimate);
+
+    /// Moves the estimate to where this level's images agree; `first`: sideways by whole pixels before that, as a
+    /// guess may be off by more than a derivative reaches.
+    DenseStatus run(bool first);
+    /// What the images tell of the pose where they were rendered last, and whether they fit.
+    void conclude();
+    /// DenseAlignment::bound at the estimate.
+    Result<Matrix6> bound();
+
+private:
+    struct Step {
+        Vector6 pose = Vector6::Zero();
+        double sigmas = 0, motion_px = 0;
+        double size = 0;       ///< below 1: small enough to end with
+        bool trusted = false;  ///< so small that noise decides whether the cost falls
+    };
+
+    [[nodiscard]] double pixels_averaged() const { return static_cast<double>(factor_) * factor_; }
+    void shift();
+    void render(const Rigid3& T);
+    void differentiate();
+    bool linearise();
+    [[nodiscard]] Step next_step(double damping) const;
+    bool try_step(const Step& step);
+    void lengthen(const Step& step);
+    void note(double sigmas, bool better);
+
+    const Camera& camera_;
+    const SensorModel& sensor_;
+    const Tracer& tracer_;
+    const std::size_t target_;
+    const int factor_;
+    LevelView& view_;
+    const DenseOptions& o_;
+    DenseEstimate& e_;
+    const bool coarse_;
+    const double rays_;  ///< for each pixel of the target
+    const int fineness_;
+    FrameSettings settings_{};
+    double target_px_ = 0;  ///< pixels that tell of the target; 0: not known yet
+
+    Robustness robust_{};
+    PhotometricCost cost_{};
+    PhotometricEquations equations_{};
+    Vector6 last_step_ = Vector6::Zero();
+    double stride_ = 1;  ///< by which steps are lengthened
+};
+
+}  // namespace narpa

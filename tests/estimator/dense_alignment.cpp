@@ -3,6 +3,7 @@
 #include "estimator/view/model_view.h"
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <limits>
@@ -83,10 +84,32 @@ TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
     DenseOptions o;
     o.fineness = 3;
     o.rays_per_pixel = 6;
+    o.finest = 2;
+    o.iterations = 8;
     const auto e = dense.align(frame, at, displaced(truth, off_by(60, 0.1, norm(truth.t))), o);
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_NE(e->status, DenseStatus::converged);
     EXPECT_GT(angle_between(e->T_camera_body.q, truth.q), 10 * kDegree) << "then it may as well converge";
+}
+
+TEST_F(DockingFrame, IsTheSameOnAnyNumberOfThreads) {
+    const MeasuredImage frame = frame_at(truth, true);
+    DenseOptions o;
+    o.fineness = 4;
+    o.rays_per_pixel = 6;
+    o.finest = 2;
+    const auto pose_on = [&](int threads) {
+        tbb::task_arena arena(threads);
+        return arena.execute([&] {
+            const auto e = DenseAlignment(*tracer, camera, 0)
+                               .align(frame, at, displaced(truth, off_by(1, 0.01, norm(truth.t))), o);
+            EXPECT_TRUE(e);
+            return e ? *e : DenseEstimate{};
+        });
+    };
+    const DenseEstimate one = pose_on(1), three = pose_on(3);
+    EXPECT_EQ(one.T_camera_body, three.T_camera_body);
+    EXPECT_EQ(one.covariance, three.covariance);
 }
 
 TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {

@@ -66,7 +66,7 @@ public:
             const FeatureEstimate e = points_->align(view.image, view.at, guess);
             out.claimed = e.ok(), out.renders = static_cast<int>(e.rounds.size());
             T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
-        } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_)) {
+        } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
             out.claimed = e->status == DenseStatus::converged, out.renders = static_cast<int>(e->steps.size());
             T = e->T_camera_body, covariance = e->covariance;
         }
@@ -78,7 +78,7 @@ public:
         out.found = out.rotation_rad < kFoundPart * off.head<3>().norm() &&
                     out.position_m < kFoundPart * off.tail<3>().norm();
         if (method_ == EstimateMethod::dense && with_bound && out.found)
-            if (const auto least = pixels_->bound(view.at, view.truth, dense_)) bound = *least;
+            if (const auto least = pixels_->bound(view.at, view.truth, dense_, view.variance_dn2)) bound = *least;
         out.bound_rotation_rad = rotation_of(bound), out.bound_position_m = position_of(bound);
         return out;
     }
@@ -158,7 +158,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
                 runs[m].frames.push_back(methods[m].look(view, displaced(view.truth, off), off, true));
         });
     }
-    for (const double deg : o.basin) {
+    for (const double deg : o.basin_trials > 0 ? o.basin : std::vector<double>{}) {
         std::vector<BasinCell> cells(methods.size(), {deg, 0, 0});
         for (int k = 0; k < o.basin_trials && !stop; ++k) {
             tell(fmt::format("basin: {} deg, trial {}/{}", deg, k, o.basin_trials));

@@ -21,9 +21,10 @@ ApproachFrames::ApproachFrames(const World& world, const Camera& camera, std::si
     : options_(options),
       camera_(camera),
       at_(at_time_0(world)),
+      sensor_(sensor_model(camera)),
       view_(world.tracer(), camera_, target, at_),
       bytes_(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})),
-      made_{{}, at_, {}} {}
+      made_{{}, at_, {}, {}} {}
 
 /// Near the line of approach, looking nearly at the target's origin.
 Rigid3 ApproachFrames::pose(double range_m, std::uint32_t number) const {
@@ -52,10 +53,15 @@ const ApproachView& ApproachFrames::make_at(double range_m, std::uint32_t number
     settings.spp = options_.frame_spp;
     settings.seed = ~options_.seed;  // not that of the renders that it is compared with
     settings.frame = number;
-    view_.render(made_.truth, settings, false);
+    view_.render(made_.truth, settings, true);
     expose(camera_, view_.radiance(), settings.seed, number, bytes_);
     made_.at.T_world_body = view_.placement().T_world_body;
     made_.image = *measured_image(camera_, bytes_);  // of the camera's own size
+    const auto& [r, g, b] = sensor_.dn_per_radiance;
+    const auto dn_per_mean = static_cast<float>(r + g + b);
+    made_.variance_dn2.clear();
+    for (const float v : view_.aovs().variance) made_.variance_dn2.push_back(v * dn_per_mean * dn_per_mean);
+    made_.variance_dn2.resize(made_.image.dn.size());  // without the embedded line
     return made_;
 }
 

@@ -13,6 +13,7 @@ struct ApproachView {
     Rigid3 truth{};  ///< T_camera_target
     Placement at;    ///< of every body
     MeasuredImage image;
+    std::vector<float> variance_dn2;  ///< of the samples that the frame was rendered with: what no real sensor has
 };
 
 class ApproachFrames {
@@ -30,6 +31,7 @@ private:
     const ApproachOptions& options_;
     Camera camera_;
     Placement at_;
+    SensorModel sensor_;
     ModelView view_;
     std::vector<std::uint8_t> bytes_;
     ApproachView made_;

@@ -15,6 +15,7 @@ struct SceneLadder {
     std::string scene;
     int width = 0, height = 0, reference_spp = 0;
     double speed_up_least = 0;  ///< over the plain loop that the scene must reach; 0: it is not judged by that
+    double speed_up_from = 0;   ///< judged over budgets of so many rays a pixel and more, but for a tenth
     Ladder ladder;
 };
 /// Frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at its edge, and
@@ -31,8 +32,7 @@ struct CraftRatios {
 };
 
 /// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover, triangles as
-/// large; seconds that moved
-/// bodies cost; seconds to the first frame; predicted to measured error.
+/// large; seconds that moved bodies cost; seconds to the first frame; predicted to measured error.
 inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
 inline constexpr double kHonestyLeast = 0.85, kHonestyMost = 1.40;
 

@@ -204,10 +204,10 @@ std::optional<double> speed_up(const Ladder& ladder, const Rung& rung, TimeBy by
     return {};
 }
 
-std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by) {
+std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by, double rays_least) {
     std::vector<double> all;
     for (const Rung& r : ladder.rungs)
-        if (!r.loop && r.adaptive == adaptive && r.knows_its_error())
+        if (!r.loop && r.adaptive == adaptive && r.knows_its_error() && r.rays >= rays_least)
             if (const auto s = speed_up(ladder, r, by)) all.push_back(*s);
     if (all.empty()) return {};
     const auto [least, most] = std::minmax_element(all.begin(), all.end());

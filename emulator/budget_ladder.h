@@ -79,6 +79,7 @@ struct SpeedUps {
     std::size_t budgets = 0;
 };
 /// Of the budgets in rays (adaptive), or of the fixed numbers of samples.
-[[nodiscard]] std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by = TimeBy::wall);
+[[nodiscard]] std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by = TimeBy::wall,
+                                                double rays_least = 0);  ///< of frames with so many rays at least
 
 }  // namespace narpa

@@ -73,8 +73,8 @@ public:
     [[nodiscard]] const TrackerOptions& options() const noexcept;
 
     /// Takes a frame as the camera put it out. `at`: where the bodies were; of it only the light on the target, the
-    /// bodies beside it, the camera's own attitude, and the truth that errors are told against are used. The first
-    /// guess, and the next after the track was lost, lie off the truth as the options say. Runs on the calling
+    /// bodies beside it, the camera's own attitude, and the truth that errors are told against are used. Until a
+    /// frame has given a pose, guesses lie off the truth as the options say. Runs on the calling
     /// thread's TBB arena.
     TrackedFrame take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
                       const Placement& at);

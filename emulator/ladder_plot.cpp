@@ -15,7 +15,7 @@ namespace {
 
 using namespace plot;
 
-constexpr int kColumns = 3, kColumnWidth = 560, kRowHeight = 570, kHeader = 96;
+constexpr int kColumns = 3, kColumnWidth = 560, kRowHeight = 612, kHeader = 96;
 constexpr int kLeft = 92, kTop = 40, kWidth = 400, kHeight = 320;
 constexpr int kBars = kTop + kHeight + 60, kBar = 14, kBarStep = 19;  // below a panel's corner; height, step
 constexpr double kSmall = 0.42;

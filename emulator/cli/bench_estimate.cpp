@@ -23,7 +23,7 @@ struct Options {
     std::string scene, camera, target;
     std::vector<double> along, up;
     bool quick = false;
-    int threads = 0;
+    int threads = 0, size = 320;
     PnpBenchOptions pnp;
     ApproachOptions approach;
 };
@@ -81,7 +81,7 @@ Outcome bench_pnp(const Options& o, Findings& findings) {
 }
 
 /// A world as the approach and the LiDAR need it.
-Result<std::unique_ptr<World>> standing_world(const std::string& scene_file) {
+Result<std::unique_ptr<World>> standing_world(const std::string& scene_file, int size) {
     std::string file = scene_file;
     if (file.empty()) {
         auto shipped = shipped_scene("docking/docking.toml");
@@ -90,11 +90,12 @@ Result<std::unique_ptr<World>> standing_world(const std::string& scene_file) {
     }
     auto scene = load_scene(file);
     if (!scene) return scene.error();
+    for (Camera& c : scene->cameras) resize_longer_side(c, size);
     return World::create(*std::move(scene));
 }
 
 Outcome bench_approach(const Options& o, Findings& findings) {
-    auto world = standing_world(o.scene);
+    auto world = standing_world(o.scene, o.size);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
     const auto camera = sensor_named(scene.cameras, o.camera, "camera", scene.file);
@@ -171,7 +172,7 @@ Outcome bench_stereo(const Options& o, Findings& findings) {
 }
 
 Outcome bench_icp(const Options& o, Findings& findings) {
-    auto world = standing_world("");
+    auto world = standing_world("", o.size);
     if (!world) return world.error();
     const auto target = (*world)->body_named("station");
     if (!target) return Error{"no body \"station\" in the docking scene", (*world)->scene().file};
@@ -294,6 +295,9 @@ Command add_bench_estimate(CLI::App& bench_command) {
     c->add_option("--scene", o->scene, "approach: scene file (default: the docking scene that narpa brings along)");
     c->add_option("--camera", o->camera, "approach: name of the camera (default: the first)");
     c->add_option("--target", o->target, "approach: name of the body (default: the first that it can be)");
+    c->add_option("--size", o->size, "approach: pixels of the camera's longer side")
+        ->check(CLI::Range(32, 10'000))
+        ->capture_default_str();
     c->add_option("--frames", o->approach.frames, "approach: frames")->check(CLI::Range(2, 100'000));
     c->add_option("--from", o->approach.from_m, "approach: m from the target's origin")
         ->check(CLI::Range(0.01, 1e7));
@@ -304,6 +308,8 @@ Command add_bench_estimate(CLI::App& bench_command) {
     c->add_option("--up", o->up, "approach: X,Y,Z that is up in the picture, target axes")
         ->delimiter(',')
         ->expected(3);
+    c->add_option("--basin-trials", o->approach.basin_trials, "approach: starts of each distance; 0: none")
+        ->check(CLI::Range(0, 100'000));
     c->add_option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")
         ->check(CLI::Range(0.01, 1e7));
     c->add_flag("--quick", o->quick, "Few draws of all, to see that it works");

@@ -22,16 +22,17 @@ struct Standing {
     double at_s;            ///< on the approach; negative: no approach
     bool loop;              ///< can the plain loop render it?
     double speed_up_least;  ///< over the plain loop at equal error; 0: not judged
+    double speed_up_from;   ///< judged from so many rays a pixel on
     int size;               ///< px, the longer side
     bool far = false;       ///< on to 64 samples a pixel, as pictures converge
 };
 using Method = RenderSettings::Method;
 constexpr std::array<Standing, 5> kStanding{{
-    {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, true, 2, 512},
-    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 256, true},  // four bounces
-    {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, false, 0, 320},
-    {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, false, 0, 320},
-    {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, true, 0, 128},
+    {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, true, 2, 0, 512},
+    {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 16, 256, true},  // four bounces
+    {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, false, 0, 0, 320},
+    {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, false, 0, 0, 320},
+    {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, true, 0, 0, 128},
 }};
 
 constexpr int kReferenceSpp = 4096, kFarReferenceSpp = 16384;
@@ -63,6 +64,7 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     SceneLadder l;
     l.scene = s.name;
     l.speed_up_least = s.speed_up_least;
+    l.speed_up_from = s.speed_up_from;
     l.reference_spp = o.quick ? 256 : s.far ? kFarReferenceSpp : kReferenceSpp;
     std::size_t camera = 0;
     auto world = world_of(s, o.quick ? 48 : s.size, camera);

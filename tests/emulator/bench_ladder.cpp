@@ -109,6 +109,16 @@ TEST(BenchLadder, TheMedianOverBudgetsInRaysMustReachItsSpeedUp) {
     EXPECT_NE(only_fault(scene).find("no budget's error lies between"), std::string::npos);
 }
 
+TEST(BenchLadder, SmallBudgetsCountOnlyWhereTheyAreJudged) {
+    SceneLadder scene = beside_the_loop({adaptive(2, 0.5)});
+    scene.width = scene.height = 100;
+    scene.speed_up_least = 2.1, scene.speed_up_from = 16;
+    scene.ladder.rungs[0].rays = 15 * 100 * 100;
+    EXPECT_NE(only_fault(scene).find("from 16 rays a pixel on"), std::string::npos);
+    scene.ladder.rungs[0].rays = 8 * 100 * 100;
+    EXPECT_NE(only_fault(scene).find("no budget's error lies between"), std::string::npos);
+}
+
 TEST(BenchLadder, RatiosOfTheCraftMustHold) {
     CraftRatios good{};
     good.cost.frame_s = 1.5, good.cost.raw.primary_s = 0.6, good.cost.raw.shadow_s = 0.4;

@@ -79,7 +79,7 @@ struct ApproachRun {
                                    const std::vector<ApproachRun>& runs);
 
 /// The paper's figure: for five frames of the approach the frame, the render at the pose that the points lead to,
-/// and the cost over the solver's steps, as a PNG.
+/// and how far the matches lie apart before and after each solution, as a PNG.
 [[nodiscard]] Status picture_of_frames(const std::string& path, const World& world, std::size_t camera,
                                        std::size_t target, const ApproachOptions& options, TracingThreads& threads);
 

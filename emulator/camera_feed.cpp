@@ -127,7 +127,7 @@ void CameraFeed::account(const FrameLedger& ledger) noexcept {
 }
 
 void CameraFeed::show(const FrameLedger& ledger, bool real_time) {
-    if (static_cast<FrameStep>(ledger.step) == FrameStep::nothing) return;
+    if (ledger.delivery != Delivery::frame) return;  // the device never had it
     if (real_time)
         watcher_->offer(ledger, unit_.bytes(), unit_.placement());
     else

@@ -52,6 +52,8 @@ void draw(cv::Mat& image, const Curve& curve, std::span<const TrackedFrame> fram
     std::vector<double> times, values;
     for (const TrackedFrame& f : frames) {
         times.push_back(static_cast<double>(f.t_ns) * 1e-9);
+        if (f.state != EstimateState::lost)
+            values.push_back(curve.scale * curve.of_error(error_between(f.filtered, f.truth)));
         if (!f.measured) continue;
         values.push_back(curve.scale * curve.of_error(error_between(*f.measured, f.truth)));
         values.push_back(3 * curve.scale * curve.of_covariance(f.covariance));
@@ -121,7 +123,9 @@ std::string estimate_row(const TrackedFrame& f) {
                            rotation_deviation(f.bound), position_deviation(f.bound));
     else
         row += ",,,,";
-    return row + fmt::format("{},{},{:.3f},{}\n", f.matches, f.renders, f.ms, f.why);
+    std::string why = f.why;  // one field
+    std::replace(why.begin(), why.end(), ',', ';');
+    return row + fmt::format("{},{},{:.3f},{}\n", f.matches, f.renders, f.ms, why);
 }
 
 EstimateSummary summarise(std::span<const TrackedFrame> frames) {
@@ -137,8 +141,8 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
             const Vector6 error = error_between(f.filtered, f.truth);
             filtered_turn.add(rotation(error)), filtered_shift.add(position(error));
         }
-        if (f.nis > 0) nis += f.nis, ++compared;
         if (f.state != EstimateState::measured || !f.measured) continue;
+        if (f.nis > 0) nis += f.nis, ++compared;
         ++s.measured;
         const Vector6 error = error_between(*f.measured, f.truth);
         turn.add(rotation(error)), shift.add(position(error)), part.add(position(error) / norm(f.truth.t));
@@ -186,7 +190,8 @@ nlohmann::json to_json(const EstimateSummary& s) {
 
 std::string estimates_in_words(const nlohmann::json& s) {
     const auto value = [&](const char* key) { return s[key].get<double>(); };
-    std::string out = fmt::format("{:.0f} of {:.0f} frames gave a pose\n", value("measured"), value("frames"));
+    std::string out = fmt::format("{:.0f} of {:.0f} frames gave a pose that the track took\n", value("measured"),
+                                  value("frames"));
     if (value("measured") == 0) return out;
     out += fmt::format(
         "    a frame alone: RMS {:.4f} deg, {:.3g} m ({:.3g} % of the range); {:.1f} and {:.1f} bounds\n",

@@ -15,6 +15,9 @@ using Clock = std::chrono::steady_clock;
 constexpr double kDegree = 3.14159265358979323846 / 180;
 /// Of what is known about velocity and rate before a second frame has been seen.
 constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
+/// Standard deviations beyond which the target is lost: a render there would show something else. Shift is a part
+/// of the range.
+constexpr double kMostTurn_rad = 0.5, kMostShift = 0.2;
 /// So many measurements in a row that contradict the filter are right, and it is wrong.
 constexpr std::uint64_t kContradictions = 5;
 
@@ -75,6 +78,8 @@ struct FrameTracker::Impl {
     void measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
     void measure_by_pixels(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
     void fuse(const PoseMeasurement& measurement, TrackedFrame& out);
+    /// Well enough for a render to be compared from there.
+    [[nodiscard]] bool knows_where(const Quat& q_frame_chaser) const;
     /// The chaser is the body that carries the camera, or the camera itself.
     [[nodiscard]] Rigid3 T_chaser_camera() const { return camera.mount < 0 ? Rigid3{} : camera.T_mount_camera; }
 
@@ -85,6 +90,7 @@ struct FrameTracker::Impl {
     std::mt19937_64 random;
     std::optional<FeatureAlignment> by_points;
     std::optional<DenseAlignment> by_pixels;
+    DenseOptions dense_used;  ///< with the last frame
     std::optional<PoseFilter> filter;
 };
 
@@ -122,8 +128,9 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
     const Rigid3 T_world_camera = m.world.sensor_pose(m.camera.mount, m.camera.T_mount_camera, at);
     out.truth = inverse(T_world_camera) * at.T_world_body[m.target];
     const Quat q_frame_chaser = (T_world_camera * inverse(m.T_chaser_camera())).q;
+    if (m.filter) m.filter->predict(t_ns);
+    if (m.filter && !m.knows_where(q_frame_chaser)) m.filter.reset();
     if (m.filter) {
-        m.filter->predict(t_ns);
         out.guess = inverse(m.T_chaser_camera()) * m.filter->pose(q_frame_chaser).T_chaser_target;
     } else {
         out.guess = off_truth(out.truth, m.options, m.random);
@@ -143,6 +150,9 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
     out.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    // What follows looks at the truth: nothing of the estimate.
+    if (m.by_pixels && out.measured)
+        if (const auto bound = m.by_pixels->bound(at, out.truth, m.dense_used)) out.bound = *bound;
     return out;
 }
 
@@ -185,7 +195,14 @@ void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Pla
     }
     out.measured = e->T_camera_body;
     out.covariance = e->covariance;
-    if (const auto bound = by_pixels->bound(at, out.truth, dense)) out.bound = *bound;
+    dense_used = dense;
+}
+
+bool FrameTracker::Impl::knows_where(const Quat& q_frame_chaser) const {
+    const PoseFilter::Pose known = filter->pose(q_frame_chaser);
+    const Matrix6& C = known.covariance;
+    return C.topLeftCorner<3, 3>().trace() < kMostTurn_rad * kMostTurn_rad &&
+           C.bottomRightCorner<3, 3>().trace() < std::pow(kMostShift * norm(known.T_chaser_target.t), 2);
 }
 
 void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& out) {
@@ -208,6 +225,8 @@ void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& 
         return;
     }
     filter.emplace(*std::move(made));
+    out.nis = 0;
+    out.why.clear();
     out.state = EstimateState::measured;
 }
 

@@ -12,6 +12,7 @@
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/threads.h"
+#include "estimator/features/feature_matcher.h"
 
 namespace narpa {
 namespace {
@@ -59,9 +60,9 @@ void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
     StartLine start(cameras_.size() + lidars_.size() + (can_ ? 1 : 0));
-    StopFlag sensors_done{false};
+    StopFlag sensors_done{false}, estimates_done{false};
     std::thread bus;
-    if (can_) bus = std::thread([&] { run_bus(start, sensors_done); });
+    if (can_) bus = std::thread([&] { run_bus(start, estimates_done); });
     std::thread estimator;
     if (estimates_) estimator = std::thread([&] { run_estimator(sensors_done); });
     std::vector<std::thread> sensors;
@@ -77,6 +78,7 @@ void Emulator::run_real_time(const StopFlag& stop) {
     page_faults_ = {after.minor - before.minor, after.major - before.major};
     sensors_done = true;
     if (estimator.joinable()) estimates_->wake(), estimator.join();
+    estimates_done = true;
     if (bus.joinable()) bus.join();
 }
 
@@ -129,12 +131,14 @@ void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
         }
     }
     send_ledgers(clock_->now_ns());
+    send_estimates(clock_->now_ns());
     send_heartbeat(clock_->now_ns(), RunState::stopping);
 }
 
-/// Without priority, in an arena of its own: it takes what the sensors leave.
+/// Without priority, on one thread: it takes what the sensors leave.
 void Emulator::run_estimator(const StopFlag& stop) {
     name_thread("narpa-estimate");
+    const OnePictureThread pictures;  // workers with the sensors' priority would help, and hold the sensors up
     tbb::task_arena alone(1);
     alone.execute([&] { estimates_->run(stop); });
 }

@@ -179,7 +179,8 @@ Outcome bench_icp(const Options& o, Findings& findings) {
     const Progress progress;
     const int count = o.quick ? 10 : 1000;
     IcpBenchSettings settings;
-    const std::vector<IcpStarts> starts{{5, 0.05, count}, {10, 0.1, count / 5}, {20, 0.2, count / 5}};
+    const std::vector<IcpStarts> starts{
+        {5, 0.05, count}, {10, 0.1, count / 5}, {20, 0.2, count / 5}, {30, 0.3, count / 5}};
     const auto runs = run_icp(**world, *target, settings, starts,
                               [&](int done, int of) { progress.tell(fmt::format("ICP: start {}/{}", done, of)); });
     if (!runs) return runs.error();
@@ -260,11 +261,6 @@ Outcome bench(const Options& o) {
     return document;
 }
 
-/// CLI::Range lets NaN through.
-std::string must_be_finite(const std::string& text) {
-    return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
-}
-
 }  // namespace
 
 Command add_bench_estimate(CLI::App& bench_command) {
@@ -277,21 +273,21 @@ Command add_bench_estimate(CLI::App& bench_command) {
                   fmt::format("Only these parts, separated by commas: {}", fmt::join(names, ", ")))
         ->delimiter(',')
         ->check(CLI::IsMember(names));
-    c->add_option("--trials", o->pnp.trials, "Draws of each cell")
+    c->add_option("--trials", o->pnp.trials, "pnp: draws of each cell")
         ->check(CLI::Range(1, 1'000'000))
         ->capture_default_str();
     c->add_option("--points", o->pnp.points, "pnp: numbers of points")->delimiter(',')->check(CLI::Range(4, 1000));
     c->add_option("--noise-px", o->pnp.noise_px, "pnp: standard deviations of a pixel")
         ->delimiter(',')
         ->check(CLI::Range(1e-6, 100.0))
-        ->check(must_be_finite);
+        ->check(finite_number());
     c->add_option("--ranges", o->pnp.ranges_m, "pnp: metres to the body")
         ->delimiter(',')
         ->check(CLI::Range(1.0, 1e6))
-        ->check(must_be_finite);
+        ->check(finite_number());
     CLI::Option* nominal = c->add_flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c->add_flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases")->excludes(nominal);
-    c->add_option("--seed", o->pnp.seed, "Of all draws")->capture_default_str();
+    c->add_option("--seed", o->pnp.seed, "pnp: of all draws")->capture_default_str();
     c->add_option("--scene", o->scene, "approach: scene file (default: the docking scene that narpa brings along)");
     c->add_option("--camera", o->camera, "approach: name of the camera (default: the first)");
     c->add_option("--target", o->target, "approach: name of the body (default: the first that it can be)");
@@ -300,8 +296,11 @@ Command add_bench_estimate(CLI::App& bench_command) {
         ->capture_default_str();
     c->add_option("--frames", o->approach.frames, "approach: frames")->check(CLI::Range(2, 100'000));
     c->add_option("--from", o->approach.from_m, "approach: m from the target's origin")
-        ->check(CLI::Range(0.01, 1e7));
-    c->add_option("--to", o->approach.to_m, "approach: m from the target's origin")->check(CLI::Range(0.01, 1e7));
+        ->check(CLI::Range(0.01, 1e7))
+        ->check(finite_number());
+    c->add_option("--to", o->approach.to_m, "approach: m from the target's origin")
+        ->check(CLI::Range(0.01, 1e7))
+        ->check(finite_number());
     c->add_option("--along", o->along, "approach: X,Y,Z from the target towards the camera, target axes")
         ->delimiter(',')
         ->expected(3);
@@ -311,11 +310,13 @@ Command add_bench_estimate(CLI::App& bench_command) {
     c->add_option("--basin-trials", o->approach.basin_trials, "approach: starts of each distance; 0: none")
         ->check(CLI::Range(0, 100'000));
     c->add_option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")
-        ->check(CLI::Range(0.01, 1e7));
+        ->check(CLI::Range(0.01, 1e7))
+        ->check(finite_number());
     c->add_flag("--quick", o->quick, "Few draws of all, to see that it works");
     c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
     c->add_option("-o,--output", o->pictures, "Folder for pictures: of each part, and of time against error");
-    c->footer("Exit status 1 where an estimator is less exact than it must be, or the bench was interrupted.");
+    c->footer(
+        "Exit status 1 where points or stereo are less exact than they must be, or the bench was interrupted.");
     return [o] { return bench(*o); };
 }
 

@@ -29,6 +29,8 @@ Command add_bench(CLI::App& app);
 Command add_replay(CLI::App& app);
 Command add_estimate(CLI::App& app);
 
+/// For numbers: CLI::Range lets NaN through.
+[[nodiscard]] CLI::Validator finite_number();
 /// Words for people, on standard error.
 void say(std::string_view text);
 /// Reads a scene, with another method than its own if one is given, and tells its warnings.

@@ -21,6 +21,7 @@ struct Options {
     int every = 1;
     TrackerFlags tracker;
     OneOptions one;  ///< of a single file
+    std::vector<const CLI::Option*> only_of_files, only_of_logs;
 };
 
 /// Frames are made again, bit for bit, and looked at one after another as navigation would.
@@ -30,8 +31,8 @@ Result<std::vector<TrackedFrame>> track(const Options& o, Replay& run, FrameTrac
     std::vector<TrackedFrame> tracked;
     for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
         progress.tell(fmt::format("frame {}/{}", i, run.frames().size()));
-        if (!run.has_image(i)) continue;
         const FrameLedger& ledger = run.frames()[i].ledger;
+        if (!run.has_image(i) || ledger.delivery != Delivery::frame) continue;
         std::vector<std::string> differs;
         threads.arena.execute([&] {
             differs = run.make(i);
@@ -88,7 +89,13 @@ Outcome estimate(const Options& o) {
     auto tracker = o.tracker.options();
     if (!tracker) return tracker.error();
     std::error_code error;
-    if (std::filesystem::is_directory(o.input, error)) return estimate_log(o, *tracker);
+    const bool of_log = std::filesystem::is_directory(o.input, error);
+    for (const CLI::Option* option : of_log ? o.only_of_files : o.only_of_logs)
+        if (option->count() > 0)
+            return Error{fmt::format("{} goes with {}", option->get_name(),
+                                     of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
+                         o.input};
+    if (of_log) return estimate_log(o, *tracker);
     OneOptions one = o.one;
     one.scene = o.input;
     one.sensor = o.camera;
@@ -114,7 +121,7 @@ Command add_estimate(CLI::App& app) {
                   "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
     c->add_option("--sweep", o->one.sweep, "FILE.pcap: a VLP-16's data packets, from the first on for one turn");
     c->add_option("--time", o->one.time_s, "Simulation time of the frame or the sweep's first shot, s")
-        ->check(CLI::Range(-9e9, 9e9));
+        ->check(CLI::Range(-9e9, 9e9) & finite_number());
     c->add_option("--range-noise", o->one.range_noise_m, "Standard deviation of the sweep's ranges, m")
         ->check(CLI::Range(1e-6, 1e3))
         ->capture_default_str();
@@ -126,7 +133,11 @@ Command add_estimate(CLI::App& app) {
     c->add_option("--csv", o->csv, "FILE.csv: a row for each frame");
     c->add_option("-o,--output", o->picture,
                   "FILE.png: errors over time, with three standard deviations and bound");
-    c->footer("Exit status 1 where no frame gave a pose.");
+    for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})
+        o->only_of_files.push_back(c->get_option(name));
+    for (const char* name : {"--scene", "--every", "--csv", "--output"})
+        o->only_of_logs.push_back(c->get_option(name));
+    c->footer("Exit status 1 where no frame gave a pose, or a sweep's is not credible.");
     return [o] { return estimate(*o); };
 }
 

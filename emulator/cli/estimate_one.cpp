@@ -89,6 +89,17 @@ Result<std::vector<RangePoint>> points_of(const std::string& path, double rate_h
     return points;
 }
 
+/// Takes out what the LiDAR sees of the body that it rides on, which lies as it knows.
+void cut_own_body(std::vector<RangePoint>& points, const World& world, const Lidar& lidar, const Placement& at) {
+    const Rigid3 T_world_lidar = world.sensor_pose(lidar.mount, lidar.T_mount_lidar, at);
+    constexpr double kAlike_m = 0.1;
+    std::erase_if(points, [&](const RangePoint& p) {
+        const Ray beam{T_world_lidar * p.origin_m, T_world_lidar.q * p.direction};
+        const Hit hit = world.tracer().intersect(at, beam, p.range_m + kAlike_m);
+        return hit.body >= 0 && hit.body == lidar.mount && hit.range_m > p.range_m - kAlike_m;
+    });
+}
+
 /// How the target moves in the LiDAR's axes from one time to another.
 SweepMotion motion_between(const Rigid3& T_lidar_target, const Rigid3& later, double dt_s) {
     return {(later.t - T_lidar_target.t) / dt_s, rotation_vector(later.q * conjugate(T_lidar_target.q)) / dt_s};
@@ -136,6 +147,9 @@ Outcome estimate_sweep(const OneOptions& o) {
     if (!target) return target.error();
     auto points = points_of(o.sweep, lidar.rate_hz);
     if (!points) return points.error();
+    Placement then(scene.bodies.size());
+    (*world)->place(t_ns, lidar.mount, then);
+    cut_own_body(*points, **world, lidar, then);
     const auto T_lidar_target_at = [&](std::int64_t t) {
         Placement at(scene.bodies.size());
         (*world)->place(t, lidar.mount, at);
@@ -161,6 +175,8 @@ Outcome estimate_sweep(const OneOptions& o) {
     const int unobserved = e.observability.unobserved;
     say(fmt::format("  {} points, {} used, {} as the model has them; {} motions that cannot be seen; {} iterations",
                     e.points, e.used, e.explained, unobserved, e.iterations));
+    if (!e.credible) say("  not credible: the pose does not explain its points, or did not settle");
+    document["passed"] = document["credible"] = e.credible;
     document["points"] = e.points;
     document["used"] = e.used;
     document["explained"] = e.explained;

@@ -1,13 +1,22 @@
 // narpa - hardware-in-the-loop camera and LiDAR emulator. This file: subcommands, --json, exit status.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 
 #include "emulator/cli/cli.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa::cli {
+
+CLI::Validator finite_number() {
+    return {[](std::string& text) {
+                return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+            },
+            ""};
+}
 
 void say(std::string_view text) {
     fmt::print(stderr, "{}\n", text);

@@ -116,6 +116,8 @@ Command add_run(CLI::App& app) {
              "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
             ->expected(0, 1);
     o->estimator.add_to(*c, "estimate-");
+    for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-seed"})
+        c->get_option(name)->needs(estimate);
     o->budget.add_to(*c);
     c->add_option("--cpus", o->cpus,
                   "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")

@@ -28,8 +28,6 @@ struct Observability {
     Matrix6 motions = Matrix6::Zero();
     int unobserved = 0;  ///< so many of them, from the first, are below the threshold
 
-    [[nodiscard]] auto unobserved_motions() const { return motions.leftCols(unobserved); }
-    [[nodiscard]] auto observed_motions() const { return motions.rightCols(6 - unobserved); }
 
     /// The motion x that solves H x = gradient, without any part along what is not observed. `hessian`: that of
     /// which this was made.

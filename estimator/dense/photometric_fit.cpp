@@ -201,7 +201,8 @@ Matrix6 PhotometricEquations::pose_information() const {
 Matrix6 PhotometricEquations::pose_covariance() const {
     const Matrix8 inverse = information.inverse();
     const bool as_expected = (inverse * scatter).trace() <= 8;
-    return (as_expected ? inverse : Matrix8(inverse * scatter * inverse)).topLeftCorner<6, 6>();
+    const Matrix6 C = (as_expected ? inverse : Matrix8(inverse * scatter * inverse)).topLeftCorner<6, 6>();
+    return 0.5 * (C + C.transpose());  // but for rounding
 }
 
 Vector6 PhotometricEquations::pose_gradient() const {

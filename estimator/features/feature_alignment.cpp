@@ -249,7 +249,10 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placem
         gather(frame, toned_frame, tones, points, round);
         round.match_ms = ms_since(start);
         start = Clock::now();
-        if (points.size() < kFewestMatches) return estimate;
+        if (points.size() < kFewestMatches) {
+            estimate.status = FeatureStatus::few_matches;
+            return estimate;
+        }
 
         // Outliers first: a pose that they cannot pull far, and who agrees with it.
         const auto solve = [&](Loss loss) {
@@ -257,10 +260,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placem
             RefineOptions options;
             options.loss.kind = loss;
             const PnpInput input{pinhole, points.body_m, points.pixels, 1, covariances};
-            const PnpFit& fit = refiner.refine(input, estimate.T_camera_target, options);
-            for (const double chi2 : fit.summary.costs())
-                round.cost.push_back(chi2 / static_cast<double>(points.size()));
-            return fit;
+            return PnpFit(refiner.refine(input, estimate.T_camera_target, options));
         };
         const std::vector<double> before = points.residuals_px(camera, estimate.T_camera_target);
         floor_px = std::max(floor_px, median(before) / kRayleighMedian);
@@ -271,7 +271,10 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placem
             std::vector<std::uint8_t> agrees;
             for (const double r : residuals) agrees.push_back(r < kOutlier * scale ? 1 : 0);
             points.keep(agrees);
-            if (points.size() < kFewestMatches) return estimate;
+            if (points.size() < kFewestMatches) {
+            estimate.status = FeatureStatus::few_matches;
+            return estimate;
+        }
             floor_px = points.floor_px(camera, fit.T_camera_body);
             fit = solve(Loss::none);
         }

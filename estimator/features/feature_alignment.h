@@ -28,7 +28,7 @@ enum class FeatureStatus : std::uint8_t {
     settled,
     unsettled,    ///< still moving after renders_max views
     few_matches,  ///< fewer than kFewestMatches points agree
-    no_pose,      ///< the solver found none: its reason is in `fit`
+    no_pose,      ///< the solver found none: its reason is in `solver`
 };
 inline constexpr int kFewestMatches = 8;
 [[nodiscard]] std::string_view name(FeatureStatus status) noexcept;
@@ -38,7 +38,6 @@ struct FeatureRound {
     int matches = 0, agreeing = 0;
     double before_px = 0, after_px = 0;  ///< distance of agreeing matches, RMS, at the guess and at the solution
     double moved_px = 0;                 ///< how far the solution moved the points, RMS
-    std::vector<double> cost;            ///< chi^2 a point after each step of the solver
     double render_ms = 0, match_ms = 0, solve_ms = 0;
 };
 

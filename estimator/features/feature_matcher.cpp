@@ -95,6 +95,13 @@ TonedImage ToneScale::toned(const RadianceImage& view) const {
     return out;
 }
 
+OnePictureThread::OnePictureThread() : before_(cv::getNumThreads()) {
+    cv::setNumThreads(1);
+}
+OnePictureThread::~OnePictureThread() {
+    cv::setNumThreads(before_);
+}
+
 std::string_view name(FeatureKind kind) noexcept {
     constexpr std::array<std::string_view, 4> names{"SIFT", "AKAZE", "ORB", "corners"};
     return names[static_cast<std::size_t>(kind)];

@@ -52,6 +52,18 @@ struct FeatureMatch {
     double frame_u = 0, frame_v = 0;
 };
 
+/// While it lives OpenCV uses the calling threads alone, in the whole process; then as many as before.
+class OnePictureThread {
+public:
+    OnePictureThread();
+    ~OnePictureThread();
+    OnePictureThread(const OnePictureThread&) = delete;
+    OnePictureThread& operator=(const OnePictureThread&) = delete;
+
+private:
+    int before_;
+};
+
 class FeatureMatcher {
 public:
     /// `most`: features that are looked for in each picture.

@@ -17,7 +17,7 @@ double typical_sigma_px(const PnpInput& input) {
 }
 
 /// How many standard deviations the body's thinnest direction covers in the picture, about.
-double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, const Spread& spread) {
+double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, const PointExtent& spread) {
     double mean_u = 0, mean_v = 0, sum = 0;
     const double n = static_cast<double>(points.size());
     for (const BodyPoint& p : points) {
@@ -28,7 +28,7 @@ double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, 
     return input.camera.fx * seen_rms * spread.rms_m.z / (spread.rms_m.x * typical_sigma_px(input));
 }
 
-bool is_a_line(const Spread& spread) {
+bool is_a_line(const PointExtent& spread) {
     return !(spread.rms_m.y > 1e-5 * spread.rms_m.x);
 }
 
@@ -67,7 +67,7 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& opt
     solution_.inlier.assign(input.body_m.size(), 1);
     points_.assign(input);
     gather();
-    const Spread spread = spread_of(gathered_);
+    const PointExtent spread = spread_of(gathered_);
     if (is_a_line(spread)) {
         solution_.status = PnpStatus::degenerate;
         return solution_;
@@ -79,10 +79,10 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& opt
     return solution_;
 }
 
-void PnpSolver::solve_all(const PnpInput& input, const Spread& spread, const PnpOptions& options) {
+void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread, const PnpOptions& options) {
     const double depth = depth_in_sigma(input, gathered_, spread);
     const bool few = points_.size() < kSurePoints;
-    const Starts starts = orthographic_starts(gathered_, spread, depth < kFlatSigma);
+    const PoseStarts starts = orthographic_starts(gathered_, spread, depth < kFlatSigma);
     for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i], options);
     if (few) consider_triples(options);
     if (!fits_the_noise()) {
@@ -102,7 +102,7 @@ void PnpSolver::consider_triples(const PnpOptions& options) {
         std::array<BodyPoint, 3> triple;
         for (std::size_t k = 0, i = 0; k < 3; ++i)
             if (i != left_out) triple[k++] = gathered_[i];
-        const Starts starts = triple_starts(triple);
+        const PoseStarts starts = triple_starts(triple);
         for (std::size_t i = 0; i < starts.count; ++i)
             tried[count++] = {points_.truncated_cost(starts.pose[i], std::numeric_limits<double>::infinity()),
                               starts.pose[i]};
@@ -141,7 +141,7 @@ void PnpSolver::consider(const Rigid3& start, const PnpOptions& options) {
     }
 }
 
-void PnpSolver::consider_reversed(const Spread& spread, const PnpOptions& options) {
+void PnpSolver::consider_reversed(const PointExtent& spread, const PnpOptions& options) {
     if (!std::isfinite(solution_.fit.chi2)) return;
     consider(depth_reversed(points_.centred(solution_.fit.T_camera_body), spread), options);
 }

@@ -1,6 +1,6 @@
 /// estimator/pose/pnp.h - a pose from points alone: no guess, outliers if need be, and never a silent choice.
 ///
-/// Starts (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the noise
+/// PoseStarts (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the noise
 /// allows, or points are too few to tell, OpenCV's SQPNP and IPPE are asked as well. The pose that a nearly flat or
 /// far body shows just as well is always looked for, and reported where the data cannot refuse it.
 #pragma once
@@ -49,13 +49,13 @@ public:
     const PnpSolution& solve(const PnpInput& input, const PnpOptions& options = {});
 
 private:
-    void solve_all(const PnpInput& input, const Spread& spread, const PnpOptions& options);
+    void solve_all(const PnpInput& input, const PointExtent& spread, const PnpOptions& options);
     void solve_with_outliers(const PnpInput& input, const PnpOptions& options);
     void gather();
     void consider(const CentredPose& start, const PnpOptions& options);
     void consider(const Rigid3& start, const PnpOptions& options);
     void consider_triples(const PnpOptions& options);
-    void consider_reversed(const Spread& spread, const PnpOptions& options);
+    void consider_reversed(const PointExtent& spread, const PnpOptions& options);
     [[nodiscard]] bool fits_the_noise() const;
     [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);
     [[nodiscard]] bool find_consensus(const PnpInput& input, const PnpOptions& options, bool orthographic);

@@ -53,7 +53,7 @@ void PnpSolver::solve_with_outliers(const PnpInput& input, const PnpOptions& opt
         T = solution_.fit.T_camera_body;
     }
     gather();
-    const Spread spread = spread_of(gathered_);
+    const PointExtent spread = spread_of(gathered_);
     if (solution_.fit.ok()) consider_reversed(spread, options);
 }
 
@@ -88,7 +88,7 @@ bool PnpSolver::find_consensus(const PnpInput& input, const PnpOptions& options,
 void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
     std::array<BodyPoint, 3> sample;
     for (std::size_t k = 0; k < 3; ++k) sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
-    const Starts starts = triple_starts(sample);
+    const PoseStarts starts = triple_starts(sample);
     for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i], options);
 }
 

@@ -45,7 +45,7 @@ struct AlongAxes {
     Pixel seen;
 };
 
-bool posit(std::span<const BodyPoint> points, const Spread& spread, bool flat, double sign, CentredPose& out) {
+bool posit(std::span<const BodyPoint> points, const PointExtent& spread, bool flat, double sign, CentredPose& out) {
     const double n = static_cast<double>(points.size());
     const Vec3 inverse{1 / (n * spread.rms_m.x * spread.rms_m.x), 1 / (n * spread.rms_m.y * spread.rms_m.y),
                        flat ? 0 : 1 / (n * spread.rms_m.z * spread.rms_m.z)};
@@ -86,7 +86,7 @@ bool posit(std::span<const BodyPoint> points, const Spread& spread, bool flat, d
 
 }  // namespace
 
-Spread spread_of(std::span<const BodyPoint> points) {
+PointExtent spread_of(std::span<const BodyPoint> points) {
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
     for (const BodyPoint& p : points) {
         const Eigen::Vector3d a = to_eigen(p.body_m);
@@ -99,8 +99,8 @@ Spread spread_of(std::span<const BodyPoint> points) {
     return {{widest, middle, cross(widest, middle)}, {rms(2), rms(1), rms(0)}};
 }
 
-Starts orthographic_starts(std::span<const BodyPoint> points, const Spread& spread, bool flat) {
-    Starts starts;
+PoseStarts orthographic_starts(std::span<const BodyPoint> points, const PointExtent& spread, bool flat) {
+    PoseStarts starts;
     if (!(spread.rms_m.y > kLine * spread.rms_m.x)) return starts;
     for (const double sign : {1.0, -1.0}) {
         if (posit(points, spread, flat, sign, starts.pose[starts.count])) ++starts.count;
@@ -109,15 +109,15 @@ Starts orthographic_starts(std::span<const BodyPoint> points, const Spread& spre
     return starts;
 }
 
-Starts triple_starts(std::array<BodyPoint, 3> points) {
+PoseStarts triple_starts(std::array<BodyPoint, 3> points) {
     const Vec3 mean = (points[0].body_m + points[1].body_m + points[2].body_m) / 3.0;
     for (BodyPoint& p : points) p.body_m -= mean;
-    Starts starts = orthographic_starts(points, spread_of(points), true);
+    PoseStarts starts = orthographic_starts(points, spread_of(points), true);
     for (std::size_t i = 0; i < starts.count; ++i) starts.pose[i].centroid_m -= starts.pose[i].q * mean;
     return starts;
 }
 
-CentredPose depth_reversed(const CentredPose& pose, const Spread& spread) {
+CentredPose depth_reversed(const CentredPose& pose, const PointExtent& spread) {
     // Two reflections are a rotation by half a turn about each normal: q' = (0, sight) q (0, normal).
     const Vec3 sight = normalized(pose.centroid_m), normal = spread.axis[2];
     return {normalized(Quat{0, sight.x, sight.y, sight.z} * pose.q * Quat{0, normal.x, normal.y, normal.z}),

@@ -19,27 +19,27 @@ struct BodyPoint {
 };
 
 /// The directions in which points spread, widest first, and their rms extent along each.
-struct Spread {
+struct PointExtent {
     std::array<Vec3, 3> axis{};  ///< orthonormal, right-handed
     Vec3 rms_m{};
 };
-[[nodiscard]] Spread spread_of(std::span<const BodyPoint> points);
+[[nodiscard]] PointExtent spread_of(std::span<const BodyPoint> points);
 
 /// Up to two poses; none where the points lie on a line, or so near that the iteration does not settle.
-struct Starts {
+struct PoseStarts {
     std::array<CentredPose, 2> pose{};
     std::size_t count = 0;
 };
 /// `flat`: the points' depth along the third axis is not used, and the two attitudes that scaled orthography cannot
 /// tell apart come out. Three points are flat.
-[[nodiscard]] Starts orthographic_starts(std::span<const BodyPoint> points, const Spread& spread, bool flat);
+[[nodiscard]] PoseStarts orthographic_starts(std::span<const BodyPoint> points, const PointExtent& spread, bool flat);
 
 /// Of three points, whose mean need not be 0; the poses are about the origin.
-[[nodiscard]] Starts triple_starts(std::array<BodyPoint, 3> points);
+[[nodiscard]] PoseStarts triple_starts(std::array<BodyPoint, 3> points);
 
 /// The same image in scaled orthography: mirrored in the plane across the line of sight and in the body's plane of
 /// widest spread.
-[[nodiscard]] CentredPose depth_reversed(const CentredPose& pose, const Spread& spread);
+[[nodiscard]] CentredPose depth_reversed(const CentredPose& pose, const PointExtent& spread);
 
 /// By OpenCV: SQPNP (Terzakis and Lourakis 2020), and IPPE (Collins and Bartoli 2014) where `flat`, of which both
 /// solutions come. Added to `out`; allocates.

@@ -77,7 +77,11 @@ SensorModel sensor_model(const Camera& camera) {
     }
     s.black_dn = d.black_level_dn;
     s.rounding_dn2 *= camera.format == PixelFormat::rgb24 ? squares : 1;
-    s.top_dn = std::min(converter_top, d.black_level_dn + d.full_well_e * dn_per_e);
+    s.top_dn = std::min(converter_top, std::floor(d.black_level_dn + d.full_well_e * dn_per_e + 0.5));
+    if (camera.format != PixelFormat::y16) {  // what its truncated bytes stand for
+        const double byte = std::exp2(converter_bits(camera) - 8);
+        s.top_dn = std::floor(s.top_dn / byte) * byte + 0.5 * (byte - 1);
+    }
     s.read_dn2 = squares * d.read_noise_e * d.read_noise_e * dn_per_e * dn_per_e;
     s.shot_dn = d.shot_noise ? squares * dn_per_e : 0;
     return s;

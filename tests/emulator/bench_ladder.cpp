@@ -30,7 +30,7 @@ Rung adaptive(double seconds, double rmse) {
 SceneLadder beside_the_loop(std::vector<Rung> rungs) {
     rungs.push_back(loop_rung(1, 1));
     rungs.push_back(loop_rung(16, 0.25));
-    return {"box", 8, 8, 64, 0, {10, 0.01, 1e-3, std::move(rungs)}};
+    return {"box", 8, 8, 64, 0, 0, {10, 0.01, 1e-3, std::move(rungs)}};
 }
 
 std::string only_fault(const SceneLadder& scene) {

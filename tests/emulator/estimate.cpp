@@ -213,6 +213,7 @@ TEST(EstimateSummary, TellsWhatIsThere) {
     EXPECT_NEAR(s.nees_mean, 2, 1e-9);
     EXPECT_NEAR(s.position_of_bound, 1 / std::sqrt(3.0), 1e-9);
     EXPECT_EQ(estimate_row(frames[2]).substr(0, 9), "0,0,lost,");
+    frames[2].why = "bad, and worse";
     const auto columns = [](const std::string& text) { return std::count(text.begin(), text.end(), ','); };
     for (const TrackedFrame& f : frames) EXPECT_EQ(columns(estimate_row(f)), columns(std::string(kEstimateHeader)));
 }

@@ -17,7 +17,7 @@ protected:
     struct Gathered {
         PnpPoints points;
         std::vector<BodyPoint> list;
-        Spread spread;
+        PointExtent spread;
 
         explicit Gathered(const test::Seen& seen) : points(seen.body_m.size()) {
             points.assign(seen.input());
@@ -47,7 +47,7 @@ TEST_F(PnpStart, SolidBodiesGiveOnePoseNearTheTruth) {
         for (int trial = 0; trial < 100; ++trial) {
             const Rigid3 truth{test::random_attitude(random_), Vec3{0.05, -0.08, 1} * range_m};
             const Gathered g(test::see(random_, test::random_points(random_, 8, 1), truth, 0));
-            const Starts starts = orthographic_starts(g.list, g.spread, false);
+            const PoseStarts starts = orthographic_starts(g.list, g.spread, false);
             ASSERT_EQ(starts.count, 1u);
             EXPECT_LT(angle(starts.pose[0], truth), 3 * kDegree) << range_m;
             EXPECT_LT(norm(g.points.uncentred(starts.pose[0]).t - truth.t), 0.03 * range_m);
@@ -63,7 +63,7 @@ TEST_F(PnpStart, FlatBodiesGiveTwoOfWhichOneIsNear) {
         std::vector<Vec3> flat = test::random_points(random_, 6, 1);
         for (Vec3& p : flat) p.z = 0;
         const Gathered g(test::see(random_, flat, truth, 0));
-        const Starts starts = orthographic_starts(g.list, g.spread, true);
+        const PoseStarts starts = orthographic_starts(g.list, g.spread, true);
         ASSERT_EQ(starts.count, 2u);
         const double first = angle(starts.pose[0], truth), second = angle(starts.pose[1], truth);
         near += std::min(first, second) < 3 * kDegree ? 1 : 0;
@@ -100,7 +100,7 @@ TEST_F(PnpStart, TriplesNeedNotBeCentred) {
         const Rigid3 truth{test::random_attitude(random_), {0.4, -0.3, 25}};
         const test::Seen seen = test::see(random_, test::random_points(random_, 5, 1), truth, 0);
         const Gathered g(seen);
-        const Starts starts = triple_starts({g.list[0], g.list[1], g.list[2]});
+        const PoseStarts starts = triple_starts({g.list[0], g.list[1], g.list[2]});
         double best = M_PI, off = 1e9;
         for (std::size_t i = 0; i < starts.count; ++i) {
             best = std::min(best, angle(starts.pose[i], truth));

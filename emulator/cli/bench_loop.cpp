@@ -57,6 +57,7 @@ Result<std::vector<LoopRun>> measure(const Options& o, const Scene& scene) {
 }
 
 Outcome bench(Options o) {
+    stop_on_signals();
     if (auto good = choose_load(o); !good) return good.error();
     if (!o.cpus.empty()) {
         auto cpus = parse_cpus(o.cpus);
@@ -74,7 +75,6 @@ Outcome bench(Options o) {
     if (scene->cameras.empty()) return Error{"has no camera, expected one at least", scene->file};
     o.budget.override_scene(scene->render);
 
-    stop_on_signals();
     auto runs = measure(o, *scene);
     if (!runs) return runs.error();
 

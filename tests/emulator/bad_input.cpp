@@ -1,12 +1,10 @@
 // What a user can get wrong, and the sentence and exit status that answer it: the program itself is run.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <fstream>
 
 #include "tests/emulator/loop_support.h"
+#include "tests/support/command.h"
 
 namespace narpa::test {
 namespace {
@@ -41,12 +39,7 @@ TEST_P(BadInput, IsAnsweredWithASentenceAndAnExitStatus) {
     arguments = replaced(replaced(arguments, "BAD", folder_ / "bad.toml"), "FOLDER", folder_ / "");
 
     const std::string command = std::string("timeout 20 ") + NARPA_BIN + " " + arguments + " 2>&1 >/dev/null";
-    std::FILE* pipe = ::popen(command.c_str(), "r");
-    ASSERT_NE(pipe, nullptr);
-    std::string said;
-    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
-        said.append(buffer.data(), n);
-    const int status = WEXITSTATUS(::pclose(pipe));
+    const auto [status, said] = run_command(command);
     EXPECT_EQ(status, m.exit_status) << said;
     EXPECT_NE(said.find(m.words), std::string::npos) << "expected: " << m.words << "\nsaid: " << said;
 }

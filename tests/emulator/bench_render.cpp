@@ -1,7 +1,6 @@
 // `narpa bench render` as it is run: the real path tracer on the Cornell box that ships, and what a user can get
 // wrong.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <array>
 #include <cmath>
@@ -11,24 +10,16 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
 namespace {
 
-struct Done {
-    int status = 0;
-    std::string out;
-};
+using test::Done;
 
 Done bench(const std::string& arguments, const char* streams) {
-    const std::string command = std::string("timeout 120 ") + NARPA_BIN + " bench render " + arguments + streams;
-    std::FILE* pipe = ::popen(command.c_str(), "r");
-    Done done;
-    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
-        done.out.append(buffer.data(), n);
-    done.status = WEXITSTATUS(::pclose(pipe));
-    return done;
+    return test::run_command(std::string("timeout 120 ") + NARPA_BIN + " bench render " + arguments + streams);
 }
 
 TEST(BenchRender, TheCornellBoxConvergesToItsReferenceWithoutBias) {

@@ -1,6 +1,5 @@
 // What `narpa check` tells of a scene's light and materials: the program itself is run.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <array>
 #include <cstdio>
@@ -9,23 +8,13 @@
 
 #include "renderer/scene/scene_file.h"
 #include "tests/emulator/loop_support.h"
+#include "tests/support/command.h"
 
 namespace narpa::test {
 namespace {
 
-struct Said {
-    int exit_status = -1;
-    std::string text;
-};
-
-Said run_check(const std::string& arguments) {
-    Said said;
-    std::FILE* pipe = ::popen((std::string("timeout 20 ") + NARPA_BIN + " check " + arguments).c_str(), "r");
-    if (pipe == nullptr) return said;
-    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
-        said.text.append(buffer.data(), n);
-    said.exit_status = WEXITSTATUS(::pclose(pipe));
-    return said;
+Done run_check(const std::string& arguments) {
+    return run_command(std::string("timeout 20 ") + NARPA_BIN + " check " + arguments);
 }
 
 constexpr const char* kComplete = NARPA_SOURCE_DIR "/tests/data/scenes/complete.toml";
@@ -42,8 +31,8 @@ TEST(UseMethod, RefusesWhatKeepsNoEnergyAndWarnsOfWhatIsDark) {
 }
 
 TEST(Check, TellsLightsMethodAndMaterialsByKind) {
-    const Said said = run_check(std::string(kComplete) + " 2>&1 >/dev/null");
-    EXPECT_EQ(said.exit_status, 0) << said.text;
+    const Done said = run_check(std::string(kComplete) + " 2>&1 >/dev/null");
+    EXPECT_EQ(said.status, 0) << said.out;
     for (const char* words :
          {"render: path tracing over at most 12 surfaces, 4 samples a pixel\n",
           "materials: 1 dielectric, 1 ggx, 1 hapke, 2 lambert, 1 lommel_seeliger, 1 lunar_lambert, 1 mirror, 2 "
@@ -51,13 +40,13 @@ TEST(Check, TellsLightsMethodAndMaterialsByKind) {
           "light beacon: point on body target\n", "light earthshine: directional\n",
           "light floodlight: disc of radius 0.05 m on body chaser\n", "light panel: rectangle of 1 x 0.5 m\n",
           "camera overview: 500 x 500 RGB24 at 2.5 Hz, with a lens\n"})
-        EXPECT_NE(said.text.find(words), std::string::npos) << words << "in\n" << said.text;
+        EXPECT_NE(said.out.find(words), std::string::npos) << words << "in\n" << said.out;
 }
 
 TEST(Check, JsonHasTheSame) {
-    const Said said = run_check(std::string("--json ") + kComplete + " 2>/dev/null");
-    ASSERT_EQ(said.exit_status, 0) << said.text;
-    const nlohmann::json scene = nlohmann::json::parse(said.text).at("scene");
+    const Done said = run_check(std::string("--json ") + kComplete + " 2>/dev/null");
+    ASSERT_EQ(said.status, 0) << said.out;
+    const nlohmann::json scene = nlohmann::json::parse(said.out).at("scene");
     EXPECT_EQ(scene.at("render"), (nlohmann::json{{"method", "path"}, {"spp", 4}, {"max_depth", 12}}));
     EXPECT_EQ(scene.at("material_kinds").at("phong"), 2);
     EXPECT_EQ(scene.at("lights").size(), 4u);
@@ -71,12 +60,12 @@ TEST(Check, TellsTheBudget) {
     const std::string file = folder / "s.toml";
     std::ofstream(file) << with_render(small_scene(), "budget_ms = 60");
     EXPECT_NE(run_check(file + " 2>&1 >/dev/null")
-                  .text.find("render: direct light, 60 ms from the end of an exposure to the hand-over\n"),
+                  .out.find("render: direct light, 60 ms from the end of an exposure to the hand-over\n"),
               std::string::npos);
     std::ofstream(file) << with_render(small_scene(), "budget_rays = 100000");
-    EXPECT_NE(run_check(file + " 2>&1 >/dev/null").text.find("render: direct light, at most 100000 rays a frame\n"),
+    EXPECT_NE(run_check(file + " 2>&1 >/dev/null").out.find("render: direct light, at most 100000 rays a frame\n"),
               std::string::npos);
-    EXPECT_EQ(nlohmann::json::parse(run_check("--json " + file + " 2>/dev/null").text).at("scene").at("render"),
+    EXPECT_EQ(nlohmann::json::parse(run_check("--json " + file + " 2>/dev/null").out).at("scene").at("render"),
               (nlohmann::json{{"method", "direct"}, {"budget_rays", 100'000}}));
 }
 
@@ -84,12 +73,12 @@ TEST(Check, WarnsOfMirrorsInDirectLight) {
     const TemporaryFolder folder;
     std::ofstream(folder / "s.toml")
         << small_scene() + "[[body]]\nname = \"ball\"\nsphere = {radius_m = 1}\nmaterial = {kind = \"mirror\"}\n";
-    const Said said = run_check((folder / "s.toml") + " 2>&1 >/dev/null");
-    EXPECT_EQ(said.exit_status, 0);
-    EXPECT_NE(said.text.find("warning: black in direct light: \"ball\" (mirror); method = \"path\""),
+    const Done said = run_check((folder / "s.toml") + " 2>&1 >/dev/null");
+    EXPECT_EQ(said.status, 0);
+    EXPECT_NE(said.out.find("warning: black in direct light: \"ball\" (mirror); method = \"path\""),
               std::string::npos)
-        << said.text;
-    EXPECT_NE(said.text.find("render: direct light, 2 samples a pixel\n"), std::string::npos) << said.text;
+        << said.out;
+    EXPECT_NE(said.out.find("render: direct light, 2 samples a pixel\n"), std::string::npos) << said.out;
 }
 
 }  // namespace

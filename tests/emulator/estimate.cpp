@@ -1,10 +1,7 @@
 // Poses estimated beside a run and from its log: what is logged, what goes out on CAN, what the program says.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -13,6 +10,7 @@
 #include "emulator/trajectory.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
+#include "tests/support/command.h"
 
 namespace narpa::test {
 namespace {
@@ -142,35 +140,23 @@ TEST_F(EstimateTest, GoesOutOnCan) {
     }
 }
 
-struct Program {
-    std::string out;
-    int status = -1;
-};
-Program narpa_does(const std::string& arguments) {
-    Program p;
-    FILE* pipe = ::popen((NARPA_BIN " " + arguments + " 2>&1").c_str(), "r");
-    if (pipe == nullptr) return p;
-    std::array<char, 4096> part;
-    while (const std::size_t n = std::fread(part.data(), 1, part.size(), pipe)) p.out.append(part.data(), n);
-    const int status = ::pclose(pipe);
-    p.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    return p;
+Done narpa_does(const std::string& arguments) {
+    return run_command(NARPA_BIN " " + arguments + " 2>&1");
 }
 
 TEST_F(EstimateTest, FromOneFrameAndFromOneSweep) {
     const std::string frame = folder_ / "frame.raw", sweep = folder_ / "sweep.pcap";
     const std::string scene = kDocking, where = " --pose chaser=20,0.5,-0.4,0,0,0,1 ";
     ASSERT_EQ(narpa_does("render " + scene + where + "--spp 4 -o " + frame).status, 0);
-    const Program of_frame = narpa_does("estimate " + scene + where + "--frame " + frame + " --json");
+    const Done of_frame = narpa_does("estimate " + scene + where + "--frame " + frame + " --json");
     ASSERT_EQ(of_frame.status, 0) << of_frame.out;
     const json told = json::parse(of_frame.out.substr(of_frame.out.find("\n{") + 1));
     EXPECT_LT(told["error_rotation_rad"].get<double>(), 5e-3);
     EXPECT_LT(told["error_position_m"].get<double>(), 0.05);
 
-    const Program scanned = narpa_does("scan " + scene + where + "-o " + sweep);
+    const Done scanned = narpa_does("scan " + scene + where + "-o " + sweep);
     ASSERT_EQ(scanned.status, 0) << scanned.out;
-    const Program of_sweep =
-        narpa_does("estimate " + scene + where + "--sweep " + sweep + " --target station --json");
+    const Done of_sweep = narpa_does("estimate " + scene + where + "--sweep " + sweep + " --target station --json");
     ASSERT_EQ(of_sweep.status, 0) << of_sweep.out;
     const json cloud = json::parse(of_sweep.out.substr(of_sweep.out.find("\n{") + 1));
     EXPECT_LT(cloud["error_rotation_rad"].get<double>(), 5e-3);
@@ -181,7 +167,7 @@ TEST_F(EstimateTest, FromOneFrameAndFromOneSweep) {
 TEST_F(EstimateTest, BadInputIsToldInWords) {
     const std::string scene = kDocking;
     const auto refuses = [](const std::string& arguments, const std::string& words) {
-        const Program p = narpa_does("estimate " + arguments);
+        const Done p = narpa_does("estimate " + arguments);
         EXPECT_EQ(p.status, 2) << p.out;
         EXPECT_NE(p.out.find(words), std::string::npos) << p.out;
     };

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -15,6 +13,7 @@
 
 #include "emulator/replay_report.h"
 #include "tests/emulator/loop_support.h"
+#include "tests/support/command.h"
 
 namespace narpa::test {
 namespace {
@@ -406,18 +405,8 @@ TEST(BudgetCost, IsTheMeanOverFramesOfWhatEachCost) {
 
 // --- The program ------------------------------------------------------------
 
-struct Done {
-    int status = 0;
-    std::string out;
-};
 Done replay(const std::string& arguments, const char* streams) {
-    const std::string command = std::string("timeout 60 ") + NARPA_BIN + " replay " + arguments + streams;
-    std::FILE* pipe = ::popen(command.c_str(), "r");
-    Done done;
-    for (std::array<char, 4096> buffer; const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe);)
-        done.out.append(buffer.data(), n);
-    done.status = WEXITSTATUS(::pclose(pipe));
-    return done;
+    return test::run_command(std::string("timeout 60 ") + NARPA_BIN + " replay " + arguments + streams);
 }
 
 TEST_F(ReplayTest, TheProgramTellsHowManyFramesRepeat) {

@@ -22,13 +22,6 @@ constexpr std::array kBandEnds{std::numeric_limits<double>::infinity(), 30.0, 10
 /// Of the start's error, so much may be left where the pose counts as found.
 constexpr double kFoundPart = 0.2;
 
-double rotation_of(const Matrix6& C) {
-    return std::sqrt(C.topLeftCorner<3, 3>().trace());
-}
-double position_of(const Matrix6& C) {
-    return std::sqrt(C.bottomRightCorner<3, 3>().trace());
-}
-
 double median(std::vector<double> values) {
     if (values.empty()) return 0;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -79,7 +72,7 @@ public:
                     out.position_m < kFoundPart * off.tail<3>().norm();
         if (method_ == EstimateMethod::dense && with_bound && out.found)
             if (const auto least = pixels_->bound(view.at, view.truth, dense_, view.variance_dn2)) bound = *least;
-        out.bound_rotation_rad = rotation_of(bound), out.bound_position_m = position_of(bound);
+        out.bound_rotation_rad = rotation_sigma(bound), out.bound_position_m = position_sigma(bound);
         return out;
     }
 
@@ -89,19 +82,6 @@ private:
     std::optional<DenseAlignment> pixels_;
     DenseOptions dense_;
 };
-
-/// An error of this attitude and part of the range, in a direction drawn at random.
-Vector6 off_by(double deg, double percent, double range_m, std::mt19937_64& random) {
-    std::normal_distribution<double> normal;
-    const auto direction = [&] {
-        const double x = normal(random), y = normal(random), z = normal(random);
-        return normalized(Vec3{x, y, z});
-    };
-    const Vec3 turn = deg * kDegree * direction(), shift = 0.01 * percent * range_m * direction();
-    Vector6 error;
-    error << to_eigen(turn), to_eigen(shift);
-    return error;
-}
 
 ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, double to_m) {
     ApproachBand b{from_m, to_m};
@@ -153,7 +133,8 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
         tell(fmt::format("approach: frame {}/{}", k, o.frames));
         threads.arena.execute([&] {
             const ApproachView& view = frames.make(k, o.frames);
-            const Vector6 off = off_by(o.start_deg, o.start_percent, norm(view.truth.t), random);
+            const Vector6 off =
+                random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(view.truth.t), random);
             for (std::size_t m = 0; m < methods.size(); ++m)
                 runs[m].frames.push_back(methods[m].look(view, displaced(view.truth, off), off, true));
         });
@@ -165,7 +146,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
             threads.arena.execute([&] {
                 const ApproachView& view =
                     frames.make_at(o.basin_range_m, static_cast<std::uint32_t>(o.frames + k));
-                const Vector6 off = off_by(deg, deg, norm(view.truth.t), random);
+                const Vector6 off = random_error(deg * kDegree, 0.01 * deg * norm(view.truth.t), random);
                 for (std::size_t m = 0; m < methods.size(); ++m) {
                     cells[m].found += methods[m].look(view, displaced(view.truth, off), off, false).found;
                     ++cells[m].trials;

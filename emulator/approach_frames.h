@@ -7,8 +7,6 @@
 
 namespace narpa {
 
-inline constexpr double kDegree = 3.14159265358979323846 / 180;
-
 struct ApproachView {
     Rigid3 truth{};  ///< T_camera_target
     Placement at;    ///< of every body

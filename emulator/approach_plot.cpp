@@ -208,15 +208,12 @@ Status picture_of_frames(const std::string& path, const World& world, std::size_
     FeatureAlignment alignment(world.tracer(), camera, target, Placement(world.scene().bodies.size()));
     ModelView view(world.tracer(), camera, target, Placement(world.scene().bodies.size()));
     std::mt19937_64 random(o.seed);
-    std::normal_distribution<double> normal;
     for (int k = 0; k < kFrames; ++k) {
         const int left = kGap + k * (kWidth + kGap);
         threads.arena.execute([&] {
             const ApproachView& made = frames.make(k, kFrames);
-            Vector6 off;
-            for (int i = 0; i < 6; ++i) off[i] = normal(random);
-            off.head<3>() *= o.start_deg * kDegree / off.head<3>().norm();
-            off.tail<3>() *= 0.01 * o.start_percent * norm(made.truth.t) / off.tail<3>().norm();
+            const Vector6 off =
+                random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(made.truth.t), random);
             const FeatureEstimate e = alignment.align(made.image, made.at, displaced(made.truth, off));
             view.place_bodies(made.at);
             FrameSettings settings;

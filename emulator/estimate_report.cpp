@@ -14,7 +14,6 @@
 namespace narpa {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
 constexpr int kFreedom = 6;
 
 double rotation(const Vector6& error) {
@@ -23,14 +22,6 @@ double rotation(const Vector6& error) {
 double position(const Vector6& error) {
     return error.tail<3>().norm();
 }
-/// Root of the summed variances.
-double rotation_deviation(const Matrix6& C) {
-    return std::sqrt(C.topLeftCorner<3, 3>().trace());
-}
-double position_deviation(const Matrix6& C) {
-    return std::sqrt(C.bottomRightCorner<3, 3>().trace());
-}
-
 /// RMS of what is added.
 struct Squares {
     double sum = 0;
@@ -120,7 +111,7 @@ std::string estimate_row(const TrackedFrame& f) {
     if (f.measured)
         row += fmt::format("{:.6g},{:.6g},{:.6g},{:.6g},",
                            normalised_error_squared(error_between(*f.measured, f.truth), f.covariance), f.nis,
-                           rotation_deviation(f.bound), position_deviation(f.bound));
+                           rotation_sigma(f.bound), position_sigma(f.bound));
     else
         row += ",,,,";
     std::string why = f.why;  // one field
@@ -149,8 +140,8 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
         if (const double square = normalised_error_squared(error, f.covariance); std::isfinite(square))
             nees += square, ++told;
         if (f.bound.topLeftCorner<3, 3>().trace() > 0) {
-            turn_of_bound.add(rotation(error) / rotation_deviation(f.bound));
-            shift_of_bound.add(position(error) / position_deviation(f.bound));
+            turn_of_bound.add(rotation(error) / rotation_sigma(f.bound));
+            shift_of_bound.add(position(error) / position_sigma(f.bound));
         }
     }
     s.rotation_rms_rad = turn.rms(), s.position_rms_m = shift.rms(), s.position_rms_of_range = part.rms();
@@ -208,8 +199,8 @@ std::string estimates_in_words(const nlohmann::json& s) {
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames) {
     cv::Mat image(860, 1100, CV_8UC3, cv::Scalar(255, 255, 255));
     plot::text(image, title, {90, 34}, plot::kTitleSize, 0, plot::kInk);
-    draw(image, {"attitude error, deg", rotation, rotation_deviation, 1 / kDegree}, frames, 90, 420);
-    draw(image, {"position error, m", position, position_deviation, 1}, frames, 490, 820);
+    draw(image, {"attitude error, deg", rotation, rotation_sigma, 1 / kDegree}, frames, 90, 420);
+    draw(image, {"position error, m", position, position_sigma, 1}, frames, 490, 820);
     plot::text(image, "simulation time, s", {image.cols / 2, 850}, plot::kTextSize, 0.5, plot::kInk);
     return plot::write_png(path, image);
 }

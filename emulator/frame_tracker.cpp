@@ -12,7 +12,6 @@ namespace narpa {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kDegree = 3.14159265358979323846 / 180;
 /// Of what is known about velocity and rate before a second frame has been seen.
 constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
 /// Standard deviations beyond which the target is lost: a render there would show something else. Shift is a part
@@ -46,16 +45,7 @@ Result<std::size_t> target_of(const World& world, int mount, std::string_view se
 }
 
 Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
-    std::normal_distribution<double> normal;
-    const auto direction = [&] {
-        const double x = normal(random), y = normal(random), z = normal(random);
-        return normalized(Vec3{x, y, z});
-    };
-    const Vec3 turn = o.start_deg * kDegree * direction(),
-               shift = 0.01 * o.start_percent * norm(truth.t) * direction();
-    Vector6 error;
-    error << to_eigen(turn), to_eigen(shift);
-    return displaced(truth, error);
+    return displaced(truth, random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(truth.t), random));
 }
 
 EstimateReport TrackedFrame::report(std::uint8_t camera) const {
@@ -200,9 +190,8 @@ void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Pla
 
 bool FrameTracker::Impl::knows_where(const Quat& q_frame_chaser) const {
     const PoseFilter::Pose known = filter->pose(q_frame_chaser);
-    const Matrix6& C = known.covariance;
-    return C.topLeftCorner<3, 3>().trace() < kMostTurn_rad * kMostTurn_rad &&
-           C.bottomRightCorner<3, 3>().trace() < std::pow(kMostShift * norm(known.T_chaser_target.t), 2);
+    return rotation_sigma(known.covariance) < kMostTurn_rad &&
+           position_sigma(known.covariance) < kMostShift * norm(known.T_chaser_target.t);
 }
 
 void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& out) {

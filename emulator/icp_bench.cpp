@@ -14,7 +14,6 @@
 namespace narpa {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
 /// Found: within so many standard deviations of the bound at the truth. Other minima lie hundreds of them away.
 constexpr double kFoundSigma = 10;
 

@@ -8,7 +8,6 @@ namespace narpa {
 namespace {
 
 constexpr double kPixels = 500;
-constexpr double kDegree = M_PI / 180;
 
 Vec3 random_direction(std::mt19937_64& random) {
     std::normal_distribution<double> n;
@@ -92,8 +91,8 @@ std::optional<PnpTrial> draw_trial(const PnpSetting& s, std::mt19937_64& random)
         {trial.camera, {trial.body_m.data(), trial.inliers}, {trial.pixels.data(), trial.inliers}, trial.sigma_px},
         trial.T_camera_body);
     if (!bound) return std::nullopt;
-    trial.bound_rotation_rad = std::sqrt(bound->topLeftCorner<3, 3>().trace());
-    trial.bound_position_m = std::sqrt(bound->bottomRightCorner<3, 3>().trace());
+    trial.bound_rotation_rad = rotation_sigma(*bound);
+    trial.bound_position_m = position_sigma(*bound);
     return trial;
 }
 

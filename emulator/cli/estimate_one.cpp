@@ -16,8 +16,6 @@
 namespace narpa::cli {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
-
 Result<std::unique_ptr<World>> world_of(const OneOptions& o, std::int64_t t_ns, std::int64_t until_ns) {
     auto scene = load_scene(o.scene);
     if (!scene) return scene.error();
@@ -36,16 +34,14 @@ nlohmann::json pose_json(const Rigid3& T) {
 nlohmann::json tell(const std::string& what, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
                     const Rigid3& truth) {
     const Vector6 error = error_between(T, truth);
-    const auto turn = [](const Matrix6& C) { return std::sqrt(C.topLeftCorner<3, 3>().trace()); };
-    const auto shift = [](const Matrix6& C) { return std::sqrt(C.bottomRightCorner<3, 3>().trace()); };
     const double nees = normalised_error_squared(error, covariance);
     say(
         fmt::format("{}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})\n"
                     "  off the truth by {:.4f} deg and {:.3g} m; standard deviations {:.4f} deg, {:.3g} m; bound "
                     "{:.4f} deg, {:.3g} m; NEES {:.2f} (6 expected)",
                     what, T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z, error.head<3>().norm() / kDegree,
-                    error.tail<3>().norm(), turn(covariance) / kDegree, shift(covariance), turn(bound) / kDegree,
-                    shift(bound), nees));
+                    error.tail<3>().norm(), rotation_sigma(covariance) / kDegree, position_sigma(covariance),
+                    rotation_sigma(bound) / kDegree, position_sigma(bound), nees));
     nlohmann::json rows = nlohmann::json::array();
     for (int i = 0; i < 6; ++i) {
         nlohmann::json row = nlohmann::json::array();
@@ -58,8 +54,8 @@ nlohmann::json tell(const std::string& what, const Rigid3& T, const Matrix6& cov
             {"covariance", rows},
             {"error_rotation_rad", error.head<3>().norm()},
             {"error_position_m", error.tail<3>().norm()},
-            {"bound_rotation_rad", turn(bound)},
-            {"bound_position_m", shift(bound)},
+            {"bound_rotation_rad", rotation_sigma(bound)},
+            {"bound_position_m", position_sigma(bound)},
             {"nees", std::isfinite(nees) ? nlohmann::json(nees) : nlohmann::json(nullptr)}};
 }
 

@@ -1,6 +1,7 @@
 #include "estimator/pose/pose_estimate.h"
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <limits>
 
 namespace narpa {
@@ -30,6 +31,26 @@ Vector6 error_between(const Rigid3& from, const Rigid3& to) {
     Vector6 e;
     e << to_eigen(rotation_vector(to.q * conjugate(from.q))), to_eigen(to.t - from.t);
     return e;
+}
+
+Vector6 random_error(double rotation_rad, double translation_m, std::mt19937_64& random) {
+    std::normal_distribution<double> normal;
+    const auto direction = [&] {
+        const double x = normal(random), y = normal(random), z = normal(random);
+        return Eigen::Vector3d(x, y, z).normalized();
+    };
+    Vector6 error;
+    error.head<3>() = rotation_rad * direction();
+    error.tail<3>() = translation_m * direction();
+    return error;
+}
+
+double rotation_sigma(const Matrix6& covariance) {
+    return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+}
+
+double position_sigma(const Matrix6& covariance) {
+    return std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
 }
 
 double normalised_error_squared(const Vector6& error, const Matrix6& covariance) {

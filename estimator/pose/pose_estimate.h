@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <random>
 
 #include "base/pose.h"
 
@@ -26,6 +27,14 @@ inline Vec3 to_vec3(const Eigen::Vector3d& v) {
 /// The error that leads from one pose to the other: displaced(from, error_between(from, to)) is `to`. The rotation
 /// is in [0, pi] and does not depend on the quaternions' signs.
 [[nodiscard]] Vector6 error_between(const Rigid3& from, const Rigid3& to);
+
+inline constexpr double kDegree = 3.14159265358979323846 / 180;  ///< radians
+/// An error of this size in rotation and in translation, each in a direction drawn at random.
+[[nodiscard]] Vector6 random_error(double rotation_rad, double translation_m, std::mt19937_64& random);
+
+/// Roots of the summed variances: of the length of an error's rotation, rad, and of its translation, m.
+[[nodiscard]] double rotation_sigma(const Matrix6& covariance);
+[[nodiscard]] double position_sigma(const Matrix6& covariance);
 
 /// Normalised estimation error squared, e' C^-1 e: chi-square with six degrees of freedom where the covariance is
 /// right. Infinite where it is not positive definite.

@@ -146,7 +146,9 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Pl
         view.measure(coarser_image(frame, factor), coarser_variance(frame_variance, i.camera, factor));
         Descent descent(camera, i.sensor, i.tracer, i.target, factor, view, options, e);
         e.status = descent.run(first);
-        if (factor == options.finest && e.status == DenseStatus::converged) descent.conclude();
+        if (factor != options.finest || e.status != DenseStatus::converged) continue;
+        descent.polish();
+        descent.conclude();
     }
     return e;
 }

@@ -18,17 +18,18 @@
 
 namespace narpa {
 
-/// What more rays bring, measured on the docking scene twelve and sixty metres off with frames that have nothing
-/// but the detector's noise, as RMS error over the bound: 64 rays a pixel 3 to 5.5, 512 rays 1.5 to 1.6. Its many
-/// details smaller than a pixel ask for them; a smooth body comes to the bound with 100. Frames of 16 samples a
-/// pixel have more noise of their own than that: with their variance told, 64 rays come within 1.3 of the bound.
+/// What the rays of the last step bring, measured on the docking scene twelve and sixty metres off with frames that
+/// have nothing but the detector's noise, as RMS error over the bound: 64 rays a pixel 3 to 5.5, 512 rays 1.5 to 1.6.
+/// Its many details smaller than a pixel ask for them; a smooth body comes to the bound with 100. Frames of 16
+/// samples a pixel have more noise of their own than that: with their variance told, 128 rays come to the bound.
 struct DenseOptions {
     ExposurePrior exposure{};
     double cauchy = 3;             ///< in standard deviations, where residuals begin to lose their say
     double sigmas = 0.2;           ///< converged: the step is less than so many standard deviations of the pose
     int iterations = 16;           ///< at most, on each level
     int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    double rays_per_pixel = 32;    ///< of the last images compared, on average over those that show the target
+    double rays_per_pixel = 16;    ///< of the finest level's images, on average over pixels that show the target;
+                                   ///< those of the last step take eight times as many
     int fineness = 6;              ///< of the last derivative: rays each way in a pixel where the light changes
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path

@@ -38,6 +38,8 @@ constexpr double kLeastInformation = 1e-10;
 /// Coarse levels, whose pixels hold many of the fine ones, take this part of the rays and so much coarser a grid.
 constexpr double kCoarseRays = 0.125;
 constexpr int kCoarseFineness = 3;
+/// The last step takes so many times the rays of those before.
+constexpr double kPolishRays = 8;
 /// Of a window that the target is taken to fill before it is known.
 constexpr double kFirstPart = 0.25;
 constexpr int kMostShift_px = 12;
@@ -141,6 +143,14 @@ DenseStatus Descent::run(bool first) {
         lengthen(step);
     }
     return least < kStillSmall ? DenseStatus::converged : DenseStatus::out_of_steps;
+}
+
+void Descent::polish() {
+    rays_ *= kPolishRays;
+    render(e_.T_camera_body);
+    differentiate();
+    stride_ = 1;
+    if (linearise()) try_step(next_step(kLeastDamping));
 }
 
 void Descent::conclude() {

@@ -18,6 +18,8 @@ public:
     /// Moves the estimate to where this level's images agree; `first`: sideways by whole pixels before that, as a
     /// guess may be off by more than a derivative reaches.
     DenseStatus run(bool first);
+    /// One more step with many more rays, so that the noise of the render's own samples hardly weighs in the end.
+    void polish();
     /// What the images tell of the pose where they were rendered last, and whether they fit.
     void conclude();
     /// DenseAlignment::bound at the estimate.
@@ -50,7 +52,7 @@ private:
     const DenseOptions& o_;
     DenseEstimate& e_;
     const bool coarse_;
-    const double rays_;  ///< for each pixel of the target
+    double rays_;  ///< for each pixel of the target
     const int fineness_;
     FrameSettings settings_{};
     double target_px_ = 0;  ///< pixels that tell of the target; 0: not known yet

@@ -1,0 +1,67 @@
+/// protocols/closed_loop.h - what dynamics and navigation say to each other in a closed loop.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "base/pose.h"
+
+namespace narpa {
+
+/// What the dynamics are doing.
+enum class DynamicsPhase : std::uint8_t {
+    flying,
+    captured,  ///< contact within the envelope: the docking system holds
+    bounced,   ///< contact outside of it: they part again
+    finished,  ///< the last word: the run is over
+};
+inline constexpr std::array<std::string_view, 4> kDynamicsPhases{"flying", "captured", "bounced", "finished"};
+
+/// Before the pose commands of the same time; at every control period, and when the phase changes.
+struct DynamicsReport {
+    std::uint8_t counter = 0;     ///< +1 with every one, wraps
+    std::int64_t t_ns = 0;        ///< simulation clock
+    std::int64_t t_start_ns = 0;  ///< the scenario's time 0 on that clock
+    DynamicsPhase phase = DynamicsPhase::flying;
+};
+
+/// What the chaser's star tracker and gyroscope measure.
+struct AttitudeReport {
+    std::uint8_t counter = 0;
+    std::int64_t t_ns = 0;
+    Quat q_world_chaser{};
+    Vec3 rate_rad_s{};  ///< body axes, against inertial space
+};
+
+/// What the navigation is doing.
+enum class GuidancePhase : std::uint8_t { moving, holding, closing, docked, retreating, done };
+inline constexpr std::array<std::string_view, 6> kGuidancePhases{"moving", "holding",    "closing",
+                                                                 "docked", "retreating", "done"};
+
+/// Why the navigation has given up.
+enum class AbortReason : std::uint8_t { none, lost, uncertain, off_reference, commanded };
+inline constexpr std::array<std::string_view, 5> kAbortReasons{"none", "lost", "uncertain", "off_reference",
+                                                               "commanded"};
+
+/// What the thrusters are to do from t_ns on, within one control period.
+struct ActuatorCommand {
+    std::uint8_t counter = 0;
+    std::int64_t t_ns = 0;
+    Vec3 impulse_n_s{};            ///< force times time, chaser's body axes
+    Vec3 angular_impulse_n_m_s{};  ///< torque about the centre of mass times time
+    GuidancePhase phase = GuidancePhase::moving;
+    std::uint8_t leg = 0;  ///< index in the scenario
+    AbortReason abort = AbortReason::none;
+};
+
+/// The target beside the chaser as the navigation believes it, at t_ns: body axes of both, as in the scene.
+struct NavigationEstimate {
+    std::uint32_t cycle = 0;
+    std::int64_t t_ns = 0;
+    Rigid3 T_chaser_target{};
+    Vec3 sigma_rotation_rad{}, sigma_position_m{};  ///< standard deviations, chaser's body axes
+    std::uint8_t frames = 0, sweeps = 0;            ///< measurements taken since the estimate before
+};
+
+}  // namespace narpa

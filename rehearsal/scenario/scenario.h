@@ -1,0 +1,181 @@
+/// rehearsal/scenario/scenario.h - what a rehearsal is about: two bodies near each other, how they begin, who
+/// steers, what goes wrong, and what is asked. docs/rehearsal.md has every key of the file.
+///
+/// Frames. World: the scene's, inertial axes, its origin at the target's centre of mass. LVLH (W. Clohessy,
+/// R. Wiltshire, 1960): x up, away from the attractor, y along the circular orbit, z along its momentum, turning
+/// about z with the orbit's rate. Port: a docking interface's, x out of it. Docked, the chaser's port is the
+/// target's turned by 180 degrees about z. All times are seconds after the scenario's time 0.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/pose.h"
+#include "base/result.h"
+
+namespace narpa::rehearsal {
+
+struct Orbit {
+    enum class Model : std::uint8_t {
+        free,                ///< no attractor: the world is inertial, and so is "LVLH"
+        clohessy_wiltshire,  ///< linear, about a circular orbit
+        two_body,            ///< both bodies about a point mass
+    };
+    Model model = Model::clohessy_wiltshire;
+    double radius_m = 6'778'137, mu_m3_s2 = 3.986004418e14;
+    Vec3 up{0, 0, 1}, along{1, 0, 0};  ///< world axes at time 0: away from the attractor, and the target's velocity
+
+    /// 0 where the model is free.
+    [[nodiscard]] double rate_rad_s() const;
+    /// LVLH axes to world axes.
+    [[nodiscard]] Quat q_world_lvlh(double t_s) const;
+};
+
+/// A rigid body of the scene that the dynamics command.
+struct Vehicle {
+    std::string body;          ///< its name in the scene
+    std::uint32_t can_id = 0;  ///< from there
+    Vec3 centre_of_mass_m{};   ///< body axes
+    Rigid3 T_body_port{};      ///< port axes to body axes
+    double mass_kg = 1;
+    Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Identity();  ///< about the centre of mass, body axes
+};
+
+/// The target's attitude at time 0 is the scene's; from there on it turns.
+struct TargetMotion {
+    bool with_lvlh = true;  ///< it holds its attitude in LVLH, beside which it turns at the rate below
+    Vec3 rate_deg_s{};      ///< body axes, at time 0; against LVLH or against inertial space
+};
+
+/// Six pairs of thruster groups, one for each direction of force and torque along the chaser's body axes.
+struct Thrusters {
+    double force_n = 400, torque_n_m = 400;  ///< of a group that fires
+    double min_on_s = 0.02;                  ///< shorter pulses are not fired
+    double gain_sigma = 0.02;                ///< of each pulse, as a part of it
+    double misalignment_sigma_deg = 0.5;     ///< of each group, drawn once a run
+};
+
+/// Star tracker and gyroscope of the chaser.
+struct AttitudeSensor {
+    double attitude_sigma_deg = 0.005;
+    double rate_sigma_deg_s = 0.002;
+};
+
+/// The chaser's port at time 0 beside the target's, and how far it may be from there (standard deviations).
+struct Start {
+    Vec3 position_m{60, 0, 0}, position_sigma_m{};  ///< of its origin, target's port axes
+    Vec3 velocity_m_s{}, velocity_sigma_m_s{};      ///< as the turning port axes see it
+    Vec3 attitude_deg{}, attitude_sigma_deg{};      ///< rotation vector off the docked attitude, chaser's port axes
+    Vec3 rate_deg_s{}, rate_sigma_deg_s{};          ///< chaser's body axes, against the target
+};
+
+/// A leg of the reference trajectory of the chaser's port origin, in the target's port axes: along a straight line
+/// from where the last leg ended (the first: the nominal start), or on an arc about the port's origin.
+struct Leg {
+    std::string name;
+    Vec3 to_m{};                    ///< straight; arc: not used
+    std::optional<double> arc_deg;  ///< on an arc instead, about `axis` (right-handed)
+    Vec3 axis{0, 0, 1};
+    double speed_m_s = 0.1;
+    double hold_s = 0;                                          ///< at its end, at least
+    double within_m = std::numeric_limits<double>::infinity();  ///< the hold ends once the estimate is so near
+    bool contact = false;         ///< goes on at this speed until there is contact; only the last
+    bool look_at_target = false;  ///< x towards the target's port origin; otherwise the docked attitude
+};
+
+struct Navigation {
+    std::vector<std::string> cameras, lidars;  ///< names in the scene; those that the chaser navigates by
+    double period_s = 1;                       ///< of measurements and of control
+    double acceleration_psd = 1e-6,
+           angular_acceleration_psd = 1e-9;  ///< m^2 s^-3, rad^2 s^-3: what the model leaves out
+    double abort_sigma_m = 2;                ///< aborts when it knows its position no better than this
+    double abort_lost_s = 20;                ///< or has had no measurement for so long
+    double abort_off_m = 5;                  ///< or its estimate is so far off the reference
+};
+
+struct Control {
+    double bandwidth_rad_s = 0.08, attitude_bandwidth_rad_s = 0.25;
+    double damping = 0.9;
+    double retreat_m_s = 0.3;  ///< away from the port, after an abort
+};
+
+struct Fault {
+    enum class Kind : std::uint8_t {
+        thruster_off,    ///< the group along `axis` does not fire
+        thruster_stuck,  ///< it fires all the time
+        attitude_bias,   ///< the attitude sensor is turned by `value` (deg, body axes)
+        target_rate,     ///< the target's rate changes by `value` (deg/s, body axes)
+        commands_lost,   ///< no actuator command gets through
+    };
+    Kind kind{};
+    double from_s = 0, until_s = std::numeric_limits<double>::infinity();
+    std::string axis;  ///< "+fx", "-fz", "+tx" ...: force or torque, chaser's body axes
+    Vec3 value{};
+};
+
+/// What is asked; a gate that is absent is not judged. Contact: International Docking System Standard, Interface
+/// Definition Document, revision E, table of initial contact conditions.
+struct Gates {
+    struct Corridor {
+        double half_angle_deg = 10,
+               radius_m = 0.5;  ///< a cone about the port's x axis that is this wide at the port
+        double from_m = 20;     ///< judged nearer than this
+    };
+    struct Contact {
+        double closing_min_m_s = 0.05, closing_max_m_s = 0.10, lateral_rate_m_s = 0.04, lateral_m = 0.10;
+        double pitch_yaw_deg = 4, roll_deg = 4, pitch_yaw_rate_deg_s = 0.20, roll_rate_deg_s = 0.20;
+    };
+    struct NavigationError {
+        double sigmas = 4;    ///< |error| of each of the six, in standard deviations as told on CAN
+        double share = 0.99;  ///< of the estimates that are within
+        double position_m = std::numeric_limits<double>::infinity();  ///< largest error at all
+        double attitude_deg = std::numeric_limits<double>::infinity();
+    };
+    std::optional<Corridor> corridor;
+    std::optional<double> keep_out_m;  ///< sphere about the target's port that only the corridor may enter
+    std::optional<std::pair<double, double>> distance_m;  ///< of the ports' origins, all the time
+    std::optional<NavigationError> navigation;
+    std::optional<Contact> contact;  ///< asks for contact
+    bool complete = true;            ///< all legs flown, without an abort
+};
+
+struct Scenario {
+    std::string file, name, title;
+    std::string scene;  ///< path of the scene file
+    double duration_s = 600;
+    double pose_rate_hz = 20;  ///< of pose commands; a multiple of 1 / navigation.period_s
+    std::uint64_t seed = 1;    ///< of run 1; run k has seed + k - 1
+    Orbit orbit;
+    Vehicle target, chaser;
+    TargetMotion target_motion;
+    std::optional<std::pair<std::string, std::uint32_t>>
+        attractor;  ///< scene body and can_id of the Earth, commanded too
+    Start start;
+    Thrusters thrusters;
+    AttitudeSensor attitude_sensor;
+    std::vector<Leg> legs;
+    Navigation navigation;
+    Control control;
+    std::vector<Fault> faults;
+    Gates gates;
+
+    /// The target's attitude at time 0, body axes to world axes: the scene's.
+    Quat q_world_target{};
+
+    [[nodiscard]] std::int64_t period_ns() const;  ///< of navigation and control
+    [[nodiscard]] std::int64_t pose_period_ns() const;
+};
+
+/// Errors name file, line, column, what is wrong and what was expected.
+Result<Scenario> read_scenario(const std::string& path);
+
+/// The chaser's port in the target's when docked: half a turn about z.
+[[nodiscard]] inline Rigid3 T_port_docked() {
+    return {{0, 0, 0, 1}, {}};
+}
+
+}  // namespace narpa::rehearsal

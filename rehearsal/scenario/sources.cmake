@@ -1,0 +1,1 @@
+target_sources(narpa_rehearsal PRIVATE scenario/scenario.cpp)

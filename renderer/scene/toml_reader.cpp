@@ -161,6 +161,19 @@ std::optional<std::string> TableReader::text(std::string_view key) {
     return std::nullopt;
 }
 
+std::optional<std::vector<std::string>> TableReader::texts(std::string_view key) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const toml::array* array = node->as_array();
+    if (!array || !(array->empty() || array->is_homogeneous(toml::node_type::string))) {
+        fail(key, fmt::format("got {}, expected an array of texts in quotes", shown(*node)));
+        return std::nullopt;
+    }
+    std::vector<std::string> out;
+    for (const toml::node& element : *array) out.push_back(element.as_string()->get());
+    return out;
+}
+
 std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::size_t count,
                                                         const Range& range) {
     const toml::node* node = find(key);

@@ -84,6 +84,8 @@ public:
     std::optional<std::int64_t> integer(std::string_view key, std::int64_t low, std::int64_t high);
     std::optional<bool> boolean(std::string_view key);
     std::optional<std::string> text(std::string_view key);
+    /// An array of texts.
+    std::optional<std::vector<std::string>> texts(std::string_view key);
     std::optional<Vec3> vec3(std::string_view key, const Range& range = kAnyNumber);
     std::optional<std::array<double, 2>> pair(std::string_view key, const Range& range = kAnyNumber);
     /// One number for the three bands, or [r, g, b].

@@ -3,15 +3,107 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tests/support/temporary_folder.h"
+
 namespace narpa::rehearsal {
 namespace {
 
-TEST(Orbit, LvlhTurnsAboutTheMomentumWithTheOrbit) {
-    Orbit orbit;
-    const double quarter_s = 0.5 * 3.14159265358979323846 / orbit.rate_rad_s();
-    const Vec3 up = orbit.q_world_lvlh(quarter_s) * Vec3{1, 0, 0};
-    EXPECT_NEAR(norm(up - orbit.along), 0, 1e-12);
+const std::string kScenarios = NARPA_BUILD_DIR "/scenes/rehearsal/";
+
+std::string text_of(const std::string& path) {
+    std::ostringstream out;
+    out << std::ifstream(path).rdbuf();
+    return out.str();
 }
+
+TEST(Orbit, LvlhTurnsAboutTheMomentumWithTheOrbit) {
+    const Orbit orbit;
+    const double quarter_s = 0.5 * 3.14159265358979323846 / orbit.rate_rad_s();
+    EXPECT_NEAR(norm(orbit.q_world_lvlh(0) * Vec3{1, 0, 0} - orbit.up), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_lvlh(0) * Vec3{0, 1, 0} - orbit.along), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_lvlh(quarter_s) * Vec3{1, 0, 0} - orbit.along), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_lvlh(quarter_s) * Vec3{0, 1, 0} + orbit.up), 0, 1e-12);
+}
+
+TEST(Scenario, TheDockingThatComesWithItIsRead) {
+    const auto s = read_scenario(kScenarios + "docking.toml");
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_EQ(s->target.can_id, 0x110u);
+    EXPECT_EQ(s->chaser.can_id, 0x100u);
+    ASSERT_TRUE(s->attractor);
+    EXPECT_EQ(s->attractor->second, 0x120u);
+    EXPECT_EQ(s->orbit.model, Orbit::Model::two_body);
+    EXPECT_NEAR(s->orbit.rate_rad_s(), 2 * 3.14159265358979 / 5553.6, 1e-7);
+    ASSERT_EQ(s->legs.size(), 3u);
+    EXPECT_TRUE(s->legs.back().contact);
+    EXPECT_EQ(s->navigation.cameras, std::vector<std::string>{"nav"});
+    EXPECT_EQ(s->period_ns(), 1'000'000'000);
+    EXPECT_EQ(s->pose_period_ns(), 50'000'000);
+    ASSERT_TRUE(s->gates.contact);
+    EXPECT_EQ(s->gates.contact->lateral_m, 0.10);
+    EXPECT_EQ(s->chaser.inertia_kg_m2(1, 1), 31000);
+}
+
+TEST(Scenario, NamesASceneThatIsNotThere) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "lost.toml") << "[scenario]\nname = \"lost\"\nscene = \"none.toml\"\n";
+    const auto s = read_scenario(folder / "lost.toml");
+    ASSERT_FALSE(s);
+    EXPECT_EQ(s.error().file, folder / "none.toml");
+    EXPECT_EQ(s.error().what, "no such file");
+}
+
+struct Bad {
+    std::string from, to;  ///< what is changed in the docking scenario
+    std::string says;
+};
+
+class BadScenario : public testing::TestWithParam<Bad> {};
+
+TEST_P(BadScenario, IsNamedWithItsPlace) {
+    const Bad& bad = GetParam();
+    std::string text = text_of(kScenarios + "docking.toml");
+    const std::size_t at = text.find(bad.from);
+    ASSERT_NE(at, std::string::npos) << bad.from;
+    text.replace(at, bad.from.size(), bad.to);
+    const std::string scene = "\"scene.toml\"";
+    if (const std::size_t named = text.find(scene); named != std::string::npos)
+        text.replace(named, scene.size(), '"' + kScenarios + "scene.toml\"");
+    const test::TemporaryFolder folder;
+    const std::string path = folder / "bad.toml";
+    std::ofstream(path) << text;
+    const auto s = read_scenario(path);
+    ASSERT_FALSE(s);
+    EXPECT_NE(s.error().what.find(bad.says), std::string::npos) << s.error().text();
+    EXPECT_EQ(s.error().file, path);
+    EXPECT_GT(s.error().line, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BadScenario,
+    testing::Values(
+        Bad{"duration_s = 400.0", "duration_s = 0", "expected a number"}, Bad{"name = \"docking\"", "", "name"},
+        Bad{"model = \"two-body\"", "model = \"three-body\"", "expected one of \"free\""},
+        Bad{"along = [1.0, 0.0, 0.0]", "along = [1.0, 0.0, 0.1]", "at right angles to `up`"},
+        Bad{"up = [0.0, 0.0, 1.0]", "up = [0.0, 0.0, 0.0]", "expected a direction"},
+        Bad{"body = \"station\"", "body = \"moon\"", "\"moon\" is no body of"},
+        Bad{"body = \"chaser\"", "body = \"station\"", "expected another body"},
+        Bad{"inertia_kg_m2 = [22000.0, 31000.0, 31000.0]", "inertia_kg_m2 = [1.0, 1.0, 3.0]", "sum of the two"},
+        Bad{"position_sigma_m = [0.5, 0.4, 0.4]", "position_sigma_m = [0.5, -0.4, 0.4]", "position_sigma_m[1]"},
+        Bad{"cameras = [\"nav\"]", "cameras = [\"left\"]", "\"left\" is not in"},
+        Bad{"period_s = 1.0", "period_s = 0.33", "a whole number of them"},
+        Bad{"to_m = [12.0, 0.0, 0.0]", "", "`arc_deg`"},
+        Bad{"hold_s = 10.0", "contact = true", "only the last leg"},
+        Bad{"contact = true", "", "expected the last one to have it"},
+        Bad{"half_angle_deg = 8.0", "half_angle = 8.0", "half_angle"},
+        Bad{"[control]", "[[fault]]\nkind = \"thruster_off\"\naxis = \"up\"\n[control]", "no group of thrusters"},
+        Bad{"[control]", "[[fault]]\nkind = \"attitude_bias\"\n[control]", "value"},
+        Bad{"[control]", "[[fault]]\nkind = \"gremlin\"\n[control]", "expected one of"},
+        Bad{"force_n = 400.0", "force_n = \"much\"", "force_n"}));
 
 }  // namespace
 }  // namespace narpa::rehearsal

@@ -1,0 +1,369 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include "rehearsal/scenario/scenario.h"
+#include "renderer/scene/file_bytes.h"
+#include "renderer/scene/scene_file.h"
+#include "renderer/scene/toml_reader.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr double kLongest_s = 1e6;
+constexpr Range kAngle_deg{.low = -360, .high = 360};
+constexpr std::array<std::string_view, 12> kAxes{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
+                                                 "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
+
+Vec3 unit(TableReader& table, std::string_view key, const Vec3& otherwise) {
+    const Vec3 v = table.vec3(key).value_or(otherwise);
+    if (norm(v) > 0) return normalized(v);
+    table.fail(key, "expected a direction, not [0, 0, 0]");
+    return otherwise;
+}
+
+Rigid3 read_port(TableReader& table) {
+    Rigid3 T;
+    if (auto port = table.table("port")) {
+        T.t = port->vec3("position_m").value_or(Vec3{});
+        T.q = port->attitude("attitude_wxyz").value_or(Quat{});
+        port->finish();
+    }
+    return T;
+}
+
+void read_orbit(TableReader& root, Orbit& orbit) {
+    auto table = root.table("orbit");
+    if (!table) return;
+    static constexpr std::array<std::pair<std::string_view, Orbit::Model>, 3> kModels{
+        {{"free", Orbit::Model::free},
+         {"clohessy-wiltshire", Orbit::Model::clohessy_wiltshire},
+         {"two-body", Orbit::Model::two_body}}};
+    orbit.model = table->choice<Orbit::Model>("model", kModels).value_or(orbit.model);
+    orbit.radius_m = table->number("radius_m", kPositive).value_or(orbit.radius_m);
+    orbit.mu_m3_s2 = table->number("mu_m3_s2", kPositive).value_or(orbit.mu_m3_s2);
+    orbit.up = unit(*table, "up", orbit.up);
+    orbit.along = unit(*table, "along", orbit.along);
+    if (std::abs(dot(orbit.up, orbit.along)) > 1e-6)
+        table->fail("along", "expected a direction at right angles to `up`: the orbit is circular");
+    table->finish();
+}
+
+Vehicle read_vehicle(TableReader& root, const char* name, const Scene& scene) {
+    Vehicle v;
+    root.require(name, fmt::format("a table [{}]", name));
+    auto table = root.table(name);
+    if (!table) return v;
+    table->require("body", "the name of a body of the scene");
+    v.body = table->text("body").value_or("");
+    v.centre_of_mass_m = table->vec3("centre_of_mass_m").value_or(v.centre_of_mass_m);
+    v.T_body_port = read_port(*table);
+    v.mass_kg = table->number("mass_kg", kPositive).value_or(v.mass_kg);
+    const Vec3 inertia = table->vec3("inertia_kg_m2", kPositive).value_or(Vec3{1, 1, 1});
+    v.inertia_kg_m2 = Eigen::Vector3d(inertia.x, inertia.y, inertia.z).asDiagonal();
+    const double largest = std::max({inertia.x, inertia.y, inertia.z});
+    if (2 * largest > inertia.x + inertia.y + inertia.z)
+        table->fail("inertia_kg_m2", "no moment may exceed the sum of the two others");
+    const auto body =
+        std::find_if(scene.bodies.begin(), scene.bodies.end(), [&](const Body& b) { return b.name == v.body; });
+    if (table->has("body") && body == scene.bodies.end()) {
+        table->fail("body", fmt::format("\"{}\" is no body of {}", v.body, scene.file));
+    } else if (body != scene.bodies.end()) {
+        if (!body->can_id)
+            table->fail("body", fmt::format("\"{}\" has no can_id in {}, expected one: its pose is commanded",
+                                            v.body, scene.file));
+        v.can_id = body->can_id.value_or(0);
+    }
+    return v;
+}
+
+void read_target(TableReader& root, Scenario& s, const Scene& scene) {
+    s.target = read_vehicle(root, "target", scene);
+    for (const Body& b : scene.bodies)
+        if (b.name == s.target.body) s.q_world_target = b.initial.T_world_body.q;
+    auto table = root.table("target");
+    if (!table) return;
+    for (const char* key : {"body", "centre_of_mass_m", "port", "mass_kg", "inertia_kg_m2"}) (void)table->has(key);
+    s.target_motion.with_lvlh = table->boolean("with_lvlh").value_or(s.target_motion.with_lvlh);
+    s.target_motion.rate_deg_s = table->vec3("rate_deg_s").value_or(s.target_motion.rate_deg_s);
+    table->finish();
+}
+
+void read_chaser(TableReader& root, Scenario& s, const Scene& scene) {
+    s.chaser = read_vehicle(root, "chaser", scene);
+    auto table = root.table("chaser");
+    if (!table) return;
+    for (const char* key : {"body", "centre_of_mass_m", "port", "mass_kg", "inertia_kg_m2"}) (void)table->has(key);
+    if (!s.chaser.body.empty() && s.chaser.body == s.target.body)
+        table->fail("body", "is the target too, expected another body");
+    table->finish();
+}
+
+void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
+    auto table = root.table("attractor");
+    if (!table) return;
+    table->require("body", "the name of a body of the scene");
+    const std::string name = table->text("body").value_or("");
+    for (const Body& b : scene.bodies)
+        if (b.name == name && b.can_id) s.attractor.emplace(name, *b.can_id);
+    if (table->has("body") && !s.attractor)
+        table->fail("body", fmt::format("\"{}\" is no body with a can_id of {}", name, scene.file));
+    if (s.orbit.model == Orbit::Model::free)
+        table->fail("body", "[orbit] has model \"free\", expected none: nothing attracts");
+    table->finish();
+}
+
+void read_start(TableReader& root, Start& start) {
+    auto table = root.table("start");
+    if (!table) return;
+    const auto with_sigma = [&](const char* key, const char* sigma_key, Vec3& value, Vec3& sigma) {
+        value = table->vec3(key).value_or(value);
+        sigma = table->vec3(sigma_key, kNotNegative).value_or(sigma);
+    };
+    with_sigma("position_m", "position_sigma_m", start.position_m, start.position_sigma_m);
+    with_sigma("velocity_m_s", "velocity_sigma_m_s", start.velocity_m_s, start.velocity_sigma_m_s);
+    with_sigma("attitude_deg", "attitude_sigma_deg", start.attitude_deg, start.attitude_sigma_deg);
+    with_sigma("rate_deg_s", "rate_sigma_deg_s", start.rate_deg_s, start.rate_sigma_deg_s);
+    table->finish();
+}
+
+void read_actuators(TableReader& root, Scenario& s) {
+    if (auto table = root.table("thrusters")) {
+        Thrusters& t = s.thrusters;
+        t.force_n = table->number("force_n", kPositive).value_or(t.force_n);
+        t.torque_n_m = table->number("torque_n_m", kPositive).value_or(t.torque_n_m);
+        t.min_on_s = table->number("min_on_s", kNotNegative).value_or(t.min_on_s);
+        t.gain_sigma = table->number("gain_sigma", {.low = 0, .high = 0.5}).value_or(t.gain_sigma);
+        t.misalignment_sigma_deg =
+            table->number("misalignment_sigma_deg", {.low = 0, .high = 20}).value_or(t.misalignment_sigma_deg);
+        table->finish();
+    }
+    if (auto table = root.table("attitude_sensor")) {
+        AttitudeSensor& a = s.attitude_sensor;
+        a.attitude_sigma_deg = table->number("attitude_sigma_deg", kNotNegative).value_or(a.attitude_sigma_deg);
+        a.rate_sigma_deg_s = table->number("rate_sigma_deg_s", kNotNegative).value_or(a.rate_sigma_deg_s);
+        table->finish();
+    }
+}
+
+void read_legs(TableReader& root, std::vector<Leg>& legs) {
+    auto tables = root.tables("leg");
+    if (tables.empty()) root.require("leg", "[[leg]], one at least");
+    for (TableReader& table : tables) {
+        Leg leg;
+        leg.name = table.text("name").value_or(fmt::format("leg {}", legs.size() + 1));
+        leg.arc_deg = table.number("arc_deg", {.low = -3600, .high = 3600});
+        if (leg.arc_deg) {
+            leg.axis = unit(table, "axis", leg.axis);
+            table.refuse("to_m", "this leg is an arc, expected either `to_m` or `arc_deg`");
+        } else {
+            table.require("to_m", "[x, y, z] in the target's port axes, or `arc_deg`");
+            table.refuse("axis", "belongs to `arc_deg`");
+            leg.to_m = table.vec3("to_m").value_or(leg.to_m);
+        }
+        leg.speed_m_s = table.number("speed_m_s", kPositive).value_or(leg.speed_m_s);
+        leg.hold_s = table.number("hold_s", {.low = 0, .high = kLongest_s}).value_or(leg.hold_s);
+        leg.within_m = table.number("within_m", kPositive).value_or(leg.within_m);
+        leg.contact = table.boolean("contact").value_or(leg.contact);
+        leg.look_at_target = table.boolean("look_at_target").value_or(leg.look_at_target);
+        if (leg.contact && legs.size() + 1 != tables.size())
+            table.fail("contact", "only the last leg may end with contact");
+        table.finish();
+        legs.push_back(std::move(leg));
+    }
+}
+
+/// Sensors that the chaser navigates by: they are in the scene, and on the chaser.
+template <class Sensor>
+std::vector<std::string> read_sensors(TableReader& table, const char* key, const std::vector<Sensor>& sensors,
+                                      const Scene& scene, const std::string& chaser) {
+    const std::vector<std::string> names = table.texts(key).value_or(std::vector<std::string>{});
+    for (const std::string& name : names) {
+        const auto found =
+            std::find_if(sensors.begin(), sensors.end(), [&](const Sensor& sensor) { return sensor.name == name; });
+        if (found == sensors.end())
+            table.fail(key, fmt::format("\"{}\" is not in {}", name, scene.file));
+        else if (found->mount < 0 || scene.bodies[static_cast<std::size_t>(found->mount)].name != chaser)
+            table.fail(key, fmt::format("\"{}\" is not mounted on the chaser, \"{}\"", name, chaser));
+    }
+    return names;
+}
+
+void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
+    root.require("navigation", "a table [navigation]");
+    auto table = root.table("navigation");
+    if (!table) return;
+    Navigation& n = s.navigation;
+    n.cameras = read_sensors(*table, "cameras", scene.cameras, scene, s.chaser.body);
+    n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
+    if (n.cameras.empty() && n.lidars.empty())
+        table->require("cameras", "`cameras` or `lidars`: what it navigates by");
+    n.period_s = table->number("period_s", {.low = 0.01, .high = 100}).value_or(n.period_s);
+    n.acceleration_psd = table->number("acceleration_psd", kPositive).value_or(n.acceleration_psd);
+    n.angular_acceleration_psd =
+        table->number("angular_acceleration_psd", kPositive).value_or(n.angular_acceleration_psd);
+    n.abort_sigma_m = table->number("abort_sigma_m", kPositive).value_or(n.abort_sigma_m);
+    n.abort_lost_s = table->number("abort_lost_s", kPositive).value_or(n.abort_lost_s);
+    n.abort_off_m = table->number("abort_off_m", kPositive).value_or(n.abort_off_m);
+    const double poses = n.period_s * s.pose_rate_hz;
+    if (std::abs(poses - std::round(poses)) > 1e-9 || poses < 1)
+        table->fail("period_s", fmt::format("is {} pose commands at {} a second, expected a whole number of them",
+                                            poses, s.pose_rate_hz));
+    table->finish();
+}
+
+void read_control(TableReader& root, Control& c) {
+    auto table = root.table("control");
+    if (!table) return;
+    c.bandwidth_rad_s = table->number("bandwidth_rad_s", kPositive).value_or(c.bandwidth_rad_s);
+    c.attitude_bandwidth_rad_s =
+        table->number("attitude_bandwidth_rad_s", kPositive).value_or(c.attitude_bandwidth_rad_s);
+    c.damping = table->number("damping", {.low = 0.1, .high = 10}).value_or(c.damping);
+    c.retreat_m_s = table->number("retreat_m_s", kPositive).value_or(c.retreat_m_s);
+    table->finish();
+}
+
+void read_faults(TableReader& root, std::vector<Fault>& faults) {
+    static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 5> kKinds{
+        {{"thruster_off", Fault::Kind::thruster_off},
+         {"thruster_stuck", Fault::Kind::thruster_stuck},
+         {"attitude_bias", Fault::Kind::attitude_bias},
+         {"target_rate", Fault::Kind::target_rate},
+         {"commands_lost", Fault::Kind::commands_lost}}};
+    for (TableReader& table : root.tables("fault")) {
+        Fault fault;
+        table.require("kind", "what goes wrong");
+        fault.kind = table.choice<Fault::Kind>("kind", kKinds).value_or(fault.kind);
+        fault.from_s = table.number("from_s", kNotNegative).value_or(fault.from_s);
+        fault.until_s = table.number("until_s", kPositive).value_or(fault.until_s);
+        const bool thruster = fault.kind == Fault::Kind::thruster_off || fault.kind == Fault::Kind::thruster_stuck;
+        const bool turns = fault.kind == Fault::Kind::attitude_bias || fault.kind == Fault::Kind::target_rate;
+        if (thruster) table.require("axis", "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters");
+        if (turns) table.require("value", "[x, y, z]");
+        if (!thruster) table.refuse("axis", "belongs to faults of thrusters");
+        if (!turns) table.refuse("value", "belongs to attitude_bias and target_rate");
+        fault.axis = thruster ? table.text("axis").value_or("") : "";
+        if (turns) fault.value = table.vec3("value", kAngle_deg).value_or(Vec3{});
+        if (thruster && table.has("axis") && std::find(kAxes.begin(), kAxes.end(), fault.axis) == kAxes.end())
+            table.fail("axis", fmt::format("\"{}\" is no group of thrusters, expected one of {}", fault.axis,
+                                           fmt::join(kAxes, ", ")));
+        table.finish();
+        faults.push_back(fault);
+    }
+}
+
+void read_contact(TableReader& gates, Gates& out) {
+    auto table = gates.table("contact");
+    if (!table) return;
+    Gates::Contact c;
+    const auto limit = [&](const char* key, double& value) {
+        value = table->number(key, kNotNegative).value_or(value);
+    };
+    limit("closing_min_m_s", c.closing_min_m_s), limit("closing_max_m_s", c.closing_max_m_s);
+    limit("lateral_rate_m_s", c.lateral_rate_m_s), limit("lateral_m", c.lateral_m);
+    limit("pitch_yaw_deg", c.pitch_yaw_deg), limit("roll_deg", c.roll_deg);
+    limit("pitch_yaw_rate_deg_s", c.pitch_yaw_rate_deg_s), limit("roll_rate_deg_s", c.roll_rate_deg_s);
+    table->finish();
+    out.contact = c;
+}
+
+void read_gates(TableReader& root, Scenario& s) {
+    auto table = root.table("gates");
+    if (!table) return;
+    Gates& g = s.gates;
+    if (auto corridor = table->table("corridor")) {
+        Gates::Corridor c;
+        c.half_angle_deg = corridor->number("half_angle_deg", {.low = 0, .high = 90}).value_or(c.half_angle_deg);
+        c.radius_m = corridor->number("radius_m", kNotNegative).value_or(c.radius_m);
+        c.from_m = corridor->number("from_m", kPositive).value_or(c.from_m);
+        corridor->finish();
+        g.corridor = c;
+    }
+    g.keep_out_m = table->number("keep_out_m", kPositive);
+    if (g.keep_out_m && !g.corridor && s.legs.back().contact)
+        table->fail("keep_out_m", "nothing may enter this sphere without a corridor, expected `corridor` too");
+    if (const auto band = table->pair("distance_m", kNotNegative)) {
+        g.distance_m.emplace((*band)[0], (*band)[1]);
+        if (!((*band)[0] < (*band)[1])) table->fail("distance_m", "expected [least, most]");
+    }
+    if (auto navigation = table->table("navigation")) {
+        Gates::NavigationError n;
+        n.sigmas = navigation->number("sigmas", kPositive).value_or(n.sigmas);
+        n.share = navigation->number("share", kUnit).value_or(n.share);
+        n.position_m = navigation->number("position_m", kPositive).value_or(n.position_m);
+        n.attitude_deg = navigation->number("attitude_deg", kPositive).value_or(n.attitude_deg);
+        navigation->finish();
+        g.navigation = n;
+    }
+    read_contact(*table, g);
+    if (g.contact && !s.legs.back().contact)
+        table->fail("contact", "no leg has contact = true, expected the last one to have it");
+    g.complete = table->boolean("complete").value_or(g.complete);
+    table->finish();
+}
+
+/// The scene that the scenario plays in; null where it cannot be read.
+std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problems) {
+    root.require("scenario", "a table [scenario]");
+    auto table = root.table("scenario");
+    if (!table) return std::nullopt;
+    table->require("name", "a text");
+    s.name = table->text("name").value_or("");
+    s.title = table->text("title").value_or(s.name);
+    s.duration_s =
+        table->number("duration_s", {.low = 0, .high = kLongest_s, .low_open = true}).value_or(s.duration_s);
+    s.pose_rate_hz = table->number("pose_rate_hz", {.low = 0.1, .high = 1000}).value_or(s.pose_rate_hz);
+    if (const auto seed = table->integer("seed", 0, std::numeric_limits<std::int64_t>::max()))
+        s.seed = static_cast<std::uint64_t>(*seed);
+    table->require("scene", "the scene file");
+    const auto scene = table->text("scene");
+    const toml::source_region place = scene ? table->place("scene") : toml::source_region{};
+    table->finish();
+    if (!scene) return std::nullopt;
+    s.scene = (std::filesystem::path(s.file).parent_path() / *scene).lexically_normal().string();
+    auto read = read_scene(s.scene);
+    if (read) return *std::move(read);
+    problems.add(place, read.error());
+    return std::nullopt;
+}
+
+void read_root(TableReader& root, Scenario& s, Problems& problems) {
+    const std::optional<Scene> scene = read_head(root, s, problems);
+    if (!scene) return;
+    read_orbit(root, s.orbit);
+    read_target(root, s, *scene);
+    read_chaser(root, s, *scene);
+    read_attractor(root, s, *scene);
+    read_start(root, s.start);
+    read_actuators(root, s);
+    read_legs(root, s.legs);
+    read_navigation(root, s, *scene);
+    read_control(root, s.control);
+    read_faults(root, s.faults);
+    if (!s.legs.empty()) read_gates(root, s);
+    root.finish();
+}
+
+}  // namespace
+
+Result<Scenario> read_scenario(const std::string& path) {
+    const auto text = read_file(path);
+    if (!text) return text.error();
+    Scenario s;
+    s.file = path;
+    Problems problems(path);
+    try {
+        const toml::table table = toml::parse(std::string_view(*text), std::string_view(path));
+        TableReader root(table, "the scenario", problems);
+        read_root(root, s, problems);
+    } catch (const toml::parse_error& e) {
+        problems.add(e.source(), std::string(e.description()));
+    }
+    if (!problems.none()) return problems.first();
+    return s;
+}
+
+}  // namespace narpa::rehearsal

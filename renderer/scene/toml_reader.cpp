@@ -68,7 +68,7 @@ std::string suggestion(std::string_view key, const std::vector<std::string>& kno
 
 Error Problems::located(const toml::source_region& at, std::string what) const {
     return {.what = std::move(what),
-            .file = file_,
+            .file = at.path ? *at.path : file_,
             .line = static_cast<int>(at.begin.line),
             .column = static_cast<int>(at.begin.column)};
 }

@@ -57,6 +57,40 @@ TEST(Scenario, NamesASceneThatIsNotThere) {
     EXPECT_EQ(s.error().what, "no such file");
 }
 
+TEST(Scenario, TakesFromAnotherWhatItDoesNotSay) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "over.toml") << "[scenario]\nbased_on = \"" << kScenarios << "docking.toml\"\n"
+                                        << "name = \"over\"\n[control]\ndamping = 0.7\n"
+                                        << "[[leg]]\nto_m = [5, 0, 0]\n[gates]\ncontact = 1\n";
+    const auto wrong = read_scenario(folder / "over.toml");
+    ASSERT_FALSE(wrong);
+    EXPECT_EQ(wrong.error().line, 9) << wrong.error().text();
+
+    std::ofstream(folder / "over.toml") << "[scenario]\nbased_on = \"" << kScenarios << "docking.toml\"\n"
+                                        << "name = \"over\"\n[control]\ndamping = 0.7\n";
+    const auto s = read_scenario(folder / "over.toml");
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_EQ(s->name, "over");
+    EXPECT_EQ(s->scene, kScenarios + "scene.toml");
+    EXPECT_EQ(s->control.damping, 0.7);
+    EXPECT_EQ(s->control.bandwidth_rad_s, 0.15);
+    EXPECT_EQ(s->legs.size(), 3u);
+}
+
+TEST(Scenario, AProblemIsToldOfTheFileThatHasIt) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "base.toml") << text_of(kScenarios + "docking.toml") << "\nsurprise = 1\n";
+    std::ofstream(folder / "over.toml")
+        << "[scenario]\nbased_on = \"base.toml\"\nname = \"over\"\nscene = \"" << kScenarios << "scene.toml\"\n";
+    const auto s = read_scenario(folder / "over.toml");
+    ASSERT_FALSE(s);
+    EXPECT_EQ(s.error().file, folder / "base.toml");
+    std::ofstream(folder / "self.toml") << "[scenario]\nbased_on = \"self.toml\"\n";
+    const auto self = read_scenario(folder / "self.toml");
+    ASSERT_FALSE(self);
+    EXPECT_NE(self.error().what.find("one on another"), std::string::npos);
+}
+
 struct Bad {
     std::string from, to;  ///< what is changed in the docking scenario
     std::string says;

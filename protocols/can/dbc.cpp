@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <string_view>
 
+#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 
 namespace narpa {
@@ -89,14 +90,19 @@ void write_set(Sections& out, const SetLayout& layout, const std::string& prefix
 
 std::string write_dbc(std::span<const DbcBody> bodies, int cameras) {
     Sections out;
-    const Route command{"Commander", "narpa"}, telemetry{"narpa", "Commander"};
+    const Route command{"Commander", "narpa"}, telemetry{"narpa", "Commander"},
+        navigation{"Navigation", "Commander"}, dynamics{"Commander", "Navigation"};
     for (const DbcBody& body : bodies) write_set(out, kPoseLayout, symbol(body.name) + "_", body.base_id, command);
     for (int i = 0; i < cameras; ++i)
         write_set(out, kLedgerLayout, "Camera" + std::to_string(i) + "_",
                   ledger_base_id(static_cast<std::uint8_t>(i)), telemetry);
     write_set(out, kEstimateLayout, "", kEstimateBaseId, telemetry);
     write_set(out, kHeartbeatLayout, "", kHeartbeatId, telemetry);
-    return "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: Commander narpa\n\n" + out.messages +
+    write_set(out, kActuatorLayout, "", kActuatorBaseId, navigation);
+    write_set(out, kNavigationLayout, "", kNavigationBaseId, navigation);
+    write_set(out, kAttitudeLayout, "", kAttitudeBaseId, dynamics);
+    write_set(out, kDynamicsLayout, "", kDynamicsBaseId, dynamics);
+    return "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: Commander narpa Navigation\n\n" + out.messages +
            "CM_ \"narpa on CAN. The most negative raw value of a signed signal means: not available.\";\n" +
            out.comments +
            "BA_DEF_ \"BusType\" STRING;\nBA_DEF_ BO_ \"VFrameFormat\" ENUM "

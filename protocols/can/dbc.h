@@ -12,8 +12,8 @@ struct DbcBody {
     std::uint32_t base_id = 0;  ///< the body's can_id
 };
 
-/// Pose messages of each body, ledger messages of each camera (named Camera0, Camera1, ...) and the heartbeat.
-/// CAN FD messages carry VFrameFormat = StandardCAN_FD.
+/// Pose messages of each body, ledger messages of each camera (named Camera0, Camera1, ...), estimate, heartbeat
+/// and what a closed loop says. CAN FD messages carry VFrameFormat = StandardCAN_FD.
 [[nodiscard]] std::string write_dbc(std::span<const DbcBody> bodies, int cameras = 1);
 
 }  // namespace narpa

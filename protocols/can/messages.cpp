@@ -1,13 +1,12 @@
 #include "protocols/can/messages.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "protocols/can/signal_values.h"
+
 namespace narpa {
 namespace {
-
-constexpr double kUnitTolerance = 1e-3;
 
 /// The 14 physical values in the order of kPoseSignals; the time is not among the doubles.
 std::array<double, kPoseSignalCount> values_of(const Motion& m) noexcept {
@@ -33,8 +32,7 @@ EncodeStatus quantise(const PoseCommand& command, BitPlace Signal::*form, RawSig
     if (!(std::abs(norm_q - 1.0) <= kUnitTolerance))
         return {"AttitudeNorm", "", norm_q, 1.0 - kUnitTolerance, 1.0 + kUnitTolerance};
     const auto values = values_of(command.motion);
-    raw[kPoseTime] = static_cast<std::int64_t>(static_cast<std::uint64_t>(command.t_valid_ns) &
-                                               static_cast<std::uint64_t>(raw_max(false, 48)));
+    raw[kPoseTime] = time_steps(command.t_valid_ns);
     for (std::size_t i = kPosePosition; i < kPoseSignalCount; ++i) {
         const Signal& signal = kPoseSignals[i];
         const auto limit = static_cast<double>(raw_max(true, (signal.*form).length));
@@ -47,21 +45,10 @@ EncodeStatus quantise(const PoseCommand& command, BitPlace Signal::*form, RawSig
     return {};
 }
 
-Quat attitude_of(const RawSignals& raw) noexcept {
-    const auto value = [&](std::size_t i) { return static_cast<double>(raw[kPoseAttitude + i]) / kAttitudeSteps; };
-    return {value(0), value(1), value(2), value(3)};
-}
-
-Vec3 vector_of(const RawSignals& raw, std::size_t first) noexcept {
-    const auto value = [&](std::size_t i) { return static_cast<double>(raw[i]) / kPoseSignals[i].steps_per_unit; };
-    return {value(first), value(first + 1), value(first + 2)};
-}
-
 DecodeStatus pose_verdict(const RawSignals& raw) noexcept {
     for (std::size_t i = 0; i < kPoseSignalCount; ++i)
         if (raw[i] == kNotAvailable) return DecodeStatus::not_a_number;
-    return std::abs(norm(attitude_of(raw)) - 1.0) <= kUnitTolerance ? DecodeStatus::complete
-                                                                    : DecodeStatus::not_unit;
+    return judge_attitude(attitude_of(raw, kPoseSignals, kPoseAttitude));
 }
 
 }  // namespace
@@ -108,10 +95,11 @@ PoseStatus PoseDecoder::accept(const CanFrame& frame, std::int64_t t_reference_n
     if (status != DecodeStatus::complete) return status;
     const RawSignals& raw = set_.raw();
     out.counter = set_.counter();
-    out.t_valid_ns = unwrap_time(static_cast<std::uint64_t>(raw[kPoseTime]), 48, t_reference_ns);
-    out.motion.T_world_body = {normalized(attitude_of(raw)), vector_of(raw, kPosePosition)};
-    out.motion.velocity_m_s = vector_of(raw, kPoseVelocity);
-    out.motion.rate_rad_s = vector_of(raw, kPoseRate);
+    out.t_valid_ns = unwrap_time(static_cast<std::uint64_t>(raw[kPoseTime]), kTimeBits, t_reference_ns);
+    out.motion.T_world_body = {normalized(attitude_of(raw, kPoseSignals, kPoseAttitude)),
+                               vector_of(raw, kPoseSignals, kPosePosition)};
+    out.motion.velocity_m_s = vector_of(raw, kPoseSignals, kPoseVelocity);
+    out.motion.rate_rad_s = vector_of(raw, kPoseSignals, kPoseRate);
     return status;
 }
 

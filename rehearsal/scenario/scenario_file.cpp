@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 
 #include "rehearsal/scenario/scenario.h"
-#include "renderer/scene/file_bytes.h"
+#include "renderer/scene/based_on.h"
 #include "renderer/scene/scene_file.h"
 #include "renderer/scene/toml_reader.h"
 
@@ -17,10 +16,6 @@ constexpr double kLongest_s = 1e6;
 constexpr Range kAngle_deg{.low = -360, .high = 360};
 constexpr std::array<std::string_view, 12> kAxes{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
                                                  "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
-
-std::string beside(const std::string& file, const std::string& named) {
-    return (std::filesystem::path(file).parent_path() / named).lexically_normal().string();
-}
 
 Vec3 unit(TableReader& table, std::string_view key, const Vec3& otherwise) {
     const Vec3 v = table.vec3(key).value_or(otherwise);
@@ -352,38 +347,6 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
     root.finish();
 }
 
-/// What `over` does not say is as in `base`. Nodes are moved: only so do they keep their place in the file.
-void merge(toml::table& over, toml::table&& base) {
-    for (auto&& [key, node] : base) {
-        toml::node* const own = over.get(key.str());
-        if (!own) {
-            node.visit([&, name = key](auto& value) { over.insert(name, std::move(value)); });
-        } else if (own->is_table() && node.is_table()) {
-            merge(*own->as_table(), std::move(*node.as_table()));
-        }
-    }
-}
-
-/// The file, on those that it is based on.
-Result<toml::table> parse(const std::string& path, int depth = 0) {
-    constexpr int kDeepest = 8;
-    const auto text = read_file(path);
-    if (!text) return text.error();
-    toml::table table = toml::parse(std::string_view(*text), std::string_view(path));
-    const toml::node* const based_on = table.at_path("scenario.based_on").node();
-    if (!based_on) return table;
-    const auto at = [&](std::string what) {
-        const toml::source_position& place = based_on->source().begin;
-        return Error{std::move(what), path, static_cast<int>(place.line), static_cast<int>(place.column)};
-    };
-    if (!based_on->is_string()) return at("based_on: expected the name of a scenario file");
-    if (depth == kDeepest) return at(fmt::format("based_on: more than {} files one on another", kDeepest));
-    auto base = parse(beside(path, based_on->as_string()->get()), depth + 1);
-    if (!base) return base.error();
-    merge(table, *std::move(base));
-    return table;
-}
-
 }  // namespace
 
 Result<Scenario> read_scenario(const std::string& path) {
@@ -391,7 +354,7 @@ Result<Scenario> read_scenario(const std::string& path) {
     s.file = path;
     Problems problems(path);
     try {
-        const auto table = parse(path);
+        const auto table = parse_based_on(path, "scenario");
         if (!table) return table.error();
         TableReader root(*table, "the scenario", problems);
         read_root(root, s, problems);

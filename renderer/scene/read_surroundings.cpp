@@ -64,6 +64,7 @@ bool read_scene_table(TableReader& root, Scene& scene) {
     scene.name = std::filesystem::path(scene.file).stem().string();
     auto table = root.table("scene");
     if (!table) return false;
+    (void)table->has("based_on");
     scene.name = table->text("name").value_or(scene.name);
     const bool has_epoch = read_epoch(*table, scene);
     table->finish();

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "renderer/scene/file_bytes.h"
+#include "renderer/scene/based_on.h"
 #include "renderer/scene/kind_names.h"
 #include "renderer/scene/scene_parts.h"
 
@@ -42,13 +42,14 @@ void warn_of_dark_materials(Scene& scene) {
     if (scene.render.method == RenderSettings::Method::direct) scene.warnings.push_back(warning);
 }
 
-Result<Scene> read_text(const std::string& path, const std::string& text) {
+Result<Scene> read_files(const std::string& path) {
     SceneReading reading{
         .scene = {}, .problems = Problems(path), .folder = std::filesystem::path(path).parent_path()};
     reading.scene.file = path;
     try {
-        const toml::table table = toml::parse(std::string_view(text), std::string_view(path));
-        TableReader root(table, "the scene", reading.problems);
+        const auto table = parse_based_on(path, "scene");
+        if (!table) return table.error();
+        TableReader root(*table, "the scene", reading.problems);
         read_root(root, reading);
     } catch (const toml::parse_error& e) {
         reading.problems.add(e.source(), std::string(e.description()));
@@ -90,9 +91,7 @@ std::string read_name(TableReader& table, std::vector<std::string>& taken) {
 
 Result<Scene> read_scene(const std::string& path) {
     try {
-        Result<std::string> text = read_file(path);
-        if (!text) return text.error();
-        return read_text(path, *text);
+        return read_files(path);
     } catch (const std::exception& e) {
         return Error{.what = fmt::format("cannot be read: {}", e.what()), .file = path};
     }

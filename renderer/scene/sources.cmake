@@ -1,5 +1,6 @@
 target_sources(narpa_renderer PRIVATE
     scene/assimp_material.cpp
+    scene/based_on.cpp
     scene/load_files.cpp
     scene/mesh_assimp.cpp
     scene/mesh_file.cpp

@@ -1,0 +1,91 @@
+#include "scenes/generate/small_body.h"
+
+#include <cmath>
+
+#include "scenes/generate/noise.h"
+
+namespace narpa::scenes {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr Vec3 kSemiAxes{28, 20, 17};
+constexpr int kMeridians = 360, kParallels = 180;
+
+/// A round feature about a direction: craters go in, boulders come out.
+struct Feature {
+    Vec3 direction;
+    double radius_m;
+    bool boulder;
+};
+
+Vec3 on_ellipsoid(const Vec3& direction) {
+    const Vec3 scaled{direction.x / kSemiAxes.x, direction.y / kSemiAxes.y, direction.z / kSemiAxes.z};
+    return direction / norm(scaled);
+}
+
+Vec3 random_direction(Random& random) {
+    const double z = random.uniform(-1, 1), azimuth = random.uniform(0, 2 * kPi), r = std::sqrt(1 - z * z);
+    return {r * std::cos(azimuth), r * std::sin(azimuth), z};
+}
+
+/// Half as large, four times as many.
+void add_features(int count, double smallest_m, double largest_m, bool boulder, Random& random,
+                  std::vector<Feature>& all) {
+    for (int i = 0; i < count; ++i) {
+        const double part = random.uniform(std::pow(smallest_m / largest_m, 2), 1);
+        all.push_back({random_direction(random), smallest_m / std::sqrt(part), boulder});
+    }
+}
+
+/// A bowl with a raised rim that falls off outside; a boulder is half of a flattened ball.
+double height_m(const Feature& f, double distance_m) {
+    const double r = distance_m / f.radius_m;
+    if (f.boulder) return r < 1 ? 0.7 * f.radius_m * std::sqrt(1 - r * r) : 0;
+    const double depth = 0.22 * f.radius_m, rim = 0.05 * f.radius_m;
+    return r < 1 ? (depth + rim) * r * r - depth : rim * std::exp(-4 * (r - 1));
+}
+
+/// Waves in directions drawn at random: no seam and no poles.
+double hills_m(const Vec3& p) {
+    Random random(77);
+    double sum = 0, amplitude = 1.6, wavelength = 30;
+    for (int octave = 0; octave < 5; ++octave, amplitude *= 0.5, wavelength *= 0.5)
+        for (int wave = 0; wave < 6; ++wave) {
+            const Vec3 k = 2 * kPi / wavelength * random_direction(random);
+            sum += amplitude / 3 * std::sin(dot(k, p) + random.uniform(0, 2 * kPi));
+        }
+    return sum;
+}
+
+}  // namespace
+
+std::vector<MaterialSpec> small_body_materials() {
+    return {{"regolith", {0.16, 0.15, 0.14}}};
+}
+
+Mesh build_small_body() {
+    Random random(5);
+    std::vector<Feature> features;
+    add_features(260, 0.5, 9, false, random, features);
+    add_features(420, 0.25, 1.5, true, random, features);
+    const auto point = [&](int i, int j) {
+        const double longitude = 2 * kPi * i / kMeridians,
+                     latitude = kPi * (static_cast<double>(j) / kParallels - 0.5);
+        const Vec3 direction{std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+                             std::sin(latitude)};
+        const Vec3 base = on_ellipsoid(direction);
+        double up_m = hills_m(base);
+        for (const Feature& f : features)
+            if (const double d = norm(base - on_ellipsoid(f.direction)); d < 2.5 * f.radius_m)
+                up_m += height_m(f, d);
+        return base + up_m * direction;
+    };
+    Mesh mesh;
+    mesh.begin("small_body", "regolith");
+    mesh.grid(kMeridians, kParallels, true, point, [](int i, int j) {
+        return Uv{static_cast<double>(i) / kMeridians, static_cast<double>(j) / kParallels};
+    });
+    return mesh;
+}
+
+}  // namespace narpa::scenes

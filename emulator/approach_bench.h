@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "emulator/frame_tracker.h"
-#include "emulator/stop.h"
+#include "base/stop.h"
 #include "emulator/threads.h"
 
 namespace narpa {

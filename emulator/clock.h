@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <ctime>
 
-#include "emulator/stop.h"
+#include "base/stop.h"
 
 namespace narpa {
 

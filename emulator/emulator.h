@@ -14,7 +14,7 @@
 #include "emulator/estimate_feed.h"
 #include "emulator/lidar_feed.h"
 #include "emulator/realtime.h"
-#include "emulator/stop.h"
+#include "base/stop.h"
 
 namespace narpa {
 

@@ -12,7 +12,7 @@
 #include "emulator/frame_tracker.h"
 #include "emulator/row_log.h"
 #include "emulator/spsc_ring.h"
-#include "emulator/stop.h"
+#include "base/stop.h"
 #include "protocols/ledger.h"
 
 namespace narpa {

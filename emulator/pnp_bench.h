@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "emulator/stop.h"
+#include "base/stop.h"
 
 namespace narpa {
 

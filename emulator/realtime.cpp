@@ -6,14 +6,10 @@
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <array>
 #include <charconv>
 #include <climits>
-#include <csignal>
-
-#include "emulator/stop.h"
 
 namespace narpa {
 
@@ -94,18 +90,6 @@ PageFaults page_faults() noexcept {
 
 void name_thread(const char* name) noexcept {
     ::pthread_setname_np(::pthread_self(), name);
-}
-
-void stop_on_signals() noexcept {
-    struct sigaction action {};
-    action.sa_handler = [](int) {
-        if (stop_flag().exchange(true)) ::_exit(130);
-    };
-    ::sigaction(SIGINT, &action, nullptr);
-    ::sigaction(SIGTERM, &action, nullptr);
-    struct sigaction ignore {};
-    ignore.sa_handler = SIG_IGN;  // a reader that leaves a FIFO or a socket is an error code, not a death
-    ::sigaction(SIGPIPE, &ignore, nullptr);
 }
 
 }  // namespace narpa

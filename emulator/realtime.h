@@ -25,8 +25,6 @@ bool run_on_cpu(int cpu) noexcept;
 Result<std::vector<int>> parse_cpus(const std::string& text);
 /// Shows up in ps and gdb; at most 15 characters.
 void name_thread(const char* name) noexcept;
-/// SIGINT and SIGTERM set the flag once; a second one ends the program at once.
-void stop_on_signals() noexcept;
 
 /// Of the whole process since it began.
 struct PageFaults {

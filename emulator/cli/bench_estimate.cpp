@@ -11,7 +11,6 @@
 #include "emulator/cli/bench_scene.h"
 #include "emulator/estimate_plots.h"
 #include "emulator/pnp_bench.h"
-#include "emulator/realtime.h"
 #include "emulator/stereo_bench.h"
 
 namespace narpa::cli {

@@ -5,12 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <thread>
 
 #include "drivers/can/can_bus.h"
+#include "drivers/can/remote_clock.h"
 #include "emulator/cli/cli.h"
 #include "emulator/clock.h"
-#include "emulator/realtime.h"
 #include "emulator/trajectory.h"
 #include "protocols/can/messages.h"
 
@@ -63,42 +62,6 @@ Result<std::map<std::string, Commander>> commanders(const Options& o, const std:
                          o.trajectory};
     return all;
 }
-
-/// The emulator may still be reading its scene: try until it is there.
-Result<std::unique_ptr<CanBus>> connect(const Options& o) {
-    const std::int64_t deadline = monotonic_ns() + std::llround(o.wait_s * 1e9);
-    for (;;) {
-        auto bus = open_can_bus(o.bus, CanRole::client);
-        if (bus || bus.error().kind != ErrorKind::missing || monotonic_ns() >= deadline || stop_flag()) return bus;
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-}
-
-/// The emulator's clock as its heartbeats tell it.
-class RemoteClock {
-public:
-    /// Takes in what has arrived.
-    void listen(CanBus& bus) noexcept {
-        ReceivedFrame received;
-        while (bus.receive(received)) {
-            Heartbeat beat;
-            if (decode(received.frame, newest_ns_, beat) != DecodeStatus::complete) continue;
-            newest_ns_ = beat.t_ns;
-            // The quickest heartbeat is the truest: all others were held up on their way.
-            offset_ns_ = heard_ ? std::max(offset_ns_, beat.t_ns - received.t_received_ns)
-                                : beat.t_ns - received.t_received_ns;
-            heard_ = true;
-        }
-    }
-    [[nodiscard]] bool heard() const noexcept { return heard_; }
-    [[nodiscard]] std::int64_t now_ns() const noexcept { return monotonic_ns() + offset_ns_; }
-    [[nodiscard]] std::int64_t newest_ns() const noexcept { return newest_ns_; }
-    void start_here() noexcept { offset_ns_ = -monotonic_ns(); }
-
-private:
-    std::int64_t newest_ns_ = 0, offset_ns_ = 0;
-    bool heard_ = false;
-};
 
 class Player {
 public:
@@ -178,10 +141,9 @@ private:
         if (granted <= last_granted_) return Ok{};
         last_granted_ = granted;
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
-        const std::int64_t rounding = 1000;  // heartbeats carry whole microseconds
-        while (clock_.newest_ns() + rounding <= granted || !clock_.heard()) {
+        while (!clock_.reached(granted)) {
             clock_.listen(bus_);
-            if (clock_.heard() && clock_.newest_ns() + rounding > granted) break;
+            if (clock_.reached(granted)) break;
             if (stop_flag()) return Ok{};
             if (monotonic_ns() > deadline)
                 return Error{
@@ -210,7 +172,7 @@ Outcome fly(const Options& o) {
     std::stable_sort(rows->begin(), rows->end(), [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
 
     stop_on_signals();
-    auto bus = connect(o);
+    auto bus = join_can_bus(o.bus, o.wait_s, stop_flag());
     if (!bus) return bus.error();
     say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), who->size(),
                     (*bus)->description()));

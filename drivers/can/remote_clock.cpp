@@ -1,0 +1,42 @@
+#include "drivers/can/remote_clock.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "drivers/can/descriptor.h"
+
+namespace narpa {
+
+bool RemoteClock::accept(const ReceivedFrame& received) noexcept {
+    if (decode(received.frame, newest_.t_ns, newest_) != DecodeStatus::complete) return false;
+    // The quickest heartbeat is the truest: all others were held up on their way.
+    const std::int64_t offset_ns = newest_.t_ns - received.t_received_ns;
+    offset_ns_ = heard_ ? std::max(offset_ns_, offset_ns) : offset_ns;
+    heard_ = true;
+    return true;
+}
+
+void RemoteClock::listen(CanBus& bus) noexcept {
+    for (ReceivedFrame received; bus.receive(received);) accept(received);
+}
+
+void RemoteClock::start_here() noexcept {
+    offset_ns_ = -monotonic_ns();
+}
+
+std::int64_t RemoteClock::now_ns() const noexcept {
+    return monotonic_ns() + offset_ns_;
+}
+
+Result<std::unique_ptr<CanBus>> join_can_bus(std::string_view spec, double wait_s, const StopFlag& stop) {
+    const std::int64_t deadline_ns = monotonic_ns() + std::llround(wait_s * 1e9);
+    for (;;) {
+        auto bus = open_can_bus(spec, CanRole::client);
+        if (bus || bus.error().kind != ErrorKind::missing || monotonic_ns() >= deadline_ns || stop) return bus;
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+}
+
+}  // namespace narpa

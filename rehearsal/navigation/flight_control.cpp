@@ -1,0 +1,112 @@
+#include "rehearsal/navigation/flight_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr double kTurnMost_rad_s = 1 * kDegree;
+/// Of the torque, so much may go into stopping a turn.
+constexpr double kShareToStop = 0.5;
+
+std::array<PulseAxis, 3> axes(double strength, const Thrusters& thrusters, double period_s) {
+    const PulseAxis axis(strength * thrusters.min_on_s, strength * period_s);
+    return {axis, axis, axis};
+}
+
+Vec3 give(std::array<PulseAxis, 3>& axes, const Vec3& wanted) {
+    return {axes[0].give(wanted.x), axes[1].give(wanted.y), axes[2].give(wanted.z)};
+}
+
+double most_turn_rad_s(const Scenario& s, const SampledGains& gains) {
+    const double least = s.thrusters.torque_n_m / s.chaser.inertia_kg_m2.diagonal().maxCoeff();
+    return std::min(kTurnMost_rad_s, kShareToStop * least / gains.velocity_s);
+}
+
+}  // namespace
+
+SampledGains SampledGains::of(double bandwidth_rad_s, double damping, double period_s) {
+    // z = exp(T (-d w +- i w sqrt(1 - d^2))): their sum and product are the closed loop's trace and determinant.
+    const double decay = std::exp(-damping * bandwidth_rad_s * period_s);
+    const double off = bandwidth_rad_s * period_s * std::sqrt(std::abs(1 - damping * damping));
+    const double trace = 2 * decay * (damping <= 1 ? std::cos(off) : std::cosh(off));
+    const double determinant = decay * decay;
+    return {(1 + determinant - trace) / (period_s * period_s), (3 - determinant - trace) / (2 * period_s)};
+}
+
+double PulseAxis::give(double wanted) noexcept {
+    const double all = wanted + saved_;
+    if (std::abs(all) < least_) {
+        saved_ = all;
+        return 0;
+    }
+    saved_ = 0;  // what is beyond the most is not made up for later: the loop asks again
+    return std::clamp(all, -most_, most_);
+}
+
+FlightControl::FlightControl(const Scenario& s)
+    : orbit_(s.orbit),
+      target_(s.target),
+      chaser_(s.chaser),
+      period_s_(s.navigation.period_s),
+      position_(SampledGains::of(s.control.bandwidth_rad_s, s.control.damping, period_s_)),
+      attitude_(SampledGains::of(s.control.attitude_bandwidth_rad_s, s.control.damping, period_s_)),
+      turn_most_rad_s_(most_turn_rad_s(s, attitude_)),
+      force_(axes(s.thrusters.force_n, s.thrusters, period_s_)),
+      torque_(axes(s.thrusters.torque_n_m, s.thrusters, period_s_)) {}
+
+void FlightControl::rest() noexcept {
+    for (PulseAxis& a : force_) a.reset();
+    for (PulseAxis& a : torque_) a.reset();
+}
+
+Impulses FlightControl::step(double t_s, const RelativeMotion& m, const Reference& reference) {
+    const Vec3 turn = angular_acceleration(m, reference);
+    const Vec3 push = conjugate(m.q_world_chaser) * acceleration(t_s, m, reference, turn);
+    const Vec3 momentum = to_vec3(chaser_.inertia_kg_m2 * to_eigen(m.chaser_rate_rad_s));
+    const Vec3 torque = to_vec3(chaser_.inertia_kg_m2 * to_eigen(turn)) + cross(m.chaser_rate_rad_s, momentum);
+    return {give(force_, chaser_.mass_kg * period_s_ * push), give(torque_, period_s_ * torque)};
+}
+
+/// Chaser's body axes.
+Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Reference& reference) const {
+    const Quat q_world_port = m.q_world_target * target_.T_body_port.q;
+    const Quat q_world_wanted = q_world_port * reference.q_port_chaser_port * conjugate(chaser_.T_body_port.q);
+    const Vec3 port_rate = m.q_world_target * m.target_rate_rad_s;
+    const Vec3 turning = q_world_port * reference.rate_rad_s;
+    const Vec3 wanted_rate = port_rate + turning;
+    const Vec3 wanted_acceleration =
+        q_world_port * reference.angular_acceleration_rad_s2 + cross(port_rate, turning);
+
+    const Quat q_chaser_world = conjugate(m.q_world_chaser);
+    Vec3 error = rotation_vector(q_chaser_world * q_world_wanted);
+    const double most = turn_most_rad_s_ * attitude_.velocity_s / attitude_.position_s2;
+    if (norm(error) > most) error = error * (most / norm(error));
+    return attitude_.position_s2 * error +
+           attitude_.velocity_s * (q_chaser_world * wanted_rate - m.chaser_rate_rad_s) +
+           q_chaser_world * wanted_acceleration;
+}
+
+/// Of the centre of mass by thrust, world axes.
+Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Reference& reference,
+                                 const Vec3& angular_acceleration_rad_s2) const {
+    // The port as it should move, from the target's centre of mass in inertial axes.
+    const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target_);
+    const Vec3 w = m.q_world_target * m.target_rate_rad_s;
+    const Vec3 wanted = T_world_port * reference.position_m;
+    const Vec3 wanted_along = T_world_port.q * reference.velocity_m_s;
+    const Vec3 wanted_velocity = wanted_along + cross(w, wanted);
+    const Vec3 wanted_acceleration = T_world_port.q * reference.acceleration_m_s2 + 2 * cross(w, wanted_along) +
+                                     cross(w, cross(w, wanted));
+    // The port as it does move with the chaser.
+    const Vec3 arm = m.q_world_chaser * port_from_mass(chaser_).t;
+    const Vec3 turn = m.q_world_chaser * m.chaser_rate_rad_s;
+    const Vec3 by_turning =
+        cross(m.q_world_chaser * angular_acceleration_rad_s2, arm) + cross(turn, cross(turn, arm));
+    return position_.position_s2 * (wanted - (m.position_m + arm)) +
+           position_.velocity_s * (wanted_velocity - (m.velocity_m_s + cross(turn, arm))) + wanted_acceleration -
+           by_turning - gravity_difference_m_s2(orbit_, t_s, m.position_m);
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,114 @@
+#include "rehearsal/navigation/guidance.h"
+
+#include <cmath>
+
+namespace narpa::rehearsal {
+namespace {
+
+/// Of what the thrusters can do, so much for the reference: the rest is the controller's.
+constexpr double kShareOfThrust = 0.2;
+/// Half of the stretch of time over which a reference attitude's rate is taken.
+constexpr double kRateStep_s = 0.05;
+
+/// x towards the origin, z as near z as may be.
+Quat looking_at_origin(const Vec3& position_m) {
+    if (norm(position_m) < 1e-6) return T_port_docked().q;
+    const Vec3 x = -normalized(position_m);
+    Vec3 y = cross(Vec3{0, 0, 1}, x);
+    if (norm(y) < 1e-6) y = {0, -1, 0};  // along z: as it is docked
+    y = normalized(y);
+    return quat_from_columns(x, y, cross(x, y));
+}
+
+}  // namespace
+
+Guidance::Guidance(const Scenario& scenario, double t_s)
+    : legs_(scenario.legs),
+      limits_(scenario.navigation),
+      control_(scenario.control),
+      period_s_(scenario.navigation.period_s),
+      acceleration_m_s2_(kShareOfThrust * scenario.thrusters.force_n / scenario.chaser.mass_kg) {
+    begin_leg(scenario.start.position_m, t_s);
+}
+
+void Guidance::begin_leg(const Vec3& from_m, double t_s) {
+    const Leg& leg = legs_[leg_];
+    path_ = LegPath::along(leg, from_m, acceleration_m_s2_);
+    leg_from_s_ = t_s;
+    phase_ = leg.contact ? GuidancePhase::closing : GuidancePhase::moving;
+}
+
+void Guidance::step(const GuidanceInput& input) {
+    if (phase_ == GuidancePhase::docked || phase_ == GuidancePhase::retreating) return;
+    if (input.dynamics == DynamicsPhase::captured) {
+        phase_ = GuidancePhase::docked;
+    } else if (input.dynamics == DynamicsPhase::bounced) {
+        retreat(input, AbortReason::commanded);
+    } else if (const AbortReason reason = reason_to_abort(input); reason != AbortReason::none) {
+        retreat(input, reason);
+    } else {
+        fly(input);
+    }
+}
+
+AbortReason Guidance::reason_to_abort(const GuidanceInput& input) const {
+    if (input.unmeasured_s > limits_.abort_lost_s) return AbortReason::lost;
+    if (!(input.position_sigma_m <= limits_.abort_sigma_m)) return AbortReason::uncertain;
+    if (!(norm(input.port_m - path_.position_m(input.t_s - leg_from_s_)) <= limits_.abort_off_m))
+        return AbortReason::off_reference;
+    return AbortReason::none;
+}
+
+/// Out along the port's axis from within the cone about it; from beside the port straight away.
+void Guidance::retreat(const GuidanceInput& input, AbortReason reason) {
+    const Vec3& r = input.port_m;
+    const bool before_port = r.x >= std::hypot(r.y, r.z);
+    const Vec3 direction = before_port || norm(r) == 0 ? Vec3{1, 0, 0} : normalized(r);
+    path_ = LegPath::away(r, direction, dot(input.port_velocity_m_s, direction), control_.retreat_m_s,
+                          acceleration_m_s2_);
+    leg_from_s_ = input.t_s;
+    phase_ = GuidancePhase::retreating;
+    abort_ = reason;
+}
+
+void Guidance::fly(const GuidanceInput& input) {
+    const double flown_s = input.t_s - leg_from_s_;
+    if (phase_ == GuidancePhase::done || flown_s < path_.duration_s()) return;
+    const Leg& leg = legs_[leg_];
+    phase_ = GuidancePhase::holding;
+    const bool there = norm(input.port_m - path_.end_m()) <= leg.within_m;
+    if (flown_s < path_.duration_s() + leg.hold_s || !there) return;
+    if (leg_ + 1 < legs_.size()) {
+        ++leg_;
+        begin_leg(path_.end_m(), input.t_s);
+    } else {
+        phase_ = GuidancePhase::done;
+    }
+}
+
+Guidance::Pose Guidance::pose(double t_s) const {
+    const double t = t_s - leg_from_s_;
+    Pose p{path_.position_m(t), path_.velocity_m_s(t), T_port_docked().q};
+    if (legs_[leg_].look_at_target) p.q = looking_at_origin(p.position_m);
+    return p;
+}
+
+Vec3 Guidance::rate(double t_s) const {
+    if (!legs_[leg_].look_at_target) return {};
+    const Quat turn = pose(t_s + kRateStep_s).q * conjugate(pose(t_s - kRateStep_s).q);
+    return rotation_vector(turn) / (2 * kRateStep_s);
+}
+
+Reference Guidance::reference(double t_s) const {
+    const Pose now = pose(t_s), then = pose(t_s + period_s_);
+    Reference r;
+    r.position_m = now.position_m;
+    r.velocity_m_s = now.velocity_m_s;
+    r.q_port_chaser_port = now.q;
+    r.rate_rad_s = rate(t_s);
+    r.acceleration_m_s2 = (then.velocity_m_s - now.velocity_m_s) / period_s_;
+    r.angular_acceleration_rad_s2 = (rate(t_s + period_s_) - r.rate_rad_s) / period_s_;
+    return r;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,71 @@
+/// rehearsal/navigation/guidance.h - where the chaser's port should be and how it should point: along the
+/// scenario's legs, to contact, or away again.
+#pragma once
+
+#include <vector>
+
+#include "protocols/closed_loop.h"
+#include "rehearsal/navigation/leg_path.h"
+#include "rehearsal/navigation/relative_motion.h"
+
+namespace narpa::rehearsal {
+
+/// The chaser's port beside the target's as it should be; target's port axes, which may turn.
+struct Reference {
+    Vec3 position_m{}, velocity_m_s{};
+    Quat q_port_chaser_port{};
+    Vec3 rate_rad_s{};  ///< of the chaser's port axes against the target's
+    /// Means over the control period that follows.
+    Vec3 acceleration_m_s2{}, angular_acceleration_rad_s2{};
+};
+
+/// What guidance goes by.
+struct GuidanceInput {
+    double t_s = 0;
+    Vec3 port_m{}, port_velocity_m_s{};  ///< estimate of the chaser's port origin, target's port axes
+    double position_sigma_m = 0;         ///< root of the summed variances
+    double unmeasured_s = 0;             ///< since a measurement was taken last
+    DynamicsPhase dynamics = DynamicsPhase::flying;
+};
+
+class Guidance {
+public:
+    /// Legs begin at t_s from the nominal start.
+    Guidance(const Scenario& scenario, double t_s);
+
+    /// Once each control period, with times that grow: moves on from leg to leg, gives up, lets go. A contact that
+    /// does not hold is an order to retreat (AbortReason::commanded).
+    void step(const GuidanceInput& input);
+
+    [[nodiscard]] GuidancePhase phase() const noexcept { return phase_; }
+    [[nodiscard]] std::size_t leg() const noexcept { return leg_; }
+    [[nodiscard]] AbortReason abort() const noexcept { return abort_; }
+    /// Thrusters rest: the docking system holds.
+    [[nodiscard]] bool thrusters_off() const noexcept { return phase_ == GuidancePhase::docked; }
+    /// At any time of the leg that is being flown.
+    [[nodiscard]] Reference reference(double t_s) const;
+
+private:
+    struct Pose {
+        Vec3 position_m, velocity_m_s;
+        Quat q;
+    };
+    [[nodiscard]] Pose pose(double t_s) const;
+    [[nodiscard]] Vec3 rate(double t_s) const;
+    [[nodiscard]] AbortReason reason_to_abort(const GuidanceInput& input) const;
+    void retreat(const GuidanceInput& input, AbortReason reason);
+    void begin_leg(const Vec3& from_m, double t_s);
+    void fly(const GuidanceInput& input);
+
+    std::vector<Leg> legs_;
+    Navigation limits_;
+    Control control_;
+    double period_s_, acceleration_m_s2_;
+    std::size_t leg_ = 0;
+    LegPath path_;
+    double leg_from_s_ = 0;
+    GuidancePhase phase_ = GuidancePhase::moving;
+    AbortReason abort_ = AbortReason::none;
+};
+
+}  // namespace narpa::rehearsal

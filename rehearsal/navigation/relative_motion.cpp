@@ -1,0 +1,68 @@
+#include "rehearsal/navigation/relative_motion.h"
+
+namespace narpa::rehearsal {
+
+Rigid3 port_from_mass(const Vehicle& vehicle) {
+    return {vehicle.T_body_port.q, vehicle.T_body_port.t - vehicle.centre_of_mass_m};
+}
+
+RelativeMotion in_world(const RelativeState& state, const Orbit& orbit, double t_s, const Quat& q_world_chaser,
+                        const Vec3& chaser_rate_rad_s) {
+    const Quat q_world_frame = orbit.q_world_lvlh(t_s);
+    const Vec3 frame_rate{0, 0, orbit.rate_rad_s()};
+    RelativeMotion out;
+    out.position_m = -(q_world_frame * state.position_m);
+    out.velocity_m_s = -(q_world_frame * (state.velocity_m_s + cross(frame_rate, state.position_m)));
+    out.q_world_target = normalized(q_world_frame * state.q_frame_target);
+    out.q_world_chaser = q_world_chaser;
+    out.target_rate_rad_s = state.rate_rad_s;
+    out.chaser_rate_rad_s = chaser_rate_rad_s;
+    return out;
+}
+
+RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double t_s) {
+    const Quat q_frame_world = conjugate(orbit.q_world_lvlh(t_s));
+    const Vec3 frame_rate{0, 0, orbit.rate_rad_s()};
+    RelativeState out;
+    out.position_m = -(q_frame_world * motion.position_m);
+    out.velocity_m_s = -(q_frame_world * motion.velocity_m_s) - cross(frame_rate, out.position_m);
+    out.q_frame_target = normalized(q_frame_world * motion.q_world_target);
+    out.rate_rad_s = motion.target_rate_rad_s;
+    return out;
+}
+
+PortMotion port_motion(const RelativeMotion& m, const Vehicle& target, const Vehicle& chaser) {
+    const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target);
+    const Rigid3 T_world_chaser_port = Rigid3{m.q_world_chaser, m.position_m} * port_from_mass(chaser);
+    const Vec3 arm = m.q_world_chaser * port_from_mass(chaser).t;
+    const Vec3 target_rate = m.q_world_target * m.target_rate_rad_s;
+    const Vec3 velocity = m.velocity_m_s + cross(m.q_world_chaser * m.chaser_rate_rad_s, arm);
+    return {inverse(T_world_port) * T_world_chaser_port,
+            conjugate(T_world_port.q) * (velocity - cross(target_rate, T_world_chaser_port.t))};
+}
+
+void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle& target, const Vehicle& chaser,
+                RelativeMotion& m) {
+    const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target);
+    const Vec3 arm = m.q_world_chaser * port_from_mass(chaser).t;
+    const Vec3 origin = T_world_port * port_m;
+    m.position_m = origin - arm;
+    m.velocity_m_s = T_world_port.q * port_velocity_m_s +
+                     cross(m.q_world_target * m.target_rate_rad_s, origin) -
+                     cross(m.q_world_chaser * m.chaser_rate_rad_s, arm);
+}
+
+Vec3 nominal_target_rate_rad_s(const Scenario& scenario) {
+    const Vec3 rate = kDegree * scenario.target_motion.rate_deg_s;
+    if (!scenario.target_motion.with_lvlh) return rate;
+    const Vec3 orbital = scenario.orbit.q_world_lvlh(0) * Vec3{0, 0, scenario.orbit.rate_rad_s()};
+    return rate + conjugate(scenario.q_world_target) * orbital;
+}
+
+Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m) {
+    const double n = orbit.rate_rad_s();
+    const Vec3 up = orbit.q_world_lvlh(t_s) * Vec3{1, 0, 0};
+    return n * n * (3 * dot(position_m, up) * up - position_m);
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,44 @@
+/// rehearsal/navigation/relative_motion.h - one relative state in the three forms that navigation needs it in: as
+/// the filter keeps it, in inertial axes, and as one docking port stands before the other.
+#pragma once
+
+#include "estimator/filter/motion_model.h"
+#include "rehearsal/scenario/scenario.h"
+
+namespace narpa::rehearsal {
+
+/// The chaser beside the target, about the target's centre of mass, which is taken to be at rest; world axes.
+struct RelativeMotion {
+    Vec3 position_m{}, velocity_m_s{};  ///< of the chaser's centre of mass, as inertial axes see it
+    Quat q_world_target{}, q_world_chaser{};
+    Vec3 target_rate_rad_s{}, chaser_rate_rad_s{};  ///< against inertial space, each in its own body axes
+};
+
+/// The chaser's port beside the target's.
+struct PortMotion {
+    Rigid3 T_port_chaser_port{};  ///< chaser's port axes to target's port axes
+    Vec3 velocity_m_s{};          ///< of the chaser's port origin, as the turning axes of the target's port see it
+};
+
+/// The port's pose about the centre of mass, in body axes.
+[[nodiscard]] Rigid3 port_from_mass(const Vehicle& vehicle);
+
+/// The filter's state (motion_model.h; frame LVLH, inertial where the model is free) in inertial axes at t_s.
+[[nodiscard]] RelativeMotion in_world(const RelativeState& state, const Orbit& orbit, double t_s,
+                                      const Quat& q_world_chaser, const Vec3& chaser_rate_rad_s);
+/// Its inverse.
+[[nodiscard]] RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double t_s);
+
+[[nodiscard]] PortMotion port_motion(const RelativeMotion& motion, const Vehicle& target, const Vehicle& chaser);
+/// Puts the chaser's centre of mass where its port's origin, of this place and velocity in the target's port axes,
+/// asks for; attitudes and rates are those in `motion`.
+void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle& target, const Vehicle& chaser,
+                RelativeMotion& motion);
+
+/// The target's rate at time 0, against inertial space, body axes.
+[[nodiscard]] Vec3 nominal_target_rate_rad_s(const Scenario& scenario);
+
+/// What gravity does to the chaser beside the target, inertial axes: linear about the target's circular orbit.
+[[nodiscard]] Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m);
+
+}  // namespace narpa::rehearsal

@@ -1,4 +1,5 @@
-target_sources(narpa_drivers PRIVATE lidar/null.cpp lidar/open_packet_sink.cpp lidar/packet_capture.cpp lidar/pcap.cpp lidar/udp.cpp)
+target_sources(narpa_drivers PRIVATE lidar/null.cpp lidar/open_packet_sink.cpp lidar/packet_capture.cpp lidar/pcap.cpp lidar/udp.cpp
+                                     lidar/udp_source.cpp)
 if(NARPA_WITH_PCAP)
   find_library(NARPA_PCAP_LIBRARY pcap)
   find_path(NARPA_PCAP_INCLUDE pcap/pcap.h)

@@ -1,9 +1,6 @@
 #include <fcntl.h>
-#include <linux/videodev2.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -12,6 +9,7 @@
 
 #include "drivers/outbox.h"
 #include "drivers/video/backends.h"
+#include "drivers/video/v4l2_device.h"
 
 // v4l2loopback 0.12.7 (Debian 12) decides the way here: memory-mapped output always returns the same buffer, so
 // frames go by write(); an unknown format is "accepted" as another, so what comes back is compared; without
@@ -28,23 +26,6 @@ std::int64_t now_ns() noexcept {
         .count();
 }
 
-int xioctl(int fd, unsigned long request, void* argument) noexcept {
-    int result = 0;
-    do result = ::ioctl(fd, request, argument);
-    while (result < 0 && errno == EINTR);
-    return result;
-}
-
-std::uint32_t fourcc(PixelFormat pixel) noexcept {
-    switch (pixel) {
-        case PixelFormat::grey: return V4L2_PIX_FMT_GREY;
-        case PixelFormat::y16: return V4L2_PIX_FMT_Y16;
-        case PixelFormat::yuyv: return V4L2_PIX_FMT_YUYV;
-        case PixelFormat::rgb24: return V4L2_PIX_FMT_RGB24;
-    }
-    return 0;
-}
-
 enum class Step : std::uint8_t { open, query, output, format_call, format_kept, stream, started };
 
 // How far the start of a device came; made into words only when a person is there to read them.
@@ -54,24 +35,6 @@ struct Start {
     v4l2_pix_format got{};
     int fd = -1;
 };
-
-v4l2_pix_format wanted_format(const VideoFormat& format) noexcept {
-    v4l2_pix_format pix{};
-    pix.width = static_cast<std::uint32_t>(format.width);
-    pix.height = static_cast<std::uint32_t>(format.height);
-    pix.pixelformat = fourcc(format.pixel);
-    pix.field = V4L2_FIELD_NONE;
-    pix.bytesperline =
-        static_cast<std::uint32_t>(format.width) * static_cast<std::uint32_t>(bytes_per_pixel(format.pixel));
-    pix.sizeimage = static_cast<std::uint32_t>(frame_bytes(format));
-    pix.colorspace = format.pixel == PixelFormat::yuyv ? V4L2_COLORSPACE_SMPTE170M : V4L2_COLORSPACE_SRGB;
-    return pix;
-}
-
-bool is_same(const v4l2_pix_format& a, const v4l2_pix_format& b) noexcept {
-    return a.width == b.width && a.height == b.height && a.pixelformat == b.pixelformat &&
-           a.bytesperline == b.bytesperline;
-}
 
 void tell_frame_rate(int fd, std::int64_t period_ns) noexcept {
     const std::int64_t common = std::gcd(period_ns, kSecondNs);
@@ -83,17 +46,15 @@ void tell_frame_rate(int fd, std::int64_t period_ns) noexcept {
 }
 
 Start start_steps(int fd, const VideoFormat& format) noexcept {
-    v4l2_capability capability{};
-    if (xioctl(fd, VIDIOC_QUERYCAP, &capability) < 0) return {Step::query, errno};
-    const std::uint32_t caps =
-        capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
-    if (!(caps & V4L2_CAP_VIDEO_OUTPUT)) return {Step::output, 0};
+    const std::uint32_t capabilities = v4l2_capabilities(fd);
+    if (capabilities == 0) return {Step::query, errno};
+    if (!(capabilities & V4L2_CAP_VIDEO_OUTPUT)) return {Step::output, 0};
 
     v4l2_format f{};
     f.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-    f.fmt.pix = wanted_format(format);
+    f.fmt.pix = v4l2_wanted_format(format);
     if (xioctl(fd, VIDIOC_S_FMT, &f) < 0) return {Step::format_call, errno};
-    if (!is_same(f.fmt.pix, wanted_format(format))) return {Step::format_kept, 0, f.fmt.pix};
+    if (!is_same_format(f.fmt.pix, v4l2_wanted_format(format))) return {Step::format_kept, 0, f.fmt.pix};
     tell_frame_rate(fd, format.period_ns);
     int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     if (xioctl(fd, VIDIOC_STREAMON, &type) < 0 && errno != EINVAL) return {Step::stream, errno};
@@ -112,24 +73,8 @@ Start start_device(const char* path, const VideoFormat& format) noexcept {
     return start;
 }
 
-std::string format_text(const v4l2_pix_format& pix) {
-    std::string text;
-    for (int i = 0; i < 4; ++i) text += static_cast<char>(pix.pixelformat >> (8 * i) & 0x7F);
-    return std::to_string(pix.width) + "x" + std::to_string(pix.height) + " " + text + ", " +
-           std::to_string(pix.bytesperline) + " bytes a line";
-}
-
-// The number in /dev/videoN, or 10.
-std::string video_number(const std::string& path) {
-    constexpr std::string_view prefix = "/dev/video";
-    const std::string number = path.starts_with(prefix) ? path.substr(prefix.size()) : "";
-    return number.empty() || !std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; }) ? "10"
-                                                                                                       : number;
-}
-
 Error describe(const std::string& path, const VideoFormat& format, const Start& start) {
-    const std::string load =
-        "sudo modprobe v4l2loopback video_nr=" + video_number(path) + " exclusive_caps=1 max_buffers=8";
+    const std::string load = v4l2loopback_remedy(path);
     const std::string reload = "sudo modprobe -r v4l2loopback && " + load;
     Error error{{}, path, 0, 0, ErrorKind::missing, load};
     const std::string why = std::strerror(start.error);
@@ -149,11 +94,11 @@ Error describe(const std::string& path, const VideoFormat& format, const Start& 
             error.remedy = reload;
             break;
         case Step::format_call:
-            error.what = "the device refuses " + format_text(wanted_format(format)) + ": " + why;
+            error.what = "the device refuses " + format_text(v4l2_wanted_format(format)) + ": " + why;
             error.remedy = reload;
             break;
         case Step::format_kept:
-            error.what = "asked for " + format_text(wanted_format(format)) + ", the device stays at " +
+            error.what = "asked for " + format_text(v4l2_wanted_format(format)) + ", the device stays at " +
                          format_text(start.got) + "; a reader may hold it open, or it cannot do this format";
             error.remedy = "close its readers, or " + reload;
             break;
@@ -212,7 +157,7 @@ private:
 class V4l2Sink final : public VideoSink {
 public:
     V4l2Sink(const std::string& path, const VideoFormat& format, WhenFull full, int fd)
-        : description_("V4L2 output " + path + ", " + format_text(wanted_format(format))),
+        : description_("V4L2 output " + path + ", " + format_text(v4l2_wanted_format(format))),
           frame_size_(frame_bytes(format)),
           writer_(path, format, fd),
           outbox_(writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}

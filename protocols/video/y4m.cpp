@@ -17,6 +17,20 @@ std::string_view colour_space(PixelFormat pixel) {
     return {};
 }
 
+/// The value of a header's tag, such as the 640 of W640; empty without one.
+std::string_view tag_value(std::string_view line, char tag) {
+    for (std::size_t at = 0; at < line.size();) {
+        const std::size_t end = std::min(line.find(' ', at), line.size());
+        if (end > at && line[at] == tag) return line.substr(at + 1, end - at - 1);
+        at = end + 1;
+    }
+    return {};
+}
+
+std::string size_text(std::string_view width, std::string_view height, std::string_view colour) {
+    return std::string(width) + "x" + std::string(height) + " C" + std::string(colour);
+}
+
 // Y0 U Y1 V in the frame; all Y, all U, all V in the samples.
 struct Planes {
     explicit Planes(const VideoFormat& f)
@@ -41,6 +55,21 @@ Result<std::string> y4m_stream_header(const VideoFormat& format) {
     return "YUV4MPEG2 W" + std::to_string(format.width) + " H" + std::to_string(format.height) + " F" +
            std::to_string(second / common) + ":" + std::to_string(format.period_ns / common) + " Ip A1:1 C" +
            std::string(colour) + "\n";
+}
+
+Status check_y4m_stream_header(std::string_view line, const VideoFormat& format) {
+    constexpr std::string_view magic = "YUV4MPEG2 ";
+    const Result<std::string> own = y4m_stream_header(format);
+    if (!own) return own.error();
+    if (!line.starts_with(magic)) return Error{"not a Y4M stream: it does not begin with YUV4MPEG2"};
+    const std::string_view tags = line.substr(magic.size());
+    const std::string_view colour = tag_value(tags, 'C');  // none means 420: yuv4mpeg(5)
+    const std::string found =
+        size_text(tag_value(tags, 'W'), tag_value(tags, 'H'), colour.empty() ? "420" : colour);
+    const std::string expected =
+        size_text(std::to_string(format.width), std::to_string(format.height), colour_space(format.pixel));
+    if (found != expected) return Error{"the stream has " + found + " frames, expected " + expected};
+    return Ok{};
 }
 
 void y4m_samples(const VideoFormat& format, std::span<const std::uint8_t> frame,

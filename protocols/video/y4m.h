@@ -18,6 +18,10 @@ namespace narpa {
 /// `YUV4MPEG2 W640 H480 F10:1 Ip A1:1 Cmono` and a line feed; the frame rate is exactly 1 / period.
 Result<std::string> y4m_stream_header(const VideoFormat& format);
 
+/// Whether a stream of this header (its first line, without the line feed) has frames of this format. Its frame
+/// rate is not compared: a stream tells it, no frame depends on it.
+Status check_y4m_stream_header(std::string_view line, const VideoFormat& format);
+
 /// Stands before each frame's samples.
 inline constexpr std::string_view kY4mFrameHeader = "FRAME\n";
 

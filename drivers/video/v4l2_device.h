@@ -1,0 +1,28 @@
+/// drivers/video/v4l2_device.h - what reading and writing a V4L2 device have in common.
+#pragma once
+
+#include <linux/videodev2.h>
+
+#include <cstdint>
+#include <string>
+
+#include "base/pixel_format.h"
+
+namespace narpa {
+
+/// ioctl, again while a signal interrupts it.
+int xioctl(int fd, unsigned long request, void* argument) noexcept;
+
+/// What this device node can do; 0 with errno when it is no V4L2 device.
+[[nodiscard]] std::uint32_t v4l2_capabilities(int fd) noexcept;
+
+[[nodiscard]] v4l2_pix_format v4l2_wanted_format(const VideoFormat& format) noexcept;
+/// Size, pixels and bytes a line agree.
+[[nodiscard]] bool is_same_format(const v4l2_pix_format& a, const v4l2_pix_format& b) noexcept;
+/// "640x480 GREY, 640 bytes a line".
+[[nodiscard]] std::string format_text(const v4l2_pix_format& pix);
+
+/// The command that makes a v4l2loopback device of this path.
+[[nodiscard]] std::string v4l2loopback_remedy(const std::string& path);
+
+}  // namespace narpa

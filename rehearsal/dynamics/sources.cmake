@@ -1,0 +1,2 @@
+target_sources(narpa_rehearsal PRIVATE dynamics/orbit_motion.cpp dynamics/port_motion.cpp dynamics/rigid_body.cpp
+                                       dynamics/simulation.cpp dynamics/thruster_model.cpp)

@@ -165,6 +165,8 @@ struct Scenario {
 
     /// The target's attitude at time 0, body axes to world axes: the scene's.
     Quat q_world_target{};
+    /// The attractor's, which keeps it: the scene's.
+    Quat q_world_attractor{};
 
     [[nodiscard]] std::int64_t period_ns() const;  ///< of navigation and control
     [[nodiscard]] std::int64_t pose_period_ns() const;

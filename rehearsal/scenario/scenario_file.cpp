@@ -107,7 +107,10 @@ void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
     table->require("body", "the name of a body of the scene");
     const std::string name = table->text("body").value_or("");
     for (const Body& b : scene.bodies)
-        if (b.name == name && b.can_id) s.attractor.emplace(name, *b.can_id);
+        if (b.name == name && b.can_id) {
+            s.attractor.emplace(name, *b.can_id);
+            s.q_world_attractor = b.initial.T_world_body.q;
+        }
     if (table->has("body") && !s.attractor)
         table->fail("body", fmt::format("\"{}\" is no body with a can_id of {}", name, scene.file));
     if (s.orbit.model == Orbit::Model::free)

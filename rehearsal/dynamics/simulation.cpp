@@ -1,0 +1,283 @@
+#include "rehearsal/dynamics/simulation.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rehearsal/dynamics/random_streams.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr std::int64_t kLongestPieceNs = 50'000'000;  // forces turn with the body: by its rate times half of this
+constexpr double kPortRadiusM = 1;                    // farther aside, ports pass each other
+constexpr double kRestitution = 0.3;
+constexpr std::int64_t kAfterCaptureNs = 2'000'000'000, kAfterBounceNs = 10'000'000'000;
+constexpr double kLeftDistances = 2;  // of the start's distance
+
+double seconds(std::int64_t ns) {
+    return static_cast<double>(ns) * 1e-9;
+}
+
+Status check(const Vehicle& v, const char* name) {
+    if (!(v.mass_kg > 0)) return Error{std::string(name) + ": mass_kg: expected more than 0"};
+    const Eigen::Matrix3d& J = v.inertia_kg_m2;
+    if (!J.allFinite() || !J.isApprox(J.transpose(), 1e-9) ||
+        Eigen::LLT<Eigen::Matrix3d>(J).info() != Eigen::Success)
+        return Error{std::string(name) + ": inertia_kg_m2: expected a symmetric, positive definite matrix"};
+    return Ok{};
+}
+
+}  // namespace
+
+Result<Simulation> Simulation::create(const Scenario& scenario, std::uint64_t seed) {
+    const auto wrong = [&](std::string what) { return Error{std::move(what), scenario.file}; };
+    if (auto good = check(scenario.target, "target"); !good) return wrong(good.error().what);
+    if (auto good = check(scenario.chaser, "chaser"); !good) return wrong(good.error().what);
+    if (scenario.period_ns() <= 0 || scenario.pose_period_ns() <= 0 ||
+        scenario.period_ns() % scenario.pose_period_ns() != 0)
+        return wrong("navigation.period_s and pose_rate_hz: expected a whole number of poses in a period");
+    if (!(scenario.thrusters.force_n > 0 && scenario.thrusters.torque_n_m > 0))
+        return wrong("thrusters: force_n and torque_n_m: expected more than 0");
+    for (const Fault& f : scenario.faults)
+        if ((f.kind == Fault::Kind::thruster_off || f.kind == Fault::Kind::thruster_stuck) &&
+            !thruster_group(f.axis))
+            return wrong("fault: axis \"" + f.axis + "\": expected +fx, -fx, +fy ... +tx ... -tz");
+    return Simulation(scenario, seed);
+}
+
+Simulation::Simulation(const Scenario& scenario, std::uint64_t seed)
+    : scenario_(scenario),
+      target_body_(scenario.target.inertia_kg_m2),
+      chaser_body_(scenario.chaser.inertia_kg_m2),
+      thrusters_(scenario, seed),
+      sensor_(engine(seed, Stream::attitude_sensor)) {
+    place_bodies(seed);
+}
+
+/// The target as the scene has it, the chaser off the nominal start by what is drawn.
+void Simulation::place_bodies(std::uint64_t seed) {
+    std::mt19937_64 draws = engine(seed, Stream::start);
+    draws_.position = draw_normal(draws);
+    draws_.velocity = draw_normal(draws);
+    draws_.attitude = draw_normal(draws);
+    draws_.rate = draw_normal(draws);
+    const auto off = [](const Vec3& sigma, const Vec3& draw) {
+        return Vec3{sigma.x * draw.x, sigma.y * draw.y, sigma.z * draw.z};
+    };
+
+    state_.target.q_world_body = normalized(scenario_.q_world_target);
+    state_.target.rate_rad_s = kRadPerDeg * scenario_.target_motion.rate_deg_s;
+    if (scenario_.target_motion.with_lvlh) {
+        const Vec3 orbit_rate = scenario_.orbit.q_world_lvlh(0) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
+        state_.target.rate_rad_s += conjugate(state_.target.q_world_body) * orbit_rate;
+    }
+
+    const Start& s = scenario_.start;
+    PortMotion port;
+    port.position_m = s.position_m + off(s.position_sigma_m, draws_.position);
+    port.velocity_m_s = s.velocity_m_s + off(s.velocity_sigma_m_s, draws_.velocity);
+    port.attitude_rad = kRadPerDeg * (s.attitude_deg + off(s.attitude_sigma_deg, draws_.attitude));
+    const Vec3 rate_body = kRadPerDeg * (s.rate_deg_s + off(s.rate_sigma_deg_s, draws_.rate));
+    port.rate_rad_s = conjugate(scenario_.chaser.T_body_port.q) * rate_body;
+    const Motion chaser = chaser_motion(port, scenario_.target, target_motion(state_), scenario_.chaser);
+    const Vec3& centre = scenario_.chaser.centre_of_mass_m;
+    state_.chaser = {chaser.T_world_body.q, chaser.rate_rad_s};
+    state_.translation = {chaser.T_world_body * centre,
+                          chaser.velocity_m_s + chaser.T_world_body.q * cross(chaser.rate_rad_s, centre)};
+    change_target_rate(-1, 0);
+}
+
+bool Simulation::apply(const ActuatorCommand& command) {
+    for (const Fault& f : scenario_.faults)
+        if (f.kind == Fault::Kind::commands_lost && t_ns() >= to_ns(f.from_s) && t_ns() < to_ns(f.until_s))
+            return false;
+    command_ = command;
+    thrusters_.fire(command, t_ns());
+    return true;
+}
+
+/// In pieces over which forces are constant.
+void Simulation::advance_to(std::int64_t t_ns) {
+    if (touching_) part_or_hold();
+    while (state_.t_ns < t_ns) {
+        const std::int64_t from_ns = state_.t_ns;
+        const std::int64_t until_ns =
+            std::min({t_ns, from_ns + kLongestPieceNs, next_fault_ns(from_ns), thrusters_.next_change_ns(from_ns)});
+        const Loads loads = thrusters_.loads(from_ns);
+        State next = after(state_, loads, until_ns - from_ns);
+        if (phase_ == DynamicsPhase::flying && passes_plane(state_, next)) {
+            const State met = at_plane(loads, until_ns - from_ns, t_ns);
+            if (ports_meet(met)) {
+                touch(met, loads);
+                return;
+            }
+        }
+        if (phase_ == DynamicsPhase::bounced && port(next).position_m.x <= 0 && ports_meet(next)) rebound(next);
+        fire_for(loads, until_ns - from_ns);
+        state_ = next;
+        change_target_rate(from_ns, until_ns);
+    }
+}
+
+/// The next fault's beginning or end that the thrusters do not know of.
+std::int64_t Simulation::next_fault_ns(std::int64_t t_ns) const {
+    std::int64_t next = std::numeric_limits<std::int64_t>::max();
+    for (const Fault& f : scenario_.faults)
+        for (const std::int64_t at : {to_ns(f.from_s), to_ns(f.until_s)})
+            if (f.kind == Fault::Kind::target_rate && at > t_ns) next = std::min(next, at);
+    return next;
+}
+
+/// By the faults that begin or end after the one time and not after the other. When one ends, the change is undone.
+void Simulation::change_target_rate(std::int64_t after_ns, std::int64_t until_ns) {
+    for (const Fault& f : scenario_.faults) {
+        if (f.kind != Fault::Kind::target_rate) continue;
+        const auto due = [&](double t_s) { return to_ns(t_s) > after_ns && to_ns(t_s) <= until_ns; };
+        if (due(f.from_s)) state_.target.rate_rad_s += kRadPerDeg * f.value;
+        if (due(f.until_s)) state_.target.rate_rad_s -= kRadPerDeg * f.value;
+    }
+}
+
+void Simulation::fire_for(const Loads& loads, std::int64_t dt_ns) {
+    fired_.force_n += seconds(dt_ns) * loads.force_n;
+    fired_.torque_n_m += seconds(dt_ns) * loads.torque_n_m;
+}
+
+// --- Motion ---------------------------------------------------------------------------------------------------
+
+Simulation::State Simulation::after(const State& from, const Loads& loads, std::int64_t dt_ns) const {
+    const double dt_s = seconds(dt_ns);
+    State to;
+    to.t_ns = from.t_ns + dt_ns;
+    to.target = target_after(from, dt_s);
+    if (T_held_) {
+        to.chaser.q_world_body = normalized(to.target.q_world_body * T_held_->q);
+        to.chaser.rate_rad_s = conjugate(T_held_->q) * to.target.rate_rad_s;
+        to.translation = {to.target.q_world_body * T_held_->t,
+                          to.target.q_world_body * cross(to.target.rate_rad_s, T_held_->t)};
+        return to;
+    }
+    to.chaser = chaser_body_.turned(from.chaser, loads.torque_n_m, dt_s);
+    Vec3 acceleration_m_s2;
+    if (loads.force_n != Vec3{}) {
+        const Attitude middle = chaser_body_.turned(from.chaser, loads.torque_n_m, 0.5 * dt_s);
+        acceleration_m_s2 = middle.q_world_body * loads.force_n / scenario_.chaser.mass_kg;
+    }
+    to.translation = coasted(scenario_.orbit, seconds(from.t_ns), dt_s, acceleration_m_s2, from.translation);
+    return to;
+}
+
+/// Held in LVLH it turns beside LVLH at a steady rate, otherwise it tumbles.
+Attitude Simulation::target_after(const State& from, double dt_s) const {
+    if (!scenario_.target_motion.with_lvlh) return target_body_.turned(from.target, {}, dt_s);
+    const Vec3 orbit_rate{0, 0, scenario_.orbit.rate_rad_s()};
+    const Quat q_lvlh_body = conjugate(scenario_.orbit.q_world_lvlh(seconds(from.t_ns))) * from.target.q_world_body;
+    const Vec3 rate = from.target.rate_rad_s - conjugate(q_lvlh_body) * orbit_rate;
+    const Quat q_lvlh_then = q_lvlh_body * exp_rotation(dt_s * rate);
+    return {normalized(scenario_.orbit.q_world_lvlh(seconds(from.t_ns) + dt_s) * q_lvlh_then),
+            rate + conjugate(q_lvlh_then) * orbit_rate};
+}
+
+Motion Simulation::target_motion(const State& state) const {
+    const auto& [q, rate] = state.target;
+    const Vec3& centre = scenario_.target.centre_of_mass_m;
+    return {{q, -(q * centre)}, -(q * cross(rate, centre)), rate};
+}
+
+Motion Simulation::chaser_motion_of(const State& state) const {
+    const auto& [q, rate] = state.chaser;
+    const Vec3& centre = scenario_.chaser.centre_of_mass_m;
+    return {{q, state.translation.position_m - q * centre},
+            state.translation.velocity_m_s - q * cross(rate, centre),
+            rate};
+}
+
+PortMotion Simulation::port(const State& state) const {
+    return port_motion(scenario_.target, target_motion(state), scenario_.chaser, chaser_motion_of(state));
+}
+
+// --- Contact --------------------------------------------------------------------------------------------------
+
+bool Simulation::passes_plane(const State& before, const State& then) const {
+    return port(before).position_m.x > 0 && port(then).position_m.x <= 0;
+}
+
+/// The first nanosecond at which the chaser's port has reached the plane; before `before_ns`, so that what stands
+/// at that time comes after it.
+Simulation::State Simulation::at_plane(const Loads& loads, std::int64_t dt_ns, std::int64_t before_ns) const {
+    std::int64_t not_yet = 0, reached = dt_ns;
+    while (reached - not_yet > 1) {
+        const std::int64_t middle = not_yet + (reached - not_yet) / 2;
+        (port(after(state_, loads, middle)).position_m.x > 0 ? not_yet : reached) = middle;
+    }
+    return after(state_, loads, std::min(reached, before_ns - 1 - state_.t_ns));
+}
+
+bool Simulation::ports_meet(const State& state) const {
+    const PortMotion p = port(state);
+    return std::hypot(p.position_m.y, p.position_m.z) <= kPortRadiusM && p.velocity_m_s.x < 0;
+}
+
+void Simulation::touch(const State& met, const Loads& loads) {
+    fire_for(loads, met.t_ns - state_.t_ns);
+    state_ = met;
+    const PortMotion p = port();
+    const bool captured = within(scenario_.gates.contact.value_or(Gates::Contact{}), p);
+    contact_ = ContactEvent{met.t_ns, p, captured};
+    phase_ = captured ? DynamicsPhase::captured : DynamicsPhase::bounced;
+    touching_ = true;
+}
+
+void Simulation::part_or_hold() {
+    touching_ = false;
+    if (phase_ != DynamicsPhase::captured) return rebound(state_);
+    const Quat q_target_world = conjugate(state_.target.q_world_body);
+    T_held_ = Rigid3{q_target_world * state_.chaser.q_world_body, q_target_world * state_.translation.position_m};
+}
+
+/// The port's speed along the target port's axis turns round, by an impulse at the chaser's centre of mass.
+void Simulation::rebound(State& state) const {
+    const Vec3 axis_world = state.target.q_world_body * scenario_.target.T_body_port.q * Vec3{1, 0, 0};
+    state.translation.velocity_m_s -= (1 + kRestitution) * port(state).velocity_m_s.x * axis_world;
+}
+
+// --- What is seen of it -----------------------------------------------------------------------------------------
+
+AttitudeReport Simulation::measure_attitude() {
+    const AttitudeSensor& s = scenario_.attitude_sensor;
+    Quat bias;
+    for (const Fault& f : scenario_.faults)
+        if (f.kind == Fault::Kind::attitude_bias && t_ns() >= to_ns(f.from_s) && t_ns() < to_ns(f.until_s))
+            bias = bias * exp_rotation(kRadPerDeg * f.value);
+    const Vec3 attitude = (s.attitude_sigma_deg * kRadPerDeg) * draw_normal(sensor_);
+    const Vec3 rate = (s.rate_sigma_deg_s * kRadPerDeg) * draw_normal(sensor_);
+    AttitudeReport report;
+    report.t_ns = t_ns();
+    report.q_world_chaser = normalized(state_.chaser.q_world_body * bias * exp_rotation(attitude));
+    report.rate_rad_s = state_.chaser.rate_rad_s + rate;
+    return report;
+}
+
+Truth Simulation::truth() const {
+    return {attractor_motion(scenario_.orbit, scenario_.q_world_attractor, seconds(t_ns())), target_motion(state_),
+            chaser_motion_of(state_)};
+}
+
+PortMotion Simulation::port() const {
+    return port(state_);
+}
+
+Ending Simulation::ending() const {
+    if (contact_ && t_ns() >= contact_->t_ns + (contact_->captured ? kAfterCaptureNs : kAfterBounceNs))
+        return contact_->captured ? Ending::captured : Ending::bounced;
+    if (t_ns() >= to_ns(scenario_.duration_s)) return Ending::duration;
+    if (command_.phase == GuidancePhase::done) return Ending::navigation_done;
+    if (command_.phase == GuidancePhase::retreating &&
+        norm(port().position_m) > kLeftDistances * norm(scenario_.start.position_m))
+        return Ending::left;
+    return Ending::not_yet;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,115 @@
+/// rehearsal/dynamics/simulation.h - two bodies near each other, from a scenario's time 0 to its end: how they
+/// move, what the chaser's thrusters do, and what happens when the ports meet. No clock, no bus; the same scenario,
+/// seed and commands give the same numbers.
+///
+/// The target is not moved by contact: its centre of mass is the world's origin, and what counts is the motion
+/// relative to it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string_view>
+
+#include "base/result.h"
+#include "protocols/closed_loop.h"
+#include "rehearsal/dynamics/orbit_motion.h"
+#include "rehearsal/dynamics/port_motion.h"
+#include "rehearsal/dynamics/rigid_body.h"
+#include "rehearsal/dynamics/thruster_model.h"
+#include "rehearsal/scenario/scenario.h"
+
+namespace narpa::rehearsal {
+
+/// As on CAN: motions of the bodies' origins, as the scene has them.
+struct Truth {
+    Motion attractor, target, chaser;
+};
+
+/// Draws of unit variance, in the order in which they are made; times the scenario's deviations they are what the
+/// start is off.
+struct StartDraws {
+    Vec3 position, velocity, attitude, rate;
+};
+
+struct ContactEvent {
+    std::int64_t t_ns = 0;
+    PortMotion port;  ///< just before
+    bool captured = false;
+};
+
+/// Why a run is over.
+enum class Ending : std::uint8_t { not_yet, captured, bounced, duration, navigation_done, left };
+inline constexpr std::array<std::string_view, 6> kEndings{"not_yet",  "captured",        "bounced",
+                                                          "duration", "navigation_done", "left"};
+
+class Simulation {
+public:
+    /// Errors: a vehicle without mass or with an impossible inertia, a fault of a thruster that is none, periods
+    /// that are none.
+    static Result<Simulation> create(const Scenario& scenario, std::uint64_t seed);
+
+    /// The scenario's time.
+    [[nodiscard]] std::int64_t t_ns() const noexcept { return state_.t_ns; }
+    /// What the thrusters do from now on; false: a fault has it lost.
+    bool apply(const ActuatorCommand& command);
+    /// On to t_ns, or to the instant at which the ports meet, if that is before: then phase() has changed and the
+    /// motion is the one just before they touch. The next call goes on from there.
+    void advance_to(std::int64_t t_ns);
+    /// Star tracker and gyroscope now. Draws their noise.
+    [[nodiscard]] AttitudeReport measure_attitude();
+
+    [[nodiscard]] Truth truth() const;
+    [[nodiscard]] PortMotion port() const;
+    [[nodiscard]] DynamicsPhase phase() const noexcept { return phase_; }
+    /// The first.
+    [[nodiscard]] const std::optional<ContactEvent>& contact() const noexcept { return contact_; }
+    [[nodiscard]] Ending ending() const;
+
+    /// Fired since the start, body axes: force and torque times time.
+    [[nodiscard]] const Loads& fired() const noexcept { return fired_; }
+    [[nodiscard]] const StartDraws& start_draws() const noexcept { return draws_; }
+    [[nodiscard]] const ThrusterModel& thrusters() const noexcept { return thrusters_; }
+    /// The last that got through.
+    [[nodiscard]] const ActuatorCommand& command() const noexcept { return command_; }
+
+private:
+    struct State {
+        std::int64_t t_ns = 0;
+        Attitude target, chaser;
+        Translation translation;
+    };
+    Simulation(const Scenario& scenario, std::uint64_t seed);
+
+    void place_bodies(std::uint64_t seed);
+    void change_target_rate(std::int64_t after_ns, std::int64_t until_ns);
+    [[nodiscard]] std::int64_t next_fault_ns(std::int64_t t_ns) const;
+    [[nodiscard]] State after(const State& from, const Loads& loads, std::int64_t dt_ns) const;
+    [[nodiscard]] Attitude target_after(const State& from, double dt_s) const;
+    [[nodiscard]] Motion target_motion(const State& state) const;
+    [[nodiscard]] Motion chaser_motion_of(const State& state) const;
+    [[nodiscard]] PortMotion port(const State& state) const;
+    void fire_for(const Loads& loads, std::int64_t dt_ns);
+    [[nodiscard]] bool passes_plane(const State& before, const State& then) const;
+    [[nodiscard]] State at_plane(const Loads& loads, std::int64_t dt_ns, std::int64_t before_ns) const;
+    [[nodiscard]] bool ports_meet(const State& state) const;
+    void touch(const State& met, const Loads& loads);
+    void part_or_hold();
+    void rebound(State& state) const;
+
+    Scenario scenario_;
+    RigidBody target_body_, chaser_body_;
+    ThrusterModel thrusters_;
+    std::mt19937_64 sensor_;
+    StartDraws draws_{};
+    State state_;
+    DynamicsPhase phase_ = DynamicsPhase::flying;
+    bool touching_ = false;         // stands at a contact that advance_to has yet to go on from
+    std::optional<Rigid3> T_held_;  // captured: chaser's body at its centre of mass, in the target's
+    std::optional<ContactEvent> contact_;
+    Loads fired_{};
+    ActuatorCommand command_{};
+};
+
+}  // namespace narpa::rehearsal

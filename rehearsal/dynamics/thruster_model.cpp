@@ -1,0 +1,94 @@
+#include "rehearsal/dynamics/thruster_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rehearsal/dynamics/random_streams.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr std::array<std::string_view, kThrusterGroups> kNames{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
+                                                               "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
+constexpr int kForceGroups = 6;
+
+}  // namespace
+
+std::optional<int> thruster_group(std::string_view axis) {
+    const auto* at = std::find(kNames.begin(), kNames.end(), axis);
+    if (at == kNames.end()) return std::nullopt;
+    return static_cast<int>(at - kNames.begin());
+}
+
+ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
+    : thrusters_(scenario.thrusters), period_ns_(scenario.period_ns()), gains_(engine(seed, Stream::pulses)) {
+    std::mt19937_64 draws = engine(seed, Stream::misalignment);
+    for (int group = 0; group < kThrusterGroups; ++group) {
+        Vec3 axis;
+        axis[group % kForceGroups / 2] = group % 2 == 0 ? 1 : -1;
+        directions_[group] =
+            exp_rotation((thrusters_.misalignment_sigma_deg * kRadPerDeg) * draw_normal(draws)) * axis;
+    }
+    for (const Fault& fault : scenario.faults) {
+        const bool stuck = fault.kind == Fault::Kind::thruster_stuck;
+        if (!stuck && fault.kind != Fault::Kind::thruster_off) continue;
+        if (const auto group = thruster_group(fault.axis))
+            faults_.push_back({to_ns(fault.from_s), to_ns(fault.until_s), *group, stuck});
+    }
+}
+
+void ThrusterModel::fire(const ActuatorCommand& command, std::int64_t t_ns) {
+    pulses_ = {};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double impulse = command.impulse_n_s[axis];
+        fire(2 * axis + (impulse < 0), std::abs(impulse), t_ns);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        const double impulse = command.angular_impulse_n_m_s[axis];
+        fire(kForceGroups + 2 * axis + (impulse < 0), std::abs(impulse), t_ns);
+    }
+}
+
+void ThrusterModel::fire(int group, double impulse, std::int64_t t_ns) {
+    const double wanted_s = impulse / full(group);
+    if (!(wanted_s >= thrusters_.min_on_s) || wanted_s == 0) return;
+    const std::int64_t on_ns = std::min(std::max<std::int64_t>(std::llround(wanted_s * 1e9), 1), period_ns_);
+    // A pulse ends at a whole nanosecond: what that is off, its strength makes good.
+    const double even_out = on_ns == period_ns_ ? 1 : wanted_s / (static_cast<double>(on_ns) * 1e-9);
+    const double gain = 1 + thrusters_.gain_sigma * std::normal_distribution<double>()(gains_);
+    pulses_[group] = {t_ns, t_ns + on_ns, full(group) * even_out * std::max(gain, 0.0)};
+}
+
+double ThrusterModel::full(int group) const noexcept {
+    return group < kForceGroups ? thrusters_.force_n : thrusters_.torque_n_m;
+}
+
+Loads ThrusterModel::loads(std::int64_t t_ns) const {
+    Loads sum;
+    for (int group = 0; group < kThrusterGroups; ++group)
+        (group < kForceGroups ? sum.force_n : sum.torque_n_m) += strength(group, t_ns) * directions_[group];
+    return sum;
+}
+
+double ThrusterModel::strength(int group, std::int64_t t_ns) const {
+    bool off = false, stuck = false;
+    for (const GroupFault& f : faults_)
+        if (f.group == group && t_ns >= f.from_ns && t_ns < f.until_ns) (f.stuck ? stuck : off) = true;
+    if (off) return 0;
+    if (stuck) return full(group);
+    const Pulse& p = pulses_[group];
+    return t_ns >= p.from_ns && t_ns < p.until_ns ? p.strength : 0;
+}
+
+std::int64_t ThrusterModel::next_change_ns(std::int64_t t_ns) const {
+    std::int64_t next = std::numeric_limits<std::int64_t>::max();
+    const auto look = [&](std::int64_t at) {
+        if (at > t_ns) next = std::min(next, at);
+    };
+    for (const Pulse& p : pulses_) look(p.until_ns);
+    for (const GroupFault& f : faults_) look(f.from_ns), look(f.until_ns);
+    return next;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,66 @@
+/// rehearsal/dynamics/thruster_model.h - what the chaser's thrusters make of a command: pulses of full force, each
+/// with its own error.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string_view>
+#include <vector>
+
+#include "protocols/closed_loop.h"
+#include "rehearsal/scenario/scenario.h"
+
+namespace narpa::rehearsal {
+
+/// On the chaser, body axes; the torque is about the centre of mass.
+struct Loads {
+    Vec3 force_n{}, torque_n_m{};
+};
+
+/// Groups in the order +fx, -fx, +fy, ... -fz, +tx, ... -tz.
+inline constexpr int kThrusterGroups = 12;
+/// "+fx" -> 0; nothing where it is no such name.
+[[nodiscard]] std::optional<int> thruster_group(std::string_view axis);
+
+/// A group fires with its full force or not at all. Of a command, each of the six impulses is for the group in its
+/// direction, which fires for |impulse| / force seconds from the command's time on: not at all where that is less
+/// than min_on_s, for the control period at most. A pulse has its own error of force, a group one of direction.
+class ThrusterModel {
+public:
+    /// Faults of other kinds are passed over; those of thrusters name a group.
+    ThrusterModel(const Scenario& scenario, std::uint64_t seed);
+
+    /// In place of what an earlier command has left to do.
+    void fire(const ActuatorCommand& command, std::int64_t t_ns);
+    /// Constant from t_ns to next_change_ns(t_ns).
+    [[nodiscard]] Loads loads(std::int64_t t_ns) const;
+    [[nodiscard]] std::int64_t next_change_ns(std::int64_t t_ns) const;
+
+    /// Each group's direction with its error, body axes.
+    [[nodiscard]] const std::array<Vec3, kThrusterGroups>& directions() const noexcept { return directions_; }
+
+private:
+    struct Pulse {
+        std::int64_t from_ns = 0, until_ns = 0;
+        double strength = 0;  ///< N, or N m
+    };
+    struct GroupFault {
+        std::int64_t from_ns = 0, until_ns = 0;
+        int group = 0;
+        bool stuck = false;
+    };
+    [[nodiscard]] double full(int group) const noexcept;
+    [[nodiscard]] double strength(int group, std::int64_t t_ns) const;
+    void fire(int group, double impulse, std::int64_t t_ns);
+
+    Thrusters thrusters_;
+    std::int64_t period_ns_;
+    std::vector<GroupFault> faults_;
+    std::mt19937_64 gains_;
+    std::array<Vec3, kThrusterGroups> directions_{};
+    std::array<Pulse, kThrusterGroups> pulses_{};
+};
+
+}  // namespace narpa::rehearsal

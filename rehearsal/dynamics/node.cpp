@@ -1,0 +1,305 @@
+#include "rehearsal/dynamics/node.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "drivers/can/descriptor.h"
+#include "drivers/can/remote_clock.h"
+#include "protocols/can/closed_loop.h"
+#include "rehearsal/dynamics/flight_log.h"
+#include "rehearsal/dynamics/simulation.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr std::int64_t kShortWaitNs = 20'000'000;
+constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
+
+/// One body's commands on the wire.
+struct Body {
+    std::string name;
+    std::uint32_t base_id = 0;
+    std::uint8_t counter = 0;
+};
+
+/// Of actuator commands.
+struct CommandCounts {
+    std::uint64_t applied = 0;
+    std::uint64_t lost = 0;     ///< by the scenario's fault
+    std::uint64_t late = 0;     ///< came more than a period after their time
+    std::uint64_t refused = 0;  ///< another time than the one that is asked for, or not newer than the last
+};
+
+class Node {
+public:
+    Node(const Scenario& scenario, const DynamicsOptions& options, Simulation simulation,
+         std::optional<TruthLog> log, CanBus& bus, const StopFlag& stop)
+        : scenario_(scenario),
+          options_(options),
+          simulation_(std::move(simulation)),
+          log_(std::move(log)),
+          bus_(bus),
+          stop_(stop),
+          fd_(bus.carries_fd()),
+          target_{scenario.target.body, scenario.target.can_id},
+          chaser_{scenario.chaser.body, scenario.chaser.can_id} {
+        if (scenario.attractor) attractor_ = Body{scenario.attractor->first, scenario.attractor->second};
+    }
+
+    Status run() {
+        const Status flown = options_.lockstep ? run_in_lockstep() : run_in_real_time();
+        if (!flown) return flown;
+        return log_ ? log_->close() : Status{Ok{}};
+    }
+    [[nodiscard]] nlohmann::json report() const;
+
+private:
+    // --- Lockstep ---
+    Status run_in_lockstep() {
+        for (;;) {
+            if (auto said = say_period(); !said || over_) return said ? wait_for_emulator() : said;
+            if (auto commanded = wait_for_command(); !commanded || stop_) return commanded;
+            const std::int64_t next_ns = simulation_.t_ns() + scenario_.period_ns();
+            while (simulation_.t_ns() < next_ns) {
+                if (auto moved = advance_to(next_pose_ns()); !moved) return moved;
+                if (simulation_.t_ns() == next_ns) break;  // its poses come after the report
+                if (auto said = send_poses(); !said) return said;
+            }
+        }
+    }
+
+    Status wait_for_command() {
+        return wait([&] { return commanded_ns_ == clock_time_ns(); },
+                    [&] { return fmt::format("no actuator command for {:.3f} s", now_s()); });
+    }
+    Status wait_for_emulator() {
+        return wait([&] { return clock_.reached(clock_time_ns()); },
+                    [&] { return fmt::format("no heartbeat of {:.3f} s", now_s()); });
+    }
+
+    template <class Done, class What>
+    Status wait(const Done& done, const What& what) {
+        const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.patience_s * 1e9);
+        for (;;) {
+            if (auto listened = listen(); !listened) return listened;
+            if (done() || stop_) return Ok{};
+            if (emulator_has_stopped()) return failed(what() + ": the emulator has stopped");
+            if (monotonic_ns() > deadline_ns) return failed(what() + fmt::format(" in {} s", options_.patience_s));
+            bus_.wait(kShortWaitNs);
+        }
+    }
+
+    // --- Real time ---
+    Status run_in_real_time() {
+        if (auto ready = synchronise(); !ready || stop_) return ready;
+        for (;; next_ns_ += scenario_.pose_period_ns()) {
+            if (auto waited = wait_until(t_start_ns_ + next_ns_); !waited || stop_) return waited;
+            if (auto moved = advance_to(next_ns_); !moved) return moved;
+            const bool period = next_ns_ % scenario_.period_ns() == 0;
+            if (auto said = period ? say_period() : send_poses(); !said || over_) return said;
+        }
+    }
+
+    /// Time 0 is a whole second of the emulator's clock.
+    Status synchronise() {
+        const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.wait_s * 1e9);
+        while (!clock_.heard() && !stop_) {
+            if (monotonic_ns() > deadline_ns)
+                return failed(fmt::format("no heartbeat in {} s: is `narpa run` there?", options_.wait_s));
+            bus_.wait(kShortWaitNs);
+            clock_.listen(bus_);
+        }
+        t_start_ns_ = (clock_.now_ns() + kHeadStartNs + kSecond_ns - 1) / kSecond_ns * kSecond_ns;
+        return Ok{};
+    }
+
+    /// Commands that come meanwhile hold from their arrival on. Ends early when stopped.
+    Status wait_until(std::int64_t t_ns) {
+        for (;;) {
+            if (auto listened = listen(); !listened) return listened;
+            const std::int64_t left_ns = t_ns - clock_.now_ns();
+            if (left_ns <= 0 || stop_) return Ok{};
+            if (emulator_has_stopped())
+                return failed(fmt::format("at {:.3f} s: the emulator has stopped", now_s()));
+            bus_.wait(std::min(left_ns, 5 * kShortWaitNs));
+        }
+    }
+
+    // --- Commands in ---
+    Status listen() {
+        for (ReceivedFrame received; bus_.receive(received);) {
+            if (clock_.accept(received)) continue;
+            ActuatorCommand command;
+            if (decoder_.accept(received.frame, clock_time_ns(), command) != DecodeStatus::complete) continue;
+            if (auto taken = take(command); !taken) return taken;
+        }
+        return Ok{};
+    }
+
+    Status take(const ActuatorCommand& command) {
+        const std::int64_t now_ns = options_.lockstep ? clock_time_ns() : clock_.now_ns();
+        if (!asked_for(command.t_ns, now_ns)) {
+            ++counts_.refused;
+        } else if (now_ns - command.t_ns > scenario_.period_ns()) {
+            ++counts_.late;
+        } else {
+            commanded_ns_ = command.t_ns;
+            if (!options_.lockstep)
+                if (auto moved = advance_to(std::min(now_ns - t_start_ns_, next_ns_)); !moved) return moved;
+            ++(simulation_.apply(command) ? counts_.applied : counts_.lost);
+        }
+        return Ok{};
+    }
+
+    /// In lockstep: for this very time, once. In real time: newer than the last, and not of a time far ahead.
+    bool asked_for(std::int64_t t_ns, std::int64_t now_ns) const {
+        if (commanded_ns_ && t_ns <= *commanded_ns_) return false;
+        if (options_.lockstep) return t_ns == now_ns;
+        return t_ns >= t_start_ns_ && t_ns <= now_ns + scenario_.period_ns();
+    }
+
+    bool emulator_has_stopped() const { return clock_.heard() && clock_.newest().state == RunState::stopping; }
+
+    // --- Motion, and what is said of it ---
+    std::int64_t next_pose_ns() const {
+        return (simulation_.t_ns() / scenario_.pose_period_ns() + 1) * scenario_.pose_period_ns();
+    }
+
+    /// Contact on the way is told at its own time.
+    Status advance_to(std::int64_t t_ns) {
+        while (simulation_.t_ns() < t_ns) {
+            const DynamicsPhase before = simulation_.phase();
+            simulation_.advance_to(t_ns);
+            if (simulation_.phase() == before) continue;
+            if (auto said = send_report(simulation_.phase()); !said) return said;
+            if (auto said = send_poses(); !said) return said;
+        }
+        return Ok{};
+    }
+
+    Status say_period() {
+        over_ = simulation_.ending() != Ending::not_yet;
+        if (auto sent = send_report(over_ ? DynamicsPhase::finished : simulation_.phase()); !sent) return sent;
+        AttitudeReport attitude = simulation_.measure_attitude();
+        attitude.t_ns = clock_time_ns();
+        attitude.counter = attitude_counter_++;
+        if (auto sent = send_message(attitude); !sent) return sent;
+        return send_poses();
+    }
+
+    Status send_report(DynamicsPhase phase) {
+        return send_message(DynamicsReport{report_counter_++, clock_time_ns(), t_start_ns_, phase});
+    }
+
+    /// The chaser last: with its command the emulator may go on to this time.
+    Status send_poses() {
+        const Truth truth = simulation_.truth();
+        if (attractor_)
+            if (auto sent = send_pose(*attractor_, truth.attractor); !sent) return sent;
+        if (auto sent = send_pose(target_, truth.target); !sent) return sent;
+        if (auto sent = send_pose(chaser_, truth.chaser); !sent) return sent;
+        if (log_) log_->append(simulation_);
+        return Ok{};
+    }
+
+    Status send_pose(Body& body, const Motion& motion) {
+        const PoseCommand command{body.counter++, clock_time_ns(), motion};
+        PoseFrames classic;
+        CanFrame fd;
+        const EncodeStatus encoded =
+            fd_ ? encode_fd(command, body.base_id, fd) : encode_classic(command, body.base_id, classic);
+        if (!encoded)
+            return failed(fmt::format("pose of \"{}\" at {:.3f} s: {}", body.name, now_s(), encoded.text()));
+        ++poses_;
+        return fd_ ? send({&fd, 1}) : send(classic);
+    }
+
+    template <class Message>
+    Status send_message(const Message& message) {
+        if (!fd_) return send(encode_classic(message));
+        const CanFrame frame = encode_fd(message);
+        return send({&frame, 1});
+    }
+
+    /// In real time what does not go is dropped, and the bus counts it; in lockstep it must go.
+    Status send(std::span<const CanFrame> frames) {
+        const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.patience_s * 1e9);
+        for (const CanFrame& frame : frames)
+            while (!bus_.send(frame) && options_.lockstep && !stop_) {
+                if (monotonic_ns() > deadline_ns)
+                    return failed(fmt::format("the bus takes no frame for {} s", options_.patience_s));
+                bus_.wait(kShortWaitNs);
+                if (auto listened = listen(); !listened) return listened;
+            }
+        return Ok{};
+    }
+
+    std::int64_t clock_time_ns() const { return t_start_ns_ + simulation_.t_ns(); }
+    double now_s() const { return static_cast<double>(simulation_.t_ns()) * 1e-9; }
+    Error failed(std::string what) const { return {std::move(what), scenario_.file, 0, 0, ErrorKind::failed}; }
+
+    const Scenario& scenario_;
+    const DynamicsOptions& options_;
+    Simulation simulation_;
+    std::optional<TruthLog> log_;
+    CanBus& bus_;
+    const StopFlag& stop_;
+    bool fd_;
+    Body target_, chaser_;
+    std::optional<Body> attractor_;
+
+    RemoteClock clock_;
+    MessageDecoder<ActuatorCommand> decoder_;
+    std::int64_t t_start_ns_ = 0;
+    std::int64_t next_ns_ = 0;                  // real time: of the next poses
+    std::optional<std::int64_t> commanded_ns_;  // of the newest command
+    std::uint8_t report_counter_ = 0, attitude_counter_ = 0;
+    std::uint64_t poses_ = 0;
+    CommandCounts counts_;
+    bool over_ = false;
+};
+
+nlohmann::json Node::report() const {
+    nlohmann::json document = summary(simulation_, scenario_, options_.seed);
+    document["lockstep"] = options_.lockstep;
+    document["stopped"] = !over_;
+    document["t_start_ns"] = t_start_ns_;
+    document["pose_commands"] = poses_;
+    std::uint64_t bad = 0;
+    for (const DecodeStatus s :
+         {DecodeStatus::too_short, DecodeStatus::too_long, DecodeStatus::wrong_kind, DecodeStatus::bad_checksum,
+          DecodeStatus::incomplete_set, DecodeStatus::not_a_number, DecodeStatus::not_unit})
+        bad += decoder_.count(s);
+    document["actuator_commands"] = {{"applied", counts_.applied},
+                                     {"lost", counts_.lost},
+                                     {"late", counts_.late},
+                                     {"refused", counts_.refused},
+                                     {"bad_frames", bad}};
+    document["bus"] = {{"frames_sent", bus_.counters().sent}, {"frames_dropped", bus_.counters().send_drops}};
+    return document;
+}
+
+}  // namespace
+
+Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
+                                    const StopFlag& stop) {
+    auto simulation = Simulation::create(scenario, options.seed);
+    if (!simulation) return simulation.error();
+    std::optional<TruthLog> log;
+    if (!options.log_folder.empty()) {
+        auto made = TruthLog::create(options.log_folder);
+        if (!made) return made.error();
+        log.emplace(std::move(*made));
+    }
+    Node node(scenario, options, std::move(*simulation), std::move(log), bus, stop);
+    const Status flown = node.run();
+    const nlohmann::json document = node.report();
+    if (!flown) return flown.error();
+    return document;
+}
+
+}  // namespace narpa::rehearsal

@@ -150,6 +150,7 @@ private:
                 if (errno != EAGAIN) stop();
                 return false;
             }
+            note_sequence(buffer.sequence);
             const std::span<const std::uint8_t> bytes = camera_.buffers[buffer.index % kBuffers].bytes();
             const bool whole = buffer.bytesused == frame.size() && frame.size() <= bytes.size();
             if (whole) std::copy_n(bytes.begin(), frame.size(), frame.begin());
@@ -158,6 +159,12 @@ private:
             if (whole) return true;
             if (stage_ != Stage::streaming) return false;
         }
+    }
+
+    void note_sequence(std::uint32_t sequence) noexcept {
+        if (has_sequence_ && sequence > sequence_) counters_.lost += sequence - sequence_ - 1;
+        sequence_ = sequence;
+        has_sequence_ = true;
     }
 
     void look_again() {
@@ -174,6 +181,7 @@ private:
 
     void stop() noexcept {
         camera_ = {};
+        has_sequence_ = false;
         stage_ = Stage::no_camera_yet;
     }
 
@@ -181,6 +189,8 @@ private:
     VideoFormat format_;
     Camera camera_;
     Stage stage_;
+    std::uint32_t sequence_ = 0;  ///< of the frame before
+    bool has_sequence_ = false;
 };
 
 }  // namespace

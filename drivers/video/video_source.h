@@ -15,10 +15,12 @@ namespace narpa {
 struct VideoSourceCounters {
     std::uint64_t received = 0;   ///< whole frames handed out
     std::uint64_t truncated = 0;  ///< thrown away: the writer left in the middle, or the device gave too few bytes
+    std::uint64_t lost = 0;       ///< the device skipped them (by its own count): nobody took them in time
 };
 
 /// Frames in the order of their coming, none of them twice, none torn. Whoever writes may come later, go, and come
-/// again: a FIFO's next writer begins a stream of its own.
+/// again: a FIFO's next writer begins a stream of its own. A FIFO holds its writer up rather than lose a frame; of
+/// frames that nobody takes, v4l2loopback (0.12) keeps two and then only the newest.
 class VideoSource {
 public:
     virtual ~VideoSource() = default;

@@ -1,0 +1,151 @@
+#include "rehearsal/judge/bus_record.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace narpa::rehearsal {
+
+double JudgedEstimate::largest_in_sigmas() const {
+    double largest = 0;
+    for (int i = 0; i < 3; ++i)
+        largest = std::max({largest, std::abs(position_error_m[i]) / sigma_position_m[i],
+                            std::abs(rotation_error_rad[i]) / sigma_rotation_rad[i]});
+    return largest;
+}
+
+double JudgedEstimate::nees() const {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) {
+        const double p = position_error_m[i] / sigma_position_m[i];
+        const double r = rotation_error_rad[i] / sigma_rotation_rad[i];
+        sum += p * p + r * r;
+    }
+    return sum;
+}
+
+BusRecord::BusRecord(const Scenario& scenario)
+    : scenario_(scenario), target_decoder_(scenario.target.can_id), chaser_decoder_(scenario.chaser.can_id) {
+    for (std::uint8_t camera = 0; camera < kMaxTelemetryCameras; ++camera) ledger_decoders_.emplace_back(camera);
+}
+
+BusRecord::News BusRecord::accept(const CanFrame& frame, std::int64_t t_reference_ns) {
+    News news;
+    if (take_pose(frame, t_reference_ns, target_decoder_, target_)) {
+        news.truth = compare_with_truth();
+    } else if (take_pose(frame, t_reference_ns, chaser_decoder_, chaser_)) {
+        t_pose_ns = chaser_.newest_ns();
+        chaser_times_.push_back(t_pose_ns);
+        news.truth = compare_with_truth();
+    } else if (DynamicsReport report; take(report_decoder_, frame, t_reference_ns, report)) {
+        reports.push_back(report);
+        news.report = true;
+    } else if (ActuatorCommand command; take(command_decoder_, frame, t_reference_ns, command)) {
+        if (!commands.empty() && command.t_ns <= commands.back().t_ns) return ++late, news;
+        commands.push_back(command);
+        news.command = true;
+    } else if (NavigationEstimate estimate; take(estimate_decoder_, frame, t_reference_ns, estimate)) {
+        if (estimate.t_ns <= t_estimate_ns_) return ++late, news;
+        t_estimate_ns_ = estimate.t_ns;
+        waiting_.push_back(estimate);
+    } else if (Heartbeat beat; decode(frame, t_reference_ns, beat) == DecodeStatus::complete) {
+        t_heartbeat_ns = std::max(t_heartbeat_ns, beat.t_ns);
+        ++heartbeats.heard;
+        heartbeats.stale += beat.stale;
+        heartbeats.deadline_missed += beat.deadline_missed;
+        heartbeats.output_dropped += beat.output_dropped;
+        heartbeats.lockstep |= beat.state == RunState::lockstep;
+        news.heartbeat = true;
+    } else if (frame.id >= kTelemetryBaseId && frame.id < kHeartbeatId - 1) {
+        FrameLedger ledger;
+        if (count(ledger_decoders_[(frame.id - kTelemetryBaseId) / kBaseIdStep].accept(frame, t_reference_ns,
+                                                                                       ledger)))
+            ledgers.push_back(ledger);
+    }
+    news.estimates = judge_waiting();
+    return news;
+}
+
+bool BusRecord::take_pose(const CanFrame& frame, std::int64_t t_reference_ns, PoseDecoder& decoder,
+                          MotionTrack& track) {
+    PoseCommand command;
+    if (!count(decoder.accept(frame, t_reference_ns, command))) return false;
+    if (track.push(command.t_valid_ns, command.motion)) return true;
+    ++late;
+    return false;
+}
+
+template <class Message>
+bool BusRecord::take(MessageDecoder<Message>& decoder, const CanFrame& frame, std::int64_t t_reference_ns,
+                     Message& out) {
+    return count(decoder.accept(frame, t_reference_ns, out));
+}
+
+/// True for a whole message; what is neither that nor on the way to it is told.
+bool BusRecord::count(DecodeStatus status) {
+    refused += status != DecodeStatus::not_mine && status != DecodeStatus::partial &&
+               status != DecodeStatus::complete && status != DecodeStatus::duplicate;
+    return status == DecodeStatus::complete;
+}
+
+std::optional<PortState> BusRecord::truth_at(std::int64_t t_ns) const {
+    const auto target = target_.at(t_ns), chaser = chaser_.at(t_ns);
+    if (!target || !chaser) return std::nullopt;
+    return port_state(scenario_, t_ns, *target, *chaser);
+}
+
+/// Where both bodies are known by now; times before the target's first command stay without.
+std::size_t BusRecord::compare_with_truth() {
+    std::size_t n = 0;
+    while (!target_.empty() && !chaser_times_.empty() && chaser_times_.front() <= target_.newest_ns()) {
+        if (const auto state = truth_at(chaser_times_.front())) {
+            truth.push_back(*state);
+            ++n;
+        }
+        chaser_times_.pop_front();
+    }
+    return n;
+}
+
+std::size_t BusRecord::judge_waiting() {
+    std::size_t n = 0;
+    while (!waiting_.empty() && !target_.empty() && !chaser_.empty() &&
+           waiting_.front().t_ns <= std::min(target_.newest_ns(), chaser_.newest_ns())) {
+        const NavigationEstimate e = waiting_.front();
+        waiting_.pop_front();
+        const auto target = target_.at(e.t_ns), chaser = chaser_.at(e.t_ns);
+        if (!target || !chaser) continue;  // before the first command
+        const Rigid3 truth_pose = inverse(chaser->T_world_body) * target->T_world_body;
+        JudgedEstimate j;
+        j.t_ns = e.t_ns;
+        j.position_error_m = e.T_chaser_target.t - truth_pose.t;
+        j.rotation_error_rad = rotation_vector(e.T_chaser_target.q * conjugate(truth_pose.q));
+        j.sigma_position_m = e.sigma_position_m;
+        j.sigma_rotation_rad = e.sigma_rotation_rad;
+        j.port_position_m = T_port_port(scenario_, e.T_chaser_target).t;
+        j.true_port_position_m = T_port_port(scenario_, truth_pose).t;
+        j.frames = e.frames;
+        j.sweeps = e.sweeps;
+        estimates.push_back(j);
+        ++n;
+    }
+    return n;
+}
+
+std::int64_t BusRecord::t_start_ns() const {
+    if (!reports.empty()) return reports.front().t_start_ns;
+    return truth.empty() ? 0 : truth.front().t_ns;
+}
+
+const ActuatorCommand* BusRecord::command_before(std::int64_t t_ns) const {
+    const auto after = std::lower_bound(commands.begin(), commands.end(), t_ns,
+                                        [](const ActuatorCommand& c, std::int64_t t) { return c.t_ns < t; });
+    return after == commands.begin() ? nullptr : &*std::prev(after);
+}
+
+const DynamicsReport* BusRecord::first_report(DynamicsPhase phase) const {
+    const auto at =
+        std::find_if(reports.begin(), reports.end(), [&](const DynamicsReport& r) { return r.phase == phase; });
+    return at == reports.end() ? nullptr : &*at;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,104 @@
+/// rehearsal/judge/bus_record.h - what was on the bus of a rehearsal: the three programs' messages, decoded, and
+/// the navigation's estimates beside the truth.
+///
+/// Each stream is kept by its own times, so that two observers of a bus, who see messages of different senders in
+/// different orders, end with the same record.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "protocols/can/closed_loop.h"
+#include "protocols/can/messages.h"
+#include "protocols/closed_loop.h"
+#include "protocols/ledger.h"
+#include "rehearsal/judge/port_state.h"
+#include "rehearsal/scenario/scenario.h"
+
+namespace narpa::rehearsal {
+
+/// An estimate beside the truth of the same time. Errors and deviations: the target in the chaser's body axes.
+struct JudgedEstimate {
+    std::int64_t t_ns = 0;
+    Vec3 position_error_m{}, rotation_error_rad{};
+    Vec3 sigma_position_m{}, sigma_rotation_rad{};
+    Vec3 port_position_m{};       ///< of the chaser's port, target's port axes, as estimated
+    Vec3 true_port_position_m{};  ///< the same, as it was
+    std::uint8_t frames = 0, sweeps = 0;
+
+    /// Largest |error| / standard deviation of the six.
+    [[nodiscard]] double largest_in_sigmas() const;
+    /// Sum of their squares: 6 on average where the covariance is right (correlations do not travel on CAN).
+    [[nodiscard]] double nees() const;
+};
+
+/// What the heartbeats told.
+struct HeartbeatCount {
+    std::uint64_t heard = 0, stale = 0, deadline_missed = 0, output_dropped = 0;
+    bool lockstep = false;
+};
+
+class BusRecord {
+public:
+    /// What one frame of the bus has brought.
+    struct News {
+        std::size_t truth = 0, estimates = 0;  ///< new ones at the ends of their series
+        bool report = false, command = false, heartbeat = false;
+    };
+
+    explicit BusRecord(const Scenario& scenario);
+
+    /// `t_reference_ns`: within 39 h of the simulation clock.
+    News accept(const CanFrame& frame, std::int64_t t_reference_ns);
+
+    std::vector<PortState> truth;
+    std::vector<JudgedEstimate> estimates;
+    std::vector<ActuatorCommand> commands;
+    std::vector<DynamicsReport> reports;
+    std::vector<FrameLedger> ledgers;
+    HeartbeatCount heartbeats;
+    std::uint64_t refused = 0;  ///< frames of a known message that could not be used
+    std::uint64_t late = 0;     ///< messages that were not newer than the last of their kind
+
+    /// The scenario's time 0 on the simulation clock; the first pose's time before it was told.
+    [[nodiscard]] std::int64_t t_start_ns() const;
+    [[nodiscard]] double seconds(std::int64_t t_ns) const {
+        return static_cast<double>(t_ns - t_start_ns()) * 1e-9;
+    }
+    /// Estimates whose truth has not come.
+    [[nodiscard]] std::size_t unjudged() const { return waiting_.size(); }
+    /// Both bodies at a time that the commands cover.
+    [[nodiscard]] std::optional<PortState> truth_at(std::int64_t t_ns) const;
+    /// The navigation's command that held at that time: the last one before it.
+    [[nodiscard]] const ActuatorCommand* command_before(std::int64_t t_ns) const;
+    [[nodiscard]] const DynamicsReport* first_report(DynamicsPhase phase) const;
+
+    static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+    std::int64_t t_pose_ns = kNever;       ///< newest of the chaser's
+    std::int64_t t_heartbeat_ns = kNever;  ///< newest
+
+private:
+    bool take_pose(const CanFrame& frame, std::int64_t t_reference_ns, PoseDecoder& decoder, MotionTrack& track);
+    std::size_t compare_with_truth();
+    std::size_t judge_waiting();
+    template <class Message>
+    bool take(MessageDecoder<Message>& decoder, const CanFrame& frame, std::int64_t t_reference_ns, Message& out);
+    bool count(DecodeStatus status);
+
+    const Scenario& scenario_;
+    PoseDecoder target_decoder_, chaser_decoder_;
+    MotionTrack target_, chaser_;
+    std::deque<std::int64_t> chaser_times_;  ///< for which the target's command has not come
+    MessageDecoder<ActuatorCommand> command_decoder_;
+    MessageDecoder<NavigationEstimate> estimate_decoder_;
+    MessageDecoder<DynamicsReport> report_decoder_;
+    std::vector<LedgerDecoder> ledger_decoders_;
+    std::deque<NavigationEstimate> waiting_;
+    std::int64_t t_estimate_ns_ = kNever;
+};
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,72 @@
+#include "rehearsal/judge/gates.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr double kDeg = 180 / std::numbers::pi;
+
+std::string said_last(const BusRecord& bus, std::int64_t t_ns) {
+    return t_ns == BusRecord::kNever ? "never" : fmt::format("at t = {:.3f} s", bus.seconds(t_ns));
+}
+
+}  // namespace
+
+double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& p) {
+    if (p.x < 0) return corridor.radius_m - norm(p);
+    const double allowed = corridor.radius_m + p.x * std::tan(corridor.half_angle_deg / kDeg);
+    return allowed - std::hypot(p.y, p.z);
+}
+
+std::vector<ContactCondition> contact_conditions(const Gates::Contact& limits, const PortState& s) {
+    return {
+        {"closing_rate", "closing rate", "m/s", s.closing_m_s(), limits.closing_min_m_s, limits.closing_max_m_s},
+        {"lateral_rate", "lateral rate", "m/s", s.lateral_m_s(), 0, limits.lateral_rate_m_s},
+        {"lateral", "lateral misalignment", "m", s.lateral_m(), 0, limits.lateral_m},
+        {"pitch_yaw", "pitch and yaw", "deg", s.pitch_yaw_rad() * kDeg, 0, limits.pitch_yaw_deg},
+        {"roll", "roll", "deg", s.roll_rad() * kDeg, 0, limits.roll_deg},
+        {"pitch_yaw_rate", "pitch and yaw rate", "deg/s", s.pitch_yaw_rad_s() * kDeg, 0,
+         limits.pitch_yaw_rate_deg_s},
+        {"roll_rate", "roll rate", "deg/s", s.roll_rad_s() * kDeg, 0, limits.roll_rate_deg_s},
+    };
+}
+
+std::string leg_in_words(const Scenario& scenario, std::size_t leg) {
+    if (leg >= scenario.legs.size() || scenario.legs[leg].name.empty()) return fmt::format("leg {}", leg + 1);
+    return fmt::format("leg {} \"{}\"", leg + 1, scenario.legs[leg].name);
+}
+
+std::string when(const Scenario& scenario, const BusRecord& bus, std::int64_t t_ns) {
+    std::string text = fmt::format("at t = {:.2f} s", bus.seconds(t_ns));
+    const ActuatorCommand* command = bus.command_before(t_ns);
+    if (!command) return text + " before the first thruster command";
+    const std::string_view phase = kGuidancePhases[static_cast<std::size_t>(command->phase)];
+    return text + fmt::format(" ({}, {})", leg_in_words(scenario, command->leg), phase);
+}
+
+/// In lockstep each waits for the one before: poses, then the emulator's heartbeat of their time, then the command.
+/// In real time nobody waits, and who stopped before the others is the one.
+std::string who_fell_silent(const Scenario& scenario, const BusRecord& bus) {
+    const std::int64_t slack = bus.heartbeats.lockstep ? 1'000'000 : 2 * scenario.period_ns();
+    const std::int64_t t_report = bus.reports.empty() ? BusRecord::kNever : bus.reports.back().t_ns;
+    const std::int64_t t_command = bus.commands.empty() ? BusRecord::kNever : bus.commands.back().t_ns;
+    const std::string last =
+        fmt::format("last heard: poses {}, heartbeat {}, thruster command {}", said_last(bus, bus.t_pose_ns),
+                    said_last(bus, bus.t_heartbeat_ns), said_last(bus, t_command));
+    const auto behind = [&](std::int64_t t, std::int64_t other) {
+        return other != BusRecord::kNever && (t == BusRecord::kNever || t < other - slack);
+    };
+    if (bus.heartbeats.heard == 0) return "the emulator was never heard; " + last;
+    if (bus.t_pose_ns == BusRecord::kNever) return "the dynamics were never heard; " + last;
+    if (behind(bus.t_heartbeat_ns, bus.t_pose_ns)) return "the emulator fell silent; " + last;
+    if (bus.heartbeats.lockstep ? behind(t_command, t_report) : behind(t_command, bus.t_pose_ns))
+        return fmt::format("the navigation {}; {}",
+                           t_command == BusRecord::kNever ? "was never heard" : "fell silent", last);
+    return "the dynamics fell silent; " + last;
+}
+
+}  // namespace narpa::rehearsal

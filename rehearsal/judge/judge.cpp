@@ -1,0 +1,172 @@
+#include "rehearsal/judge/judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "drivers/can/can_bus.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr double kDeg = 180 / std::numbers::pi;
+
+}  // namespace
+
+Judge::Judge(const Scenario& scenario, Failure on_failure)
+    : scenario_(scenario), on_failure_(std::move(on_failure)) {}
+
+void Judge::accept(const CanFrame& frame, std::int64_t t_reference_ns) {
+    const BusRecord::News news = bus_.accept(frame, t_reference_ns);
+    if (news.report) see(bus_.reports.back());
+    for (std::size_t i = bus_.truth.size() - news.truth; i < bus_.truth.size(); ++i) see(bus_.truth[i]);
+    for (std::size_t i = bus_.estimates.size() - news.estimates; i < bus_.estimates.size(); ++i)
+        see(bus_.estimates[i]);
+    if (news.command && bus_.commands.back().abort != AbortReason::none && !abort_told_) {
+        abort_told_ = true;
+        if (scenario_.gates.complete) tell(complete());
+    }
+}
+
+void Judge::tell(const GateResult& result) {
+    ++failures_;
+    if (on_failure_) on_failure_(result);
+}
+
+void Judge::see(const DynamicsReport& report) {
+    if (report.phase != DynamicsPhase::captured && report.phase != DynamicsPhase::bounced) return;
+    if (!t_contact_ns_) t_contact_ns_ = report.t_ns;
+    if (report.phase == DynamicsPhase::captured && !t_captured_ns_) t_captured_ns_ = report.t_ns;
+}
+
+void Judge::see(const PortState& state) {
+    if (t_contact_ns_ && !contact_judged_ && state.t_ns >= *t_contact_ns_) {
+        contact_judged_ = true;
+        const GateResult result = contact();
+        if (result.state == GateState::failed) tell(result);
+    }
+    if (t_captured_ns_ && state.t_ns > *t_captured_ns_) return;
+    const Gates& gates = scenario_.gates;
+    const double wall_m = gates.corridor ? corridor_clearance_m(*gates.corridor, state.position_m)
+                                         : -std::numeric_limits<double>::infinity();
+    if (gates.corridor && state.range_m() < gates.corridor->from_m && corridor_.see(state, wall_m))
+        tell(corridor());
+    // Inside the corridor the sphere asks for nothing, however far the wall is.
+    if (gates.keep_out_m && keep_out_.see(state, std::max(wall_m, state.range_m() - *gates.keep_out_m)))
+        tell(keep_out());
+    if (gates.distance_m) {
+        const auto [least, most] = *gates.distance_m;
+        if (distance_.see(state, std::min(state.range_m() - least, most - state.range_m()))) tell(distance());
+    }
+}
+
+void Judge::see(const JudgedEstimate& estimate) {
+    if (t_captured_ns_ && estimate.t_ns > *t_captured_ns_) return;
+    const Gates::NavigationError limits = scenario_.gates.navigation.value_or(Gates::NavigationError{});
+    const bool told = position_.first || attitude_.first;
+    sigmas_.see(estimate, limits.sigmas - estimate.largest_in_sigmas());
+    const bool too_far = position_.see(estimate, limits.position_m - norm(estimate.position_error_m));
+    const bool too_turned = attitude_.see(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDeg);
+    if (scenario_.gates.navigation && (too_far || too_turned) && !told) tell(navigation());
+}
+
+// --- The verdict ----------------------------------------------------------------------------------------------
+
+NavigationStatistics Judge::navigation_statistics() const {
+    NavigationStatistics s;
+    s.unjudged = bus_.unjudged();
+    const double sigmas = scenario_.gates.navigation.value_or(Gates::NavigationError{}).sigmas;
+    std::vector<double> position, attitude;
+    std::size_t within = 0;
+    for (const JudgedEstimate& e : bus_.estimates) {
+        if (t_captured_ns_ && e.t_ns > *t_captured_ns_) continue;
+        ++s.estimates;
+        s.with_frames += e.frames > 0;
+        s.with_sweeps += e.sweeps > 0;
+        within += e.largest_in_sigmas() <= sigmas;
+        s.nees += e.nees();
+        position.push_back(norm(e.position_error_m));
+        attitude.push_back(norm(e.rotation_error_rad) * kDeg);
+    }
+    if (s.estimates > 0) {
+        s.share_within = static_cast<double>(within) / static_cast<double>(s.estimates);
+        s.nees /= static_cast<double>(s.estimates);
+    }
+    s.position_m = distribution(std::move(position));
+    s.attitude_deg = distribution(std::move(attitude));
+    return s;
+}
+
+LedgerStatistics Judge::ledger_statistics() const {
+    LedgerStatistics s;
+    std::vector<double> latency, exposed, render, late;
+    for (const FrameLedger& l : bus_.ledgers) {
+        ++s.frames;
+        s.deadlines_met += l.deadline_met;
+        s.stale += l.pose_stale;
+        render.push_back(static_cast<double>(l.t_render_end_ns - l.t_render_start_ns) * 1e-6);
+        if (l.t_hand_over_ns == 0 || l.delivery == Delivery::nothing) continue;
+        ++s.handed_over;
+        latency.push_back(static_cast<double>(l.t_hand_over_ns - l.t_pose_ns) * 1e-6);
+        exposed.push_back(static_cast<double>(l.t_hand_over_ns - l.t_exposure_mid_ns) * 1e-6);
+        late.push_back(static_cast<double>(l.t_hand_over_ns - l.t_deadline_ns) * 1e-6);
+    }
+    s.latency_ms = distribution(std::move(latency));
+    s.exposure_to_hand_over_ms = distribution(std::move(exposed));
+    s.render_ms = distribution(std::move(render));
+    s.late_ms = distribution(std::move(late));
+    return s;
+}
+
+std::string Judge::headline(const Verdict& v) const {
+    const auto failed = std::find_if(v.gates.begin(), v.gates.end(),
+                                     [](const GateResult& g) { return g.state == GateState::failed; });
+    const std::string what = t_captured_ns_ ? fmt::format("Docked after {:.1f} s", bus_.seconds(*t_captured_ns_))
+                                            : fmt::format("Flown for {:.1f} s", v.t_end_s);
+    if (failed == v.gates.end()) return what + ", all gates passed";
+    // What is left undone is the consequence more often than the cause: the gate that failed first comes first.
+    auto cause = failed;
+    for (auto g = failed; g != v.gates.end(); ++g)
+        if (g->state == GateState::failed && g->t_first_s.value_or(1e30) < cause->t_first_s.value_or(1e30))
+            cause = g;
+    return fmt::format("{}, but gate {} failed: {}", what, cause->name, cause->reason);
+}
+
+Verdict Judge::finish() const {
+    Verdict v;
+    const Gates& gates = scenario_.gates;
+    if (gates.corridor) v.gates.push_back(corridor());
+    if (gates.keep_out_m) v.gates.push_back(keep_out());
+    if (gates.distance_m) v.gates.push_back(distance());
+    if (gates.navigation) v.gates.push_back(navigation());
+    if (gates.contact) v.gates.push_back(contact());
+    v.gates.push_back(complete());
+    if (gates.complete) v.gates.push_back(duration());
+    v.passed = std::none_of(v.gates.begin(), v.gates.end(),
+                            [](const GateResult& g) { return g.state == GateState::failed; });
+    v.t_end_s = bus_.truth.empty() ? 0 : bus_.seconds(bus_.truth.back().t_ns);
+    v.lockstep = bus_.heartbeats.lockstep;
+    v.contact = contact_made();
+    v.navigation = navigation_statistics();
+    v.ledger = ledger_statistics();
+    v.poses = bus_.truth.size();
+    v.estimates = bus_.estimates.size();
+    v.commands = bus_.commands.size();
+    v.heartbeats = bus_.heartbeats.heard;
+    v.refused = bus_.refused;
+    v.late = bus_.late;
+    v.headline = headline(v);
+    return v;
+}
+
+Result<Verdict> judge_log(const Scenario& scenario, const std::string& path) {
+    auto log = open_can_bus("log:" + path, CanRole::hub);
+    if (!log) return log.error();
+    Judge judge(scenario);
+    for (ReceivedFrame received; (*log)->receive(received);) judge.accept(received.frame, received.t_received_ns);
+    return judge.finish();
+}
+
+}  // namespace narpa::rehearsal

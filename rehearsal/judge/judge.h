@@ -1,0 +1,69 @@
+/// rehearsal/judge/judge.h - listens to the bus of a rehearsal and says whether it was good.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "base/result.h"
+#include "rehearsal/judge/bus_record.h"
+#include "rehearsal/judge/gates.h"
+#include "rehearsal/judge/verdict.h"
+
+namespace narpa::rehearsal {
+
+/// Pure: frames in, a verdict out. Knows the scenario and what is on the bus, nothing else; a log read afterwards
+/// gives the verdict that listening gave.
+///
+/// After capture the two are one body: corridor, distances and estimates are judged up to that instant.
+class Judge {
+public:
+    using Failure = std::function<void(const GateResult&)>;
+
+    /// `on_failure` is told of each gate as soon as it has failed.
+    explicit Judge(const Scenario& scenario, Failure on_failure = {});
+
+    /// `t_reference_ns`: a time within 39 h of the simulation clock, as a log's stamp.
+    void accept(const CanFrame& frame, std::int64_t t_reference_ns);
+    /// The verdict on what has been heard; the run is taken to be over.
+    [[nodiscard]] Verdict finish() const;
+
+    [[nodiscard]] const BusRecord& bus() const { return bus_; }
+    /// The dynamics have said that the run is over.
+    [[nodiscard]] bool finished() const { return bus_.first_report(DynamicsPhase::finished) != nullptr; }
+    /// Gates that have failed so far.
+    [[nodiscard]] std::size_t failures() const { return failures_; }
+
+private:
+    void see(const PortState& state);
+    void see(const JudgedEstimate& estimate);
+    void see(const DynamicsReport& report);
+    void tell(const GateResult& result);
+
+    [[nodiscard]] GateResult corridor() const;
+    [[nodiscard]] GateResult keep_out() const;
+    [[nodiscard]] GateResult distance() const;
+    [[nodiscard]] GateResult navigation() const;
+    [[nodiscard]] GateResult contact() const;
+    [[nodiscard]] GateResult complete() const;
+    [[nodiscard]] GateResult duration() const;
+    [[nodiscard]] std::optional<Contact> contact_made() const;
+    [[nodiscard]] NavigationStatistics navigation_statistics() const;
+    [[nodiscard]] LedgerStatistics ledger_statistics() const;
+    [[nodiscard]] std::string headline(const Verdict& verdict) const;
+
+    const Scenario scenario_;
+    const Failure on_failure_;
+    BusRecord bus_{scenario_};
+    std::size_t failures_ = 0;
+    std::optional<std::int64_t> t_captured_ns_;
+    std::optional<std::int64_t> t_contact_ns_;  ///< captured or bounced, whichever came first
+    bool abort_told_ = false, contact_judged_ = false;
+
+    Watch<PortState> corridor_, keep_out_, distance_;
+    Watch<JudgedEstimate> position_, attitude_, sigmas_;  ///< largest errors, and those beyond the gate's sigmas
+};
+
+/// Of a candump log.
+Result<Verdict> judge_log(const Scenario& scenario, const std::string& path);
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,252 @@
+// What each gate says of what the judge has seen.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "rehearsal/judge/judge.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr double kDeg = 180 / std::numbers::pi;
+
+/// State, margin and times from what a watch has seen; the words are the caller's.
+template <class Sample>
+void conclude(GateResult& gate, const Watch<Sample>& watch, const BusRecord& bus, const std::string& unit) {
+    if (watch.seen == 0) return;
+    gate.state = watch.first ? GateState::failed : GateState::passed;
+    gate.margin = watch.margin;
+    gate.unit = unit;
+    if (watch.first) gate.t_first_s = bus.seconds(watch.first->t_ns);
+    if (watch.worst) gate.t_worst_s = bus.seconds(watch.worst->t_ns);
+}
+
+/// "at t = .. s: WORDS; worst at t = .. s: WORDS" or "nearest to it at ..".
+template <class Sample, class Words>
+std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, const Watch<Sample>& watch,
+                            Words words) {
+    if (watch.seen == 0) return "";
+    if (!watch.first) {
+        if (!watch.worst) return "never near it";
+        return "nearest to the limit " + when(scenario, bus, watch.worst->t_ns) + ": " + words(*watch.worst);
+    }
+    std::string text = when(scenario, bus, watch.first->t_ns) + ": " + words(*watch.first);
+    if (watch.worst->t_ns != watch.first->t_ns)
+        text += "; worst " + when(scenario, bus, watch.worst->t_ns) + ": " + words(*watch.worst);
+    return text;
+}
+
+}  // namespace
+
+GateResult Judge::corridor() const {
+    const Gates::Corridor& c = *scenario_.gates.corridor;
+    GateResult gate{
+        .name = "corridor",
+        .asked = fmt::format("within a cone of {:g} deg about the port's axis, {:g} m wide at the port, "
+                             "nearer than {:g} m",
+                             c.half_angle_deg, c.radius_m, c.from_m)};
+    conclude(gate, corridor_, bus_, "m");
+    gate.reason = first_and_worst(scenario_, bus_, corridor_, [&](const PortState& s) {
+        if (s.position_m.x < 0)
+            return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -s.position_m.x,
+                               s.lateral_m());
+        return fmt::format("{:.3f} m off the axis {:.2f} m before the port, the corridor allows {:.3f} m",
+                           s.lateral_m(), s.position_m.x, corridor_clearance_m(c, s.position_m) + s.lateral_m());
+    });
+    if (gate.state == GateState::not_judged)
+        gate.reason = fmt::format("the chaser never came nearer than {:g} m", c.from_m);
+    return gate;
+}
+
+GateResult Judge::keep_out() const {
+    GateResult gate{
+        .name = "keep_out",
+        .asked = fmt::format("no nearer to the port than {:g} m but in the corridor", *scenario_.gates.keep_out_m)};
+    conclude(gate, keep_out_, bus_, "m");
+    gate.reason = first_and_worst(scenario_, bus_, keep_out_, [&](const PortState& s) {
+        return fmt::format("{:.2f} m from the port, {:.2f} m off its axis", s.range_m(), s.lateral_m());
+    });
+    if (gate.state == GateState::not_judged) gate.reason = "no poses of both bodies were on the bus";
+    return gate;
+}
+
+GateResult Judge::distance() const {
+    const auto [least, most] = *scenario_.gates.distance_m;
+    GateResult gate{.name = "distance", .asked = fmt::format("{:g} to {:g} m between the ports", least, most)};
+    conclude(gate, distance_, bus_, "m");
+    gate.reason = first_and_worst(scenario_, bus_, distance_,
+                                  [](const PortState& s) { return fmt::format("{:.3f} m apart", s.range_m()); });
+    if (gate.state == GateState::not_judged) gate.reason = "no poses of both bodies were on the bus";
+    return gate;
+}
+
+GateResult Judge::navigation() const {
+    const Gates::NavigationError& limits = *scenario_.gates.navigation;
+    GateResult gate{.name = "navigation",
+                    .asked = fmt::format("{:g} % of the estimates within {:g} standard "
+                                         "deviations in all six components",
+                                         limits.share * 100, limits.sigmas)};
+    if (std::isfinite(limits.position_m)) gate.asked += fmt::format(", never {:g} m off", limits.position_m);
+    if (std::isfinite(limits.attitude_deg)) gate.asked += fmt::format(", never {:g} deg off", limits.attitude_deg);
+    if (sigmas_.seen == 0) {
+        gate.state = GateState::failed;
+        gate.reason = bus_.unjudged() > 0 ? "no estimate could be judged: no poses of both bodies of its time"
+                                          : "no estimate was on the bus";
+        return gate;
+    }
+    const auto position = [](const JudgedEstimate& e) {
+        return fmt::format("{:.3f} m off, standard deviations {:.3f}, {:.3f}, {:.3f} m", norm(e.position_error_m),
+                           e.sigma_position_m.x, e.sigma_position_m.y, e.sigma_position_m.z);
+    };
+    const auto attitude = [](const JudgedEstimate& e) {
+        return fmt::format("{:.3f} deg off, standard deviations {:.3f}, {:.3f}, {:.3f} deg",
+                           norm(e.rotation_error_rad) * kDeg, e.sigma_rotation_rad.x * kDeg,
+                           e.sigma_rotation_rad.y * kDeg, e.sigma_rotation_rad.z * kDeg);
+    };
+    const auto sigmas = [](const JudgedEstimate& e) {
+        return fmt::format("{:.2f} standard deviations", e.largest_in_sigmas());
+    };
+    const NavigationStatistics s = navigation_statistics();
+    const bool enough = s.share_within >= limits.share;
+    const bool good = enough && !position_.first && !attitude_.first;
+    gate.state = good ? GateState::passed : GateState::failed;
+    gate.margin = (s.share_within - limits.share) * 100;
+    gate.unit = "%";
+    if (sigmas_.worst) gate.t_worst_s = bus_.seconds(sigmas_.worst->t_ns);
+    for (const auto* watch : {&position_, &attitude_})
+        if (watch->first && (!gate.t_first_s || bus_.seconds(watch->first->t_ns) < *gate.t_first_s))
+            gate.t_first_s = bus_.seconds(watch->first->t_ns);
+    gate.reason = fmt::format("{:.2f} % of {} estimates are within {:g} standard deviations", s.share_within * 100,
+                              s.estimates, limits.sigmas);
+    if (!enough && sigmas_.first) {
+        if (!gate.t_first_s) gate.t_first_s = bus_.seconds(sigmas_.first->t_ns);
+        gate.reason += ", first beyond " + first_and_worst(scenario_, bus_, sigmas_, sigmas);
+    } else {
+        gate.reason += ", most " + when(scenario_, bus_, sigmas_.worst->t_ns) + ": " + sigmas(*sigmas_.worst);
+    }
+    if (position_.first) gate.reason += "; position " + first_and_worst(scenario_, bus_, position_, position);
+    if (attitude_.first) gate.reason += "; attitude " + first_and_worst(scenario_, bus_, attitude_, attitude);
+    if (good)
+        gate.reason += fmt::format("; largest errors {:.3f} m, {:.3f} deg", s.position_m.max, s.attitude_deg.max);
+    return gate;
+}
+
+std::optional<Contact> Judge::contact_made() const {
+    if (!t_contact_ns_) return std::nullopt;
+    const auto state = bus_.truth_at(*t_contact_ns_);
+    if (!state) return std::nullopt;
+    const Gates::Contact limits = scenario_.gates.contact.value_or(Gates::Contact{});
+    return Contact{bus_.seconds(*t_contact_ns_), t_captured_ns_ == t_contact_ns_, *state,
+                   contact_conditions(limits, *state)};
+}
+
+GateResult Judge::contact() const {
+    GateResult gate{.name = "contact", .asked = "contact within the initial contact conditions, and capture"};
+    const auto made = contact_made();
+    if (!made) {
+        gate.state = GateState::failed;
+        gate.reason = t_contact_ns_
+                          ? "the dynamics report contact, but no poses of its time"
+                          : fmt::format("there was no contact: {}",
+                                        bus_.truth.empty() ? "no poses of both bodies were on the bus"
+                                                           : fmt::format("the ports were {:.2f} m apart at the end",
+                                                                         bus_.truth.back().range_m()));
+        return gate;
+    }
+    gate.t_worst_s = made->t_s;
+    std::string beyond;
+    double least = std::numeric_limits<double>::infinity();
+    for (const ContactCondition& c : made->conditions) {
+        // The margin of the whole gate: what is left of the narrowest condition, as a part of its range.
+        least = std::min(
+            {least, (c.max - c.value) / (c.max - c.min), c.min > 0 ? (c.value - c.min) / (c.max - c.min) : 1.0});
+        if (!c.within())
+            beyond += fmt::format("{}{} {:.4f} {}, asked {:g} to {:g}", beyond.empty() ? "" : "; ", c.title,
+                                  c.value, c.unit, c.min, c.max);
+    }
+    gate.margin = least * 100;
+    gate.unit = "% of the range";
+    gate.state = beyond.empty() && made->captured ? GateState::passed : GateState::failed;
+    if (gate.state == GateState::failed) gate.t_first_s = made->t_s;
+    gate.reason = when(scenario_, bus_, *t_contact_ns_) + (made->captured ? ", captured" : ", bounced off");
+    if (!beyond.empty()) {
+        gate.reason += ": " + beyond;
+    } else {
+        const auto value = [&](std::size_t i) { return made->conditions[i].value; };
+        gate.reason += fmt::format(
+            ": closing {:.3f} m/s, {:.3f} m off the axis at {:.3f} m/s, {:.2f} deg pitch and "
+            "yaw, {:.2f} deg roll",
+            value(0), value(2), value(1), value(3), value(4));
+    }
+    return gate;
+}
+
+GateResult Judge::complete() const {
+    const bool docks = !scenario_.legs.empty() && scenario_.legs.back().contact;
+    GateResult gate{.name = "complete",
+                    .asked = !scenario_.gates.complete ? "to the end, whatever it is"
+                             : docks                   ? "all legs flown and docked, without an abort"
+                                                       : "all legs flown, without an abort"};
+    gate.state = GateState::failed;
+    const auto aborted = std::find_if(bus_.commands.begin(), bus_.commands.end(),
+                                      [](const ActuatorCommand& c) { return c.abort != AbortReason::none; });
+    const bool gave_up = aborted != bus_.commands.end();
+    if (gave_up) {
+        gate.t_first_s = bus_.seconds(aborted->t_ns);
+        gate.reason = fmt::format("the navigation gave up at t = {:.2f} s in {}: {}", *gate.t_first_s,
+                                  leg_in_words(scenario_, aborted->leg),
+                                  kAbortReasons[static_cast<std::size_t>(aborted->abort)]);
+    }
+    if (gave_up && scenario_.gates.complete) return gate;
+    const DynamicsReport* finished = bus_.first_report(DynamicsPhase::finished);
+    if (!finished) {
+        gate.reason +=
+            (gave_up ? "; the run broke off: " : "the run broke off: ") + who_fell_silent(scenario_, bus_);
+        return gate;
+    }
+    const double t_end_s = bus_.seconds(finished->t_ns);
+    const auto done = std::find_if(bus_.commands.begin(), bus_.commands.end(),
+                                   [](const ActuatorCommand& c) { return c.phase == GuidancePhase::done; });
+    const bool flown = docks ? t_captured_ns_.has_value() : done != bus_.commands.end();
+    if (flown || !scenario_.gates.complete) gate.state = GateState::passed;
+    if (flown) {
+        gate.reason = docks ? fmt::format("docked at t = {:.2f} s", bus_.seconds(*t_captured_ns_))
+                            : fmt::format("all {} legs flown by t = {:.2f} s", scenario_.legs.size(),
+                                          bus_.seconds(done->t_ns));
+        return gate;
+    }
+    if (!gate.reason.empty()) gate.reason += "; ";
+    gate.reason += fmt::format("over at t = {:.2f} s", t_end_s);
+    if (!bus_.commands.empty()) gate.reason += " in " + leg_in_words(scenario_, bus_.commands.back().leg);
+    if (!bus_.truth.empty()) gate.reason += fmt::format(", the ports {:.2f} m apart", bus_.truth.back().range_m());
+    if (docks && t_contact_ns_) gate.reason += ", after a contact that bounced";
+    return gate;
+}
+
+GateResult Judge::duration() const {
+    GateResult gate{.name = "duration", .asked = fmt::format("done within {:g} s", scenario_.duration_s)};
+    const bool docks = !scenario_.legs.empty() && scenario_.legs.back().contact;
+    std::optional<double> t_done_s;
+    for (const ActuatorCommand& c : bus_.commands)
+        if (!docks && !t_done_s && c.phase == GuidancePhase::done) t_done_s = bus_.seconds(c.t_ns);
+    if (docks && t_captured_ns_) t_done_s = bus_.seconds(*t_captured_ns_);
+    const DynamicsReport* finished = bus_.first_report(DynamicsPhase::finished);
+    const bool timed_out = !t_done_s && finished && bus_.seconds(finished->t_ns) >= scenario_.duration_s - 1e-6;
+    if (!t_done_s && !timed_out) {
+        gate.reason = "it did not come to its goal";
+        return gate;
+    }
+    const double t_s = t_done_s.value_or(bus_.seconds(finished->t_ns));
+    gate.state = t_done_s && t_s <= scenario_.duration_s ? GateState::passed : GateState::failed;
+    gate.unit = "s";
+    gate.margin = scenario_.duration_s - t_s;
+    gate.t_worst_s = t_s;
+    if (gate.state == GateState::failed) gate.t_first_s = scenario_.duration_s;
+    gate.reason = t_done_s ? fmt::format("done at t = {:.2f} s", t_s)
+                           : fmt::format("the goal was not reached when {:g} s were over", scenario_.duration_s);
+    return gate;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,139 @@
+#include "rehearsal/judge/verdict.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace narpa::rehearsal {
+namespace {
+
+using nlohmann::json;
+
+json number_or_null(const std::optional<double>& value) {
+    return value && std::isfinite(*value) ? json(*value) : json(nullptr);
+}
+
+json of_gate(const GateResult& g) {
+    return {{"name", g.name},
+            {"asked", g.asked},
+            {"state", std::string(kGateStates[static_cast<std::size_t>(g.state)])},
+            {"reason", g.reason},
+            {"margin", number_or_null(g.margin)},
+            {"unit", g.unit},
+            {"t_first_s", number_or_null(g.t_first_s)},
+            {"t_worst_s", number_or_null(g.t_worst_s)}};
+}
+
+json of_contact(const Contact& c) {
+    json conditions = json::array();
+    for (const ContactCondition& k : c.conditions)
+        conditions.push_back({{"name", k.name},
+                              {"title", k.title},
+                              {"unit", k.unit},
+                              {"value", k.value},
+                              {"min", k.min},
+                              {"max", k.max},
+                              {"within", k.within()}});
+    const Vec3 &p = c.state.position_m, &v = c.state.velocity_m_s, &r = c.state.rotation_rad;
+    return {{"t_s", c.t_s},
+            {"captured", c.captured},
+            {"position_m", {p.x, p.y, p.z}},
+            {"velocity_m_s", {v.x, v.y, v.z}},
+            {"rotation_rad", {r.x, r.y, r.z}},
+            {"conditions", conditions}};
+}
+
+}  // namespace
+
+json to_json(const Distribution& d) {
+    if (d.count == 0) return nullptr;
+    return {{"count", d.count}, {"mean", d.mean}, {"sigma", d.sigma}, {"min", d.min}, {"p50", d.p50},
+            {"p90", d.p90},     {"p99", d.p99},   {"p99.9", d.p999},  {"max", d.max}};
+}
+
+json to_json(const Verdict& v) {
+    json gates = json::array();
+    for (const GateResult& g : v.gates) gates.push_back(of_gate(g));
+    const NavigationStatistics& n = v.navigation;
+    const LedgerStatistics& l = v.ledger;
+    return {{"passed", v.passed},
+            {"headline", v.headline},
+            {"t_end_s", v.t_end_s},
+            {"mode", v.lockstep ? "lockstep" : "real time"},
+            {"gates", gates},
+            {"contact", v.contact ? of_contact(*v.contact) : json(nullptr)},
+            {"navigation",
+             {{"estimates", n.estimates},
+              {"with_frames", n.with_frames},
+              {"with_sweeps", n.with_sweeps},
+              {"unjudged", n.unjudged},
+              {"share_within", n.share_within},
+              {"nees", n.nees},
+              {"position_m", to_json(n.position_m)},
+              {"attitude_deg", to_json(n.attitude_deg)}}},
+            {"frames",
+             {{"ledgers", l.frames},
+              {"handed_over", l.handed_over},
+              {"deadlines_met", l.deadlines_met},
+              {"stale", l.stale},
+              {"pose_to_hand_over_ms", to_json(l.latency_ms)},
+              {"mid_exposure_to_hand_over_ms", to_json(l.exposure_to_hand_over_ms)},
+              {"render_ms", to_json(l.render_ms)},
+              {"hand_over_after_deadline_ms", to_json(l.late_ms)}}},
+            {"bus",
+             {{"poses", v.poses},
+              {"estimates", v.estimates},
+              {"commands", v.commands},
+              {"heartbeats", v.heartbeats},
+              {"refused", v.refused},
+              {"late", v.late}}}};
+}
+
+std::string escape(std::string_view text) {
+    std::string out;
+    for (const char c : text) switch (c) {
+            case '&': out += "&amp;"; break;
+            case '<': out += "&lt;"; break;
+            case '>': out += "&gt;"; break;
+            case '"': out += "&quot;"; break;
+            case '\'': out += "&#39;"; break;
+            default:
+                if (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t')
+                    out += "\xEF\xBF\xBD";
+                else
+                    out += c;
+        }
+    return out;
+}
+
+std::string junit(const Verdict& v, const std::string& suite, double wall_s) {
+    const auto in_state = [&](GateState state) {
+        return std::count_if(v.gates.begin(), v.gates.end(), [&](const GateResult& g) { return g.state == state; });
+    };
+    std::string out = fmt::format(
+        "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\" time=\"{:.3f}\">\n",
+        escape(suite), v.gates.size(), in_state(GateState::failed), in_state(GateState::not_judged), wall_s);
+    for (const GateResult& g : v.gates) {
+        out += fmt::format("    <testcase classname=\"{}\" name=\"{}\" time=\"0\"", escape(suite), escape(g.name));
+        const std::string reason = escape(g.reason), asked = escape(g.asked);
+        switch (g.state) {
+            case GateState::passed:
+                out += fmt::format(">\n      <system-out>asked: {}; {}</system-out>\n    </testcase>\n", asked,
+                                   reason);
+                break;
+            case GateState::failed:
+                out += fmt::format(
+                    ">\n      <failure type=\"gate\" message=\"{}\">asked: {}</failure>\n    "
+                    "</testcase>\n",
+                    reason, asked);
+                break;
+            case GateState::not_judged:
+                out += fmt::format(">\n      <skipped message=\"{}\"/>\n    </testcase>\n", reason);
+                break;
+        }
+    }
+    return out + "  </testsuite>\n";
+}
+
+}  // namespace narpa::rehearsal

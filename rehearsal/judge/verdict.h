@@ -1,0 +1,81 @@
+/// rehearsal/judge/verdict.h - what a rehearsal has come to: gates, contact, numbers.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rehearsal/judge/port_state.h"
+#include "rehearsal/judge/statistics.h"
+
+namespace narpa::rehearsal {
+
+enum class GateState : std::uint8_t { passed, failed, not_judged };
+inline constexpr std::array<std::string_view, 3> kGateStates{"passed", "failed", "not judged"};
+
+struct GateResult {
+    std::string name{};   ///< "corridor", for machines
+    std::string asked{};  ///< what it asks, in words
+    GateState state = GateState::not_judged;
+    std::string reason{};            ///< in plain words, with times and numbers
+    std::optional<double> margin{};  ///< what was left at the worst; negative: missing
+    std::string unit{};              ///< of the margin
+    std::optional<double> t_first_s{},
+        t_worst_s{};  ///< of the first violation and of the worst (or nearest to one)
+};
+
+/// One of the initial contact conditions.
+struct ContactCondition {
+    std::string name, title, unit;
+    double value = 0, min = 0, max = 0;
+    [[nodiscard]] bool within() const { return value >= min && value <= max; }
+};
+
+struct Contact {
+    double t_s = 0;
+    bool captured = false;
+    PortState state{};
+    std::vector<ContactCondition> conditions;
+};
+
+/// How the navigation's errors compare with what it told of them.
+struct NavigationStatistics {
+    std::size_t estimates = 0, with_frames = 0, with_sweeps = 0, unjudged = 0;
+    double share_within = 0;                ///< of the estimates, all six components within the gate's sigmas
+    double nees = 0;                        ///< mean; 6 is what the covariance promises
+    Distribution position_m, attitude_deg;  ///< lengths of the errors
+};
+
+struct LedgerStatistics {
+    std::size_t frames = 0, handed_over = 0, deadlines_met = 0, stale = 0;
+    Distribution latency_ms;                ///< from the pose command's time to the hand-over
+    Distribution exposure_to_hand_over_ms;  ///< from the middle of the exposure
+    Distribution render_ms;
+    Distribution late_ms;  ///< hand-over after its deadline; negative: before
+};
+
+struct Verdict {
+    bool passed = false;
+    std::string headline;
+    double t_end_s = 0;  ///< of the last pose
+    bool lockstep = false;
+    std::vector<GateResult> gates;
+    std::optional<Contact> contact;
+    NavigationStatistics navigation;
+    LedgerStatistics ledger;
+    std::uint64_t poses = 0, estimates = 0, commands = 0, heartbeats = 0, refused = 0, late = 0;
+};
+
+[[nodiscard]] nlohmann::json to_json(const Verdict& verdict);
+[[nodiscard]] nlohmann::json to_json(const Distribution& d);
+
+/// A <testsuite> of this name with a test case for each gate; a document has them within <testsuites>.
+[[nodiscard]] std::string junit(const Verdict& verdict, const std::string& suite, double wall_s);
+/// For attributes and text of XML and HTML; what XML forbids becomes U+FFFD.
+[[nodiscard]] std::string escape(std::string_view text);
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,217 @@
+// Each gate of the judge, passed and failed, on messages as they are on the bus.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/rehearsal/judge_support.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+using namespace test;
+using State = GateState;
+constexpr double kRad = std::numbers::pi / 180;
+
+/// Within every limit of the standard.
+Motion good_contact(const Scenario& s) {
+    return chaser_at(s, {0, 0.03, -0.04}, {-0.07, 0.01, 0.02}, {1 * kRad, 0.5 * kRad, -1 * kRad},
+                     {0.05 * kRad, 0.02 * kRad, 0});
+}
+
+TEST(Judge, AGoodDockingPassesEveryGate) {
+    Scenario s = small_scenario();
+    s.gates.corridor = Gates::Corridor{10, 0.5, 20};
+    s.gates.keep_out_m = 8;
+    s.gates.navigation = Gates::NavigationError{};
+    s.gates.contact = Gates::Contact{};
+    const Verdict v = judge(s, docking(s, good_contact(s)));
+    for (const GateResult& g : v.gates) EXPECT_EQ(g.state, State::passed) << g.name << ": " << g.reason;
+    EXPECT_EQ(v.gates.size(), 6u);
+    EXPECT_TRUE(v.passed);
+    EXPECT_NE(v.headline.find("Docked after 10.0 s"), std::string::npos) << v.headline;
+    EXPECT_EQ(v.poses, 12u);
+    EXPECT_EQ(v.navigation.estimates, 10u);
+    EXPECT_LT(v.navigation.nees, 0.01);  // errors of the wire's steps alone
+}
+
+TEST(Judge, ContactConditionsAreThoseOfTheTruthAtThatInstant) {
+    Scenario s = small_scenario();
+    s.gates.contact = Gates::Contact{};
+    const Verdict v = judge(s, docking(s, good_contact(s)));
+    ASSERT_TRUE(v.contact);
+    const auto value = [&](std::size_t i) { return v.contact->conditions[i].value; };
+    EXPECT_NEAR(value(0), 0.07, 1e-4);
+    EXPECT_NEAR(value(1), std::hypot(0.01, 0.02), 1e-4);
+    EXPECT_NEAR(value(2), 0.05, 1e-5);
+    EXPECT_NEAR(value(3), std::hypot(0.5, 1), 0.01);
+    EXPECT_NEAR(value(4), 1, 0.01);
+    EXPECT_NEAR(value(5), 0.02, 2e-3);
+    EXPECT_NEAR(value(6), 0.05, 2e-3);
+    EXPECT_NEAR(v.contact->t_s, 10, 1e-9);
+}
+
+TEST(Judge, EachContactConditionFailsByItself) {
+    Scenario s = small_scenario();
+    s.gates.contact = Gates::Contact{};
+    const Vec3 v_good{-0.07, 0, 0};
+    const std::vector<std::pair<std::string, Motion>> bad{
+        {"closing rate 0.12", chaser_at(s, {}, {-0.12, 0, 0})},
+        {"closing rate 0.03", chaser_at(s, {}, {-0.03, 0, 0})},
+        {"lateral rate", chaser_at(s, {}, {-0.07, 0, 0.05})},
+        {"lateral misalignment", chaser_at(s, {0, 0.11, 0}, v_good)},
+        {"pitch and yaw 4.5", chaser_at(s, {}, v_good, {0, 0, 4.5 * kRad})},
+        {"roll 4.5", chaser_at(s, {}, v_good, {4.5 * kRad, 0, 0})},
+        {"pitch and yaw rate", chaser_at(s, {}, v_good, {}, {0, 0.25 * kRad, 0})},
+        {"roll rate", chaser_at(s, {}, v_good, {}, {0.25 * kRad, 0, 0})},
+    };
+    for (const auto& [expected, motion] : bad) {
+        const Verdict v = judge(s, docking(s, motion));
+        EXPECT_EQ(gate(v, "contact").state, State::failed);
+        EXPECT_NE(gate(v, "contact").reason.find(expected), std::string::npos) << gate(v, "contact").reason;
+        int beyond = 0;
+        for (const ContactCondition& c : v.contact->conditions) beyond += !c.within();
+        EXPECT_EQ(beyond, 1) << expected << ": " << gate(v, "contact").reason;
+        EXPECT_LT(*gate(v, "contact").margin, 0);
+    }
+}
+
+TEST(Judge, AtALimitIsWithin) {
+    const PortState s{0, {0, 0.10, 0}, {-0.05, 0, 0.04}, {}, {}};
+    for (const ContactCondition& c : contact_conditions(Gates::Contact{}, s)) EXPECT_TRUE(c.within()) << c.name;
+}
+
+TEST(Judge, WhatBouncesHasNotDocked) {
+    Scenario s = small_scenario();
+    s.gates.contact = Gates::Contact{};
+    const Verdict v = judge(s, docking(s, chaser_at(s, {}, {-0.3, 0, 0}), DynamicsPhase::bounced));
+    EXPECT_EQ(gate(v, "contact").state, State::failed);
+    EXPECT_NE(gate(v, "contact").reason.find("bounced off: closing rate 0.3"), std::string::npos);
+    EXPECT_EQ(gate(v, "complete").state, State::failed);
+    EXPECT_EQ(gate(v, "duration").state, State::not_judged);
+}
+
+TEST(Judge, OffTheCorridorTellsFirstAndWorstAndWhichLeg) {
+    Scenario s = small_scenario();
+    s.gates.corridor = Gates::Corridor{10, 0.5, 20};
+    std::vector<std::string> told;
+    const Verdict v = judge(s, docking(s, good_contact(s), DynamicsPhase::captured, 3),
+                            [&](const GateResult& g) { told.push_back(g.name); });
+    const GateResult& g = gate(v, "corridor");
+    EXPECT_EQ(g.state, State::failed);
+    EXPECT_EQ(g.t_first_s, 5);
+    EXPECT_NEAR(*g.margin, 0.5 + 5 * std::tan(10 * kRad) - 3, 1e-4);
+    EXPECT_NE(g.reason.find("at t = 5.00 s (leg 1 \"far\", moving): 3.000 m off the axis 5.00 m before the port"),
+              std::string::npos)
+        << g.reason;
+    EXPECT_EQ(told, std::vector<std::string>{"corridor"});
+    // The same path, judged from 4 m on only.
+    s.gates.corridor->from_m = 4;
+    EXPECT_EQ(gate(judge(s, docking(s, good_contact(s), DynamicsPhase::captured, 3)), "corridor").state,
+              State::passed);
+}
+
+TEST(Judge, TheCorridorIsNotJudgedWhereNobodyCame) {
+    Scenario s = small_scenario();
+    s.gates.corridor = Gates::Corridor{10, 0.5, 5};
+    Messages m(s);
+    m.period(0, chaser_at(s, {50, 0, 0}));
+    EXPECT_EQ(gate(judge(s, m), "corridor").state, State::not_judged);
+}
+
+TEST(Judge, TheCorridorsWall) {
+    const Gates::Corridor c{45, 1, 20};
+    EXPECT_NEAR(corridor_clearance_m(c, {2, 0, 0}), 3, 1e-12);
+    EXPECT_NEAR(corridor_clearance_m(c, {2, 0, -3.5}), -0.5, 1e-12);
+    EXPECT_NEAR(corridor_clearance_m(c, {-0.6, 0.8, 0}), 0, 1e-12);
+}
+
+TEST(Judge, OnlyTheCorridorEntersTheKeepOutSphere) {
+    Scenario s = small_scenario();
+    s.gates.keep_out_m = 6;
+    EXPECT_EQ(gate(judge(s, docking(s, good_contact(s))), "keep_out").state, State::failed);
+    s.gates.corridor = Gates::Corridor{10, 0.5, 1};
+    EXPECT_EQ(gate(judge(s, docking(s, good_contact(s))), "keep_out").state, State::passed);
+    const Verdict off = judge(s, docking(s, good_contact(s), DynamicsPhase::captured, 2));
+    EXPECT_EQ(gate(off, "keep_out").t_first_s, 5);
+}
+
+TEST(Judge, DistancesHaveTwoLimits) {
+    Scenario s = small_scenario();
+    s.legs[1].contact = false;
+    s.gates.distance_m = {4, 9};
+    const auto flown = [&](double near_m, double far_m) {
+        Messages m(s);
+        m.period(0, chaser_at(s, {0, near_m, 0}));
+        m.period(1, chaser_at(s, {0, 0, -far_m}), 1, GuidancePhase::done);
+        m.report(2, DynamicsPhase::finished);
+        return judge(s, m);
+    };
+    EXPECT_TRUE(flown(4.5, 8.5).passed);
+    EXPECT_NEAR(*gate(flown(4.5, 8.7), "distance").margin, 0.3, 1e-5);
+    EXPECT_EQ(gate(flown(3.5, 8.5), "distance").t_first_s, 0);
+    EXPECT_EQ(gate(flown(4.5, 9.5), "distance").t_first_s, 1);
+}
+
+TEST(Judge, EstimatesAreJudgedByTheirOwnDeviations) {
+    Scenario s = small_scenario();
+    s.legs[1].contact = false;
+    s.gates.navigation = Gates::NavigationError{.sigmas = 3, .share = 0.75, .position_m = 5, .attitude_deg = 3};
+    const auto flown = [&](double wrong_m, double wrong_rad) {
+        Messages m(s);
+        const Motion chaser = chaser_at(s, {30, 1, 2}, {}, {0.1, 0.2, 0.3});
+        for (int k = 0; k < 4; ++k) {
+            m.poses(k, chaser);
+            m.estimate(k, chaser, {0, k == 2 ? wrong_m : 0.1, 0}, {0, 0, k == 3 ? wrong_rad : 0});
+        }
+        m.command(4, GuidancePhase::done, 1);
+        m.report(5, DynamicsPhase::finished);
+        return judge(s, m);
+    };
+    const Verdict one = flown(0.5, 0);  // one of four is beyond: that is what is allowed
+    EXPECT_EQ(gate(one, "navigation").state, State::passed) << gate(one, "navigation").reason;
+    EXPECT_DOUBLE_EQ(one.navigation.share_within, 0.75);
+    EXPECT_NEAR(one.navigation.nees, (25 + 3 * 1) / 4.0, 0.01);
+    const Verdict two = flown(0.5, 0.035);
+    EXPECT_EQ(gate(two, "navigation").state, State::failed);
+    EXPECT_NE(gate(two, "navigation").reason.find("50.00 % of 4 estimates"), std::string::npos);
+    const Verdict far = flown(6, 0);
+    EXPECT_EQ(gate(far, "navigation").state, State::failed);
+    EXPECT_EQ(gate(far, "navigation").t_first_s, 2) << gate(far, "navigation").reason;
+}
+
+TEST(Judge, WithoutEstimatesTheNavigationFails) {
+    Scenario s = small_scenario();
+    s.gates.navigation = Gates::NavigationError{};
+    Messages m(s);
+    m.report(0);
+    m.poses(0, chaser_at(s, {9, 0, 0}));
+    EXPECT_EQ(gate(judge(s, m), "navigation").reason, "no estimate was on the bus");
+}
+
+TEST(Judge, AnAbortFailsAtOnceUnlessItIsAllowed) {
+    Scenario s = small_scenario();
+    Messages m(s);
+    m.period(0, chaser_at(s, {9, 0, 0}));
+    m.command(1, GuidancePhase::retreating, 1, AbortReason::lost);
+    std::vector<std::string> told;
+    const Verdict v = judge(s, m, [&](const GateResult& g) { told.push_back(g.reason); });
+    ASSERT_EQ(told.size(), 1u);
+    EXPECT_EQ(told[0], "the navigation gave up at t = 1.00 s in leg 2 \"last\": lost");
+    EXPECT_FALSE(v.passed);
+    s.gates.complete = false;
+    m.report(2, DynamicsPhase::finished);
+    EXPECT_TRUE(judge(s, m).passed);
+}
+
+TEST(Judge, OutOfTimeIsSaid) {
+    Scenario s = small_scenario();
+    Messages m(s);
+    m.period(0, chaser_at(s, {9, 0, 0}));
+    m.report(100, DynamicsPhase::finished);
+    const Verdict v = judge(s, m);
+    EXPECT_EQ(gate(v, "duration").state, State::failed);
+    EXPECT_EQ(gate(v, "complete").state, State::failed);
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "emulator/sweep_points.h"
+#include "estimator/cloud/sweep_points.h"
 #include "renderer/trace/camera_image.h"
 
 namespace narpa {

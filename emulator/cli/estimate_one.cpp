@@ -8,9 +8,9 @@
 #include <random>
 
 #include "drivers/lidar/packet_capture.h"
-#include "emulator/sweep_points.h"
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
+#include "estimator/cloud/sweep_points.h"
 #include "estimator/view/measured_image.h"
 
 namespace narpa::cli {

@@ -1,1 +1,2 @@
-target_sources(narpa_estimator PRIVATE cloud/beam_association.cpp cloud/cloud_icp.cpp cloud/observability.cpp)
+target_sources(narpa_estimator PRIVATE cloud/beam_association.cpp cloud/cloud_icp.cpp cloud/observability.cpp
+                                       cloud/sweep_points.cpp)

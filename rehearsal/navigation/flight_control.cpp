@@ -97,8 +97,8 @@ Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Refe
     const Vec3 wanted = T_world_port * reference.position_m;
     const Vec3 wanted_along = T_world_port.q * reference.velocity_m_s;
     const Vec3 wanted_velocity = wanted_along + cross(w, wanted);
-    const Vec3 wanted_acceleration = T_world_port.q * reference.acceleration_m_s2 + 2 * cross(w, wanted_along) +
-                                     cross(w, cross(w, wanted));
+    const Vec3 wanted_acceleration =
+        T_world_port.q * reference.acceleration_m_s2 + 2 * cross(w, wanted_along) + cross(w, cross(w, wanted));
     // The port as it does move with the chaser.
     const Vec3 arm = m.q_world_chaser * port_from_mass(chaser_).t;
     const Vec3 turn = m.q_world_chaser * m.chaser_rate_rad_s;

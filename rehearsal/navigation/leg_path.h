@@ -31,8 +31,8 @@ private:
     [[nodiscard]] Vec3 at(double way_m) const;
 
     Vec3 from_m_{}, direction_{-1, 0, 0};  ///< direction: unit, of a straight way; of none: into the port
-    Vec3 axis_{};                  ///< of an arc: unit, turning as the way goes
-    double radius_m_ = 0;          ///< > 0: an arc
+    Vec3 axis_{};                          ///< of an arc: unit, turning as the way goes
+    double radius_m_ = 0;                  ///< > 0: an arc
     double length_m_ = 0, duration_s_ = 0;
     double first_m_s_ = 0, speed_m_s_ = 0, acceleration_m_s2_ = 1;
 };

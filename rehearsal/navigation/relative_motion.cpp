@@ -47,8 +47,7 @@ void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle
     const Vec3 arm = m.q_world_chaser * port_from_mass(chaser).t;
     const Vec3 origin = T_world_port * port_m;
     m.position_m = origin - arm;
-    m.velocity_m_s = T_world_port.q * port_velocity_m_s +
-                     cross(m.q_world_target * m.target_rate_rad_s, origin) -
+    m.velocity_m_s = T_world_port.q * port_velocity_m_s + cross(m.q_world_target * m.target_rate_rad_s, origin) -
                      cross(m.q_world_chaser * m.chaser_rate_rad_s, arm);
 }
 

@@ -5,7 +5,7 @@
 
 #include "emulator/icp_bench.h"
 #include "emulator/lidar_unit.h"
-#include "emulator/sweep_points.h"
+#include "estimator/cloud/sweep_points.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa {

@@ -1,4 +1,4 @@
-#include "emulator/sweep_points.h"
+#include "estimator/cloud/sweep_points.h"
 
 #include <array>
 

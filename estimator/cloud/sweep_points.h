@@ -1,4 +1,4 @@
-/// emulator/sweep_points.h - a VLP-16's packets as the points that the estimator takes.
+/// estimator/cloud/sweep_points.h - a VLP-16's packets as the points that the estimator takes.
 #pragma once
 
 #include <cstdint>

@@ -1,0 +1,131 @@
+#include "rehearsal/navigation/autopilot.h"
+
+#include <cmath>
+
+namespace narpa::rehearsal {
+namespace {
+
+SightingRecord::Outcome outcome_of(UpdateOutcome o) {
+    switch (o) {
+        case UpdateOutcome::taken: return SightingRecord::Outcome::taken;
+        case UpdateOutcome::gated: return SightingRecord::Outcome::gated;
+        case UpdateOutcome::too_late: return SightingRecord::Outcome::too_late;
+        case UpdateOutcome::bad: return SightingRecord::Outcome::bad;
+    }
+    return SightingRecord::Outcome::bad;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, std::uint64_t seed) {
+    std::unique_ptr<Autopilot> a(new Autopilot);
+    a->scenario_ = scenario;
+    auto model = SightModel::create(scenario);
+    if (!model) return model.error();
+    a->model_ = *std::move(model);
+    for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
+    for (const std::size_t lidar : a->model_->lidars()) {
+        auto sight = LidarSight::create(*a->model_, lidar);
+        if (!sight) return sight.error();
+        a->lidars_.push_back(*std::move(sight));
+    }
+    return a;
+}
+
+Status Autopilot::start(std::int64_t t_start_ns, const AttitudeReport& attitude) {
+    auto estimator = StateEstimator::create(scenario_, t_start_ns, attitude);
+    if (!estimator) return estimator.error();
+    const std::lock_guard lock(mutex_);
+    estimator_.emplace(*std::move(estimator));
+    guidance_.emplace(scenario_, 0);
+    control_.emplace(scenario_);
+    return Ok{};
+}
+
+void Autopilot::take(const AttitudeReport& report) {
+    const std::lock_guard lock(mutex_);
+    estimator_->take(report);
+}
+
+Autopilot::Before Autopilot::before(std::int64_t t_ns) {
+    const std::lock_guard lock(mutex_);
+    if (t_ns > estimator_->t_ns()) estimator_->advance(t_ns);
+    const TargetEstimate known = estimator_->estimate();
+    return {estimator_->t_s(t_ns),
+            estimator_->attitude(t_ns).q_world_chaser,
+            estimator_->guess(t_ns),
+            estimator_->motion_in_chaser(),
+            position_sigma(known.covariance),
+            rotation_sigma(known.covariance)};
+}
+
+void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
+    const Before b = before(t_ns);
+    CameraSight& sight = cameras_[camera];
+    conclude(sight.camera().name, t_ns, sight.look(bytes, t_ns, b.t_s, b.q_world_chaser, b.T_chaser_target),
+             frames_);
+}
+
+void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {
+    const Before b = before(t_ns);
+    LidarSight& sight = lidars_[lidar];
+    conclude(sight.lidar().name, t_ns,
+             sight.look(points, t_ns, b.motion, b.T_chaser_target, b.position_sigma_m, b.rotation_sigma_rad),
+             sweeps_);
+}
+
+void Autopilot::conclude(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting,
+                         std::uint8_t& count) {
+    SightingRecord record{sensor,          t_ns,       SightingRecord::Outcome::no_pose, 0, sighting.why,
+                          sighting.points, sighting.ms};
+    const std::lock_guard lock(mutex_);
+    if (sighting.pose) {
+        const UpdateResult result = estimator_->take(*sighting.pose);
+        record.outcome = outcome_of(result.outcome);
+        record.nis = result.nis;
+        record.why = result.why;
+        if (result.outcome == UpdateOutcome::taken && count < 255) ++count;
+    }
+    sightings_.push_back(std::move(record));
+}
+
+CycleRecord Autopilot::cycle(std::int64_t t_ns, DynamicsPhase dynamics) {
+    const std::lock_guard lock(mutex_);
+    CycleRecord out;
+    estimator_->advance(t_ns);
+    const RelativeMotion motion = estimator_->motion();
+    const TargetEstimate known = estimator_->estimate();
+    out.t_s = estimator_->t_s(t_ns);
+    out.port = port_motion(motion, scenario_.target, scenario_.chaser);
+    out.position_sigma_m = position_sigma(known.covariance);
+
+    const double unmeasured_s = 1e-9 * static_cast<double>(t_ns - estimator_->taken_ns());
+    guidance_->step({out.t_s, out.port.T_port_chaser_port.t, out.port.velocity_m_s, out.position_sigma_m,
+                     unmeasured_s, dynamics});
+    out.reference = guidance_->reference(out.t_s);
+    Impulses impulses;
+    if (guidance_->thrusters_off()) {
+        control_->rest();
+    } else {
+        impulses = control_->step(out.t_s, motion, out.reference);
+    }
+    estimator_->thrust(t_ns, impulses.linear_n_s);
+
+    const auto sigma = [&](int i) { return std::sqrt(known.covariance(i, i)); };
+    out.estimate = {
+        cycle_,  t_ns,   known.T_chaser_target, {sigma(0), sigma(1), sigma(2)}, {sigma(3), sigma(4), sigma(5)},
+        frames_, sweeps_};
+    out.command = {static_cast<std::uint8_t>(cycle_),
+                   t_ns,
+                   impulses.linear_n_s,
+                   impulses.angular_n_m_s,
+                   guidance_->phase(),
+                   static_cast<std::uint8_t>(guidance_->leg()),
+                   guidance_->abort()};
+    out.sightings = std::exchange(sightings_, {});
+    frames_ = sweeps_ = 0;
+    ++cycle_;
+    return out;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,202 @@
+#include "rehearsal/navigation/state_estimator.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace narpa::rehearsal {
+namespace {
+
+/// Room for a minute's measurements and the edges of its pulses.
+constexpr std::size_t kHistory = 256;
+constexpr std::uint64_t kContradictions = 5;
+/// What is known of velocity and rate when the filter begins anew.
+constexpr double kAnewVelocity_m_s = 0.2, kAnewRate_rad_s = 0.2 * kDegree;
+/// Nothing is known better than this at the start.
+constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
+                 kLeastRate_rad_s = 2e-3 * kDegree;
+
+Eigen::Matrix3d skew(const Vec3& v) {
+    Eigen::Matrix3d m;
+    m << 0, -v.z, v.y, v.z, 0, -v.x, -v.y, v.x, 0;
+    return m;
+}
+
+Eigen::Matrix3d matrix(const Quat& q) {
+    const auto c = columns(q);
+    Eigen::Matrix3d m;
+    m << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
+    return m;
+}
+
+/// A star tracker's error turns the target about the chaser: of a pose with this translation from it.
+Matrix6 turned_about_chaser(const Vec3& target_from_chaser_m, double sigma_rad) {
+    Eigen::Matrix<double, 6, 3> J;
+    J << Eigen::Matrix3d::Identity(), -skew(target_from_chaser_m);
+    return sigma_rad * sigma_rad * J * J.transpose();
+}
+
+/// Variances along axes that q turns, of deviations that are at least `least`.
+Eigen::Matrix3d spread(const Quat& q, const Vec3& sigma, double least) {
+    Eigen::Vector3d variance;
+    for (int i = 0; i < 3; ++i) variance[i] = std::pow(std::max(sigma[i], least), 2);
+    const Eigen::Matrix3d R = matrix(q);
+    return R * variance.asDiagonal() * R.transpose();
+}
+
+FilterSettings filter_settings(const Scenario& s) {
+    FilterSettings f;
+    f.history = kHistory;
+    f.motion.orbit_rate_rad_s = s.orbit.rate_rad_s();
+    if (!s.target_motion.with_lvlh) f.motion.inertia_kg_m2 = s.target.inertia_kg_m2;
+    f.motion.acceleration_psd = s.navigation.acceleration_psd;
+    f.motion.angular_acceleration_psd = s.navigation.angular_acceleration_psd;
+    return f;
+}
+
+Matrix12 first_covariance(const Scenario& s, const RelativeMotion& motion) {
+    const Quat q_frame_port = conjugate(s.orbit.q_world_lvlh(0)) * motion.q_world_target * s.target.T_body_port.q;
+    const Quat q_target_chaser_port =
+        conjugate(motion.q_world_target) * motion.q_world_chaser * s.chaser.T_body_port.q;
+    Matrix12 P = Matrix12::Zero();
+    P.block<3, 3>(0, 0) = spread(q_frame_port, s.start.position_sigma_m, kLeastPosition_m);
+    P.block<3, 3>(3, 3) = spread(q_frame_port, s.start.velocity_sigma_m_s, kLeastVelocity_m_s);
+    P.block<3, 3>(6, 6) = spread(q_target_chaser_port, kDegree * s.start.attitude_sigma_deg, kLeastAttitude_rad);
+    P.block<3, 3>(9, 9) = spread(conjugate(motion.q_world_target) * motion.q_world_chaser,
+                                 kDegree * s.start.rate_sigma_deg_s, kLeastRate_rad_s);
+    return 0.5 * (P + P.transpose());
+}
+
+}  // namespace
+
+PoseMeasurement about_masses(const TargetSighting& s, const Vec3& chaser_centre_m, const Vec3& target_centre_m,
+                             const Quat& q_frame_chaser, double attitude_sigma_rad) {
+    const Rigid3 T_target_mass{{}, target_centre_m};
+    PoseMeasurement m;
+    m.t_ns = s.t_ns;
+    m.T_sensor_target = s.T_sensor_target * T_target_mass;
+    m.T_chaser_sensor = {s.T_chaser_sensor.q, s.T_chaser_sensor.t - chaser_centre_m};
+    m.q_frame_chaser = q_frame_chaser;
+    const Vec3 from_chaser = conjugate(m.T_chaser_sensor.q) * (m.T_chaser_sensor * m.T_sensor_target.t);
+    m.covariance = covariance_of_product(s.T_sensor_target, s.covariance, T_target_mass) +
+                   turned_about_chaser(from_chaser, attitude_sigma_rad);
+    m.covariance = (0.5 * (m.covariance + m.covariance.transpose())).eval();
+    return m;
+}
+
+Result<StateEstimator> StateEstimator::create(const Scenario& s, std::int64_t t_start_ns,
+                                              const AttitudeReport& attitude) {
+    RelativeMotion nominal;
+    nominal.q_world_target = s.q_world_target;
+    nominal.target_rate_rad_s = nominal_target_rate_rad_s(s);
+    nominal.q_world_chaser = attitude.q_world_chaser;
+    nominal.chaser_rate_rad_s = attitude.rate_rad_s;
+    place_port(s.start.position_m, s.start.velocity_m_s, s.target, s.chaser, nominal);
+    auto filter = PoseFilter::create(filter_settings(s), t_start_ns, in_frame(nominal, s.orbit, 0),
+                                     first_covariance(s, nominal));
+    if (!filter) return filter.error();
+    StateEstimator made(s, t_start_ns, *std::move(filter));
+    made.take(attitude);
+    return made;
+}
+
+Quat StateEstimator::q_frame_chaser(std::int64_t t_ns) const {
+    return normalized(conjugate(scenario_.orbit.q_world_lvlh(t_s(t_ns))) * attitude_.at(t_ns).q_world_chaser);
+}
+
+void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
+    advance(t_ns);
+    pulses_.clear();
+    const Thrusters& thrusters = scenario_.thrusters;
+    const double sigma = std::hypot(thrusters.gain_sigma, kDegree * thrusters.misalignment_sigma_deg);
+    const Quat q = q_frame_chaser(t_ns);
+    // Groups stop one after another: between two of these times the force is constant.
+    std::array<std::int64_t, 4> edges{t_ns, t_ns, t_ns, t_ns};
+    for (int i = 0; i < 3; ++i)
+        edges[static_cast<std::size_t>(i + 1)] += std::llround(1e9 * std::abs(impulse_n_s[i]) / thrusters.force_n);
+    const auto ends = edges;
+    std::ranges::sort(edges);
+    for (const std::int64_t from_ns : edges) {
+        Vec3 force;
+        for (int i = 0; i < 3; ++i)
+            if (from_ns < ends[static_cast<std::size_t>(i + 1)])
+                force[i] = std::copysign(thrusters.force_n, impulse_n_s[i]);
+        // A pulse of on-time T and error s dv spreads the velocity by (s dv)^2 = psd T.
+        double error2 = 0;
+        for (int i = 0; i < 3; ++i)
+            if (force[i] != 0) {
+                const double on_s = 1e-9 * static_cast<double>(ends[static_cast<std::size_t>(i + 1)] - t_ns);
+                error2 += std::pow(sigma * force[i] / scenario_.chaser.mass_kg, 2) * on_s;
+            }
+        pulses_.push_back({from_ns, -(q * force) / scenario_.chaser.mass_kg, error2});
+    }
+    advance(t_ns);
+}
+
+void StateEstimator::advance(std::int64_t t_ns) {
+    while (!pulses_.empty() && pulses_.front().from_ns <= t_ns) {
+        const Pulse pulse = pulses_.front();
+        pulses_.pop_front();
+        if (!pulses_.empty() && pulses_.front().from_ns == pulse.from_ns) continue;
+        filter_.predict(pulse.from_ns);
+        filter_.accelerate(pulse.acceleration_m_s2, pulse.psd);
+    }
+    filter_.predict(t_ns);
+}
+
+UpdateResult StateEstimator::take(const TargetSighting& sighting) {
+    if (sighting.t_ns > t_ns()) advance(sighting.t_ns);
+    const PoseMeasurement m =
+        about_masses(sighting, scenario_.chaser.centre_of_mass_m, scenario_.target.centre_of_mass_m,
+                     q_frame_chaser(sighting.t_ns), kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
+    UpdateResult result = filter_.update(m);
+    if (result.outcome == UpdateOutcome::gated && filter_.counts().gated_in_a_row >= kContradictions) {
+        auto anew = PoseFilter::create(filter_settings(scenario_), m, kAnewVelocity_m_s, kAnewRate_rad_s);
+        if (anew) {
+            filter_ = *std::move(anew);
+            ++restarts_;
+            result = {UpdateOutcome::taken, 0, ""};
+        }
+    }
+    if (result.outcome == UpdateOutcome::taken) taken_ns_ = std::max(taken_ns_, sighting.t_ns);
+    return result;
+}
+
+RelativeMotion StateEstimator::motion() const {
+    const AttitudeTrack::At now = attitude_.at(t_ns());
+    return in_world(filter_.state(), scenario_.orbit, t_s(t_ns()), now.q_world_chaser, now.rate_rad_s);
+}
+
+TargetEstimate StateEstimator::estimate() const {
+    const PoseFilter::Pose pose = filter_.pose(q_frame_chaser(t_ns()));
+    const Rigid3 T_mass_target{{}, -scenario_.target.centre_of_mass_m};
+    const Matrix6 covariance =
+        pose.covariance +
+        turned_about_chaser(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
+    // The chaser's own centre only shifts the origin: errors stay as they are.
+    return {Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
+            covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
+}
+
+Rigid3 StateEstimator::guess(std::int64_t t_ns) const {
+    const double by_s = 1e-9 * static_cast<double>(t_ns - filter_.t_ns());
+    RelativeState state = filter_.state();
+    const Vec3 turn = state.rate_rad_s - conjugate(state.q_frame_target) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
+    state.position_m = state.position_m + by_s * state.velocity_m_s;
+    state.q_frame_target = normalized(state.q_frame_target * exp_rotation(by_s * turn));
+    const Quat q_chaser_frame = conjugate(q_frame_chaser(t_ns));
+    return Rigid3{q_chaser_frame, scenario_.chaser.centre_of_mass_m} *
+           Rigid3{state.q_frame_target, state.position_m} * Rigid3{{}, -scenario_.target.centre_of_mass_m};
+}
+
+SweepMotion StateEstimator::motion_in_chaser() const {
+    const RelativeMotion m = motion();
+    const Quat q_chaser_world = conjugate(m.q_world_chaser);
+    const Vec3 target_rate = m.q_world_target * m.target_rate_rad_s;
+    const Vec3 origin = -(m.q_world_target * scenario_.target.centre_of_mass_m);
+    const Vec3 velocity = q_chaser_world * (cross(target_rate, origin) - m.velocity_m_s);
+    return {velocity - cross(m.chaser_rate_rad_s, q_chaser_world * (origin - m.position_m)),
+            q_chaser_world * target_rate - m.chaser_rate_rad_s};
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,60 @@
+#include "rehearsal/navigation/bus_link.h"
+
+#include <utility>
+
+namespace narpa::rehearsal {
+
+BusLink::BusLink(std::unique_ptr<CanBus> bus) : bus_(std::move(bus)) {
+    for (std::uint8_t camera = 0; camera < kMaxTelemetryCameras; ++camera) ledger_decoders_.emplace_back(camera);
+}
+
+void BusLink::listen(std::int64_t timeout_ns) {
+    if (timeout_ns > 0) bus_->wait(timeout_ns);
+    for (ReceivedFrame received; bus_->receive(received);) {
+        const CanFrame& frame = received.frame;
+        if (clock_.accept(received)) continue;
+        const std::int64_t now_ns = clock_.newest().t_ns;
+        DynamicsReport dynamics;
+        if (dynamics_decoder_.accept(frame, now_ns, dynamics) == DecodeStatus::complete) dynamics_ = dynamics;
+        AttitudeReport attitude;
+        if (attitude_decoder_.accept(frame, now_ns, attitude) == DecodeStatus::complete) attitude_ = attitude;
+        for (LedgerDecoder& decoder : ledger_decoders_) {
+            FrameLedger l;
+            if (decoder.accept(frame, now_ns, l) == DecodeStatus::complete)
+                notices_.push_back({l.camera, l.t_exposure_mid_ns, l.t_hand_over_ns, l.delivery});
+        }
+    }
+}
+
+std::vector<FrameNotice> BusLink::take_notices() {
+    return std::exchange(notices_, {});
+}
+
+template <class Message>
+bool BusLink::send_as_the_bus_can(const Message& message) {
+    if (bus_->carries_fd()) return bus_->send(encode_fd(message));
+    bool all = true;
+    for (const CanFrame& frame : encode_classic(message)) all = bus_->send(frame) && all;
+    return all;
+}
+
+bool BusLink::send(const NavigationEstimate& estimate) {
+    return send_as_the_bus_can(estimate);
+}
+
+bool BusLink::send(const ActuatorCommand& command) {
+    return send_as_the_bus_can(command);
+}
+
+std::uint64_t BusLink::bad_messages() const noexcept {
+    std::uint64_t n = 0;
+    for (const DecodeStatus status :
+         {DecodeStatus::too_short, DecodeStatus::too_long, DecodeStatus::wrong_kind, DecodeStatus::bad_checksum,
+          DecodeStatus::incomplete_set, DecodeStatus::not_a_number, DecodeStatus::not_unit}) {
+        n += dynamics_decoder_.count(status) + attitude_decoder_.count(status);
+        for (const LedgerDecoder& decoder : ledger_decoders_) n += decoder.count(status);
+    }
+    return n;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,62 @@
+/// rehearsal/navigation/bus_link.h - what the navigation hears and says on CAN. It does not listen to pose
+/// commands, nor to what ledgers know of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "drivers/can/can_bus.h"
+#include "drivers/can/remote_clock.h"
+#include "protocols/can/closed_loop.h"
+#include "protocols/can/messages.h"
+
+namespace narpa::rehearsal {
+
+/// That a camera handed over a frame.
+struct FrameNotice {
+    std::uint8_t camera = 0;  ///< index in the scene
+    std::int64_t t_mid_ns = 0, t_hand_over_ns = 0;
+    Delivery delivery = Delivery::frame;
+};
+
+class BusLink {
+public:
+    explicit BusLink(std::unique_ptr<CanBus> bus);
+
+    /// Takes in what has arrived; waits for it, at most so long.
+    void listen(std::int64_t timeout_ns);
+
+    [[nodiscard]] const RemoteClock& clock() const noexcept { return clock_; }
+    [[nodiscard]] const std::optional<DynamicsReport>& dynamics() const noexcept { return dynamics_; }
+    /// The newest one.
+    [[nodiscard]] const std::optional<AttitudeReport>& attitude() const noexcept { return attitude_; }
+    /// What was handed over since this was asked last, in the order of the bus.
+    [[nodiscard]] std::vector<FrameNotice> take_notices();
+
+    /// False: the bus did not take all of it.
+    bool send(const NavigationEstimate& estimate);
+    bool send(const ActuatorCommand& command);
+
+    /// Messages that could not be read.
+    [[nodiscard]] std::uint64_t bad_messages() const noexcept;
+    [[nodiscard]] const CanCounters& counters() const noexcept { return bus_->counters(); }
+    [[nodiscard]] std::string description() const { return bus_->description(); }
+
+private:
+    template <class Message>
+    bool send_as_the_bus_can(const Message& message);
+
+    std::unique_ptr<CanBus> bus_;
+    RemoteClock clock_;
+    MessageDecoder<DynamicsReport> dynamics_decoder_;
+    MessageDecoder<AttitudeReport> attitude_decoder_;
+    std::vector<LedgerDecoder> ledger_decoders_;
+    std::optional<DynamicsReport> dynamics_;
+    std::optional<AttitudeReport> attitude_;
+    std::vector<FrameNotice> notices_;
+};
+
+}  // namespace narpa::rehearsal

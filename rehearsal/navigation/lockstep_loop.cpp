@@ -1,0 +1,130 @@
+#include "rehearsal/navigation/lockstep_loop.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <optional>
+
+#include "drivers/can/descriptor.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kPatience_ns = 600 * kSecond_ns;  // the emulator may render large frames
+constexpr std::int64_t kFrameWait_ns = 10 * kSecond_ns, kPacketWait_ns = 1 * kSecond_ns;
+
+class LockstepLoop {
+public:
+    explicit LockstepLoop(const Loop& loop) : loop_(loop), newest_(loop.wires.cameras.size()) {}
+
+    Status fly() {
+        if (auto began = wait_for([&] { return loop_.link.dynamics() && loop_.link.attitude(); },
+                                  "a report of the dynamics");
+            !began || loop_.over())
+            return began;
+        const std::int64_t t_start_ns = loop_.link.dynamics()->t_start_ns;
+        if (auto started = loop_.autopilot.start(t_start_ns, *loop_.link.attitude()); !started) return started;
+        const std::int64_t period_ns = loop_.autopilot.scenario().period_ns();
+        for (std::int64_t t_ns = t_start_ns;; t_ns += period_ns) {
+            auto reached = wait_for([&] { return loop_.link.clock().reached(t_ns); },
+                                    fmt::format("a heartbeat of {:.3f} s", 1e-9 * static_cast<double>(t_ns)));
+            if (!reached || loop_.over()) return reached;
+            cycle(t_ns, t_ns == t_start_ns);
+        }
+    }
+
+private:
+    struct Frame {
+        std::int64_t t_mid_ns = 0;
+        std::vector<std::uint8_t> bytes;
+    };
+
+    template <class Condition>
+    Status wait_for(const Condition& met, const std::string& what) {
+        const std::int64_t deadline = monotonic_ns() + kPatience_ns;
+        while (!met() && !loop_.over()) {
+            loop_.link.listen(20 * kMs);
+            if (auto read = read_frames(); !read) return read;
+            read_packets();
+            if (monotonic_ns() > deadline)
+                return Error{fmt::format("no {} in {} s: are `narpa run --lockstep` and the dynamics there?", what,
+                                         kPatience_ns / kSecond_ns),
+                             loop_.link.description(), 0, 0, ErrorKind::failed};
+        }
+        return Ok{};
+    }
+
+    /// Every frame that was announced is read, at once: the emulator waits for room before it goes on.
+    Status read_frames() {
+        for (const FrameNotice& notice : loop_.link.take_notices()) {
+            if (notice.delivery == Delivery::nothing) continue;
+            for (std::size_t i = 0; i < loop_.wires.cameras.size(); ++i) {
+                CameraWire& wire = loop_.wires.cameras[i];
+                if (wire.camera != notice.camera) continue;
+                buffer_.resize(wire.frame_bytes);
+                if (!wire.source->receive(buffer_, kFrameWait_ns)) {
+                    if (!wire.source->status()) return wire.source->status();
+                    ++loop_.counts.frames_missing;
+                    continue;
+                }
+                ++loop_.counts.frames;
+                if (notice.delivery == Delivery::frame) newest_[i] = Frame{notice.t_mid_ns, buffer_};
+            }
+        }
+        return Ok{};
+    }
+
+    void read_packets() {
+        for (LidarWire& wire : loop_.wires.lidars)
+            while (const std::size_t n = wire.source->receive(packet_, 0)) take_packet(wire, n);
+    }
+    void take_packet(LidarWire& wire, std::size_t bytes) {
+        wire.buffer.take({packet_.data(), bytes}, loop_.link.clock().newest().t_ns);
+    }
+
+    void cycle(std::int64_t t_ns, bool first) {
+        loop_.autopilot.take(*loop_.link.attitude());
+        for (std::size_t i = 0; i < newest_.size(); ++i) {
+            if (!newest_[i]) continue;  // none since the last cycle
+            if (loop_.log) loop_.log->frame(camera(i), newest_[i]->bytes);
+            loop_.autopilot.take_frame(i, newest_[i]->t_mid_ns, newest_[i]->bytes);
+            newest_[i].reset();
+        }
+        if (!first)  // no packet has been completed yet
+            for (std::size_t i = 0; i < loop_.wires.lidars.size(); ++i) look_at_turn(i, t_ns);
+        loop_.say(loop_.autopilot.cycle(t_ns, loop_.link.dynamics()->phase));
+    }
+
+    void look_at_turn(std::size_t i, std::int64_t t_ns) {
+        LidarWire& wire = loop_.wires.lidars[i];
+        const std::int64_t deadline = monotonic_ns() + kPacketWait_ns;
+        while (!wire.buffer.complete_to(t_ns)) {
+            const std::int64_t left_ns = deadline - monotonic_ns();
+            const std::size_t n = left_ns > 0 ? wire.source->receive(packet_, left_ns) : 0;
+            if (n == 0) break;
+            take_packet(wire, n);
+        }
+        if (!wire.buffer.complete_to(t_ns)) ++loop_.counts.turns_incomplete;
+        wire.buffer.turn(t_ns, points_);
+        if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
+    }
+
+    [[nodiscard]] const Camera& camera(std::size_t i) const {
+        return loop_.autopilot.model().scene().cameras[loop_.wires.cameras[i].camera];
+    }
+
+    const Loop& loop_;
+    std::vector<std::optional<Frame>> newest_;
+    std::vector<std::uint8_t> buffer_;
+    std::array<std::uint8_t, 2048> packet_{};
+    std::vector<RangePoint> points_;
+};
+
+}  // namespace
+
+Status fly_in_lockstep(const Loop& loop) {
+    return LockstepLoop(loop).fly();
+}
+
+}  // namespace narpa::rehearsal

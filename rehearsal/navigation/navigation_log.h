@@ -1,0 +1,56 @@
+/// rehearsal/navigation/navigation_log.h - what the navigation leaves behind: navigation.csv (a line for each
+/// cycle), sightings.csv (one for each frame and sweep), pictures of what the cameras saw as holds began and at
+/// last before contact, navigation.json (counts). Frames may come from another thread than the rest.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+
+#include "rehearsal/navigation/autopilot.h"
+
+namespace narpa::rehearsal {
+
+/// What was met on the wires.
+struct NodeCounts {
+    std::uint64_t cycles = 0, cycles_late = 0;  ///< late: begun more than a tenth of a period after their time
+    std::uint64_t cycles_passed_over = 0;
+    std::uint64_t frames = 0, frames_missing = 0;  ///< read; announced on the bus, but not to be had
+    std::uint64_t packets = 0, packets_bad = 0, turns_incomplete = 0;
+    std::uint64_t bad_messages = 0, send_drops = 0;
+};
+
+class NavigationLog {
+public:
+    /// Makes the folder. Errors: it cannot be written to.
+    static Result<std::unique_ptr<NavigationLog>> create(const std::string& folder, const Scenario& scenario);
+
+    /// What this camera saw last.
+    void frame(const Camera& camera, std::span<const std::uint8_t> bytes);
+    void cycle(const CycleRecord& record);
+    Status finish(const NodeCounts& counts, std::uint64_t restarts, const std::string& version);
+
+private:
+    NavigationLog() = default;
+    void pictures(const std::string& name);
+
+    struct Seen {
+        Camera camera;
+        std::vector<std::uint8_t> bytes;
+    };
+    std::string folder_;
+    std::vector<std::string> legs_;
+    std::ofstream cycles_, sightings_;
+    std::mutex mutex_;  ///< of what was seen
+    std::map<std::string, Seen> seen_;
+    std::map<std::string, std::array<std::uint64_t, kSightingOutcomes.size()>> outcomes_;
+    GuidancePhase phase_ = GuidancePhase::moving;
+    AbortReason abort_ = AbortReason::none;
+    Status pictures_written_{Ok{}};
+};
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,40 @@
+#include "rehearsal/navigation/node.h"
+
+#include "rehearsal/navigation/lockstep_loop.h"
+#include "rehearsal/navigation/real_time_loop.h"
+
+namespace narpa::rehearsal {
+
+Status navigate(const Scenario& scenario, const NodeOptions& options, const StopFlag& stop,
+                const std::function<void()>& ready) {
+    auto autopilot = Autopilot::create(scenario, options.seed);
+    if (!autopilot) return autopilot.error();
+    auto wires = open_sensor_wires(scenario, (*autopilot)->model(), options.video, options.lidar);
+    if (!wires) return wires.error();
+    std::unique_ptr<NavigationLog> log;
+    if (!options.log.empty()) {
+        auto made = NavigationLog::create(options.log, scenario);
+        if (!made) return made.error();
+        log = *std::move(made);
+    }
+    auto bus = join_can_bus(options.bus, options.wait_s, stop);
+    if (!bus) return bus.error();
+    BusLink link(*std::move(bus));
+    ready();
+
+    NodeCounts counts;
+    const Loop loop{**autopilot, *wires, link, log.get(), stop, counts};
+    Status flown = options.lockstep ? fly_in_lockstep(loop) : fly_in_real_time(loop);
+    counts.bad_messages = link.bad_messages();
+    counts.send_drops = link.counters().send_drops;
+    for (const LidarWire& wire : wires->lidars) {
+        counts.packets += wire.buffer.received();
+        counts.packets_bad += wire.buffer.bad();
+    }
+    if (log)
+        if (auto written = log->finish(counts, (*autopilot)->restarts(), options.version); !written && flown)
+            return written.error();
+    return flown;
+}
+
+}  // namespace narpa::rehearsal

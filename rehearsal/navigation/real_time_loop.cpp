@@ -1,0 +1,164 @@
+#include "rehearsal/navigation/real_time_loop.h"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "drivers/can/descriptor.h"
+#include "estimator/features/feature_matcher.h"
+#include "rehearsal/navigation/intake.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+/// The clock's first heartbeat, the dynamics' first report; and how long the emulator may fall silent.
+constexpr std::int64_t kPatience_ns = 60 * kSecond_ns, kSilence_ns = 10 * kSecond_ns;
+/// The report of t_k, and what was exposed at t_k, may come so much later.
+constexpr std::int64_t kReportWait_ns = 50 * kMs, kSensorWait_ns = 60 * kMs;
+
+class RealTimeLoop {
+public:
+    explicit RealTimeLoop(const Loop& loop)
+        : loop_(loop),
+          intake_(loop.wires, loop.autopilot.model()),
+          period_ns_(loop.autopilot.scenario().period_ns()) {}
+
+    Status fly() {
+        if (auto began = wait_for_the_start(); !began || loop_.over()) return began;
+        t_start_ns_ = loop_.link.dynamics()->t_start_ns;
+        if (auto started = loop_.autopilot.start(t_start_ns_, *loop_.link.attitude()); !started) return started;
+        std::thread looking([this] { look(); });
+        Status flown = run_cycles();
+        {
+            const std::lock_guard lock(mutex_);
+            over_ = true;
+        }
+        changed_.notify_all();
+        looking.join();
+        loop_.counts.frames = intake_.frames();
+        return flown;
+    }
+
+private:
+    void listen(std::int64_t timeout_ns) {
+        const std::int64_t heard_ns = loop_.link.clock().newest().t_ns;
+        loop_.link.listen(timeout_ns);
+        if (loop_.link.clock().newest().t_ns != heard_ns) t_heard_ns_ = monotonic_ns();
+        intake_.hear(loop_.link.take_notices(), loop_.link.clock().now_ns() - monotonic_ns());
+    }
+
+    Status wait_for_the_start() {
+        const std::int64_t deadline = monotonic_ns() + kPatience_ns;
+        while (!loop_.over()) {
+            listen(20 * kMs);
+            if (loop_.link.clock().heard() && loop_.link.dynamics() && loop_.link.attitude()) return Ok{};
+            if (monotonic_ns() > deadline)
+                return Error{fmt::format("{} in {} s: are `narpa run` and the dynamics there?",
+                                         loop_.link.clock().heard() ? "no report of the dynamics" : "no heartbeat",
+                                         kPatience_ns / kSecond_ns),
+                             loop_.link.description(), 0, 0, ErrorKind::failed};
+        }
+        return Ok{};
+    }
+
+    Status run_cycles() {
+        for (std::int64_t t_ns = t_start_ns_;; t_ns += period_ns_) {
+            if (auto there = wait_until(t_ns); !there || loop_.over()) return there;
+            const std::int64_t late_ns = loop_.link.clock().now_ns() - t_ns;
+            if (late_ns > period_ns_) {
+                const std::int64_t passed = late_ns / period_ns_;
+                loop_.counts.cycles_passed_over += static_cast<std::uint64_t>(passed);
+                t_ns += passed * period_ns_;
+            } else if (late_ns > kReportWait_ns + period_ns_ / 10) {
+                ++loop_.counts.cycles_late;
+            }
+            loop_.say(loop_.autopilot.cycle(t_ns, loop_.link.dynamics()->phase));
+        }
+    }
+
+    /// Until the clock shows t_ns and the attitude of that time is there; without it, a little longer.
+    Status wait_until(std::int64_t t_ns) {
+        t_heard_ns_ = monotonic_ns();
+        while (!loop_.over()) {
+            const std::int64_t left_ns = t_ns - loop_.link.clock().now_ns();
+            const bool reported = hand_on_attitude() >= t_ns;
+            if (left_ns <= 0 && (reported || -left_ns > kReportWait_ns)) return Ok{};
+            listen(std::clamp<std::int64_t>(left_ns, 1 * kMs, 20 * kMs));
+            if (monotonic_ns() - t_heard_ns_ > kSilence_ns)
+                return Error{fmt::format("no heartbeat for {} s", kSilence_ns / kSecond_ns),
+                             loop_.link.description(), 0, 0, ErrorKind::failed};
+        }
+        return Ok{};
+    }
+
+    /// To the autopilot, and to those who look. Its time.
+    std::int64_t hand_on_attitude() {
+        const AttitudeReport& attitude = *loop_.link.attitude();
+        if (attitude.t_ns > t_attitude_ns_ || attitude.t_ns == t_start_ns_) {
+            loop_.autopilot.take(attitude);
+            {
+                const std::lock_guard lock(mutex_);
+                t_attitude_ns_ = attitude.t_ns;
+            }
+            changed_.notify_all();
+        }
+        return attitude.t_ns;
+    }
+
+    /// The thread of the sightings.
+    void look() {
+        const OnePictureThread pictures;
+        tbb::task_arena arena;
+        std::int64_t done_ns = t_start_ns_;
+        for (;;) {
+            std::int64_t t_ns = 0;
+            {
+                std::unique_lock lock(mutex_);
+                changed_.wait(lock, [&] { return over_ || t_attitude_ns_ > done_ns; });
+                if (over_) return;
+                t_ns = t_attitude_ns_;
+                changed_.wait_for(lock, std::chrono::nanoseconds(kSensorWait_ns), [&] { return over_; });
+                if (over_) return;
+            }
+            arena.execute([&] { look_at(t_ns); });
+            done_ns = t_ns;
+        }
+    }
+
+    void look_at(std::int64_t t_ns) {
+        for (std::size_t i = 0; i < loop_.wires.lidars.size(); ++i) {
+            if (!intake_.turn(i, t_ns, points_)) ++loop_.counts.turns_incomplete;
+            if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
+        }
+        for (std::size_t i = 0; i < loop_.wires.cameras.size(); ++i) {
+            const auto frame = intake_.newest_frame(i, t_ns);
+            if (!frame) {
+                ++loop_.counts.frames_missing;
+                continue;
+            }
+            if (loop_.log)
+                loop_.log->frame(loop_.autopilot.model().scene().cameras[loop_.wires.cameras[i].camera],
+                                 frame->bytes);
+            loop_.autopilot.take_frame(i, frame->t_mid_ns, frame->bytes);
+        }
+    }
+
+    const Loop& loop_;
+    Intake intake_;
+    std::int64_t period_ns_, t_start_ns_ = 0, t_heard_ns_ = 0;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::int64_t t_attitude_ns_ = std::numeric_limits<std::int64_t>::min();
+    bool over_ = false;
+    std::vector<RangePoint> points_;
+};
+
+}  // namespace
+
+Status fly_in_real_time(const Loop& loop) {
+    return RealTimeLoop(loop).fly();
+}
+
+}  // namespace narpa::rehearsal

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <optional>
@@ -61,6 +62,17 @@ int fly(Arguments a) {
     return 0;
 }
 
+/// CLI::Range lets NaN through.
+CLI::Validator seconds_within(double least, double most) {
+    return {[=](std::string& text) {
+                const double value = std::strtod(text.c_str(), nullptr);
+                return value >= least && value <= most
+                           ? ""
+                           : fmt::format("{}: expected seconds from {} to {}", text, least, most);
+            },
+            "SECONDS"};
+}
+
 int run(int argc, char** argv) {
     CLI::App app{
         "narpa-dynamics flies the two bodies of a rehearsal: poses and what the chaser's attitude sensors "
@@ -74,14 +86,15 @@ int run(int argc, char** argv) {
     app.add_flag(
         "--lockstep", a.options.lockstep,
         "Time stands still until the actuator command for it has come; the same seed gives the same bytes");
-    app.add_option("--seed", a.seed, "Of all that is drawn at random (default: the scenario's)");
+    app.add_option("--seed", a.seed, "Of all that is drawn at random (default: the scenario's)")
+        ->check(CLI::NonNegativeNumber);
     app.add_option("--log", a.options.log_folder, "Folder for truth.csv and dynamics.json");
     app.add_option("--wait", a.options.wait_s, "Seconds to wait for the bus and for the first heartbeat")
-        ->check(CLI::Range(0.0, 3600.0))
+        ->check(seconds_within(0, 3600))
         ->capture_default_str();
     app.add_option("--patience", a.options.patience_s,
                    "In lockstep: seconds to wait for an actuator command, and at the end for the emulator")
-        ->check(CLI::Range(0.1, 86400.0))
+        ->check(seconds_within(0.1, 86400))
         ->capture_default_str();
     try {
         app.parse(argc, argv);

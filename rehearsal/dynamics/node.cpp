@@ -141,6 +141,7 @@ private:
     }
 
     Status take(const ActuatorCommand& command) {
+        if (over_) return Ok{};
         const std::int64_t now_ns = options_.lockstep ? clock_time_ns() : clock_.now_ns();
         if (!asked_for(command.t_ns, now_ns)) {
             ++counts_.refused;

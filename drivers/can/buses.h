@@ -14,6 +14,7 @@ using CanBusResult = Result<std::unique_ptr<CanBus>>;
 CanBusResult open_socketcan(const std::string& interface);
 /// Port 0 takes a free port, which description() tells.
 CanBusResult open_slcan_hub(std::uint16_t port);
+/// Comes back once the hub has opened the channel: no frame of the bus is missed after that.
 CanBusResult open_slcan_client(std::uint16_t port);
 /// `group`: an IPv4 multicast address.
 CanBusResult open_udp_multicast(const std::string& group);

@@ -4,6 +4,7 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -43,9 +44,38 @@ Connection outcome(int fd, std::int64_t timeout_ns) noexcept {
     return reason == 0 ? Connection::made : Connection::refused;
 }
 
+constexpr std::array<std::string_view, 3> kGreeting{"C\r", "S8\r", "O\r"};
+constexpr std::int64_t kAnswerPatience_ns = 5 * kSecond_ns;  // the hub may have heavier things to do
+
+/// Opens the channel and waits for the hub's word that it is open: from then on nothing of the bus passes us by. A
+/// hub says nothing else before, so what comes after the answers is left in the socket.
+Status greet(int fd) {
+    const auto failed = [] {
+        const bool hung_up = errno == 0 || errno == EPIPE || errno == ECONNRESET;
+        return Error{hung_up ? "hung up on: it has as many clients as it can have" : std::strerror(errno)};
+    };
+    for (const std::string_view line : kGreeting)
+        if (::send(fd, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size()))
+            return failed();
+    const std::int64_t until_ns = monotonic_ns() + kAnswerPatience_ns;
+    for (std::size_t answers = 0; answers < kGreeting.size();) {
+        std::array<pollfd, 1> fds{{{fd, POLLIN, 0}}};
+        wait_ready(fds, std::max<std::int64_t>(until_ns - monotonic_ns(), 0));
+        char answer = 0;
+        errno = 0;
+        const ssize_t n = ::recv(fd, &answer, 1, 0);
+        if (n == 1 && answer != '\r') return Error{"no slcan hub: it does not answer as one"};
+        if (n == 1) ++answers;
+        if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) return failed();
+        if (n < 0 && monotonic_ns() >= until_ns) return Error{"it does not answer"};
+    }
+    return Ok{};
+}
+
 class SlcanClient final : public CanBus {
 public:
-    SlcanClient(Descriptor fd, std::uint16_t port) : port_(port) { begin(std::move(fd)); }
+    /// The channel is open.
+    SlcanClient(Descriptor fd, std::uint16_t port) : port_(port) { stream_.attach(std::move(fd)); }
     ~SlcanClient() override {
         if (stream_ && stream_.write("C\r")) stream_.flush();
     }
@@ -98,9 +128,10 @@ public:
     }
 
 private:
+    /// On the way again, without waiting for answers.
     void begin(Descriptor fd) noexcept {
         stream_.attach(std::move(fd));
-        for (const std::string_view line : {"C\r", "S8\r", "O\r"})
+        for (const std::string_view line : kGreeting)
             if (!stream_.write(line)) ++counters_.send_drops;
     }
 
@@ -132,16 +163,18 @@ private:
 }  // namespace
 
 CanBusResult open_slcan_client(std::uint16_t port) {
+    const std::string spec = "slcan:" + std::to_string(port);
+    const auto failed = [&](const std::string& what) {
+        return Error{.what = spec + ": " + what,
+                     .kind = ErrorKind::missing,
+                     .remedy = "narpa run SCENE --can " + spec + "   (start the hub first)"};
+    };
     Descriptor fd;
     Connection connection = connect_to(port, fd);
     if (connection == Connection::under_way) connection = outcome(fd.get(), kSecond_ns);
-    if (connection != Connection::made) {
-        const std::string spec = "slcan:" + std::to_string(port);
-        return Error{
-            .what = spec + ": cannot connect to 127.0.0.1:" + std::to_string(port) + ": " + std::strerror(errno),
-            .kind = ErrorKind::missing,
-            .remedy = "narpa run SCENE --can " + spec + "   (start the hub first)"};
-    }
+    const std::string hub = "127.0.0.1:" + std::to_string(port);
+    if (connection != Connection::made) return failed("cannot connect to " + hub + ": " + std::strerror(errno));
+    if (const Status greeted = greet(fd.get()); !greeted) return failed(hub + ": " + greeted.error().what);
     return CanBusResult(std::make_unique<SlcanClient>(std::move(fd), port));
 }
 

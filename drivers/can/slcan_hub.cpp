@@ -24,6 +24,7 @@ struct Client {
     SlcanStream stream{};
     bool open = false;  ///< it has sent O: it takes part in the bus
     std::uint64_t overlong = 0;
+    std::int64_t t_full_ns = 0;  ///< since when it leaves no room for what others say; 0: it keeps up
 };
 
 /// Frames that have come in and not been taken yet; its size is fixed at the start.
@@ -41,6 +42,12 @@ private:
 
 /// No read brings more frames than this: the shortest line is "t1230" and CR.
 constexpr std::size_t kFramesPerRead = SlcanStream::kReadBytes / 6 + 1;
+/// What all of them take on their way to another client.
+constexpr std::size_t kRoomForRead = kFramesPerRead * kSlcanMaxLine;
+/// Of the kernel's own buffer for a client: the larger it is, the later the kernel says that there is room again.
+constexpr int kSocketBytes = 128 << 10;
+/// How long all others wait for one who does not read. Then he is left behind.
+constexpr std::int64_t kPatience_ns = 1000'000'000;
 
 class SlcanHub final : public CanBus {
 public:
@@ -75,11 +82,15 @@ public:
         if (!queue_.empty()) return;
         std::array<pollfd, kClients + 1> fds{};
         fds[kClients] = {listener_.get(), POLLIN, 0};
+        bool held_up = false;
         for (std::size_t i = 0; i < kClients; ++i) {
             const SlcanStream& s = clients_[i].stream;
-            fds[i] = {s.fd(), static_cast<short>(s.pending() ? POLLIN | POLLOUT : POLLIN), 0};
+            const bool may_speak = others_keep_up(clients_[i]);
+            held_up = held_up || !may_speak;
+            fds[i] = {s.fd(), static_cast<short>((may_speak ? POLLIN : 0) | (s.pending() ? POLLOUT : 0)), 0};
         }
-        wait_ready(fds, timeout_ns);
+        const bool patience_ends_first = held_up && (timeout_ns < 0 || timeout_ns > kPatience_ns);
+        wait_ready(fds, patience_ends_first ? kPatience_ns : timeout_ns);
     }
 
     [[nodiscard]] bool carries_fd() const noexcept override { return false; }
@@ -97,9 +108,25 @@ private:
         for (Client& client : clients_) {
             if (!client.stream) continue;
             client.stream.flush();
-            // A full queue leaves the rest in the client's socket: it is slowed down and loses nothing.
-            if (queue_.free() >= kFramesPerRead) serve(client);
+            // What finds no room stays in the client's socket: it is slowed down, and nothing is lost.
+            if (queue_.free() >= kFramesPerRead && others_keep_up(client)) serve(client);
         }
+    }
+
+    /// There is room for what this client may say, at everyone whom it would be told.
+    bool others_keep_up(const Client& speaker) noexcept {
+        bool all = true;
+        for (Client& c : clients_)
+            if (&c != &speaker) all = keeps_up(c) && all;
+        return all;
+    }
+    static bool keeps_up(Client& client) noexcept {
+        if (!client.open || client.stream.room() >= kRoomForRead) {
+            client.t_full_ns = 0;
+            return true;
+        }
+        if (client.t_full_ns == 0) client.t_full_ns = monotonic_ns();
+        return monotonic_ns() - client.t_full_ns > kPatience_ns;
     }
 
     void accept_clients() noexcept {
@@ -108,6 +135,7 @@ private:
             if (!fd) return;
             const int on = 1;
             ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+            ::setsockopt(fd.get(), SOL_SOCKET, SO_SNDBUF, &kSocketBytes, sizeof kSocketBytes);
             for (std::size_t i = 0; i < kTcpClients; ++i) {
                 if (clients_[i].stream) continue;
                 clients_[i].stream.attach(std::move(fd));

@@ -29,6 +29,8 @@ public:
     void flush() noexcept;
     /// Throws away what is queued.
     void discard() noexcept { out_begin_ = out_end_ = 0; }
+    /// Bytes that `write` would still take.
+    [[nodiscard]] std::size_t room() const noexcept { return out_.size() - (out_end_ - out_begin_); }
     [[nodiscard]] bool pending() const noexcept { return out_begin_ != out_end_; }
 
     /// Reads what is there, at most `kReadBytes`; false when the other end has gone. Then next_line() tells the

@@ -55,7 +55,7 @@ struct Pair {
 Pair slcan_tcp() {
     Pair p;
     p.hub = open_or_fail("slcan:0", CanRole::hub);
-    p.peer = open_or_fail("slcan:" + std::to_string(hub_port(*p.hub)), CanRole::client);
+    p.peer = open_client_of(*p.hub);
     return p;
 }
 

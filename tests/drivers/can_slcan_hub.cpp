@@ -5,7 +5,9 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <atomic>
 #include <random>
+#include <thread>
 
 #include "drivers/can/descriptor.h"
 #include "tests/drivers/can_support.h"
@@ -272,7 +274,7 @@ TEST_F(SlcanHub, SurvivesRandomTalk) {
 TEST(SlcanClient, ComesBackWhenTheHubDoes) {
     auto hub = open_or_fail("slcan:0", CanRole::hub);
     const std::string spec = "slcan:" + std::to_string(hub_port(*hub));
-    auto client = open_or_fail(spec, CanRole::client);
+    auto client = open_client_of(*hub);
     ASSERT_TRUE(client);
     ReceivedFrame out;
     ASSERT_TRUE(client->send(can_frame(0x1, {1})));
@@ -290,6 +292,138 @@ TEST(SlcanClient, ComesBackWhenTheHubDoes) {
     EXPECT_TRUE(turn_until(*client, [&] { return client->send(can_frame(0x2, {1})); }));
     ASSERT_TRUE(next_frame(*hub, out));
     EXPECT_EQ(out.frame.id, 0x2u);
+}
+
+/// A hub that a thread of its own serves; it says `every`-th frame anew under an identifier of its own.
+class ServedHub {
+public:
+    explicit ServedHub(std::uint32_t says_every) : says_every_(says_every), thread_([this] { serve(); }) {}
+    ~ServedHub() { end(); }
+    /// The hub, no longer served.
+    CanBus& end() {
+        done_ = true;
+        if (thread_.joinable()) thread_.join();
+        return *hub_;
+    }
+    std::string spec() const { return "slcan:" + std::to_string(hub_port(*hub_)); }
+
+private:
+    void serve() {
+        std::uint32_t heard = 0;
+        while (!done_) {
+            for (ReceivedFrame out; hub_->receive(out);)
+                if (says_every_ != 0 && ++heard % says_every_ == 0) {
+                    out.frame.id = 0x700;
+                    EXPECT_TRUE(hub_->send(out.frame));
+                }
+            hub_->wait(1'000'000);
+        }
+    }
+
+    std::unique_ptr<CanBus> hub_ = open_or_fail("slcan:0", CanRole::hub);
+    std::uint32_t says_every_;
+    std::atomic<bool> done_{false};
+    std::thread thread_;
+};
+
+CanFrame numbered(std::uint32_t id, std::uint32_t n) {
+    return can_frame(id, {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8),
+                          static_cast<std::uint8_t>(n >> 16), 0, 0, 0, 0, 0xEE});
+}
+std::string key(const CanFrame& f) {
+    return std::to_string(f.id) + ":" + std::to_string(f.data[0] + 256u * f.data[1] + 65536u * f.data[2]);
+}
+
+TEST(SlcanBus, AllHearAllInOneOrder) {
+    ServedHub hub(3);
+    constexpr std::uint32_t speakers = 3, frames = 2000, total = speakers * frames + speakers * frames / 3;
+    std::vector<std::unique_ptr<CanBus>> bus;
+    for (std::uint32_t i = 0; i < speakers + 2; ++i) bus.push_back(open_or_fail(hub.spec(), CanRole::client));
+    std::vector<std::vector<std::string>> heard(bus.size());
+    std::vector<std::thread> threads;
+    for (std::uint32_t i = 0; i < bus.size(); ++i)  // the last two only listen
+        threads.emplace_back([&, i] {
+            std::uint32_t said = i < speakers ? 0 : frames;
+            const std::size_t expected = i < speakers ? total - frames : total;
+            const std::int64_t until_ns = monotonic_ns() + 30 * kSecond_ns;
+            for (; (said < frames || heard[i].size() < expected) && monotonic_ns() < until_ns;
+                 bus[i]->wait(1'000'000)) {
+                for (ReceivedFrame out; bus[i]->receive(out);) heard[i].push_back(key(out.frame));
+                for (int burst = 0; burst < 50 && said < frames; ++burst, ++said)
+                    EXPECT_TRUE(bus[i]->send(numbered(0x100 + i, said)));
+            }
+        });
+    for (std::thread& t : threads) t.join();
+    const std::vector<std::string>& all = heard.back();
+    ASSERT_EQ(all.size(), total);
+    for (std::uint32_t i = 0; i < bus.size(); ++i) {
+        std::vector<std::string> expected;
+        for (const std::string& frame : all)
+            if (i >= speakers || !frame.starts_with(std::to_string(0x100 + i) + ":")) expected.push_back(frame);
+        EXPECT_TRUE(heard[i] == expected) << "client " << i << " heard another order";
+    }
+}
+
+TEST(SlcanBus, NothingIsMissedOnceAClientIsOpen) {
+    ServedHub hub(0);
+    auto speaker = open_or_fail(hub.spec(), CanRole::client);
+    for (std::uint32_t i = 0; i < 50; ++i) {
+        auto late = open_or_fail(hub.spec(), CanRole::client);
+        ASSERT_TRUE(speaker->send(numbered(0x123, i)));
+        ReceivedFrame out;
+        ASSERT_TRUE(next_frame(*late, out)) << i;
+        EXPECT_EQ(key(out.frame), key(numbered(0x123, i)));
+    }
+}
+
+TEST(SlcanBus, AFastSpeakerWaitsForASlowListener) {
+    ServedHub hub(0);
+    auto fast = open_or_fail(hub.spec(), CanRole::client);
+    Wire slow(static_cast<std::uint16_t>(std::stoi(hub.spec().substr(6))));
+    const int little = 32 << 10;  // or the kernel would keep it all for him
+    ::setsockopt(slow.fd(), SOL_SOCKET, SO_RCVBUF, &little, sizeof little);
+    slow.say("O\r");
+    std::array<char, 1000> part;
+    while (::read(slow.fd(), part.data(), 1) != 1) std::this_thread::yield();
+
+    constexpr std::uint32_t frames = 80'000;  // 1.8 MB: more than there is room for on the way
+    const std::string line = "t12380011223344556677\r";
+    std::atomic<bool> done{false};
+    std::thread speaker([&] {
+        const CanFrame frame = can_frame(0x123, {0x00, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77});
+        for (std::uint32_t said = 0; said < frames || !done;) {
+            // What does not go now is the speaker's to say again; receiving also sends what is queued.
+            if (said < frames && fast->send(frame))
+                ++said;
+            else
+                fast->wait(1'000'000);
+            ReceivedFrame out;
+            EXPECT_FALSE(fast->receive(out)) << "nobody else speaks";
+        }
+    });
+    std::string text;
+    const std::int64_t until_ns = monotonic_ns() + 30 * kSecond_ns;
+    while (text.size() < frames * line.size() && monotonic_ns() < until_ns) {
+        const ssize_t n = ::read(slow.fd(), part.data(), part.size());
+        if (n > 0) text.append(part.data(), static_cast<std::size_t>(n));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    done = true;
+    speaker.join();
+    EXPECT_EQ(hub.end().counters().send_drops, 0U);
+    ASSERT_EQ(text.size(), frames * line.size());
+    for (std::size_t i = 0; i < text.size(); i += line.size())
+        ASSERT_EQ(text.compare(i, line.size(), line), 0) << i;
+}
+
+TEST(SlcanClient, SaysWhatIsWrongWithAHub) {
+    ServedHub hub(0);
+    std::vector<std::unique_ptr<CanBus>> all;
+    for (int i = 0; i < 8; ++i) all.push_back(open_or_fail(hub.spec(), CanRole::client));
+    const auto ninth = open_can_bus(hub.spec(), CanRole::client);
+    ASSERT_FALSE(ninth);
+    EXPECT_EQ(ninth.error().kind, ErrorKind::missing);
+    EXPECT_NE(ninth.error().what.find("as many clients as it can have"), std::string::npos) << ninth.error().what;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <functional>
+#include <future>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,19 @@ inline std::uint16_t hub_port(const CanBus& hub) {
 inline std::string hub_pty(const CanBus& hub) {
     const std::string text = hub.description();
     return text.substr(text.rfind(' ') + 1);
+}
+
+/// A client of a hub that no other thread serves.
+inline std::unique_ptr<CanBus> open_client_of(CanBus& hub) {
+    const std::string spec = "slcan:" + std::to_string(hub_port(hub));
+    auto client = std::async(std::launch::async, [&] { return open_or_fail(spec, CanRole::client); });
+    std::vector<ReceivedFrame> came;  // nobody has said anything yet
+    turn_until(hub, [&] {
+        for (ReceivedFrame out; hub.receive(out);) came.push_back(out);
+        return client.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    });
+    EXPECT_TRUE(came.empty());
+    return client.get();
 }
 
 /// A group of this process alone, so that tests may run side by side.

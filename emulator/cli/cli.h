@@ -28,6 +28,7 @@ Command add_scan(CLI::App& app);
 Command add_bench(CLI::App& app);
 Command add_replay(CLI::App& app);
 Command add_estimate(CLI::App& app);
+Command add_rehearse(CLI::App& app);
 
 /// For numbers: CLI::Range lets NaN through.
 [[nodiscard]] CLI::Validator finite_number();

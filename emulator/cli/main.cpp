@@ -79,7 +79,7 @@ int run(int argc, char** argv) {
 
     Command chosen;
     for (const auto& add :
-         {add_check, add_run, add_fly, add_render, add_scan, add_replay, add_estimate, add_bench}) {
+         {add_check, add_run, add_fly, add_render, add_scan, add_replay, add_estimate, add_rehearse, add_bench}) {
         const Command command = add(app);
         CLI::App* subcommand = app.get_subcommands([](const CLI::App*) { return true; }).back();
         subcommand->add_flag("--json", json, kJsonHelp);

@@ -1,0 +1,100 @@
+// narpa rehearse - a docking with everything in the loop, judged.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "emulator/cli/cli.h"
+#include "rehearsal/conduct/child.h"
+#include "rehearsal/conduct/conduct.h"
+
+namespace narpa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using rehearsal::Conducted;
+
+struct Options {
+    rehearsal::ConductOptions conduct;
+    std::vector<std::string> video;
+};
+
+/// The docking that comes with narpa: beside the program in a build, or installed.
+Result<std::string> shipped_scenario() {
+    const std::string bin = rehearsal::program_folder();
+    for (const char* at : {"/../scenes/rehearsal/docking.toml", "/../share/narpa/scenes/rehearsal/docking.toml"})
+        if (std::error_code none; fs::exists(bin + at, none)) return fs::path(bin + at).lexically_normal().string();
+    return Error{"no scenario was given, and the docking that comes with narpa is not beside the program"};
+}
+
+rehearsal::Narrator narrator() {
+    if (!::isatty(STDERR_FILENO)) return {[](std::string_view text) { say(text); }, [](std::string_view) {}};
+    return {[](std::string_view text) { fmt::print(stderr, "\r\033[K{}\n", text); },
+            [](std::string_view text) { fmt::print(stderr, "\r\033[K{}", text); }};
+}
+
+Outcome one(const rehearsal::ConductOptions& options) {
+    const auto done = rehearsal::conduct(options, narrator(), stop_flag());
+    if (!done) return done.error();
+    for (const rehearsal::GateResult& g : done->verdict.gates)
+        say(fmt::format("  {:<10} {:<12} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
+                        g.reason));
+    say(done->verdict.headline);
+    if (!done->page.empty()) say("page: " + done->page);
+    return done->result;
+}
+
+Outcome rehearse(const Options& given) {
+    rehearsal::ConductOptions o = given.conduct;
+    for (const std::string& text : given.video) {
+        auto pair = split_pair(text, "CAMERA=DEVICE, like nav=/dev/video10");
+        if (!pair) return pair.error();
+        o.video.insert(*std::move(pair));
+    }
+    if (o.scenario.empty()) {
+        auto shipped = shipped_scenario();
+        if (!shipped) return shipped.error();
+        o.scenario = *shipped;
+    }
+    auto scenario = rehearsal::read_scenario(o.scenario);
+    if (!scenario) return scenario.error();
+    if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name;
+    stop_on_signals();
+    return one(o);
+}
+
+}  // namespace
+
+Command add_rehearse(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    rehearsal::ConductOptions& r = o->conduct;
+    r.version = NARPA_VERSION;
+    CLI::App* c = app.add_subcommand(
+        "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");
+    c->add_option("SCENARIO", r.scenario, "Scenario file (default: the docking that comes with narpa)");
+    c->add_option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
+    c->add_flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
+    c->add_option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
+    c->add_option("--can", r.bus, "BUS: slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
+        ->capture_default_str();
+    c->add_option("--video", o->video,
+                  "CAMERA=DEVICE instead of a FIFO, like nav=/dev/video10; may be given many times")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_option(
+        "--dynamics", r.dynamics,
+        "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it");
+    c->add_option(
+        "--navigation", r.navigation,
+        "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
+        "set; says \"ready\" when it listens, or has 10 s; none: you start it");
+    c->add_option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)")
+        ->check(CLI::Range(0, 1024));
+    c->add_option("--patience", r.patience_s, "Seconds without progress after which it is given up")
+        ->check(CLI::Range(1.0, 86400.0))
+        ->capture_default_str();
+    c->footer("Exit status: 0 all gates passed; 1 one failed; 2 bad input; 3 a device is missing.");
+    return [o] { return rehearse(*o); };
+}
+
+}  // namespace narpa::cli

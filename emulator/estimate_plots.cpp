@@ -64,6 +64,22 @@ void draw_nees(cv::Mat& image, cv::Point corner, const FilterRun& run) {
     text(image, "seconds", {frame.x + frame.width / 2, frame.y + frame.height + 42}, kTextSize, 0.5, kInk);
 }
 
+constexpr int kLabelHeight = 17, kLetterWidth = 9;
+
+/// Beside a dot, or above or below where another label stands already.
+cv::Rect free_place(const std::string& label, const cv::Point2d& dot, const std::vector<cv::Rect>& taken) {
+    const int width = kLetterWidth * static_cast<int>(label.size());
+    const bool to_the_left = dot.x > 700;
+    cv::Rect place(static_cast<int>(dot.x) + (to_the_left ? -12 - width : 12), static_cast<int>(dot.y) - 8, width,
+                   kLabelHeight);
+    const int wanted = place.y;
+    const auto covered = [&] {
+        return std::any_of(taken.begin(), taken.end(), [&](const cv::Rect& r) { return (r & place).area() > 0; });
+    };
+    for (int k = 1; covered(); ++k) place.y = wanted + (k % 2 ? 1 : -1) * (k + 1) / 2 * kLabelHeight;
+    return place;
+}
+
 }  // namespace
 
 Status write_icp_plot(const std::string& path, const std::string& title, const std::vector<IcpRun>& runs) {
@@ -121,6 +137,7 @@ Status write_time_plot(const std::string& path, const std::vector<TimeAndError>&
         if (std::find(families.begin(), families.end(), e.family) == families.end()) families.push_back(e.family);
     }
     if (estimators.empty()) return Error{"no estimator was measured, expected one at least", path};
+    std::vector<cv::Rect> taken;
     const plot::Axis x = plot::logarithmic_axis(times, 90, 960), y = plot::logarithmic_axis(errors, 640, 70);
     for (const double v : x.ticks()) plot::vertical_tick(image, x, y, v);
     for (const double v : y.ticks()) plot::horizontal_tick(image, y, x, v, fmt::format("{:g}", v));
@@ -130,9 +147,11 @@ Status write_time_plot(const std::string& path, const std::vector<TimeAndError>&
         const cv::Scalar& colour = kFamilies[family % kFamilies.size()];
         const cv::Point2d at(x.at(e.ms), y.at(100 * e.position_of_range));
         plot::dot(image, at, 5, colour);
-        const bool to_the_left = at.x > 700;
-        plot::text(image, e.name, {static_cast<int>(at.x) + (to_the_left ? -10 : 10), static_cast<int>(at.y) + 5},
-                   plot::kTextSize, to_the_left ? 1 : 0, colour);
+        const cv::Rect place = free_place(e.name, at, taken);
+        taken.push_back(place);
+        const cv::Point foot(place.x, place.y + kLabelHeight - 4);
+        if (std::abs(foot.y - at.y) > kLabelHeight) plot::line(image, at, cv::Point2d(foot), plot::kGuide, 1);
+        plot::text(image, e.name, foot, plot::kTextSize, 0, colour);
     }
     plot::text(image, "position error, RMS, % of the range, against time of an estimate, ms", {90, 40},
                plot::kTitleSize, 0, plot::kInk);

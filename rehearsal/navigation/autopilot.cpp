@@ -62,20 +62,17 @@ Autopilot::Before Autopilot::before(std::int64_t t_ns) {
 void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
     const Before b = before(t_ns);
     CameraSight& sight = cameras_[camera];
-    conclude(sight.camera().name, t_ns, sight.look(bytes, t_ns, b.t_s, b.q_world_chaser, b.T_chaser_target),
-             frames_);
+    take(sight.camera().name, t_ns, sight.look(bytes, t_ns, b.t_s, b.q_world_chaser, b.T_chaser_target), frames_);
 }
 
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {
     const Before b = before(t_ns);
     LidarSight& sight = lidars_[lidar];
-    conclude(sight.lidar().name, t_ns,
-             sight.look(points, t_ns, b.motion, b.T_chaser_target, b.position_sigma_m, b.rotation_sigma_rad),
-             sweeps_);
+    take(sight.lidar().name, t_ns,
+         sight.look(points, t_ns, b.motion, b.T_chaser_target, b.position_sigma_m, b.rotation_sigma_rad), sweeps_);
 }
 
-void Autopilot::conclude(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting,
-                         std::uint8_t& count) {
+void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting, std::uint8_t& count) {
     SightingRecord record{sensor,          t_ns,       SightingRecord::Outcome::no_pose, 0, sighting.why,
                           sighting.points, sighting.ms};
     const std::lock_guard lock(mutex_);
@@ -96,7 +93,7 @@ CycleRecord Autopilot::cycle(std::int64_t t_ns, DynamicsPhase dynamics) {
     const RelativeMotion motion = estimator_->motion();
     const TargetEstimate known = estimator_->estimate();
     out.t_s = estimator_->t_s(t_ns);
-    out.port = port_motion(motion, scenario_.target, scenario_.chaser);
+    out.port = port_state(motion, scenario_.target, scenario_.chaser);
     out.position_sigma_m = position_sigma(known.covariance);
 
     const double unmeasured_s = 1e-9 * static_cast<double>(t_ns - estimator_->taken_ns());

@@ -33,7 +33,7 @@ struct CycleRecord {
     NavigationEstimate estimate;
     ActuatorCommand command;
     double t_s = 0;  ///< after the scenario's time 0
-    PortMotion port;
+    PortState port;
     Reference reference;
     double position_sigma_m = 0;
     std::vector<SightingRecord> sightings;  ///< since the cycle before
@@ -58,6 +58,10 @@ public:
     /// their times count from t_ns, its end.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
     void take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points);
+    /// What any other sensor saw at t_ns; counts as a frame.
+    void take(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting) {
+        take(sensor, t_ns, sighting, frames_);
+    }
     /// Where it stands at t_ns, and what is to be done from then on; times grow by control periods.
     CycleRecord cycle(std::int64_t t_ns, DynamicsPhase dynamics);
 
@@ -74,7 +78,7 @@ private:
     };
     Autopilot() = default;
     [[nodiscard]] Before before(std::int64_t t_ns);
-    void conclude(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting, std::uint8_t& count);
+    void take(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting, std::uint8_t& count);
 
     Scenario scenario_;
     std::unique_ptr<SightModel> model_;

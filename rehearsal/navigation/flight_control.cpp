@@ -19,6 +19,13 @@ Vec3 give(std::array<PulseAxis, 3>& axes, const Vec3& wanted) {
     return {axes[0].give(wanted.x), axes[1].give(wanted.y), axes[2].give(wanted.z)};
 }
 
+/// A push that is as good as over before the period is leaves a body ahead of one that was pushed evenly: so much
+/// slower it is when the push begins. `steady`: the mean acceleration that is given; `most`: while pushing.
+Vec3 push_lag(const Vec3& steady, double most, double period_s) {
+    const double on = std::min(1.0, norm(steady) / most);
+    return (0.5 * (1 - on) * period_s) * steady;
+}
+
 double most_turn_rad_s(const Scenario& s, const SampledGains& gains) {
     const double least = s.thrusters.torque_n_m / s.chaser.inertia_kg_m2.diagonal().maxCoeff();
     return std::min(kTurnMost_rad_s, kShareToStop * least / gains.velocity_s);
@@ -32,7 +39,7 @@ SampledGains SampledGains::of(double bandwidth_rad_s, double damping, double per
     const double off = bandwidth_rad_s * period_s * std::sqrt(std::abs(1 - damping * damping));
     const double trace = 2 * decay * (damping <= 1 ? std::cos(off) : std::cosh(off));
     const double determinant = decay * decay;
-    return {(1 + determinant - trace) / (period_s * period_s), (3 - determinant - trace) / (2 * period_s)};
+    return {(1 + determinant - trace) / (period_s * period_s), (1 - determinant) / period_s};
 }
 
 double PulseAxis::give(double wanted) noexcept {
@@ -52,6 +59,8 @@ FlightControl::FlightControl(const Scenario& s)
       period_s_(s.navigation.period_s),
       position_(SampledGains::of(s.control.bandwidth_rad_s, s.control.damping, period_s_)),
       attitude_(SampledGains::of(s.control.attitude_bandwidth_rad_s, s.control.damping, period_s_)),
+      acceleration_most_m_s2_(s.thrusters.force_n / s.chaser.mass_kg),
+      turn_acceleration_most_rad_s2_(s.thrusters.torque_n_m / s.chaser.inertia_kg_m2.diagonal().maxCoeff()),
       turn_most_rad_s_(most_turn_rad_s(s, attitude_)),
       force_(axes(s.thrusters.force_n, s.thrusters, period_s_)),
       torque_(axes(s.thrusters.torque_n_m, s.thrusters, period_s_)) {}
@@ -83,9 +92,9 @@ Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Referenc
     Vec3 error = rotation_vector(q_chaser_world * q_world_wanted);
     const double most = turn_most_rad_s_ * attitude_.velocity_s / attitude_.position_s2;
     if (norm(error) > most) error = error * (most / norm(error));
-    return attitude_.position_s2 * error +
-           attitude_.velocity_s * (q_chaser_world * wanted_rate - m.chaser_rate_rad_s) +
-           q_chaser_world * wanted_acceleration;
+    const Vec3 steady = q_chaser_world * wanted_acceleration;
+    const Vec3 rate = q_chaser_world * wanted_rate - push_lag(steady, turn_acceleration_most_rad_s2_, period_s_);
+    return attitude_.position_s2 * error + attitude_.velocity_s * (rate - m.chaser_rate_rad_s) + steady;
 }
 
 /// Of the centre of mass by thrust, world axes.
@@ -104,9 +113,10 @@ Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Refe
     const Vec3 turn = m.q_world_chaser * m.chaser_rate_rad_s;
     const Vec3 by_turning =
         cross(m.q_world_chaser * angular_acceleration_rad_s2, arm) + cross(turn, cross(turn, arm));
+    const Vec3 steady = wanted_acceleration - gravity_difference_m_s2(orbit_, t_s, m.position_m);
+    const Vec3 velocity = wanted_velocity - push_lag(steady, acceleration_most_m_s2_, period_s_);
     return position_.position_s2 * (wanted - (m.position_m + arm)) +
-           position_.velocity_s * (wanted_velocity - (m.velocity_m_s + cross(turn, arm))) + wanted_acceleration -
-           by_turning - gravity_difference_m_s2(orbit_, t_s, m.position_m);
+           position_.velocity_s * (velocity - (m.velocity_m_s + cross(turn, arm))) + steady - by_turning;
 }
 
 }  // namespace narpa::rehearsal

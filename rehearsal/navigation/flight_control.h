@@ -7,8 +7,8 @@
 
 namespace narpa::rehearsal {
 
-/// Of a double integrator under an acceleration that is constant over each period: a = position (r - x) +
-/// velocity (r' - x') has the sampled poles of the continuous ones of this bandwidth and damping.
+/// Of a double integrator that is pushed at the beginning of each period: a = position (r - x) + velocity (r' -
+/// x'), given as a dv of a * period_s, has the sampled poles of the continuous ones of this bandwidth and damping.
 struct SampledGains {
     double position_s2 = 0, velocity_s = 0;  ///< s^-2, s^-1
 
@@ -52,6 +52,7 @@ private:
     Vehicle target_, chaser_;
     double period_s_;
     SampledGains position_, attitude_;
+    double acceleration_most_m_s2_, turn_acceleration_most_rad_s2_;
     double turn_most_rad_s_;  ///< rate at which an error of attitude is taken back
     std::array<PulseAxis, 3> force_, torque_;
 };

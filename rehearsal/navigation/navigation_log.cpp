@@ -90,7 +90,7 @@ void NavigationLog::cycle(const CycleRecord& r) {
 void NavigationLog::pictures(const std::string& name) {
     const std::lock_guard lock(mutex_);
     for (const auto& [camera, seen] : seen_) {
-        const RadianceImage none(0, 0);
+        const RadianceImage none(seen.camera.width, seen.camera.height);
         const auto written = write_image(folder_ + "/" + name + "_" + camera + ".png",
                                          RenderedFrame{seen.camera, none, nullptr, seen.bytes});
         if (!written && pictures_written_) pictures_written_ = written.error();

@@ -31,7 +31,7 @@ RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double 
     return out;
 }
 
-PortMotion port_motion(const RelativeMotion& m, const Vehicle& target, const Vehicle& chaser) {
+PortState port_state(const RelativeMotion& m, const Vehicle& target, const Vehicle& chaser) {
     const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target);
     const Rigid3 T_world_chaser_port = Rigid3{m.q_world_chaser, m.position_m} * port_from_mass(chaser);
     const Vec3 arm = m.q_world_chaser * port_from_mass(chaser).t;

@@ -15,7 +15,7 @@ struct RelativeMotion {
 };
 
 /// The chaser's port beside the target's.
-struct PortMotion {
+struct PortState {
     Rigid3 T_port_chaser_port{};  ///< chaser's port axes to target's port axes
     Vec3 velocity_m_s{};          ///< of the chaser's port origin, as the turning axes of the target's port see it
 };
@@ -29,7 +29,7 @@ struct PortMotion {
 /// Its inverse.
 [[nodiscard]] RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double t_s);
 
-[[nodiscard]] PortMotion port_motion(const RelativeMotion& motion, const Vehicle& target, const Vehicle& chaser);
+[[nodiscard]] PortState port_state(const RelativeMotion& motion, const Vehicle& target, const Vehicle& chaser);
 /// Puts the chaser's centre of mass where its port's origin, of this place and velocity in the target's port axes,
 /// asks for; attitudes and rates are those in `motion`.
 void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle& target, const Vehicle& chaser,

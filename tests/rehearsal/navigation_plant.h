@@ -56,7 +56,7 @@ struct Plant {
         t_s += dt;
     }
 
-    [[nodiscard]] PortMotion port() const { return port_motion(motion, scenario.target, scenario.chaser); }
+    [[nodiscard]] PortState port() const { return port_state(motion, scenario.target, scenario.chaser); }
     /// Angle between the chaser's port and the docked attitude.
     [[nodiscard]] double off_docked_rad() const {
         return angle_between(port().T_port_chaser_port.q, T_port_docked().q);

@@ -47,6 +47,14 @@ void Autopilot::take(const AttitudeReport& report) {
     estimator_->take(report);
 }
 
+void Autopilot::take(DynamicsPhase phase, std::int64_t t_ns) {
+    const std::lock_guard lock(mutex_);
+    if (phase == dynamics_) return;
+    dynamics_ = phase;
+    if (phase == DynamicsPhase::captured || phase == DynamicsPhase::bounced)
+        estimator_->met(t_ns, phase == DynamicsPhase::captured);
+}
+
 Autopilot::Before Autopilot::before(std::int64_t t_ns) {
     const std::lock_guard lock(mutex_);
     if (t_ns > estimator_->t_ns()) estimator_->advance(t_ns);
@@ -86,7 +94,7 @@ void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const Sightin
     sightings_.push_back(std::move(record));
 }
 
-CycleRecord Autopilot::cycle(std::int64_t t_ns, DynamicsPhase dynamics) {
+CycleRecord Autopilot::cycle(std::int64_t t_ns) {
     const std::lock_guard lock(mutex_);
     CycleRecord out;
     estimator_->advance(t_ns);
@@ -98,7 +106,7 @@ CycleRecord Autopilot::cycle(std::int64_t t_ns, DynamicsPhase dynamics) {
 
     const double unmeasured_s = 1e-9 * static_cast<double>(t_ns - estimator_->taken_ns());
     guidance_->step({out.t_s, out.port.T_port_chaser_port.t, out.port.velocity_m_s, out.position_sigma_m,
-                     unmeasured_s, dynamics});
+                     unmeasured_s, dynamics_});
     out.reference = guidance_->reference(out.t_s);
     Impulses impulses;
     if (guidance_->thrusters_off()) {

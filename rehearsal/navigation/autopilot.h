@@ -54,6 +54,8 @@ public:
     // What follows needs a start.
 
     void take(const AttitudeReport& report);
+    /// What the dynamics are doing at t_ns; before the sightings of that time.
+    void take(DynamicsPhase phase, std::int64_t t_ns);
     /// `camera`, `lidar`: indices in the scenario's lists. A frame: its bytes and mid-exposure. Returns of a turn:
     /// their times count from t_ns, its end.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
@@ -63,7 +65,7 @@ public:
         take(sensor, t_ns, sighting, frames_);
     }
     /// Where it stands at t_ns, and what is to be done from then on; times grow by control periods.
-    CycleRecord cycle(std::int64_t t_ns, DynamicsPhase dynamics);
+    CycleRecord cycle(std::int64_t t_ns);
 
     [[nodiscard]] std::uint64_t restarts() const noexcept { return estimator_ ? estimator_->restarts() : 0; }
 
@@ -90,6 +92,7 @@ private:
     std::optional<Guidance> guidance_;
     std::optional<FlightControl> control_;
     std::vector<SightingRecord> sightings_;
+    DynamicsPhase dynamics_ = DynamicsPhase::flying;
     std::uint8_t frames_ = 0, sweeps_ = 0;
     std::uint32_t cycle_ = 0;
 };

@@ -85,6 +85,7 @@ private:
 
     void cycle(std::int64_t t_ns, bool first) {
         loop_.autopilot.take(*loop_.link.attitude());
+        loop_.autopilot.take(loop_.link.dynamics()->phase, t_ns);
         for (std::size_t i = 0; i < newest_.size(); ++i) {
             if (!newest_[i]) continue;  // none since the last cycle
             if (loop_.log) loop_.log->frame(camera(i), newest_[i]->bytes);
@@ -93,7 +94,7 @@ private:
         }
         if (!first)  // no packet has been completed yet
             for (std::size_t i = 0; i < loop_.wires.lidars.size(); ++i) look_at_turn(i, t_ns);
-        loop_.say(loop_.autopilot.cycle(t_ns, loop_.link.dynamics()->phase));
+        loop_.say(loop_.autopilot.cycle(t_ns));
     }
 
     void look_at_turn(std::size_t i, std::int64_t t_ns) {

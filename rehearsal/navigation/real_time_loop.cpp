@@ -74,7 +74,7 @@ private:
             } else if (late_ns > kReportWait_ns + period_ns_ / 10) {
                 ++loop_.counts.cycles_late;
             }
-            loop_.say(loop_.autopilot.cycle(t_ns, loop_.link.dynamics()->phase));
+            loop_.say(loop_.autopilot.cycle(t_ns));
         }
     }
 
@@ -98,6 +98,7 @@ private:
         const AttitudeReport& attitude = *loop_.link.attitude();
         if (attitude.t_ns > t_attitude_ns_ || attitude.t_ns == t_start_ns_) {
             loop_.autopilot.take(attitude);
+            loop_.autopilot.take(loop_.link.dynamics()->phase, attitude.t_ns);
             {
                 const std::lock_guard lock(mutex_);
                 t_attitude_ns_ = attitude.t_ns;

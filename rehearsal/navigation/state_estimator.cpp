@@ -12,6 +12,9 @@ constexpr std::size_t kHistory = 256;
 constexpr std::uint64_t kContradictions = 5;
 /// What is known of velocity and rate when the filter begins anew.
 constexpr double kAnewVelocity_m_s = 0.2, kAnewRate_rad_s = 0.2 * kDegree;
+/// What contact leaves unsure.
+constexpr double kMetPosition_m = 0.05, kMetAttitude_rad = 0.3 * kDegree, kMetRate_rad_s = 0.1 * kDegree,
+                 kHeldVelocity_m_s = 0.01, kBouncedVelocity_m_s = 0.2;
 /// Nothing is known better than this at the start.
 constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
                  kLeastRate_rad_s = 2e-3 * kDegree;
@@ -142,6 +145,25 @@ void StateEstimator::advance(std::int64_t t_ns) {
         filter_.accelerate(pulse.acceleration_m_s2, pulse.psd);
     }
     filter_.predict(t_ns);
+}
+
+void StateEstimator::met(std::int64_t t_ns, bool held) {
+    advance(t_ns);
+    pulses_.clear();
+    RelativeMotion m = motion();
+    if (held) {
+        Vec3 port = port_state(m, scenario_.target, scenario_.chaser).T_port_chaser_port.t;
+        port.x = 0;
+        place_port(port, {}, scenario_.target, scenario_.chaser, m);
+    }
+    Vector12 more;
+    more << Eigen::Vector3d::Constant(kMetPosition_m),
+        Eigen::Vector3d::Constant(held ? kHeldVelocity_m_s : kBouncedVelocity_m_s),
+        Eigen::Vector3d::Constant(kMetAttitude_rad), Eigen::Vector3d::Constant(kMetRate_rad_s);
+    const Matrix12 covariance = filter_.covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
+    if (auto anew = PoseFilter::create(filter_settings(scenario_), filter_.t_ns(),
+                                       in_frame(m, scenario_.orbit, t_s(filter_.t_ns())), covariance))
+        filter_ = *std::move(anew);
 }
 
 UpdateResult StateEstimator::take(const TargetSighting& sighting) {

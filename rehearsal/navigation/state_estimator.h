@@ -46,6 +46,9 @@ public:
     /// Late ones are set in at their own time. So many in a row that contradict the filter are right, and it is
     /// wrong: it begins anew from the last of them.
     UpdateResult take(const TargetSighting& sighting);
+    /// The ports met shortly before t_ns: velocities are not what they were. `held`: the docking system holds, the
+    /// ports' origins lie in one plane and rest against each other.
+    void met(std::int64_t t_ns, bool held);
     /// Moves on.
     void advance(std::int64_t t_ns);
 

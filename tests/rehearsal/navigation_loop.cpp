@@ -46,6 +46,7 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
             EXPECT_TRUE((*autopilot)->start(0, attitude));
         }
         (*autopilot)->take(attitude);
+        (*autopilot)->take(simulation->phase(), t_ns);
         const Truth truth = simulation->truth();
         const Rigid3 T_chaser_target = inverse(truth.chaser.T_world_body) * truth.target.T_world_body;
         if (seen(1e-9 * static_cast<double>(t_ns))) {
@@ -55,7 +56,7 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
             sighting.pose = {t_ns, displaced(T_chaser_target, error), sigma.cwiseAbs2().asDiagonal(), {}};
             (*autopilot)->take("noise", t_ns, sighting);
         }
-        flight.cycles.push_back((*autopilot)->cycle(t_ns, simulation->phase()));
+        flight.cycles.push_back((*autopilot)->cycle(t_ns));
         const NavigationEstimate& e = flight.cycles.back().estimate;
         Vector6 deviations;
         deviations << to_eigen(e.sigma_rotation_rad), to_eigen(e.sigma_position_m);

@@ -1,0 +1,213 @@
+// Between the sensors' body axes and the filter: covariances, known thrust, contact; attitudes and packets in
+// between.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "rehearsal/navigation/state_estimator.h"
+#include "rehearsal/navigation/turn_buffer.h"
+#include "tests/rehearsal/navigation_plant.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+Scenario docking() {
+    static const Scenario scenario = [] {
+        auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
+        EXPECT_TRUE(s) << s.error().text();
+        return *std::move(s);
+    }();
+    return scenario;
+}
+
+Rigid3 chaser_target(const test::Plant& plant) {
+    const RelativeMotion& m = plant.motion;
+    const Scenario& s = plant.scenario;
+    return inverse(Rigid3{m.q_world_chaser, m.position_m - m.q_world_chaser * s.chaser.centre_of_mass_m}) *
+           Rigid3{m.q_world_target, -(m.q_world_target * s.target.centre_of_mass_m)};
+}
+
+AttitudeReport attitude(const test::Plant& plant) {
+    return {0, std::llround(1e9 * plant.t_s), plant.motion.q_world_chaser, plant.motion.chaser_rate_rad_s};
+}
+
+/// Draws a sighting's error and a star tracker's, and looks at where the masses come out.
+TEST(AboutMasses, TheCovarianceIsThatOfTheDraws) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    const Vec3 chaser_centre{-3, 0.2, 0.1}, target_centre{-12, 1, 0.5};
+    const Rigid3 T_chaser_sensor{exp_rotation({0.3, 1.2, -0.4}), {-0.5, 0.1, 2}};
+    const Rigid3 T_sensor_target{exp_rotation({0.4, -0.2, 2}), {1, -2, 20}};
+    const Quat q_frame_chaser = exp_rotation({1, 0.3, -0.7});
+    Vector6 sigma;
+    sigma << 1e-3, 2e-3, 5e-4, 0.01, 0.02, 0.05;
+    constexpr double kStar = 1e-3;
+    TargetSighting sighting{0, T_sensor_target, sigma.cwiseAbs2().asDiagonal(), T_chaser_sensor};
+    const PoseMeasurement m = about_masses(sighting, chaser_centre, target_centre, q_frame_chaser, kStar);
+    // Where the filter has the target's mass: in frame axes, by the attitude it believes.
+    const auto masses = [&](const Rigid3& T, const Vec3& star) {
+        const Rigid3 seen = T_chaser_sensor * T * Rigid3{{}, target_centre};
+        const Quat q = q_frame_chaser * exp_rotation(star);
+        return Rigid3{q * seen.q, q * (seen.t - chaser_centre)};
+    };
+    const Rigid3 truth = masses(T_sensor_target, {});
+    Matrix6 sum = Matrix6::Zero();
+    constexpr int kDraws = 20000;
+    for (int i = 0; i < kDraws; ++i) {
+        Vector6 e;
+        for (int k = 0; k < 6; ++k) e[k] = sigma[k] * normal(random);
+        const Vec3 star{kStar * normal(random), kStar * normal(random), kStar * normal(random)};
+        const Vector6 off = error_between(truth, masses(displaced(T_sensor_target, e), star));
+        sum += off * off.transpose() / kDraws;
+    }
+    const Matrix6 expected = covariance_in_other_axes(q_frame_chaser * T_chaser_sensor.q, m.covariance);
+    for (int i = 0; i < 6; ++i)
+        for (int k = 0; k < 6; ++k)
+            EXPECT_NEAR(sum(i, k), expected(i, k), 0.05 * std::sqrt(expected(i, i) * expected(k, k))) << i << k;
+}
+
+struct Estimated {
+    test::Plant plant{docking()};
+    std::optional<StateEstimator> estimator;
+    Estimated() {
+        plant.stand(plant.scenario.start.position_m, {0.02, -0.01, 0.03});
+        auto made = StateEstimator::create(plant.scenario, 0, attitude(plant));
+        EXPECT_TRUE(made);
+        estimator.emplace(*std::move(made));
+    }
+    [[nodiscard]] double off_m() const {
+        return norm(estimator->estimate().T_chaser_target.t - chaser_target(plant).t);
+    }
+    void fly(const Impulses& impulses) {
+        const auto t_ns = std::llround(1e9 * plant.t_s);
+        estimator->thrust(t_ns, impulses.linear_n_s);
+        plant.fly(impulses, 1);
+        estimator->take(attitude(plant));
+        estimator->advance(t_ns + 1'000'000'000);
+    }
+};
+
+TEST(StateEstimator, StartsWhereTheScenarioDoes) {
+    const Estimated e;
+    EXPECT_LT(e.off_m(), 1e-9);
+    EXPECT_LT(angle_between(e.estimator->estimate().T_chaser_target.q, chaser_target(e.plant).q), 1e-9);
+    // Of the start, 0.5 m in x and 0.4 m beside it; chaser's axes point the other way.
+    const Matrix6 C = e.estimator->estimate().covariance;
+    EXPECT_NEAR(std::sqrt(C(3, 3)), 0.5, 0.03);
+}
+
+TEST(StateEstimator, KnowsWhatThrustDoes) {
+    Estimated e;
+    for (int k = 0; k < 20; ++k)
+        e.fly({{k % 2 ? 150.0 : -40.0, 25.0, k < 10 ? 399.0 : -60.0}, {0, 20.0 * (k % 3 - 1), 0}});
+    EXPECT_GT(norm(e.plant.port().T_port_chaser_port.t - e.plant.scenario.start.position_m), 1);
+    EXPECT_LT(e.off_m(), 0.01) << "it fires and turns, and the pulses' edges lie between the plant's steps";
+    const Vec3 v = e.estimator->motion().velocity_m_s - e.plant.motion.velocity_m_s;
+    EXPECT_LT(norm(v), 1e-3);
+}
+
+TEST(StateEstimator, TellsTheMotionOfASweep) {
+    Estimated e;
+    e.plant.motion.chaser_rate_rad_s = {0.01, -0.02, 0.03};
+    e.plant.motion.velocity_m_s = {0.3, -0.2, 0.1};
+    const RelativeState state = in_frame(e.plant.motion, e.plant.scenario.orbit, 0);
+    auto filter = StateEstimator::create(e.plant.scenario, 0, attitude(e.plant));
+    ASSERT_TRUE(filter);
+    // The estimator stands still beside the port; the chaser's rate is the gyroscope's.
+    const SweepMotion motion = filter->motion_in_chaser();
+    const Rigid3 before = filter->estimate().T_chaser_target;
+    const Rigid3 after = filter->guess(10'000'000);
+    const Vector6 moved = error_between(before, after) / 0.01;
+    EXPECT_LT(norm(to_vec3(moved.head<3>()) - motion.rate_rad_s), 1e-4);
+    EXPECT_LT(norm(to_vec3(moved.tail<3>()) - motion.velocity_m_s), 1e-2);
+    EXPECT_GT(norm(state.velocity_m_s), 0.3);
+}
+
+TEST(StateEstimator, BelievesWhatContradictsItOftenEnough) {
+    Estimated e;
+    TargetSighting seen;
+    Rigid3 T = chaser_target(e.plant);
+    T.t.y += 8;
+    seen.T_sensor_target = T;
+    seen.covariance = 1e-4 * Matrix6::Identity();
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(e.estimator->take(seen).outcome, UpdateOutcome::gated);
+    EXPECT_EQ(e.estimator->restarts(), 0u);
+    EXPECT_EQ(e.estimator->take(seen).outcome, UpdateOutcome::taken);
+    EXPECT_EQ(e.estimator->restarts(), 1u);
+    EXPECT_LT(norm(e.estimator->estimate().T_chaser_target.t - T.t), 1e-6);
+}
+
+TEST(StateEstimator, RestsAtThePortOnceItIsHeld) {
+    Estimated e;
+    e.plant.stand({0.04, 0.01, -0.02}, {});
+    place_port({0.04, 0.01, -0.02}, {-0.075, 0, 0}, e.plant.scenario.target, e.plant.scenario.chaser,
+               e.plant.motion);
+    Scenario s = e.plant.scenario;
+    s.start.position_m = {0.04, 0.01, -0.02};
+    s.start.velocity_m_s = {-0.075, 0, 0};
+    auto estimator = StateEstimator::create(s, 0, attitude(e.plant));
+    ASSERT_TRUE(estimator);
+    estimator->met(1'000'000'000, true);
+    const PortState port = port_state(estimator->motion(), s.target, s.chaser);
+    EXPECT_NEAR(port.T_port_chaser_port.t.x, 0, 1e-9);
+    EXPECT_NEAR(port.T_port_chaser_port.t.y, 0.01, 1e-3);
+    EXPECT_LT(norm(port.velocity_m_s), 1e-9);
+}
+
+TEST(AttitudeTrack, TurnsEvenlyBetweenReportsAndOnAfterThem) {
+    AttitudeTrack track;
+    EXPECT_TRUE(track.empty());
+    const Vec3 rate{0, 0, 0.1};
+    for (int k = 0; k < 20; ++k)
+        EXPECT_TRUE(track.take({0, k * 1'000'000'000LL, exp_rotation({0, 0, 0.1 * k}), rate}));
+    EXPECT_FALSE(track.take({0, 19'000'000'000, {}, {}}));
+    for (const double t_s : {10.0, 15.3, 18.999, 19.0, 19.7})
+        EXPECT_LT(angle_between(track.at(std::llround(1e9 * t_s)).q_world_chaser, exp_rotation({0, 0, 0.1 * t_s})),
+                  1e-9)
+            << t_s;
+}
+
+std::vector<std::uint8_t> packet(std::int64_t number, std::int64_t epoch_unix_ns) {
+    std::array<double, vlp16::kShots> range_m;
+    std::array<float, vlp16::kShots> reflectivity{};
+    range_m.fill(5);
+    std::vector<std::uint8_t> bytes(vlp16::kDataPacketBytes);
+    vlp16::encode(number, 10, epoch_unix_ns, range_m, reflectivity,
+                  std::span<std::uint8_t, vlp16::kDataPacketBytes>(bytes));
+    return bytes;
+}
+
+TEST(TurnBuffer, HasTheLastTurnEvenAcrossTheHour) {
+    Lidar lidar;
+    lidar.rate_hz = 10;
+    const std::int64_t epoch = 1'772'366'399'500'000'000;  // half a second before the hour
+    TurnBuffer buffer(lidar, epoch);
+    const std::int64_t t_ns = 1'000'000'000, last = t_ns / vlp16::kPacketPeriodNs - 1;
+    EXPECT_FALSE(buffer.complete_to(t_ns));
+    for (std::int64_t p = 0; p < last; ++p) ASSERT_TRUE(buffer.take(packet(p, epoch), t_ns));
+    EXPECT_FALSE(buffer.complete_to(t_ns)) << "the last one is missing";
+    ASSERT_TRUE(buffer.take(packet(last, epoch), t_ns));
+    EXPECT_TRUE(buffer.complete_to(t_ns));
+    ASSERT_TRUE(buffer.take(packet(last + 1, epoch), t_ns));  // not over at t
+    std::vector<RangePoint> points;
+    buffer.turn(t_ns, points);
+    ASSERT_FALSE(points.empty());
+    EXPECT_EQ(points.size() % vlp16::kShots, 0u);
+    EXPECT_NEAR(static_cast<double>(points.size()) / vlp16::kShots, 0.1e9 / vlp16::kPacketPeriodNs, 2);
+    EXPECT_GE(points.front().t_s, -0.1);
+    EXPECT_LT(points.back().t_s, 0);
+    EXPECT_GT(points.back().t_s, -0.003);
+}
+
+TEST(TurnBuffer, CountsWhatIsNoPacket) {
+    TurnBuffer buffer(Lidar{}, 0);
+    const std::vector<std::uint8_t> noise(vlp16::kDataPacketBytes, 0x5a), empty;
+    EXPECT_FALSE(buffer.take(noise, 0));
+    EXPECT_FALSE(buffer.take(empty, 0));
+    EXPECT_EQ(buffer.bad(), 2u);
+    EXPECT_EQ(buffer.received(), 0u);
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal

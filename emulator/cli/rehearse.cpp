@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "emulator/cli/cli.h"
+#include "rehearsal/conduct/campaign.h"
 #include "rehearsal/conduct/child.h"
 #include "rehearsal/conduct/conduct.h"
 
@@ -17,6 +18,8 @@ using rehearsal::Conducted;
 struct Options {
     rehearsal::ConductOptions conduct;
     std::vector<std::string> video;
+    std::size_t runs = 0;  ///< 0: one, without a summary
+    int jobs = 1;
 };
 
 /// The docking that comes with narpa: beside the program in a build, or installed.
@@ -44,6 +47,24 @@ Outcome one(const rehearsal::ConductOptions& options) {
     return done->result;
 }
 
+Outcome many(const rehearsal::CampaignOptions& options) {
+    auto summary = rehearsal::conduct_campaign(options, narrator(), stop_flag());
+    if (!summary) return summary;
+    const nlohmann::json& s = *summary;
+    say(fmt::format("{} of {} runs succeeded: {:.1f} %, with 95 % confidence {:.1f} to {:.1f} %",
+                    s["succeeded"].get<std::size_t>(), s["judged"].get<std::size_t>(),
+                    s["success_rate"].get<double>() * 100, s["success_interval_95"][0].get<double>() * 100,
+                    s["success_interval_95"][1].get<double>() * 100));
+    for (const auto& c : s["contact"])
+        say(fmt::format("  {:<22} {:>8.4f} +- {:.4f}, at most {:.4f} {}; asked {:g} to {:g}",
+                        c["title"].get<std::string>(), c["mean"].get<double>(), c["sigma"].get<double>(),
+                        c["max"].get<double>(), c["unit"].get<std::string>(), c["asked_min"].get<double>(),
+                        c["asked_max"].get<double>()));
+    for (const auto& [gate, list] : s["failures"].items()) say(fmt::format("  {}: {} runs", gate, list.size()));
+    say("page: " + options.run.folder + "/index.html");
+    return summary;
+}
+
 Outcome rehearse(const Options& given) {
     rehearsal::ConductOptions o = given.conduct;
     for (const std::string& text : given.video) {
@@ -60,7 +81,7 @@ Outcome rehearse(const Options& given) {
     if (!scenario) return scenario.error();
     if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name;
     stop_on_signals();
-    return one(o);
+    return given.runs > 0 ? many({o, given.runs, given.jobs}) : one(o);
 }
 
 }  // namespace
@@ -75,6 +96,12 @@ Command add_rehearse(CLI::App& app) {
     c->add_option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
     c->add_flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
     c->add_option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
+    CLI::Option* runs =
+        c->add_option("--runs", o->runs,
+                      "So many runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
+                      "goes on where it was interrupted")
+            ->check(CLI::Range(1, 100000));
+    c->add_option("--jobs", o->jobs, "Runs at the same time")->check(CLI::Range(1, 256))->needs(runs);
     c->add_option("--can", r.bus, "BUS: slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
         ->capture_default_str();
     c->add_option("--video", o->video,

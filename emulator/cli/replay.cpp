@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "emulator/cli/bench_scene.h"
 #include "emulator/cli/cli.h"
 #include "emulator/replay_report.h"
 #include "emulator/threads.h"
+#include "rehearsal/conduct/rerun.h"
 
 namespace narpa::cli {
 namespace {
@@ -140,13 +142,30 @@ Outcome replay(const Options& o) {
     return document;
 }
 
+/// In lockstep all of it can be run again; what was run in real time has the emulator's frames to repeat.
+Outcome replay_any(const Options& o) {
+    std::error_code none;
+    if (!std::filesystem::exists(o.folder + "/rehearsal.json", none)) return replay(o);
+    const auto record = rehearsal::read_record(o.folder);
+    if (!record) return record.error();
+    const bool frames_alone = o.reference > 0 || o.frames > 0 || !o.camera.empty();
+    if ((*record)["mode"] != "lockstep" || frames_alone) {
+        Options emulator = o;
+        emulator.folder += "/emulator";
+        return replay(emulator);
+    }
+    stop_on_signals();
+    return rehearsal::rerun(o.folder, o.threads, NARPA_VERSION,
+                            {[](std::string_view text) { say(text); }, [](std::string_view) {}}, stop_flag());
+}
+
 }  // namespace
 
 Command add_replay(CLI::App& app) {
     auto o = std::make_shared<Options>();
     CLI::App* c = app.add_subcommand(
         "replay", "Render the frames of a logged run once more, bit for bit, and tell what their budget cost");
-    c->add_option("DIR", o->folder, "Folder that `run --log` has written")->required();
+    c->add_option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written")->required();
     c->add_option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
     c->add_option("--scene", o->scene, "Scene file (default: the one that the run had)");
     c->add_option("--reference", o->reference,
@@ -161,7 +180,7 @@ Command add_replay(CLI::App& app) {
     c->footer(
         "Exit status 1 where a frame does not repeat bit for bit, or none has an image to repeat. RMSE, bias and "
         "errors are of the mean of the bands, as parts of the radiance that fills the sensor's scale.");
-    return [o] { return replay(*o); };
+    return [o] { return replay_any(*o); };
 }
 
 }  // namespace narpa::cli

@@ -81,8 +81,8 @@ void bodies_of_the_approach(const Run& run, Chart& chart, int along, int across,
     const auto truth = path_of(run.bus.truth, along, across, [](const PortState& s) { return s.position_m; });
     const auto estimated =
         path_of(run.bus.estimates, along, across, [](const JudgedEstimate& e) { return e.port_position_m; });
-    chart.dots(estimated, kOrange, 1.5, "estimated");
     chart.line(truth, kBlue, 1.8, "true");
+    chart.dots(estimated, kOrange, 1.1, "estimated");
     Points holds;
     for (const Leg& leg : run.scenario.legs)
         if (!leg.arc_deg && !leg.contact) holds.emplace_back(leg.to_m[along], leg.to_m[across]);
@@ -182,6 +182,10 @@ std::string motion(const Run& run) {
            far.svg() + rate.svg() + "</div>\n";
 }
 
+bool captured(const Run& run) {
+    return run.verdict.contact && run.verdict.contact->captured;
+}
+
 std::string errors(const Run& run) {
     const auto& estimates = run.bus.estimates;
     std::string out = fmt::format(
@@ -207,6 +211,7 @@ std::string errors(const Run& run) {
             double most = 0;
             for (const JudgedEstimate& e : estimates) {
                 const double t = run.bus.seconds(e.t_ns);
+                if (captured(run) && t > run.verdict.contact->t_s) break;  // one body: nothing more to know
                 const double value = (quantity == 0 ? e.position_error_m : e.rotation_error_rad)[axis] * unit;
                 const double sigma = (quantity == 0 ? e.sigma_position_m : e.sigma_rotation_rad)[axis] * unit;
                 error.emplace_back(t, value);
@@ -281,7 +286,10 @@ std::string pictures(const Run& run) {
     std::error_code none;
     for (const auto& entry : fs::directory_iterator(run.folder + "/navigation", none))
         if (entry.path().extension() == ".png") files.push_back(entry.path());
-    std::sort(files.begin(), files.end());
+    // In the order in which they were taken.
+    std::sort(files.begin(), files.end(), [&](const fs::path& a, const fs::path& b) {
+        return std::pair(fs::last_write_time(a, none), a) < std::pair(fs::last_write_time(b, none), b);
+    });
     if (files.size() > kPictures) files.resize(kPictures);
     if (files.empty()) return "";
     std::string out = "<h2>What the navigation saw</h2>\n<div class=\"charts\">";

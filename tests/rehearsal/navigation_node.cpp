@@ -1,0 +1,161 @@
+// The navigation on its wires: a hub that plays the emulator and the dynamics, frames through a FIFO, and what
+// comes back on CAN.
+#include "rehearsal/navigation/node.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "drivers/video/video_sink.h"
+#include "protocols/can/closed_loop.h"
+#include "protocols/can/messages.h"
+#include "tests/drivers/can_support.h"
+#include "tests/rehearsal/navigation_stage.h"
+#include "tests/support/command.h"
+#include "tests/support/temporary_folder.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+const std::string kScenario = NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml";
+
+/// By camera alone.
+Scenario docking() {
+    static const Scenario scenario = [] {
+        auto s = read_scenario(kScenario);
+        EXPECT_TRUE(s) << s.error().text();
+        s->navigation.lidars.clear();
+        return *std::move(s);
+    }();
+    return scenario;
+}
+
+/// What the navigation said.
+struct Heard {
+    std::vector<CanFrame> frames;
+    std::vector<NavigationEstimate> estimates;
+    std::vector<ActuatorCommand> commands;
+    std::vector<double> errors_m;
+    Status ended{Ok{}};
+};
+
+Heard fly(const std::string& folder, std::int64_t cycles) {
+    const Scenario s = docking();
+    auto model = SightModel::create(s);
+    EXPECT_TRUE(model);
+    const Camera& camera = (*model)->scene().cameras[0];
+    const std::string fifo = folder + "/nav.y4m";
+    ::mkfifo(fifo.c_str(), 0600);
+    auto sink =
+        open_video_sink(fifo, {camera.width, camera.height, camera.format, camera.period_ns}, WhenFull::wait);
+    EXPECT_TRUE(sink);
+    const auto hub = open_or_fail("slcan:0", CanRole::hub);
+
+    NodeOptions options;
+    options.bus = "slcan:" + std::to_string(hub_port(*hub));
+    options.video = {{"nav", fifo}};
+    options.lockstep = true;
+    options.log = folder + "/log";
+    StopFlag stop{false}, ready{false};
+    Heard heard;
+    std::thread navigation([&] { heard.ended = navigate(s, options, stop, [&] { ready = true; }); });
+
+    MessageDecoder<NavigationEstimate> estimates;
+    MessageDecoder<ActuatorCommand> commands;
+    const auto listen = [&](std::int64_t t_ns) {
+        for (ReceivedFrame received; hub->receive(received);) {
+            heard.frames.push_back(received.frame);
+            NavigationEstimate e;
+            if (estimates.accept(received.frame, t_ns, e) == DecodeStatus::complete) heard.estimates.push_back(e);
+            ActuatorCommand c;
+            if (commands.accept(received.frame, t_ns, c) == DecodeStatus::complete) heard.commands.push_back(c);
+        }
+    };
+    const auto send = [&](const auto& message) {
+        for (const CanFrame& f : encode_classic(message)) hub->send(f);
+    };
+    EXPECT_TRUE(turn_until(*hub, [&] {
+        listen(0);  // lets it onto the bus
+        return ready.load();
+    }));
+    test::Plant plant{s};
+    plant.stand(s.start.position_m + Vec3{0.4, -0.3, 0.3}, {0.01, -0.01, 0.01});
+    for (std::int64_t k = 0; k < cycles; ++k) {
+        const std::int64_t t_ns = k * s.period_ns();
+        send(DynamicsReport{static_cast<std::uint8_t>(k), t_ns, 0, DynamicsPhase::flying});
+        send(AttitudeReport{static_cast<std::uint8_t>(k), t_ns, plant.motion.q_world_chaser,
+                            plant.motion.chaser_rate_rad_s});
+        (*sink)->send(test::frame(**model, plant, static_cast<std::uint32_t>(k)));
+        FrameLedger ledger;
+        ledger.frame = static_cast<std::uint32_t>(5 * k);
+        ledger.t_exposure_mid_ns = ledger.t_hand_over_ns = t_ns;
+        send(ledger);
+        hub->send(encode(Heartbeat{t_ns, RunState::lockstep}));
+        EXPECT_TRUE(turn_until(*hub, [&] {
+            listen(t_ns);
+            return heard.commands.size() > static_cast<std::size_t>(k);
+        }));
+        if (heard.commands.size() != static_cast<std::size_t>(k + 1) ||
+            heard.estimates.size() != static_cast<std::size_t>(k + 1))
+            break;
+        heard.errors_m.push_back(norm(heard.estimates.back().T_chaser_target.t - test::chaser_target(plant).t));
+        plant.fly({heard.commands.back().impulse_n_s, heard.commands.back().angular_impulse_n_m_s}, 1);
+    }
+    send(DynamicsReport{static_cast<std::uint8_t>(cycles), cycles * s.period_ns(), 0, DynamicsPhase::finished});
+    navigation.join();
+    return heard;
+}
+
+TEST(NavigationNode, AnswersEachPeriodAndSaysTheSameAgain) {
+    const narpa::test::TemporaryFolder folder, other;
+    const Heard one = fly(folder / "", 3);
+    EXPECT_TRUE(one.ended) << one.ended.error().text();
+    ASSERT_EQ(one.commands.size(), 3u);
+    ASSERT_EQ(one.estimates.size(), 3u);
+    for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_EQ(one.commands[k].t_ns, static_cast<std::int64_t>(k) * 1'000'000'000);
+        EXPECT_EQ(one.estimates[k].t_ns, one.commands[k].t_ns);
+        EXPECT_EQ(one.estimates[k].frames, 1);
+        EXPECT_EQ(one.commands[k].phase, GuidancePhase::moving);
+        EXPECT_LT(one.errors_m[k], 0.05);
+    }
+    EXPECT_TRUE(std::filesystem::exists(folder / "log/navigation.json"));
+    std::ifstream csv(folder / "log/navigation.csv");
+    EXPECT_EQ(std::count(std::istreambuf_iterator<char>(csv), {}, '\n'), 4);
+
+    const Heard again = fly(other / "", 3);
+    ASSERT_EQ(again.frames.size(), one.frames.size());
+    for (std::size_t i = 0; i < one.frames.size(); ++i) EXPECT_TRUE(same(one.frames[i], again.frames[i])) << i;
+}
+
+TEST(NavigationNode, NamesWhatIsWrongWithItsSources) {
+    const StopFlag stop{false};
+    NodeOptions options;
+    options.bus = "slcan:1";
+    options.wait_s = 0;
+    const auto what = [&] {
+        const Status ended = navigate(docking(), options, stop, [] {});
+        EXPECT_FALSE(ended);
+        return ended ? std::string() : ended.error().what;
+    };
+    EXPECT_NE(what().find("0 sources for \"nav\""), std::string::npos) << what();
+    options.video = {{"left", "x.y4m"}};
+    EXPECT_NE(what().find("does not navigate by \"left\""), std::string::npos) << what();
+}
+
+TEST(NavigationProgram, EndsWithTheStatusOfWhatIsWrong) {
+    const auto status = [](const std::string& arguments) {
+        return narpa::test::run_command(NARPA_BUILD_DIR "/bin/narpa-navigation " + arguments + " 2>&1").status;
+    };
+    EXPECT_EQ(status("--help"), 0);
+    EXPECT_EQ(status("none.toml --can slcan:1"), 2);
+    EXPECT_EQ(status(kScenario), 2);
+    EXPECT_EQ(status(kScenario + " --can slcan:1 --video nav"), 2);
+    EXPECT_EQ(status(kScenario + " --can slcan:1 --video nav=/dev/video99 --lidar top=udp:0"), 3);
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal

@@ -42,6 +42,7 @@ void Guidance::step(const GuidanceInput& input) {
     if (phase_ == GuidancePhase::docked || phase_ == GuidancePhase::retreating) return;
     if (input.dynamics == DynamicsPhase::captured) {
         phase_ = GuidancePhase::docked;
+        path_ = LegPath::along({}, {}, acceleration_m_s2_);  // at rest, port to port
     } else if (input.dynamics == DynamicsPhase::bounced) {
         retreat(input, AbortReason::commanded);
     } else if (const AbortReason reason = reason_to_abort(input); reason != AbortReason::none) {

@@ -101,6 +101,7 @@ TEST(Guidance, FliesTheLegsHoldsAndDocks) {
     g.step(input);
     EXPECT_EQ(g.phase(), GuidancePhase::docked);
     EXPECT_TRUE(g.thrusters_off());
+    EXPECT_EQ(norm(g.reference(closed + 60).position_m), 0);
     EXPECT_EQ(g.abort(), AbortReason::none);
 }
 

@@ -112,9 +112,11 @@ private:
             fs::remove_all(in(name), failed);
             fs::create_directories(in(name), failed);
         }
-        for (const char* name : {"emulator.log", "dynamics.log", "navigation.log", "result.json", "junit.xml",
-                                 "index.html", "rehearsal.json"})
+        for (const char* name :
+             {"emulator.log", "dynamics.log", "navigation.log", "result.json", "junit.xml", "index.html"})
             fs::remove(in(name), failed);
+        // From here on the folder is a rehearsal's, whatever becomes of it.
+        if (Status good = write_text(in("rehearsal.json"), "{}\n"); !good) return good;
         const auto texts = scenario_texts(s_.file, s_.scene);
         if (!texts) return texts.error();
         hash_ = texts->hash;
@@ -362,14 +364,8 @@ private:
     Result<Conducted> conclude() {
         Conducted done;
         done.wall_s = seconds_since(began_);
-        done.verdict = judge_.finish();
-        Verdict& v = done.verdict;
-        if (!trouble_.empty()) {
-            v.passed = false;
-            v.headline = trouble_ + ". " + v.headline;
-            for (GateResult& g : v.gates)
-                if (g.name == "complete") g.state = GateState::failed, g.reason = trouble_ + "; " + g.reason;
-        }
+        done.verdict = judge_.finish(trouble_);
+        const Verdict& v = done.verdict;
         done.result = to_json(v);
         done.result["scenario"] = s_.name;
         done.result["scenario_hash"] = hash_;

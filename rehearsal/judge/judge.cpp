@@ -120,11 +120,12 @@ LedgerStatistics Judge::ledger_statistics() const {
     return s;
 }
 
-std::string Judge::headline(const Verdict& v) const {
+std::string Judge::headline(const Verdict& v, const std::string& trouble) const {
     const auto failed = std::find_if(v.gates.begin(), v.gates.end(),
                                      [](const GateResult& g) { return g.state == GateState::failed; });
     const std::string what = t_captured_ns_ ? fmt::format("Docked after {:.1f} s", bus_.seconds(*t_captured_ns_))
                                             : fmt::format("Flown for {:.1f} s", v.t_end_s);
+    if (!trouble.empty()) return fmt::format("{}, but {}", what, trouble);
     if (failed == v.gates.end()) return what + ", all gates passed";
     // What is left undone is the consequence more often than the cause: the gate that failed first comes first.
     auto cause = failed;
@@ -134,7 +135,7 @@ std::string Judge::headline(const Verdict& v) const {
     return fmt::format("{}, but gate {} failed: {}", what, cause->name, cause->reason);
 }
 
-Verdict Judge::finish() const {
+Verdict Judge::finish(const std::string& trouble) const {
     Verdict v;
     const Gates& gates = scenario_.gates;
     if (gates.corridor) v.gates.push_back(corridor());
@@ -143,6 +144,10 @@ Verdict Judge::finish() const {
     if (gates.navigation) v.gates.push_back(navigation());
     if (gates.contact) v.gates.push_back(contact());
     v.gates.push_back(complete());
+    if (!trouble.empty()) {
+        v.gates.back().state = GateState::failed;
+        v.gates.back().reason = trouble + "; " + v.gates.back().reason;
+    }
     if (gates.complete) v.gates.push_back(duration());
     v.passed = std::none_of(v.gates.begin(), v.gates.end(),
                             [](const GateResult& g) { return g.state == GateState::failed; });
@@ -157,7 +162,7 @@ Verdict Judge::finish() const {
     v.heartbeats = bus_.heartbeats.heard;
     v.refused = bus_.refused;
     v.late = bus_.late;
-    v.headline = headline(v);
+    v.headline = headline(v, trouble);
     return v;
 }
 

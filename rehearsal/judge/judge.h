@@ -24,8 +24,9 @@ public:
 
     /// `t_reference_ns`: a time within 39 h of the simulation clock, as a log's stamp.
     void accept(const CanFrame& frame, std::int64_t t_reference_ns);
-    /// The verdict on what has been heard; the run is taken to be over.
-    [[nodiscard]] Verdict finish() const;
+    /// The verdict on what has been heard; the run is taken to be over. `trouble`: why it is, where something went
+    /// wrong that the bus does not tell; it fails the run.
+    [[nodiscard]] Verdict finish(const std::string& trouble = {}) const;
 
     [[nodiscard]] const BusRecord& bus() const { return bus_; }
     /// The dynamics have said that the run is over.
@@ -49,7 +50,7 @@ private:
     [[nodiscard]] std::optional<Contact> contact_made() const;
     [[nodiscard]] NavigationStatistics navigation_statistics() const;
     [[nodiscard]] LedgerStatistics ledger_statistics() const;
-    [[nodiscard]] std::string headline(const Verdict& verdict) const;
+    [[nodiscard]] std::string headline(const Verdict& verdict, const std::string& trouble) const;
 
     const Scenario scenario_;
     const Failure on_failure_;

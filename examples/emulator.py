@@ -5,7 +5,7 @@ FIFO as Y4M, black; then the heartbeat says how far it is. Draw your own picture
 import os, sys, can
 
 CHANNEL, FIFO = sys.argv[1:3]
-WIDTH, HEIGHT, PERIOD_NS, CHASER = 320, 240, 200_000_000, 0x100
+WIDTH, HEIGHT, PERIOD_NS, CHASER = 320, 240, 1_000_000_000, 0x100
 
 def crc(data, bits, polynomial, value, final):
     for byte in data:
@@ -43,7 +43,7 @@ for message in bus:
         tell(frame, frame * PERIOD_NS)
         if video is None:
             video = open(FIFO, "wb", buffering=0)  # waits for a reader
-            video.write(b"YUV4MPEG2 W%d H%d F5:1 Ip A1:1 Cmono\n" % (WIDTH, HEIGHT))
+            video.write(b"YUV4MPEG2 W%d H%d F1:1 Ip A1:1 Cmono\n" % (WIDTH, HEIGHT))
         picture = b"FRAME\n" + bytes(WIDTH * HEIGHT)
         try:
             while picture: picture = picture[video.write(picture):]

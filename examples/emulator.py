@@ -2,7 +2,7 @@
 """emulator.py CHANNEL FIFO: stands in for the camera, in lockstep, on a CAN FD bus: vcan0, or the UDP group 239.74.163.2.
 Once the chaser's pose has come (it is the last), every frame that is due by its time is told in a ledger and written to the
 FIFO as Y4M, black; then the heartbeat says how far it is. Draw your own picture where it is black."""
-import os, sys, can
+import sys, can
 
 CHANNEL, FIFO = sys.argv[1:3]
 WIDTH, HEIGHT, PERIOD_NS, CHASER = 320, 240, 1_000_000_000, 0x100

@@ -1,0 +1,94 @@
+#!/usr/bin/python3
+"""The programs of examples/: docs/interfaces.md shows them as they are, each is under 60 lines, nothing of narpa's is
+imported; dynamics.py and navigation.py close the loop around `narpa run`, emulator.py stands in for it."""
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import support
+from support import expect
+
+try:
+    import can, cv2, msgpack, serial  # noqa: F401: what the examples need
+except ImportError as error:
+    support.skip(f"{error} (python3-can, python3-msgpack, python3-opencv, python3-serial)")
+
+BUILD, SOURCE = Path(os.environ["NARPA_BUILD_DIR"]), Path(__file__).resolve().parents[2]
+SCENES, GROUP = BUILD / "scenes/rehearsal", f"239.74.198.{1 + os.getpid() % 250}"
+EXAMPLES = SOURCE / "examples"
+folder = support.work_folder()
+
+
+def started(name, *command):
+    """A program in the background that has said that it is ready, and the file with what it says."""
+    out = folder / f"{name}.out"
+    process = subprocess.Popen([str(c) for c in command], stdout=open(out, "wb"), stderr=subprocess.STDOUT)
+    for _ in range(600):
+        if "ready" in out.read_text(errors="replace"):
+            return process, out
+        if process.poll() is not None:
+            break
+        support.time.sleep(0.1)
+    process.kill()
+    expect(False, f"{name} says ready; it says: {out.read_text(errors='replace')}")
+
+
+def finished(name, process, out):
+    try:
+        status = process.wait(timeout=60)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        status = "(does not end)"
+    if status != 0:
+        print(out.read_text(errors="replace"))
+    expect(status == 0, f"{name} ends well: {status}")
+    return out.read_text(errors="replace")
+
+
+def check_texts():
+    page = (SOURCE / "docs/interfaces.md").read_text()
+    for path in sorted(EXAMPLES.glob("*.py")):
+        text = path.read_text()
+        lines = len(text.splitlines())
+        expect(lines < 60, f"{path.name} has {lines} lines")
+        expect(f"```python\n{text}```\n" in page, f"docs/interfaces.md shows {path.name} as it is")
+        modules = {m for line in re.findall(r"^import (.*)", text, re.M) for m in re.split(r", | as \w+", line) if m}
+        expect(modules <= {"os", "sys", "math", "time", "can", "cv2", "numpy"}, f"{path.name} imports {sorted(modules)}")
+
+
+def check_dynamics_and_navigation(seconds):
+    fifo = folder / "nav"
+    os.mkfifo(fifo)
+    with support.Run(SCENES / "scene.toml", "--can", "slcan:0", "--video", f"nav={fifo}", "--lockstep") as run:
+        channel = "socket://127.0.0.1:" + run.wait_for(r"commands: slcan: 127\.0\.0\.1:(\d+) ")[1]
+        navigation = started("navigation", sys.executable, EXAMPLES / "navigation.py", channel, fifo, "0")
+        done = subprocess.run([sys.executable, EXAMPLES / "dynamics.py", channel, str(seconds)], capture_output=True,
+                              text=True, timeout=120)
+        expect(done.returncode == 0, f"dynamics.py ends well: {done.returncode} {done.stderr[-500:]}")
+        expect(len(done.stdout.splitlines()) == seconds, f"it was commanded {seconds} times: {done.stdout[-300:]}")
+        said = finished("navigation.py", *navigation)
+        expect(f"{seconds - 1}: off by" in said, "it answered to the last")
+        run.stop()
+
+
+def check_emulator(seconds):
+    fifo, scenario = folder / "black", folder / "short.toml"
+    os.mkfifo(fifo)
+    scenario.write_text(f"""[scenario]\nbased_on = "{SCENES}/docking-camera.toml"\nname = "short"
+scene = "{SCENES}/scene.toml"\nduration_s = {seconds}.0\n""")
+    emulator = started("emulator", sys.executable, EXAMPLES / "emulator.py", GROUP, fifo)
+    bus = ["--can", f"udp:{GROUP}", "--lockstep"]
+    navigation = started("narpa-navigation", BUILD / "bin/narpa-navigation", scenario, *bus, "--video", f"nav={fifo}")
+    done = subprocess.run([BUILD / "bin/narpa-dynamics", scenario, *bus, "--patience", "60"], capture_output=True,
+                          text=True, timeout=120)
+    expect(done.returncode == 0, f"narpa-dynamics ends well: {done.returncode} {done.stderr[-500:]}")
+    finished("narpa-navigation", *navigation)
+    said = finished("emulator.py", *emulator)
+    expect(f"{seconds}.00 s, {seconds + 1} frames" in said, f"{seconds + 1} frames were handed over")
+
+
+check_texts()
+check_dynamics_and_navigation(8)
+check_emulator(8)

@@ -41,6 +41,8 @@ Child::Command command_for(const CampaignOptions& o, const std::string& folder, 
               std::to_string(threads),
               "--patience",
               fmt::format("{:g}", r.patience_s)};
+    c.line.insert(c.line.end(), {"--can", r.bus});
+    for (const auto& [camera, device] : r.video) c.line.insert(c.line.end(), {"--video", camera + "=" + device});
     if (r.real_time) c.line.emplace_back("--real-time");
     if (!r.dynamics.empty()) c.line.insert(c.line.end(), {"--dynamics", r.dynamics});
     if (!r.navigation.empty()) c.line.insert(c.line.end(), {"--navigation", r.navigation});
@@ -63,6 +65,11 @@ bool is_done(const std::string& folder, const std::string& scenario_hash, std::u
 }
 
 Result<json> conduct_campaign(const CampaignOptions& o, const Narrator& narrator, const StopFlag& stop) {
+    if (o.jobs > 1 && (o.run.bus != "slcan:0" || !o.run.video.empty()))
+        return Error{
+            fmt::format("--jobs {}: runs at the same time cannot share a bus or a device, expected --jobs 1 "
+                        "with --can or --video",
+                        o.jobs)};
     const auto scenario = read_scenario(o.run.scenario);
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(scenario->file, scenario->scene);

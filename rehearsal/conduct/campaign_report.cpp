@@ -149,9 +149,9 @@ std::string contact_plots(const std::vector<RunResult>& runs) {
         lateral = limit(2);
         pitch = limit(3), roll = limit(4);
     }
-    Chart a("Where the ports met", "y [cm]", "z [cm]", 370, 360),
-        b("Rates", "closing [cm/s]", "lateral [cm/s]", 370, 360),
-        c("Angles", "pitch and yaw [deg]", "roll [deg]", 370, 360);
+    Chart a("Where the ports met", "y [cm]", "z [cm]", 360, 350),
+        b("Rates", "closing [cm/s]", "lateral [cm/s]", 360, 350),
+        c("Angles", "pitch and yaw [deg]", "roll [deg]", 360, 350);
     a.equal_scales();
     a.range_x(-130 * lateral, 130 * lateral);
     a.range_y(-130 * lateral, 130 * lateral);

@@ -115,5 +115,15 @@ TEST(Whole, WhatTheEmulatorRefusesIsBadInput) {
     EXPECT_NE(conduct(o, kSilent, stop).error().what.find("does not navigate by this camera"), std::string::npos);
 }
 
+TEST(Whole, RunsAtTheSameTimeShareNoDevice) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    CampaignOptions o{options(folder), 2, 2};
+    o.run.bus = "vcan0";
+    const auto done = conduct_campaign(o, kSilent, stop);
+    ASSERT_FALSE(done);
+    EXPECT_NE(done.error().what.find("cannot share a bus"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace narpa::rehearsal

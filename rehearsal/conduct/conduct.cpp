@@ -1,8 +1,6 @@
 #include "rehearsal/conduct/conduct.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -16,6 +14,7 @@
 
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/conduct/child.h"
+#include "rehearsal/conduct/lidar_port.h"
 #include "rehearsal/conduct/page.h"
 
 namespace narpa::rehearsal {
@@ -30,23 +29,6 @@ constexpr std::int64_t kBusWaitNs = 20'000'000;
 
 double seconds_since(Clock::time_point t) {
     return std::chrono::duration<double>(Clock::now() - t).count();
-}
-
-/// A UDP port of the loopback that nobody has now.
-Result<int> free_udp_port() {
-    const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    const bool good = fd >= 0 && ::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
-                      ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0;
-    const int reason = errno;
-    if (fd >= 0) ::close(fd);
-    if (!good)
-        return Error{fmt::format("no UDP port on the loopback: {}", std::strerror(reason)), "", 0, 0,
-                     ErrorKind::missing};
-    return static_cast<int>(ntohs(address.sin_port));
 }
 
 std::string time_of_day() {
@@ -142,7 +124,7 @@ private:
                                          camera, device, fmt::join(s_.navigation.cameras, " or ")),
                              s_.file};
         for (const std::string& lidar : s_.navigation.lidars) {
-            auto port = free_udp_port();
+            auto port = free_lidar_port();
             if (!port) return port.error();
             lidar_.emplace_back(lidar, *port);
         }

@@ -1,0 +1,94 @@
+#!/usr/bin/python3
+"""Whole rehearsals, judged.
+
+Usage: rehearse.py docks       the last ten metres: docks inside the docking standard's box, on 1 and 2 threads byte for byte, and replay agrees
+       rehearse.py fails       the three scenarios that must fail do, each at its gate
+       rehearse.py flies       around a real small body (the shape of Itokawa), where ../shared/assets has it"""
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import support
+from support import expect
+
+SCENARIOS = Path(os.environ["NARPA_BUILD_DIR"]) / "scenes/rehearsal"
+MESH = Path(__file__).resolve().parents[3] / "shared/assets/smallbody/itokawa/ItokawaHayabusa.obj"
+
+
+def rehearse(scenario, folder, *options):
+    """Exit status and verdict."""
+    done = subprocess.run([support.NARPA, "rehearse", scenario, "-o", folder, "--json", *options], capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        print(done.stderr)
+    expect(done.returncode in (0, 1), f"{scenario.name} runs to its end")
+    return done.returncode, json.loads(done.stdout)
+
+
+def failed_gates(verdict):
+    return {g["name"]: g["reason"] for g in verdict["gates"] if g["state"] == "failed"}
+
+
+def docks():
+    folder = support.work_folder()
+    status, verdict = rehearse(SCENARIOS / "dispersions.toml", folder / "one", "--threads", "1")
+    expect(status == 0, f"it docks and passes all gates: {failed_gates(verdict)}")
+    for c in verdict["contact"]["conditions"]:
+        print(f"    {c['name']} {c['value']:.4g} {c['unit']}")
+    rehearse(SCENARIOS / "dispersions.toml", folder / "two", "--threads", "2")
+    for file in ["emulator/can.log", "emulator/nav.ledger.csv", "dynamics/truth.csv", "navigation/navigation.csv"]:
+        one, two = ((folder / run / file).read_bytes() for run in ("one", "two"))
+        if file.endswith("ledger.csv"):  # its times of making are those of the wall
+            one, two = ([line.split(b",")[-1] for line in text.splitlines()] for text in (one, two))
+        expect(one == two, f"{file} is the same on 1 and on 2 threads")
+
+
+def fails():
+    for name, gate, reason in [("fails-stuck-thruster", "corridor", "off the axis"),
+                               ("fails-fast-contact", "contact", "closing rate 0.1"),
+                               ("fails-blind", "complete", "lost")]:
+        status, verdict = rehearse(SCENARIOS / f"{name}.toml", support.work_folder() / name)
+        failed = failed_gates(verdict)
+        expect(status == 1 and reason in failed.get(gate, ""), f"{name} fails at {gate}: {failed.get(gate)}")
+
+
+def flies():
+    if not MESH.exists():
+        support.skip(f"{MESH} is not there: the shape of Itokawa")
+    folder = support.work_folder()
+    (folder / "scene.toml").write_text(f"""
+[scene]
+based_on = "{SCENARIOS}/flyaround-scene.toml"
+
+[[body]]
+name = "asteroid"
+mesh = "{MESH}"
+scale = 100.0
+can_id = 0x110
+
+[[body]]
+name = "chaser"
+mesh = "{SCENARIOS}/../docking/chaser.obj"
+can_id = 0x100
+position_m = [62.0, 0.0, 0.0]
+attitude_wxyz = [0.0, 0.0, 0.0, 1.0]
+""")
+    (folder / "itokawa.toml").write_text(f"""
+[scenario]
+based_on = "{SCENARIOS}/flyaround.toml"
+name = "itokawa"
+scene = "scene.toml"
+duration_s = 40.0
+
+[gates]
+complete = false
+""")
+    _, verdict = rehearse(folder / "itokawa.toml", folder / "out")
+    failed = failed_gates(verdict)
+    expect(set(failed) <= {"duration"}, f"around Itokawa nothing fails but that 40 s are over: {failed}")
+    n = verdict["navigation"]
+    expect(n["with_frames"] >= 38 and n["with_sweeps"] >= 38, f"frames and sweeps are taken: {n['with_frames']}, {n['with_sweeps']} of {n['estimates']}")
+
+
+{"docks": docks, "fails": fails, "flies": flies}[sys.argv[1]]()

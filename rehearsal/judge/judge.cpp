@@ -67,6 +67,8 @@ void Judge::see(const JudgedEstimate& estimate) {
     const Gates::NavigationError limits = scenario_.gates.navigation.value_or(Gates::NavigationError{});
     const bool told = position_.first || attitude_.first;
     sigmas_.see(estimate, limits.sigmas - estimate.largest_in_sigmas());
+    measured_ |= estimate.frames + estimate.sweeps > 0;
+    if (!measured_) return;  // it knows what the scenario tells
     const bool too_far = position_.see(estimate, limits.position_m - norm(estimate.position_error_m));
     const bool too_turned = attitude_.see(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDeg);
     if (scenario_.gates.navigation && (too_far || too_turned) && !told) tell(navigation());
@@ -80,6 +82,7 @@ NavigationStatistics Judge::navigation_statistics() const {
     const double sigmas = scenario_.gates.navigation.value_or(Gates::NavigationError{}).sigmas;
     std::vector<double> position, attitude;
     std::size_t within = 0;
+    bool measured = false;
     for (const JudgedEstimate& e : bus_.estimates) {
         if (t_captured_ns_ && e.t_ns > *t_captured_ns_) continue;
         ++s.estimates;
@@ -87,6 +90,8 @@ NavigationStatistics Judge::navigation_statistics() const {
         s.with_sweeps += e.sweeps > 0;
         within += e.largest_in_sigmas() <= sigmas;
         s.nees += e.nees();
+        measured |= e.frames + e.sweeps > 0;
+        if (!measured) continue;
         position.push_back(norm(e.position_error_m));
         attitude.push_back(norm(e.rotation_error_rad) * kDeg);
     }
@@ -102,6 +107,7 @@ NavigationStatistics Judge::navigation_statistics() const {
 LedgerStatistics Judge::ledger_statistics() const {
     LedgerStatistics s;
     std::vector<double> latency, exposed, render, late;
+    const DynamicsReport* const finished = bus_.first_report(DynamicsPhase::finished);
     for (const FrameLedger& l : bus_.ledgers) {
         ++s.frames;
         s.deadlines_met += l.deadline_met;
@@ -109,7 +115,9 @@ LedgerStatistics Judge::ledger_statistics() const {
         render.push_back(static_cast<double>(l.t_render_end_ns - l.t_render_start_ns) * 1e-6);
         if (l.t_hand_over_ns == 0 || l.delivery == Delivery::nothing) continue;
         ++s.handed_over;
-        latency.push_back(static_cast<double>(l.t_hand_over_ns - l.t_pose_ns) * 1e-6);
+        // Before the first pose and after the last there is none to be late for.
+        if (l.t_pose_ns >= bus_.t_start_ns() && (!finished || l.t_exposure_mid_ns <= finished->t_ns))
+            latency.push_back(static_cast<double>(l.t_hand_over_ns - l.t_pose_ns) * 1e-6);
         exposed.push_back(static_cast<double>(l.t_hand_over_ns - l.t_exposure_mid_ns) * 1e-6);
         late.push_back(static_cast<double>(l.t_hand_over_ns - l.t_deadline_ns) * 1e-6);
     }

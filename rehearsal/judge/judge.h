@@ -58,7 +58,7 @@ private:
     std::size_t failures_ = 0;
     std::optional<std::int64_t> t_captured_ns_;
     std::optional<std::int64_t> t_contact_ns_;  ///< captured or bounced, whichever came first
-    bool abort_told_ = false, contact_judged_ = false;
+    bool abort_told_ = false, contact_judged_ = false, measured_ = false;
 
     Watch<PortState> corridor_, keep_out_, distance_;
     Watch<JudgedEstimate> position_, attitude_, sigmas_;  ///< largest errors, and those beyond the gate's sigmas

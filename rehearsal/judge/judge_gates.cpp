@@ -88,7 +88,8 @@ GateResult Judge::navigation() const {
                     .asked = fmt::format("{:g} % of the estimates within {:g} standard "
                                          "deviations in all six components",
                                          limits.share * 100, limits.sigmas)};
-    if (std::isfinite(limits.position_m)) gate.asked += fmt::format(", never {:g} m off", limits.position_m);
+    if (std::isfinite(limits.position_m))
+        gate.asked += fmt::format(", once it has measured never {:g} m off", limits.position_m);
     if (std::isfinite(limits.attitude_deg)) gate.asked += fmt::format(", never {:g} deg off", limits.attitude_deg);
     if (sigmas_.seen == 0) {
         gate.state = GateState::failed;

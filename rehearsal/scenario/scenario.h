@@ -132,7 +132,7 @@ struct Gates {
     struct NavigationError {
         double sigmas = 4;    ///< |error| of each of the six, in standard deviations as told on CAN
         double share = 0.99;  ///< of the estimates that are within
-        double position_m = std::numeric_limits<double>::infinity();  ///< largest error at all
+        double position_m = std::numeric_limits<double>::infinity();  ///< largest error once it has measured
         double attitude_deg = std::numeric_limits<double>::infinity();
     };
     std::optional<Corridor> corridor;

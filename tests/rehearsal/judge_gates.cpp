@@ -179,6 +179,29 @@ TEST(Judge, EstimatesAreJudgedByTheirOwnDeviations) {
     EXPECT_EQ(gate(far, "navigation").t_first_s, 2) << gate(far, "navigation").reason;
 }
 
+TEST(Judge, LargestErrorsCountFromTheFirstMeasurementOn) {
+    Scenario s = small_scenario();
+    s.legs[1].contact = false;
+    s.gates.navigation = Gates::NavigationError{.sigmas = 4, .share = 0, .position_m = 0.5, .attitude_deg = 3};
+    const auto flown = [&](int wrong) {
+        Messages m(s);
+        const Motion chaser = chaser_at(s, {30, 1, 2}, {}, {0.1, 0.2, 0.3});
+        for (int k = 0; k < 4; ++k) {
+            m.poses(k, chaser);
+            const std::uint8_t taken = k == 1 ? 1 : 0;
+            m.estimate(k, chaser, {0, k == wrong ? 2.0 : 0.0, 0}, {}, 1, 0.01, {}, taken);
+        }
+        m.command(4, GuidancePhase::done, 1);
+        m.report(5, DynamicsPhase::finished);
+        return judge(s, m);
+    };
+    const Verdict before = flown(0), after = flown(3);
+    EXPECT_EQ(gate(before, "navigation").state, State::passed) << gate(before, "navigation").reason;
+    EXPECT_LT(before.navigation.position_m.max, 1e-3);
+    EXPECT_EQ(gate(after, "navigation").state, State::failed);
+    EXPECT_EQ(gate(after, "navigation").t_first_s, 3);
+}
+
 TEST(Judge, WithoutEstimatesTheNavigationFails) {
     Scenario s = small_scenario();
     s.gates.navigation = Gates::NavigationError{};

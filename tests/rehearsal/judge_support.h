@@ -64,7 +64,8 @@ public:
     }
     /// Off the truth by errors in the chaser's body axes.
     void estimate(double t_s, const Motion& chaser, const Vec3& error_m = {}, const Vec3& error_rad = {},
-                  double sigma_m = 0.1, double sigma_rad = 0.01, const Motion& target = {}) {
+                  double sigma_m = 0.1, double sigma_rad = 0.01, const Motion& target = {},
+                  std::uint8_t taken = 1) {
         NavigationEstimate e;
         e.cycle = cycle_++;
         e.t_ns = ns(t_s);
@@ -73,7 +74,7 @@ public:
         e.T_chaser_target.q = exp_rotation(error_rad) * e.T_chaser_target.q;
         e.sigma_position_m = {sigma_m, sigma_m, sigma_m};
         e.sigma_rotation_rad = {sigma_rad, sigma_rad, sigma_rad};
-        e.frames = 1;
+        e.frames = taken;
         put(encode_classic(e));
     }
     void ledger(std::uint32_t frame, double t_pose_s, double t_hand_over_s, bool met = true) {

@@ -17,6 +17,8 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr std::int64_t kShortWaitNs = 20'000'000;
+/// In real time poses are on the bus so long before they hold, so that a frame of that instant is of that pose.
+constexpr std::int64_t kLeadNs = 5'000'000;
 constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
 
 /// One body's commands on the wire.
@@ -97,7 +99,7 @@ private:
     Status run_in_real_time() {
         if (auto ready = synchronise(); !ready || stop_) return ready;
         for (;; next_ns_ += scenario_.pose_period_ns()) {
-            if (auto waited = wait_until(t_start_ns_ + next_ns_); !waited || stop_) return waited;
+            if (auto waited = wait_until(t_start_ns_ + next_ns_ - kLeadNs); !waited || stop_) return waited;
             if (auto moved = advance_to(next_ns_); !moved) return moved;
             const bool period = next_ns_ % scenario_.period_ns() == 0;
             if (auto said = period ? say_period() : send_poses(); !said || over_) return said;

@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdint>
+#include <ctime>
 
 namespace narpa {
 
@@ -16,11 +18,20 @@ inline StopFlag& stop_flag() noexcept {
     return flag;
 }
 
-/// SIGINT and SIGTERM set the flag once; a second one ends the program at once.
+/// SIGINT and SIGTERM set the flag; one more after a second or longer ends the program at once, with status 130.
+/// (timeout(1) and others signal a process and then its group, which it is in: that is one request, not two.)
 inline void stop_on_signals() noexcept {
     struct sigaction action {};
     action.sa_handler = [](int) {
-        if (stop_flag().exchange(true)) ::_exit(130);
+        static std::atomic<std::int64_t> first_ns{0};
+        timespec now{};
+        ::clock_gettime(CLOCK_MONOTONIC, &now);
+        const std::int64_t now_ns = std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+        std::int64_t before_ns = 0;
+        if (first_ns.compare_exchange_strong(before_ns, now_ns))
+            stop_flag() = true;
+        else if (now_ns - before_ns >= 1'000'000'000)
+            ::_exit(130);
     };
     ::sigaction(SIGINT, &action, nullptr);
     ::sigaction(SIGTERM, &action, nullptr);

@@ -35,11 +35,12 @@ struct TracingThreads {
     [[nodiscard]] bool refused() const noexcept { return real_time.refused; }
 
     /// Returns when all threads were in the arena at once, so that each has its stack, its heap and its priority;
-    /// or, where the kernel does not let them run, soon. Called by the thread that will trace.
-    void gather() {
+    /// or, where the kernel does not let them run, when `patience` has passed. Called by the thread that will
+    /// trace.
+    void gather(std::chrono::seconds patience = std::chrono::seconds(1)) {
         using namespace std::chrono_literals;
         const int wanted_here = arena.max_concurrency();
-        const auto until = std::chrono::steady_clock::now() + 1s;
+        const auto until = std::chrono::steady_clock::now() + patience;
         std::atomic<int> here{0};
         arena.execute([&] {
             tbb::parallel_for(

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "emulator/frame_tracker.h"
 #include "base/stop.h"
+#include "emulator/frame_tracker.h"
 #include "emulator/threads.h"
 
 namespace narpa {

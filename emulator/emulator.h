@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/stop.h"
 #include "emulator/camera_feed.h"
 #include "emulator/can_node.h"
 #include "emulator/estimate_feed.h"
 #include "emulator/lidar_feed.h"
 #include "emulator/realtime.h"
-#include "base/stop.h"
 
 namespace narpa {
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "base/stop.h"
 #include "emulator/frame_tracker.h"
 #include "emulator/row_log.h"
 #include "emulator/spsc_ring.h"
-#include "base/stop.h"
 #include "protocols/ledger.h"
 
 namespace narpa {

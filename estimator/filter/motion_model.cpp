@@ -14,12 +14,6 @@ namespace {
 /// Of a turn that one step of a tumbling body makes: the fourth-order steps are good to 1e-9 of it.
 constexpr double kTumbleStepRad = 0.02;
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-    Eigen::Matrix3d m;
-    m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-    return m;
-}
-
 /// Of (position, velocity).
 Matrix6 translation_rates(double n) {
     Matrix6 F = Matrix6::Zero();

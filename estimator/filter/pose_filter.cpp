@@ -10,13 +10,6 @@ namespace {
 
 using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 
-Eigen::Matrix3d matrix(const Quat& q) {
-    const auto c = columns(q);
-    Eigen::Matrix3d m;
-    m << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
-    return m;
-}
-
 bool is_unit(const Quat& q) {
     return std::abs(norm(q) - 1) < 1e-6;
 }
@@ -52,8 +45,8 @@ Rigid3 expected_pose(const RelativeState& state, const PoseMeasurement& m) {
 /// How the error of a pose in axes that q_frame_axes turns to the frame's depends on that of the state.
 Matrix6x12 pose_jacobian(const Quat& q_frame_axes, const RelativeState& state) {
     Matrix6x12 H = Matrix6x12::Zero();
-    H.block<3, 3>(0, 6) = matrix(conjugate(q_frame_axes) * state.q_frame_target);
-    H.block<3, 3>(3, 0) = matrix(conjugate(q_frame_axes));
+    H.block<3, 3>(0, 6) = rotation_matrix(conjugate(q_frame_axes) * state.q_frame_target);
+    H.block<3, 3>(3, 0) = rotation_matrix(conjugate(q_frame_axes));
     return H;
 }
 

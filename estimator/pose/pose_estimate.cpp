@@ -5,23 +5,6 @@
 #include <limits>
 
 namespace narpa {
-namespace {
-
-Eigen::Matrix3d skew(const Vec3& v) {
-    Eigen::Matrix3d m;
-    m << 0, -v.z, v.y, v.z, 0, -v.x, -v.y, v.x, 0;
-    return m;
-}
-
-Eigen::Matrix3d matrix(const Quat& q) {
-    const auto c = columns(q);
-    Eigen::Matrix3d m;
-    m << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
-    return m;
-}
-
-}  // namespace
-
 Rigid3 displaced(const Rigid3& T, const Vector6& error) {
     return {normalized(exp_rotation({error[0], error[1], error[2]}) * T.q),
             T.t + Vec3{error[3], error[4], error[5]}};
@@ -61,10 +44,10 @@ double normalised_error_squared(const Vector6& error, const Matrix6& covariance)
 
 Matrix6 covariance_of_inverse(const Rigid3& T, const Matrix6& covariance) {
     // q^-1 exp(-r) = exp(-q^-1 r) q^-1;  t' = -q^-1 exp(-r) (t + d)  =>  d' = -q^-1 (d + [t] r)
-    const Eigen::Matrix3d R_inverse = matrix(T.q).transpose();
+    const Eigen::Matrix3d R_inverse = rotation_matrix(T.q).transpose();
     Matrix6 J = Matrix6::Zero();
     J.topLeftCorner<3, 3>() = -R_inverse;
-    J.bottomLeftCorner<3, 3>() = -R_inverse * skew(T.t);
+    J.bottomLeftCorner<3, 3>() = -R_inverse * skew(to_eigen(T.t));
     J.bottomRightCorner<3, 3>() = -R_inverse;
     return J * covariance * J.transpose();
 }
@@ -72,13 +55,13 @@ Matrix6 covariance_of_inverse(const Rigid3& T, const Matrix6& covariance) {
 Matrix6 covariance_of_product(const Rigid3& T_a_b, const Matrix6& covariance_of_a_b, const Rigid3& T_b_c) {
     // q_ac turns with q_ab; t_ac = q_ab t_bc + t_ab  =>  d_ac = d_ab - [q_ab t_bc] r
     Matrix6 J = Matrix6::Identity();
-    J.bottomLeftCorner<3, 3>() = -skew(T_a_b.q * T_b_c.t);
+    J.bottomLeftCorner<3, 3>() = -skew(to_eigen(T_a_b.q * T_b_c.t));
     return J * covariance_of_a_b * J.transpose();
 }
 
 Matrix6 covariance_in_other_axes(const Quat& q_a_c, const Matrix6& covariance) {
     // q_ab = q_ac q_cb and t_ab = q_ac t_cb + t_ac: both errors only turn.
-    const Eigen::Matrix3d R = matrix(q_a_c);
+    const Eigen::Matrix3d R = rotation_matrix(q_a_c);
     Matrix6 J = Matrix6::Zero();
     J.topLeftCorner<3, 3>() = R;
     J.bottomRightCorner<3, 3>() = R;

@@ -18,6 +18,19 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 inline Eigen::Vector3d to_eigen(const Vec3& v) {
     return {v.x, v.y, v.z};
 }
+/// R(q) v = q * v.
+inline Eigen::Matrix3d rotation_matrix(const Quat& q) {
+    const auto c = columns(q);
+    Eigen::Matrix3d R;
+    R << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
+    return R;
+}
+/// skew(a) b = a x b.
+inline Eigen::Matrix3d skew(const Eigen::Vector3d& a) {
+    Eigen::Matrix3d m;
+    m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+    return m;
+}
 inline Vec3 to_vec3(const Eigen::Vector3d& v) {
     return {v.x(), v.y(), v.z()};
 }

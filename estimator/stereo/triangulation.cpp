@@ -21,13 +21,6 @@ constexpr int kIterationsMax = 20, kHalvingsMax = 10;
 /// What cancels to this part of its terms is rounding.
 constexpr double kRounding = 1e-12;
 
-Matrix3d rotation_matrix(const Quat& q) {
-    const auto c = columns(q);
-    Matrix3d R;
-    R << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
-    return R;
-}
-
 /// Direction of a pixel's ray, z = 1.
 Vector3d ray_through(const Camera& camera, const Vector2d& px) {
     return {(px.x() - camera.cx) / camera.fx, (px.y() - camera.cy) / camera.fy, 1};

@@ -19,23 +19,10 @@ constexpr double kMetPosition_m = 0.05, kMetAttitude_rad = 0.3 * kDegree, kMetRa
 constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
                  kLeastRate_rad_s = 2e-3 * kDegree;
 
-Eigen::Matrix3d skew(const Vec3& v) {
-    Eigen::Matrix3d m;
-    m << 0, -v.z, v.y, v.z, 0, -v.x, -v.y, v.x, 0;
-    return m;
-}
-
-Eigen::Matrix3d matrix(const Quat& q) {
-    const auto c = columns(q);
-    Eigen::Matrix3d m;
-    m << to_eigen(c[0]), to_eigen(c[1]), to_eigen(c[2]);
-    return m;
-}
-
 /// A star tracker's error turns the target about the chaser: of a pose with this translation from it.
 Matrix6 turned_about_chaser(const Vec3& target_from_chaser_m, double sigma_rad) {
     Eigen::Matrix<double, 6, 3> J;
-    J << Eigen::Matrix3d::Identity(), -skew(target_from_chaser_m);
+    J << Eigen::Matrix3d::Identity(), -skew(to_eigen(target_from_chaser_m));
     return sigma_rad * sigma_rad * J * J.transpose();
 }
 
@@ -43,7 +30,7 @@ Matrix6 turned_about_chaser(const Vec3& target_from_chaser_m, double sigma_rad) 
 Eigen::Matrix3d spread(const Quat& q, const Vec3& sigma, double least) {
     Eigen::Vector3d variance;
     for (int i = 0; i < 3; ++i) variance[i] = std::pow(std::max(sigma[i], least), 2);
-    const Eigen::Matrix3d R = matrix(q);
+    const Eigen::Matrix3d R = rotation_matrix(q);
     return R * variance.asDiagonal() * R.transpose();
 }
 

@@ -9,14 +9,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-Scenario docking() {
-    static const Scenario scenario = [] {
-        auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
-        EXPECT_TRUE(s) << s.error().text();
-        return *std::move(s);
-    }();
-    return scenario;
-}
+using test::docking;
 
 Leg straight(const Vec3& to_m, double speed_m_s) {
     Leg leg;

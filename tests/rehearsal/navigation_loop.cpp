@@ -6,18 +6,12 @@
 
 #include "rehearsal/dynamics/simulation.h"
 #include "rehearsal/navigation/autopilot.h"
+#include "tests/rehearsal/navigation_plant.h"
 
 namespace narpa::rehearsal {
 namespace {
 
-Scenario docking() {
-    static const Scenario scenario = [] {
-        auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
-        EXPECT_TRUE(s) << s.error().text();
-        return *std::move(s);
-    }();
-    return scenario;
-}
+using test::docking;
 
 struct Flight {
     std::vector<CycleRecord> cycles;

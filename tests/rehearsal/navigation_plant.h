@@ -2,11 +2,23 @@
 /// without a bus: linear gravity, rigid chaser, pulses at full force from the beginning of each period.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/LU>
 
 #include "rehearsal/navigation/flight_control.h"
 
 namespace narpa::rehearsal::test {
+
+/// The docking that comes with narpa; read once.
+inline const Scenario& docking() {
+    static const Scenario scenario = [] {
+        auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
+        EXPECT_TRUE(s) << s.error().text();
+        return *std::move(s);
+    }();
+    return scenario;
+}
 
 struct Plant {
     Scenario scenario;

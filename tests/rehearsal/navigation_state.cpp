@@ -12,14 +12,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-Scenario docking() {
-    static const Scenario scenario = [] {
-        auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
-        EXPECT_TRUE(s) << s.error().text();
-        return *std::move(s);
-    }();
-    return scenario;
-}
+using test::docking;
 
 Rigid3 chaser_target(const test::Plant& plant) {
     const RelativeMotion& m = plant.motion;

@@ -40,9 +40,9 @@ inline constexpr std::array<std::string_view, 6> kGuidancePhases{"moving", "hold
                                                                  "docked", "retreating", "done"};
 
 /// Why the navigation has given up.
-enum class AbortReason : std::uint8_t { none, lost, uncertain, off_reference, commanded };
+enum class AbortReason : std::uint8_t { none, lost, uncertain, off_reference, bounced };
 inline constexpr std::array<std::string_view, 5> kAbortReasons{"none", "lost", "uncertain", "off_reference",
-                                                               "commanded"};
+                                                               "bounced"};
 
 /// What the thrusters are to do from t_ns on, within one control period.
 struct ActuatorCommand {

@@ -5,8 +5,9 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// Of what the thrusters can do, so much for the reference: the rest is the controller's.
-constexpr double kShareOfThrust = 0.2;
+/// Of what the thrusters can do, so much for the reference: the rest is the controller's. A retreat has to come to
+/// a stop before the port.
+constexpr double kShareOfThrust = 0.2, kShareToRetreat = 0.6;
 /// Half of the stretch of time over which a reference attitude's rate is taken.
 constexpr double kRateStep_s = 0.05;
 
@@ -27,13 +28,13 @@ Guidance::Guidance(const Scenario& scenario, double t_s)
       limits_(scenario.navigation),
       control_(scenario.control),
       period_s_(scenario.navigation.period_s),
-      acceleration_m_s2_(kShareOfThrust * scenario.thrusters.force_n / scenario.chaser.mass_kg) {
+      thrust_m_s2_(scenario.thrusters.force_n / scenario.chaser.mass_kg) {
     begin_leg(scenario.start.position_m, t_s);
 }
 
 void Guidance::begin_leg(const Vec3& from_m, double t_s) {
     const Leg& leg = legs_[leg_];
-    path_ = LegPath::along(leg, from_m, acceleration_m_s2_);
+    path_ = LegPath::along(leg, from_m, kShareOfThrust * thrust_m_s2_);
     leg_from_s_ = t_s;
     phase_ = leg.contact ? GuidancePhase::closing : GuidancePhase::moving;
 }
@@ -42,9 +43,9 @@ void Guidance::step(const GuidanceInput& input) {
     if (phase_ == GuidancePhase::docked || phase_ == GuidancePhase::retreating) return;
     if (input.dynamics == DynamicsPhase::captured) {
         phase_ = GuidancePhase::docked;
-        path_ = LegPath::along({}, {}, acceleration_m_s2_);  // at rest, port to port
+        path_ = LegPath::along({}, {}, kShareOfThrust * thrust_m_s2_);  // at rest, port to port
     } else if (input.dynamics == DynamicsPhase::bounced) {
-        retreat(input, AbortReason::commanded);
+        retreat(input, AbortReason::bounced);
     } else if (const AbortReason reason = reason_to_abort(input); reason != AbortReason::none) {
         retreat(input, reason);
     } else {
@@ -60,13 +61,15 @@ AbortReason Guidance::reason_to_abort(const GuidanceInput& input) const {
     return AbortReason::none;
 }
 
-/// Out along the port's axis from within the cone about it; from beside the port straight away.
+/// Out along the port's axis from contact and from within the cone about it; from beside the port straight away.
+/// From contact it begins at rest: what carried it in is gone.
 void Guidance::retreat(const GuidanceInput& input, AbortReason reason) {
     const Vec3& r = input.port_m;
+    const bool bounced = reason == AbortReason::bounced;
     const bool before_port = r.x >= std::hypot(r.y, r.z);
-    const Vec3 direction = before_port || norm(r) == 0 ? Vec3{1, 0, 0} : normalized(r);
-    path_ = LegPath::away(r, direction, dot(input.port_velocity_m_s, direction), control_.retreat_m_s,
-                          acceleration_m_s2_);
+    const Vec3 direction = bounced || before_port ? Vec3{1, 0, 0} : normalized(r);
+    const double first_m_s = bounced ? 0 : dot(input.port_velocity_m_s, direction);
+    path_ = LegPath::away(r, direction, first_m_s, control_.retreat_m_s, kShareToRetreat * thrust_m_s2_);
     leg_from_s_ = input.t_s;
     phase_ = GuidancePhase::retreating;
     abort_ = reason;

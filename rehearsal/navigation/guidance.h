@@ -34,7 +34,7 @@ public:
     Guidance(const Scenario& scenario, double t_s);
 
     /// Once each control period, with times that grow: moves on from leg to leg, gives up, lets go. A contact that
-    /// does not hold is an order to retreat (AbortReason::commanded).
+    /// does not hold is a reason to retreat.
     void step(const GuidanceInput& input);
 
     [[nodiscard]] GuidancePhase phase() const noexcept { return phase_; }
@@ -60,7 +60,7 @@ private:
     std::vector<Leg> legs_;
     Navigation limits_;
     Control control_;
-    double period_s_, acceleration_m_s2_;
+    double period_s_, thrust_m_s2_;
     std::size_t leg_ = 0;
     LegPath path_;
     double leg_from_s_ = 0;

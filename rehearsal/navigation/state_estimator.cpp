@@ -138,11 +138,10 @@ void StateEstimator::met(std::int64_t t_ns, bool held) {
     advance(t_ns);
     pulses_.clear();
     RelativeMotion m = motion();
-    if (held) {
-        Vec3 port = port_state(m, scenario_.target, scenario_.chaser).T_port_chaser_port.t;
-        port.x = 0;
-        place_port(port, {}, scenario_.target, scenario_.chaser, m);
-    }
+    const PortState port = port_state(m, scenario_.target, scenario_.chaser);
+    const Vec3 at = port.T_port_chaser_port.t, along = port.velocity_m_s;
+    place_port({held ? 0 : at.x, at.y, at.z}, held ? Vec3{} : Vec3{0, along.y, along.z}, scenario_.target,
+               scenario_.chaser, m);
     Vector12 more;
     more << Eigen::Vector3d::Constant(kMetPosition_m),
         Eigen::Vector3d::Constant(held ? kHeldVelocity_m_s : kBouncedVelocity_m_s),

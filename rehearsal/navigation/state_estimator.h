@@ -47,7 +47,7 @@ public:
     /// wrong: it begins anew from the last of them.
     UpdateResult take(const TargetSighting& sighting);
     /// The ports met shortly before t_ns: velocities are not what they were. `held`: the docking system holds, the
-    /// ports' origins lie in one plane and rest against each other.
+    /// ports' origins lie in one plane and rest against each other; otherwise they part, at an unknown speed.
     void met(std::int64_t t_ns, bool held);
     /// Moves on.
     void advance(std::int64_t t_ns);

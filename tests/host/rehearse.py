@@ -45,12 +45,13 @@ def docks():
 
 
 def fails():
-    for name, gate, reason in [("fails-stuck-thruster", "corridor", "off the axis"),
-                               ("fails-fast-contact", "contact", "closing rate 0.1"),
-                               ("fails-blind", "complete", "lost")]:
+    for name, gate, reason, too in [("fails-stuck-thruster", "corridor", "off the axis", {"keep_out"}),
+                                    ("fails-fast-contact", "contact", "closing rate 0.1", {"complete"}),
+                                    ("fails-blind", "complete", "lost", {"contact", "navigation"})]:
         status, verdict = rehearse(SCENARIOS / f"{name}.toml", support.work_folder() / name)
         failed = failed_gates(verdict)
         expect(status == 1 and reason in failed.get(gate, ""), f"{name} fails at {gate}: {failed.get(gate)}")
+        expect(failed.keys() <= {gate} | too, f"{name} fails at nothing else: {sorted(failed)}")
 
 
 def flies():

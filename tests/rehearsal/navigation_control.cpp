@@ -112,6 +112,19 @@ TEST(Guidance, AHoldLastsUntilTheEstimateIsThere) {
     EXPECT_EQ(g.phase(), GuidancePhase::moving);
 }
 
+TEST(Guidance, StopsBeforeThePortWhereItGivesUpNearIt) {
+    const Scenario s = docking();
+    Guidance g(s, 0);
+    GuidanceInput input = at(g, 0);
+    input.port_m = {0.15, 0.01, 0};
+    input.port_velocity_m_s = {-0.075, 0, 0};
+    input.unmeasured_s = 100;
+    g.step(input);
+    ASSERT_EQ(g.abort(), AbortReason::lost);
+    for (double t = 0; t < 30; t += 0.1) EXPECT_GT(g.reference(t).position_m.x, 0) << t;
+    EXPECT_GT(g.reference(30).position_m.x, 5);
+}
+
 TEST(Guidance, GivesUpForItsReasons) {
     const Scenario s = docking();
     const auto reason = [&](const auto& change) {
@@ -122,9 +135,10 @@ TEST(Guidance, GivesUpForItsReasons) {
         g.step(input);
         EXPECT_EQ(g.phase() == GuidancePhase::retreating, g.abort() != AbortReason::none);
         if (g.phase() == GuidancePhase::retreating) {
-            // Away along the port's axis, from where it is and as fast as it is.
+            // Away along the port's axis, from where it is and as fast as it is, or from rest.
             EXPECT_LT(norm(g.reference(30).position_m - input.port_m), 1e-12);
-            EXPECT_NEAR(g.reference(30).velocity_m_s.x, input.port_velocity_m_s.x, 1e-12);
+            const bool bounced = g.abort() == AbortReason::bounced;
+            EXPECT_NEAR(g.reference(30).velocity_m_s.x, bounced ? 0 : input.port_velocity_m_s.x, 1e-12);
             EXPECT_NEAR(g.reference(300).velocity_m_s.x, s.control.retreat_m_s, 1e-12);
             EXPECT_GT(g.reference(300).position_m.x, input.port_m.x + 20);
         }
@@ -135,7 +149,7 @@ TEST(Guidance, GivesUpForItsReasons) {
     EXPECT_EQ(reason([](GuidanceInput& i) { i.position_sigma_m = 2.1; }), AbortReason::uncertain);
     EXPECT_EQ(reason([](GuidanceInput& i) { i.position_sigma_m = std::nan(""); }), AbortReason::uncertain);
     EXPECT_EQ(reason([](GuidanceInput& i) { i.port_m.z += 5.1; }), AbortReason::off_reference);
-    EXPECT_EQ(reason([](GuidanceInput& i) { i.dynamics = DynamicsPhase::bounced; }), AbortReason::commanded);
+    EXPECT_EQ(reason([](GuidanceInput& i) { i.dynamics = DynamicsPhase::bounced; }), AbortReason::bounced);
 }
 
 TEST(Guidance, LooksAtTheTargetAllAround) {

@@ -17,7 +17,8 @@ struct Flight {
     std::vector<CycleRecord> cycles;
     std::vector<Vector6> errors;  ///< of each estimate, in its standard deviations
     std::optional<ContactEvent> contact;
-    double farthest_m = 0;  ///< of the port from the target's, after an abort
+    double farthest_m = 0;        ///< of the port from the target's, after an abort
+    std::vector<double> axial_m;  ///< of the port along the target's axis, in each cycle of a retreat
 
     [[nodiscard]] const ActuatorCommand& last() const { return cycles.back().command; }
 };
@@ -56,8 +57,10 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
         deviations << to_eigen(e.sigma_rotation_rad), to_eigen(e.sigma_position_m);
         flight.errors.push_back(error_between(e.T_chaser_target, T_chaser_target).cwiseQuotient(deviations));
         if (flight.last().phase == GuidancePhase::docked) break;
-        if (flight.last().phase == GuidancePhase::retreating)
+        if (flight.last().phase == GuidancePhase::retreating) {
             flight.farthest_m = std::max(flight.farthest_m, norm(simulation->port().position_m));
+            flight.axial_m.push_back(simulation->port().position_m.x);
+        }
         simulation->apply(flight.last());
     }
     flight.contact = simulation->contact();
@@ -97,6 +100,20 @@ TEST(NavigationLoop, GivesUpWhenItSeesNothingMore) {
         if (c.command.abort != AbortReason::none) continue;
         ASSERT_LE(c.t_s, 80.5);
     }
+}
+
+/// Too fast for the docking system: it bounces, and goes away without touching again, knowing where it is.
+TEST(NavigationLoop, RetreatsFromAContactThatDoesNotHold) {
+    Scenario s = docking();
+    s.legs.back().speed_m_s = 0.2;
+    const Flight flight = fly(s, 7, [](double) { return true; });
+    ASSERT_TRUE(flight.contact);
+    EXPECT_FALSE(flight.contact->captured);
+    EXPECT_EQ(flight.last().abort, AbortReason::bounced);
+    ASSERT_GT(flight.axial_m.size(), 60u);
+    for (std::size_t k = 3; k < 60; ++k) EXPECT_GT(flight.axial_m[k], flight.axial_m[k - 1]) << k;
+    EXPECT_GT(flight.axial_m[59], 10);
+    for (const Vector6& e : flight.errors) EXPECT_LT(e.cwiseAbs().maxCoeff(), 5);
 }
 
 /// A thruster that does not fire: it is off its reference, or the filter contradicts the sensor, but it does not

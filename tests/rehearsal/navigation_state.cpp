@@ -148,6 +148,30 @@ TEST(StateEstimator, RestsAtThePortOnceItIsHeld) {
     EXPECT_LT(norm(port.velocity_m_s), 1e-9);
 }
 
+TEST(StateEstimator, DoesNotKnowHowFastItBounced) {
+    Estimated e;
+    Scenario s = e.plant.scenario;
+    s.start.position_m = {0.2, 0.01, -0.02};
+    s.start.velocity_m_s = {-0.2, 0.01, 0};
+    auto estimator = StateEstimator::create(s, 0, attitude(e.plant));
+    ASSERT_TRUE(estimator);
+    estimator->met(1'000'000'000, false);
+    const PortState port = port_state(estimator->motion(), s.target, s.chaser);
+    EXPECT_NEAR(port.T_port_chaser_port.t.x, 0, 1e-3);
+    EXPECT_NEAR(port.velocity_m_s.x, 0, 1e-9);
+    EXPECT_NEAR(port.velocity_m_s.y, 0.01, 1e-3);
+    // Seen a second later where a bounce of half its speed has taken it, it does not contradict that.
+    const Rigid3 before = estimator->estimate().T_chaser_target;
+    estimator->advance(2'000'000'000);
+    TargetSighting seen;
+    seen.t_ns = 2'000'000'000;
+    seen.T_sensor_target = estimator->estimate().T_chaser_target;
+    seen.T_sensor_target.t.x += 0.1;
+    seen.covariance = 1e-6 * Matrix6::Identity();
+    EXPECT_EQ(estimator->take(seen).outcome, UpdateOutcome::taken);
+    EXPECT_LT(norm(before.t - estimator->estimate().T_chaser_target.t), 0.2);
+}
+
 TEST(AttitudeTrack, TurnsEvenlyBetweenReportsAndOnAfterThem) {
     AttitudeTrack track;
     EXPECT_TRUE(track.empty());

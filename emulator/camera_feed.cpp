@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "emulator/ledger_log.h"
+#include "emulator/log/ledger_log.h"
 #include "emulator/trajectory.h"
 
 namespace narpa {

@@ -10,10 +10,10 @@
 #include "drivers/video/video_sink.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
-#include "emulator/contact_sheet.h"
 #include "emulator/estimate_feed.h"
-#include "emulator/histogram.h"
-#include "emulator/row_log.h"
+#include "emulator/log/contact_sheet.h"
+#include "emulator/log/histogram.h"
+#include "emulator/log/row_log.h"
 #include "emulator/spsc_ring.h"
 
 namespace narpa {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/can/can_bus.h"
-#include "emulator/row_log.h"
+#include "emulator/log/row_log.h"
 #include "emulator/world.h"
 #include "protocols/can/messages.h"
 

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "emulator/run_record.h"
+#include "emulator/log/run_record.h"
 #include "emulator/threads.h"
 
 namespace narpa {

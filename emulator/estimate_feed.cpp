@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "emulator/estimate_report.h"
+#include "emulator/log/estimate_report.h"
 
 namespace narpa {
 

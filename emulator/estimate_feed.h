@@ -11,7 +11,7 @@
 
 #include "base/stop.h"
 #include "emulator/frame_tracker.h"
-#include "emulator/row_log.h"
+#include "emulator/log/row_log.h"
 #include "emulator/spsc_ring.h"
 #include "protocols/ledger.h"
 

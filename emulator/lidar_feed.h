@@ -7,8 +7,8 @@
 
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/clock.h"
-#include "emulator/histogram.h"
 #include "emulator/lidar_unit.h"
+#include "emulator/log/histogram.h"
 
 namespace narpa {
 

@@ -6,12 +6,12 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "emulator/approach_bench.h"
+#include "emulator/bench/approach.h"
+#include "emulator/bench/estimate_plots.h"
+#include "emulator/bench/pnp.h"
+#include "emulator/bench/stereo.h"
 #include "emulator/cli/bench.h"
 #include "emulator/cli/bench_scene.h"
-#include "emulator/estimate_plots.h"
-#include "emulator/pnp_bench.h"
-#include "emulator/stereo_bench.h"
 
 namespace narpa::cli {
 namespace {

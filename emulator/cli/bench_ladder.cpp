@@ -8,8 +8,8 @@
 #include <memory>
 #include <utility>
 
+#include "emulator/bench/ladder_plot.h"
 #include "emulator/cli/bench_scene.h"
-#include "emulator/ladder_plot.h"
 #include "emulator/trajectory.h"
 
 namespace narpa::cli {

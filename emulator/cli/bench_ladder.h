@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "emulator/bench_gates.h"
+#include "emulator/bench/gates.h"
 #include "emulator/cli/cli.h"
 
 namespace narpa::cli {

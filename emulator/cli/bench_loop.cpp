@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
+#include "emulator/bench/loop.h"
 #include "emulator/cli/bench.h"
 #include "emulator/cli/bench_scene.h"
 #include "emulator/cli/budget_options.h"
-#include "emulator/loop_bench.h"
 #include "emulator/realtime.h"
 
 namespace narpa::cli {

@@ -7,13 +7,13 @@
 #include <cstdio>
 #include <memory>
 
+#include "emulator/bench/convergence.h"
+#include "emulator/bench/convergence_plot.h"
 #include "emulator/camera_unit.h"
 #include "emulator/cli/bench.h"
 #include "emulator/cli/bench_ladder.h"
 #include "emulator/cli/bench_scene.h"
 #include "emulator/clock.h"
-#include "emulator/convergence.h"
-#include "emulator/convergence_plot.h"
 #include "emulator/threads.h"
 
 namespace narpa::cli {

@@ -9,8 +9,8 @@
 #include "emulator/cli/cli.h"
 #include "emulator/cli/estimate_one.h"
 #include "emulator/cli/tracker_options.h"
-#include "emulator/estimate_report.h"
-#include "emulator/replay.h"
+#include "emulator/log/estimate_report.h"
+#include "emulator/replay/replay.h"
 #include "emulator/threads.h"
 
 namespace narpa::cli {

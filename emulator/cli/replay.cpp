@@ -7,7 +7,7 @@
 
 #include "emulator/cli/bench_scene.h"
 #include "emulator/cli/cli.h"
-#include "emulator/replay_report.h"
+#include "emulator/replay/replay_report.h"
 #include "emulator/threads.h"
 #include "rehearsal/conduct/rerun.h"
 

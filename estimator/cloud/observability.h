@@ -28,7 +28,6 @@ struct Observability {
     Matrix6 motions = Matrix6::Zero();
     int unobserved = 0;  ///< so many of them, from the first, are below the threshold
 
-
     /// The motion x that solves H x = gradient, without any part along what is not observed. `hessian`: that of
     /// which this was made.
     [[nodiscard]] Vector6 solve(const Matrix6& hessian, const Vector6& gradient) const;

@@ -19,9 +19,9 @@
 namespace narpa {
 
 /// What the rays of the last step bring, measured on the docking scene twelve and sixty metres off with frames that
-/// have nothing but the detector's noise, as RMS error over the bound: 64 rays a pixel 3 to 5.5, 512 rays 1.5 to 1.6.
-/// Its many details smaller than a pixel ask for them; a smooth body comes to the bound with 100. Frames of 16
-/// samples a pixel have more noise of their own than that: with their variance told, 128 rays come to the bound.
+/// have nothing but the detector's noise, as RMS error over the bound: 64 rays a pixel 3 to 5.5, 512 rays 1.5
+/// to 1.6. Its many details smaller than a pixel ask for them; a smooth body comes to the bound with 100. Frames of
+/// 16 samples a pixel have more noise of their own than that: with their variance told, 128 rays come to the bound.
 struct DenseOptions {
     ExposurePrior exposure{};
     double cauchy = 3;             ///< in standard deviations, where residuals begin to lose their say

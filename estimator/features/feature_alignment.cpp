@@ -272,9 +272,9 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placem
             for (const double r : residuals) agrees.push_back(r < kOutlier * scale ? 1 : 0);
             points.keep(agrees);
             if (points.size() < kFewestMatches) {
-            estimate.status = FeatureStatus::few_matches;
-            return estimate;
-        }
+                estimate.status = FeatureStatus::few_matches;
+                return estimate;
+            }
             floor_px = points.floor_px(camera, fit.T_camera_body);
             fit = solve(Loss::none);
         }

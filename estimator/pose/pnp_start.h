@@ -32,7 +32,8 @@ struct PoseStarts {
 };
 /// `flat`: the points' depth along the third axis is not used, and the two attitudes that scaled orthography cannot
 /// tell apart come out. Three points are flat.
-[[nodiscard]] PoseStarts orthographic_starts(std::span<const BodyPoint> points, const PointExtent& spread, bool flat);
+[[nodiscard]] PoseStarts orthographic_starts(std::span<const BodyPoint> points, const PointExtent& spread,
+                                             bool flat);
 
 /// Of three points, whose mean need not be 0; the poses are about the origin.
 [[nodiscard]] PoseStarts triple_starts(std::array<BodyPoint, 3> points);

@@ -1,6 +1,6 @@
 // The bench of an approach: what it finds on the docking scene, on the real station before the Earth at the edge of
 // eclipse, and what it writes.
-#include "emulator/approach_bench.h"
+#include "emulator/bench/approach.h"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "emulator/convergence.h"
-#include "emulator/convergence_plot.h"
+#include "emulator/bench/convergence.h"
+#include "emulator/bench/convergence_plot.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "../support/temporary_folder.h"
-#include "emulator/estimate_plots.h"
+#include "emulator/bench/estimate_plots.h"
 #include "renderer/scene/texture_file.h"
 
 namespace narpa {

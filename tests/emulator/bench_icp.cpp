@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "emulator/icp_bench.h"
+#include "emulator/bench/icp.h"
 #include "emulator/lidar_unit.h"
 #include "estimator/cloud/sweep_points.h"
 #include "renderer/scene/scene_file.h"

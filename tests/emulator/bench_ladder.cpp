@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "emulator/bench_gates.h"
-#include "emulator/ladder_plot.h"
+#include "emulator/bench/gates.h"
+#include "emulator/bench/ladder_plot.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "emulator/loop_bench.h"
+#include "emulator/bench/loop.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 

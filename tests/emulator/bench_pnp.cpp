@@ -6,8 +6,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "emulator/pnp_bench.h"
-#include "emulator/pnp_trial.h"
+#include "emulator/bench/pnp.h"
+#include "emulator/bench/pnp_trial.h"
 #include "estimator/pose/pose_estimate.h"
 #include "tests/support/temporary_folder.h"
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <memory>
 
-#include "emulator/budget_ladder.h"
-#include "emulator/raw_embree.h"
-#include "emulator/reference_loop.h"
+#include "emulator/bench/budget_ladder.h"
+#include "emulator/bench/raw_embree.h"
+#include "emulator/bench/reference_loop.h"
 #include "emulator/world.h"
 #include "renderer/scene/scene_file.h"
 

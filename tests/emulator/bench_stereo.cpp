@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
-#include "emulator/stereo_bench.h"
+#include "emulator/bench/stereo.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/support/temporary_folder.h"
 

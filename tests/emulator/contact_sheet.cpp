@@ -1,4 +1,4 @@
-#include "emulator/contact_sheet.h"
+#include "emulator/log/contact_sheet.h"
 
 #include <gtest/gtest.h>
 

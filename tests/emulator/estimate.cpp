@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "emulator/estimate_report.h"
+#include "emulator/log/estimate_report.h"
 #include "emulator/trajectory.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"

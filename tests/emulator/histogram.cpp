@@ -1,4 +1,4 @@
-#include "emulator/histogram.h"
+#include "emulator/log/histogram.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // How far a picture is from a better one: places and structure, against what is known of them.
-#include "emulator/image_compare.h"
+#include "emulator/replay/image_compare.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // A logged run made again: bit for bit from its log, what is wrong with the log, and what the budget cost.
-#include "emulator/replay.h"
+#include "emulator/replay/replay.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "emulator/replay_report.h"
+#include "emulator/replay/replay_report.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
 

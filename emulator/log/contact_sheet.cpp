@@ -1,0 +1,104 @@
+#include "emulator/log/contact_sheet.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace narpa {
+namespace {
+
+constexpr int kThumbnailWidth = 320;
+
+/// Blue, green, red of one pixel, 0..255, as the format carries them.
+std::array<int, 3> pixel(const VideoFormat& f, std::span<const std::uint8_t> bytes, int x, int y) {
+    const std::size_t i =
+        (static_cast<std::size_t>(y) * static_cast<std::size_t>(f.width) + static_cast<std::size_t>(x)) *
+        bytes_per_pixel(f.pixel);
+    switch (f.pixel) {
+        case PixelFormat::grey: return {bytes[i], bytes[i], bytes[i]};
+        case PixelFormat::y16: return {bytes[i + 1], bytes[i + 1], bytes[i + 1]};
+        case PixelFormat::rgb24: return {bytes[i + 2], bytes[i + 1], bytes[i]};
+        case PixelFormat::yuyv: break;
+    }
+    const std::size_t pair = i & ~std::size_t{3};  // Y0 U Y1 V; BT.601 limited range
+    const double luma = 1.164 * (bytes[i] - 16), u = bytes[pair + 1] - 128.0, v = bytes[pair + 3] - 128.0;
+    const auto byte = [](double c) { return static_cast<int>(std::clamp(c, 0.0, 255.0)); };
+    return {byte(luma + 2.017 * u), byte(luma - 0.392 * u - 0.813 * v), byte(luma + 1.596 * v)};
+}
+
+cv::Mat srgb_curve() {
+    cv::Mat table(1, 256, CV_8U);
+    for (int i = 0; i < 256; ++i) {
+        const double l = i / 255.0, s = l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
+        table.at<std::uint8_t>(i) = static_cast<std::uint8_t>(std::lround(255 * s));
+    }
+    return table;
+}
+
+}  // namespace
+
+ContactSheet::ContactSheet(const VideoFormat& format)
+    : format_(format),
+      scale_(std::max(1, (format.width + kThumbnailWidth - 1) / kThumbnailWidth)),
+      width_(format.width / scale_),
+      height_(std::max(1, format.height / scale_)),
+      tiles_(kTiles) {
+    for (Tile& t : tiles_) t.bgr.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 3);
+}
+
+void ContactSheet::offer(std::uint64_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes) noexcept {
+    if (frame % stride_ != 0) return;
+    if (used_ == tiles_.size()) thin_out();
+    if (frame % stride_ != 0) return;
+    tiles_[used_].t_ns = t_ns;
+    shrink(bytes, tiles_[used_].bgr);
+    ++used_;
+}
+
+void ContactSheet::thin_out() noexcept {
+    for (std::size_t i = 0; 2 * i < used_; ++i) std::swap(tiles_[i], tiles_[2 * i]);
+    used_ = (used_ + 1) / 2;
+    stride_ *= 2;
+}
+
+void ContactSheet::shrink(std::span<const std::uint8_t> bytes, std::span<std::uint8_t> bgr) const noexcept {
+    const int area = scale_ * scale_;
+    for (int y = 0; y < height_; ++y) {
+        for (int x = 0; x < width_; ++x) {
+            std::array<int, 3> sum{};
+            for (int k = 0; k < area; ++k) {
+                const auto p = pixel(format_, bytes, x * scale_ + k % scale_, y * scale_ + k / scale_);
+                for (std::size_t c = 0; c < 3; ++c) sum[c] += p[c];
+            }
+            std::uint8_t* out = &bgr[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                                          static_cast<std::size_t>(x))];
+            for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<std::uint8_t>(sum[c] / area);
+        }
+    }
+}
+
+Status ContactSheet::write(const std::string& path) const {
+    if (used_ == 0) return Ok{};
+    const int rows = static_cast<int>((used_ + kColumns - 1) / kColumns), gap = 4;
+    const int columns = std::min<int>(kColumns, static_cast<int>(used_));
+    cv::Mat sheet(rows * (height_ + gap) + gap, columns * (width_ + gap) + gap, CV_8UC3, cv::Scalar(48, 48, 48));
+    for (std::size_t i = 0; i < used_; ++i) {
+        const int x = gap + static_cast<int>(i % kColumns) * (width_ + gap);
+        const int y = gap + static_cast<int>(i / kColumns) * (height_ + gap);
+        cv::Mat tile(height_, width_, CV_8UC3, const_cast<std::uint8_t*>(tiles_[i].bgr.data())), shown;
+        cv::LUT(tile, srgb_curve(), shown);
+        cv::putText(shown, fmt::format("t = {:.1f} s", static_cast<double>(tiles_[i].t_ns) * 1e-9),
+                    {6, height_ - 8}, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar(80, 220, 255), 1, cv::LINE_AA);
+        shown.copyTo(sheet(cv::Rect(x, y, width_, height_)));
+    }
+    try {
+        if (cv::imwrite(path, sheet)) return Ok{};
+    } catch (const cv::Exception&) {
+    }
+    return Error{"cannot be written, expected a PNG file in a folder that exists", path, 0, 0, ErrorKind::failed};
+}
+
+}  // namespace narpa

@@ -1,0 +1,208 @@
+#include "emulator/log/estimate_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "emulator/log/plot.h"
+
+#include <opencv2/imgproc.hpp>
+
+namespace narpa {
+namespace {
+
+constexpr int kFreedom = 6;
+
+double rotation(const Vector6& error) {
+    return error.head<3>().norm();
+}
+double position(const Vector6& error) {
+    return error.tail<3>().norm();
+}
+/// RMS of what is added.
+struct Squares {
+    double sum = 0;
+    std::size_t n = 0;
+    void add(double v) { sum += v * v, ++n; }
+    [[nodiscard]] double rms() const { return n > 0 ? std::sqrt(sum / static_cast<double>(n)) : 0; }
+};
+
+/// One error over time, with the deviations that it is told beside.
+struct Curve {
+    std::string words;
+    double (*of_error)(const Vector6&);
+    double (*of_covariance)(const Matrix6&);
+    double scale;
+};
+
+void draw(cv::Mat& image, const Curve& curve, std::span<const TrackedFrame> frames, int top, int bottom) {
+    const cv::Scalar measured{180, 90, 20}, filtered{40, 120, 40}, deviation{150, 150, 240}, bound{60, 60, 200};
+    std::vector<double> times, values;
+    for (const TrackedFrame& f : frames) {
+        times.push_back(static_cast<double>(f.t_ns) * 1e-9);
+        if (f.state != EstimateState::lost)
+            values.push_back(curve.scale * curve.of_error(error_between(f.filtered, f.truth)));
+        if (!f.measured) continue;
+        values.push_back(curve.scale * curve.of_error(error_between(*f.measured, f.truth)));
+        values.push_back(3 * curve.scale * curve.of_covariance(f.covariance));
+        if (f.bound.trace() > 0) values.push_back(curve.scale * curve.of_covariance(f.bound));
+    }
+    std::erase_if(values, [](double v) { return !(v > 0) || !std::isfinite(v); });
+    if (values.empty()) return;
+    const plot::Axis x = plot::linear_axis(times, 90, image.cols - 30);
+    const plot::Axis y = plot::logarithmic_axis(values, bottom, top);
+    for (const double v : x.ticks()) plot::vertical_tick(image, x, y, v);
+    for (const double v : y.ticks()) plot::horizontal_tick(image, y, x, v, fmt::format("{:g}", v));
+    const auto at = [&](const TrackedFrame& f, double value) {
+        return cv::Point2d(x.at(static_cast<double>(f.t_ns) * 1e-9), y.at(curve.scale * value));
+    };
+    const auto follow = [&](auto value_of, const cv::Scalar& colour, int width) {
+        const TrackedFrame* last = nullptr;
+        for (const TrackedFrame& f : frames) {
+            if (!(value_of(f) > 0)) {
+                last = nullptr;
+                continue;
+            }
+            if (last != nullptr) plot::line(image, at(*last, value_of(*last)), at(f, value_of(f)), colour, width);
+            last = &f;
+        }
+    };
+    follow([&](const TrackedFrame& f) { return f.measured ? 3 * curve.of_covariance(f.covariance) : 0; }, deviation,
+           2);
+    follow([&](const TrackedFrame& f) { return f.measured ? curve.of_covariance(f.bound) : 0; }, bound, 1);
+    follow(
+        [&](const TrackedFrame& f) {
+            return f.state == EstimateState::lost ? 0 : curve.of_error(error_between(f.filtered, f.truth));
+        },
+        filtered, 1);
+    for (const TrackedFrame& f : frames)
+        if (f.measured) plot::dot(image, at(f, curve.of_error(error_between(*f.measured, f.truth))), 3, measured);
+    plot::text(image, curve.words, {90, top - 12}, plot::kTitleSize, 0, plot::kInk);
+    int right = image.cols - 30;
+    for (const auto& [name, colour] : {std::pair{"bound", bound}, std::pair{"3 sigma", deviation},
+                                       std::pair{"filtered", filtered}, std::pair{"a frame alone", measured}}) {
+        plot::text(image, name, {right, top - 12}, plot::kTextSize, 1, colour);
+        right -= 110;
+    }
+}
+
+}  // namespace
+
+std::string estimate_row(const TrackedFrame& f) {
+    std::string row = fmt::format("{},{},{},", f.frame, f.t_ns, kEstimateStates[static_cast<std::size_t>(f.state)]);
+    if (f.measured) {
+        const Rigid3& T = *f.measured;
+        row += fmt::format("{},{},{},{},{},{},{},", T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z);
+        for (int i = 0; i < kFreedom; ++i) row += fmt::format("{:.6g},", std::sqrt(f.covariance(i, i)));
+        const Vector6 error = error_between(T, f.truth);
+        row += fmt::format("{:.6g},{:.6g},", rotation(error), position(error));
+    } else {
+        row += ",,,,,,,,,,,,,,,";
+    }
+    if (f.state != EstimateState::lost) {
+        const Vector6 error = error_between(f.filtered, f.truth);
+        row += fmt::format("{:.6g},{:.6g},", rotation(error), position(error));
+    } else {
+        row += ",,";
+    }
+    if (f.measured)
+        row += fmt::format("{:.6g},{:.6g},{:.6g},{:.6g},",
+                           normalised_error_squared(error_between(*f.measured, f.truth), f.covariance), f.nis,
+                           rotation_sigma(f.bound), position_sigma(f.bound));
+    else
+        row += ",,,,";
+    std::string why = f.why;  // one field
+    std::replace(why.begin(), why.end(), ',', ';');
+    return row + fmt::format("{},{},{:.3f},{}\n", f.matches, f.renders, f.ms, why);
+}
+
+EstimateSummary summarise(std::span<const TrackedFrame> frames) {
+    EstimateSummary s;
+    s.frames = frames.size();
+    Squares turn, shift, part, filtered_turn, filtered_shift, turn_of_bound, shift_of_bound;
+    double nees = 0, nis = 0;
+    std::size_t told = 0, compared = 0;
+    std::vector<double> ms;
+    for (const TrackedFrame& f : frames) {
+        ms.push_back(f.ms);
+        if (f.state != EstimateState::lost) {
+            const Vector6 error = error_between(f.filtered, f.truth);
+            filtered_turn.add(rotation(error)), filtered_shift.add(position(error));
+        }
+        if (f.state != EstimateState::measured || !f.measured) continue;
+        if (f.nis > 0) nis += f.nis, ++compared;
+        ++s.measured;
+        const Vector6 error = error_between(*f.measured, f.truth);
+        turn.add(rotation(error)), shift.add(position(error)), part.add(position(error) / norm(f.truth.t));
+        if (const double square = normalised_error_squared(error, f.covariance); std::isfinite(square))
+            nees += square, ++told;
+        if (f.bound.topLeftCorner<3, 3>().trace() > 0) {
+            turn_of_bound.add(rotation(error) / rotation_sigma(f.bound));
+            shift_of_bound.add(position(error) / position_sigma(f.bound));
+        }
+    }
+    s.rotation_rms_rad = turn.rms(), s.position_rms_m = shift.rms(), s.position_rms_of_range = part.rms();
+    s.filtered_rotation_rms_rad = filtered_turn.rms(), s.filtered_position_rms_m = filtered_shift.rms();
+    s.rotation_of_bound = turn_of_bound.rms(), s.position_of_bound = shift_of_bound.rms();
+    if (told > 0) {
+        s.nees_mean = nees / static_cast<double>(told);
+        const double half = 1.96 * std::sqrt(2.0 * kFreedom / static_cast<double>(told));  // of chi-square
+        s.nees_low = std::max(0.0, kFreedom - half), s.nees_high = kFreedom + half;
+    }
+    if (compared > 0) s.nis_mean = nis / static_cast<double>(compared);
+    if (!ms.empty()) {
+        const auto middle = ms.begin() + static_cast<std::ptrdiff_t>(ms.size() / 2);
+        std::nth_element(ms.begin(), middle, ms.end());
+        s.ms_median = *middle;
+        s.ms_most = *std::max_element(ms.begin(), ms.end());
+    }
+    return s;
+}
+
+nlohmann::json to_json(const EstimateSummary& s) {
+    return {{"frames", s.frames},
+            {"measured", s.measured},
+            {"rotation_rms_rad", s.rotation_rms_rad},
+            {"position_rms_m", s.position_rms_m},
+            {"position_rms_of_range", s.position_rms_of_range},
+            {"filtered_rotation_rms_rad", s.filtered_rotation_rms_rad},
+            {"filtered_position_rms_m", s.filtered_position_rms_m},
+            {"nees_mean", s.nees_mean},
+            {"nees_95", {s.nees_low, s.nees_high}},
+            {"nis_mean", s.nis_mean},
+            {"rotation_of_bound", s.rotation_of_bound},
+            {"position_of_bound", s.position_of_bound},
+            {"ms_median", s.ms_median},
+            {"ms_most", s.ms_most}};
+}
+
+std::string estimates_in_words(const nlohmann::json& s) {
+    const auto value = [&](const char* key) { return s[key].get<double>(); };
+    std::string out = fmt::format("{:.0f} of {:.0f} frames gave a pose that the track took\n", value("measured"),
+                                  value("frames"));
+    if (value("measured") == 0) return out;
+    out += fmt::format(
+        "    a frame alone: RMS {:.4f} deg, {:.3g} m ({:.3g} % of the range); {:.1f} and {:.1f} bounds\n",
+        value("rotation_rms_rad") / kDegree, value("position_rms_m"), 100 * value("position_rms_of_range"),
+        value("rotation_of_bound"), value("position_of_bound"));
+    out += fmt::format("    filtered: RMS {:.4f} deg, {:.3g} m\n", value("filtered_rotation_rms_rad") / kDegree,
+                       value("filtered_position_rms_m"));
+    out += fmt::format("    NEES {:.2f} (95 % band {:.2f} to {:.2f}), NIS {:.2f}; 6 where covariances are right\n",
+                       value("nees_mean"), s["nees_95"][0].get<double>(), s["nees_95"][1].get<double>(),
+                       value("nis_mean"));
+    return out + fmt::format("    {:.0f} ms a frame (median; most {:.0f})\n", value("ms_median"), value("ms_most"));
+}
+
+Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames) {
+    cv::Mat image(860, 1100, CV_8UC3, cv::Scalar(255, 255, 255));
+    plot::text(image, title, {90, 34}, plot::kTitleSize, 0, plot::kInk);
+    draw(image, {"attitude error, deg", rotation, rotation_sigma, 1 / kDegree}, frames, 90, 420);
+    draw(image, {"position error, m", position, position_sigma, 1}, frames, 490, 820);
+    plot::text(image, "simulation time, s", {image.cols / 2, 850}, plot::kTextSize, 0.5, plot::kInk);
+    return plot::write_png(path, image);
+}
+
+}  // namespace narpa

@@ -1,0 +1,54 @@
+#include "emulator/log/row_log.h"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace narpa {
+namespace {
+
+constexpr std::size_t kLines = 4096;  // 2 MB: seconds of a saturated bus, minutes of frames
+
+}  // namespace
+
+Result<std::unique_ptr<RowLog>> RowLog::create(const std::string& path, std::string_view header,
+                                               bool wait_when_full) {
+    std::FILE* file = std::fopen(path.c_str(), "we");
+    if (!file) return Error{fmt::format("cannot be written: {}", std::strerror(errno)), path};
+    std::fwrite(header.data(), 1, header.size(), file);
+    return std::unique_ptr<RowLog>(new RowLog(path, file, wait_when_full));
+}
+
+RowLog::RowLog(std::string path, std::FILE* file, bool wait_when_full)
+    : path_(std::move(path)),
+      file_(file),
+      outbox_(std::make_unique<Outbox>(*this, kLines, kMaxLine, wait_when_full)) {}
+
+RowLog::~RowLog() {
+    (void)close();
+}
+
+void RowLog::append(std::string_view line) noexcept {
+    outbox_->push({reinterpret_cast<const std::uint8_t*>(line.data()), line.size()});
+}
+
+void RowLog::write(std::span<const std::uint8_t> item, const Outbox&) noexcept {
+    if (std::fwrite(item.data(), 1, item.size(), file_) != item.size()) ++lost_;
+}
+
+Status RowLog::close() {
+    if (!file_) return Ok{};
+    std::uint64_t dropped = outbox_->dropped();
+    outbox_.reset();  // ends its thread: nobody else writes the file or `lost_`
+    dropped += lost_;
+    const bool closed = std::fclose(file_) == 0;
+    file_ = nullptr;
+    if (dropped > 0)
+        return Error{fmt::format("{} lines could not be written", dropped), path_, 0, 0, ErrorKind::failed};
+    if (!closed)
+        return Error{fmt::format("cannot be written: {}", std::strerror(errno)), path_, 0, 0, ErrorKind::failed};
+    return Ok{};
+}
+
+}  // namespace narpa

@@ -1,0 +1,41 @@
+/// emulator/log/row_log.h - lines to a file from the loop, without the disk ever holding the loop up.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "drivers/outbox.h"
+
+namespace narpa {
+
+class RowLog final : public OutboxWriter {
+public:
+    /// Makes the file and writes `header` (with its line end) first. One thread appends. `wait_when_full`: a
+    /// lockstep run waits for the disk where a real-time run drops the line and counts it.
+    static Result<std::unique_ptr<RowLog>> create(const std::string& path, std::string_view header,
+                                                  bool wait_when_full);
+    ~RowLog() override;
+
+    /// A line with its line end; longer than kMaxLine is dropped and counted. Allocates nothing.
+    void append(std::string_view line) noexcept;
+    /// Writes out what was appended and closes the file; an Error when any line was lost.
+    Status close();
+
+    static constexpr std::size_t kMaxLine = 512;
+
+private:
+    RowLog(std::string path, std::FILE* file, bool wait_when_full);
+    void write(std::span<const std::uint8_t> item, const Outbox&) noexcept override;
+    void abandon(std::span<const std::uint8_t>) noexcept override { ++lost_; }
+
+    std::string path_;
+    std::FILE* file_;
+    std::uint64_t lost_ = 0;  // the outbox's thread only, until it has ended
+    std::unique_ptr<Outbox> outbox_;
+};
+
+}  // namespace narpa

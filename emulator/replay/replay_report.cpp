@@ -1,0 +1,174 @@
+#include "emulator/replay/replay_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace narpa {
+namespace {
+
+using nlohmann::json;
+
+/// A reference's error above this part of a frame's shows in the frame's numbers.
+constexpr double kGoodReference = 1.0 / 3;
+
+/// Of the bodies' centres; nothing where none was measured.
+std::optional<double> largest_shift_px(const ImageDifference& d) {
+    std::optional<double> most;
+    for (const BodyShift& b : d.bodies) most = std::max(most.value_or(0), std::hypot(b.x_px, b.y_px));
+    return most;
+}
+
+double ratio(double a, double b) {
+    return b > 0 ? a / b : 0;
+}
+
+json to_json(const ShiftStatistics& s) {
+    return {{"pixels", s.count}, {"mean_px", s.mean_px}, {"rms_px", s.rms_px}, {"p99_px", s.p99_px}};
+}
+
+std::string or_dash(const char* format, const std::optional<double>& value) {
+    return value ? fmt::format(fmt::runtime(format), *value) : "-";
+}
+
+}  // namespace
+
+double ReplayedFrame::measured_error() const noexcept {
+    const double error = compared->difference.rmse, noise = compared->reference_error;
+    return std::sqrt(std::max(0.0, error * error - noise * noise)) / compared->difference.full_scale;
+}
+
+std::optional<double> ReplayedFrame::predicted_over_measured() const noexcept {
+    const double measured = measured_error();
+    if (logged.ledger.expected_error < 0 || measured == 0) return std::nullopt;
+    return static_cast<double>(logged.ledger.expected_error) / measured;
+}
+
+BudgetCost budget_cost(std::span<const ReplayedFrame> frames) {
+    BudgetCost c;
+    double squares = 0, noise = 0, predicted = 0, measured = 0, edges = 0, edge_squares = 0, body_squares = 0;
+    double ssim = 0;
+    for (const ReplayedFrame& f : frames) {
+        if (!f.compared) continue;
+        const ImageDifference& d = f.compared->difference;
+        const double rmse = d.rmse / d.full_scale, reference = f.compared->reference_error / d.full_scale;
+        ++c.frames;
+        squares += rmse * rmse;
+        noise += reference * reference;
+        c.rmse_largest = std::max(c.rmse_largest, rmse);
+        c.bias += d.bias / d.full_scale;
+        ssim += d.ssim;
+        c.ssim_least = std::min(c.ssim_least, d.ssim);
+        const auto pixels = static_cast<double>(d.edges.count);
+        c.edges.count += d.edges.count;
+        edges += pixels * d.edges.mean_px;
+        edge_squares += pixels * d.edges.rms_px * d.edges.rms_px;
+        c.edges.p99_px = std::max(c.edges.p99_px, d.edges.p99_px);
+        for (const BodyShift& b : d.bodies) {
+            ++c.bodies;
+            c.bodies_x_px += b.x_px;
+            c.bodies_y_px += b.y_px;
+            body_squares += b.x_px * b.x_px + b.y_px * b.y_px;
+        }
+        c.bodies_largest_px = std::max(c.bodies_largest_px, largest_shift_px(d).value_or(0));
+        if (f.predicted_over_measured()) {
+            const auto expected = static_cast<double>(f.logged.ledger.expected_error);
+            predicted += expected * expected;
+            measured += f.measured_error() * f.measured_error();
+        }
+    }
+    const auto n = static_cast<double>(c.frames);
+    c.rmse = std::sqrt(ratio(squares, n));
+    c.reference_error = std::sqrt(ratio(noise, n));
+    c.bias = ratio(c.bias, n);
+    if (c.frames > 0) c.ssim_mean = ssim / n;
+    c.edges.mean_px = ratio(edges, static_cast<double>(c.edges.count));
+    c.edges.rms_px = std::sqrt(ratio(edge_squares, static_cast<double>(c.edges.count)));
+    c.bodies_x_px = ratio(c.bodies_x_px, static_cast<double>(c.bodies));
+    c.bodies_y_px = ratio(c.bodies_y_px, static_cast<double>(c.bodies));
+    c.bodies_rms_px = std::sqrt(ratio(body_squares, static_cast<double>(c.bodies)));
+    if (measured > 0) c.predicted_over_measured = std::sqrt(predicted / measured);
+    return c;
+}
+
+json to_json(const ReplayedFrame& f, const Scene& scene) {
+    const FrameLedger& l = f.logged.ledger;
+    json out{{"frame", l.frame},
+             {"t_s", static_cast<double>(l.t_exposure_mid_ns) * 1e-9},
+             {"step", kStepNames[l.step]},
+             {"samples_per_pixel", l.samples_per_pixel},
+             {"differs", f.differs}};
+    if (!f.compared) return out;
+    const ImageDifference& d = f.compared->difference;
+    json bodies = json::array();
+    for (const BodyShift& b : d.bodies)
+        bodies.push_back(
+            {{"body", scene.bodies[static_cast<std::size_t>(b.body)].name}, {"x_px", b.x_px}, {"y_px", b.y_px}});
+    const auto predicted = f.predicted_over_measured();
+    out.update({{"rmse", d.rmse / d.full_scale},
+                {"bias", d.bias / d.full_scale},
+                {"reference_error", f.compared->reference_error / d.full_scale},
+                {"expected_error", l.expected_error < 0 ? json(nullptr) : json(l.expected_error)},
+                {"predicted_over_measured", predicted ? json(*predicted) : json(nullptr)},
+                {"ssim", d.ssim},
+                {"edges", to_json(d.edges)},
+                {"bodies", bodies}});
+    return out;
+}
+
+json to_json(const BudgetCost& c) {
+    return {
+        {"frames", c.frames},
+        {"rmse", c.rmse},
+        {"rmse_largest", c.rmse_largest},
+        {"bias", c.bias},
+        {"reference_error", c.reference_error},
+        {"predicted_over_measured", c.predicted_over_measured ? json(*c.predicted_over_measured) : json(nullptr)},
+        {"ssim_mean", c.ssim_mean},
+        {"ssim_least", c.ssim_least},
+        {"edges", to_json(c.edges)},
+        {"bodies",
+         {{"centroids", c.bodies},
+          {"mean_x_px", c.bodies_x_px},
+          {"mean_y_px", c.bodies_y_px},
+          {"rms_px", c.bodies_rms_px},
+          {"largest_px", c.bodies_largest_px}}}};
+}
+
+std::string in_words(std::span<const ReplayedFrame> frames, const BudgetCost& cost) {
+    const auto row = [](const std::string& frame, const std::string& t, std::string_view step,
+                        const std::string& spp, double rmse, double bias, const std::optional<double>& predicted,
+                        double ssim, const ShiftStatistics& edges, const std::optional<double>& bodies_px) {
+        return fmt::format("{:>7} {:>9} {:>12} {:>7} {:>9.4f} {:>9.4f} {:>10} {:>8.5f} {:>9.4f} / {:.4f} {:>9}\n",
+                           frame, t, step, spp, 100 * rmse, 100 * bias, or_dash("{:.2f}", predicted), ssim,
+                           edges.mean_px, edges.rms_px, or_dash("{:.4f}", bodies_px));
+    };
+    constexpr const char* kHead = "{:>7} {:>9} {:>12} {:>7} {:>9} {:>9} {:>10} {:>8} {:>18} {:>9}\n";
+    std::string out =
+        fmt::format(kHead, "frame", "t [s]", "step", "spp", "RMSE [%]", "bias [%]", "predicted", "SSIM",
+                    "edges [px]", "bodies") +
+        fmt::format(kHead, "", "", "", "", "of scale", "of scale", "/ measured", "", "mean / rms", "[px]");
+    for (const ReplayedFrame& f : frames) {
+        const ImageDifference& d = f.compared->difference;
+        const FrameLedger& l = f.logged.ledger;
+        out +=
+            row(fmt::format("{}", l.frame), fmt::format("{:.3f}", static_cast<double>(l.t_exposure_mid_ns) * 1e-9),
+                kStepNames[l.step], fmt::format("{:.2f}", l.samples_per_pixel), d.rmse / d.full_scale,
+                d.bias / d.full_scale, f.predicted_over_measured(), d.ssim, d.edges, largest_shift_px(d));
+    }
+    out += row("all", "", "", "", cost.rmse, cost.bias, cost.predicted_over_measured, cost.ssim_mean, cost.edges,
+               cost.bodies > 0 ? std::optional(cost.bodies_rms_px) : std::nullopt);
+    out += fmt::format(
+        "worst: RMSE {:.4f} %, SSIM {:.5f}, 1 % of the edges beyond {:.3f} px{}; the reference's own "
+        "error {:.4f} %\n",
+        100 * cost.rmse_largest, cost.ssim_least, cost.edges.p99_px,
+        cost.bodies > 0 ? fmt::format(", a body {:.4f} px", cost.bodies_largest_px) : "",
+        100 * cost.reference_error);
+    if (cost.reference_error > kGoodReference * cost.rmse)
+        out += "the reference is hardly better than the frames, expected a higher --reference\n";
+    return out;
+}
+
+}  // namespace narpa

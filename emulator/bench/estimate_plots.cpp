@@ -1,9 +1,9 @@
 #include "emulator/bench/estimate_plots.h"
 
 #include <fmt/format.h>
-#include <array>
 
 #include <algorithm>
+#include <array>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
@@ -64,9 +64,9 @@ void draw_nees(cv::Mat& image, cv::Point corner, const FilterRun& run) {
     text(image, "seconds", {frame.x + frame.width / 2, frame.y + frame.height + 42}, kTextSize, 0.5, kInk);
 }
 
-constexpr int kLabelHeight = 17, kLetterWidth = 9;
+constexpr int kLabelHeight = 17, kLetterWidth = 9, kDot = 5;
 
-/// Beside a dot, or above or below where another label stands already.
+/// Beside a dot, or above or below where a dot or another label stands already.
 cv::Rect free_place(const std::string& label, const cv::Point2d& dot, const std::vector<cv::Rect>& taken) {
     const int width = kLetterWidth * static_cast<int>(label.size());
     const bool to_the_left = dot.x > 700;
@@ -137,20 +137,24 @@ Status write_time_plot(const std::string& path, const std::vector<TimeAndError>&
         if (std::find(families.begin(), families.end(), e.family) == families.end()) families.push_back(e.family);
     }
     if (estimators.empty()) return Error{"no estimator was measured, expected one at least", path};
-    std::vector<cv::Rect> taken;
     const plot::Axis x = plot::logarithmic_axis(times, 90, 960), y = plot::logarithmic_axis(errors, 640, 70);
     for (const double v : x.ticks()) plot::vertical_tick(image, x, y, v);
     for (const double v : y.ticks()) plot::horizontal_tick(image, y, x, v, fmt::format("{:g}", v));
+    std::vector<cv::Rect> taken;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+        const cv::Point at(cv::Point2d(x.at(times[i]), y.at(errors[i])));
+        taken.emplace_back(at.x - kDot, at.y - kDot, 2 * kDot, 2 * kDot);
+    }
     for (const TimeAndError& e : estimators) {
         const auto family =
             static_cast<std::size_t>(std::find(families.begin(), families.end(), e.family) - families.begin());
         const cv::Scalar& colour = kFamilies[family % kFamilies.size()];
         const cv::Point2d at(x.at(e.ms), y.at(100 * e.position_of_range));
-        plot::dot(image, at, 5, colour);
         const cv::Rect place = free_place(e.name, at, taken);
         taken.push_back(place);
         const cv::Point foot(place.x, place.y + kLabelHeight - 4);
         if (std::abs(foot.y - at.y) > kLabelHeight) plot::line(image, at, cv::Point2d(foot), plot::kGuide, 1);
+        plot::dot(image, at, kDot, colour);
         plot::text(image, e.name, foot, plot::kTextSize, 0, colour);
     }
     plot::text(image, "position error, RMS, % of the range, against time of an estimate, ms", {90, 40},

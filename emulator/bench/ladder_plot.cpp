@@ -15,7 +15,7 @@ namespace {
 
 using namespace plot;
 
-constexpr int kColumns = 3, kColumnWidth = 560, kRowHeight = 612, kHeader = 96;
+constexpr int kColumns = 3, kColumnWidth = 560, kHeader = 96;
 constexpr int kLeft = 92, kTop = 40, kWidth = 400, kHeight = 320;
 constexpr int kBars = kTop + kHeight + 60, kBar = 14, kBarStep = 19;  // below a panel's corner; height, step
 constexpr double kSmall = 0.42;
@@ -138,6 +138,14 @@ void draw_bars(cv::Mat& image, const Panel& panel) {
     }
 }
 
+/// Room for the panel with the most bars.
+int row_height(std::span<const SceneLadder> scenes) {
+    std::ptrdiff_t bars = 0;
+    for (const SceneLadder& s : scenes)
+        bars = std::max(bars, std::ranges::count(s.ladder.rungs, false, &Rung::loop));
+    return kBars + static_cast<int>(bars) * kBarStep + 20;
+}
+
 std::string part_name(std::size_t k) {
     std::string name = k < kPhases ? kPhaseNames[k] : "detector and conversion";
     std::replace(name.begin(), name.end(), '_', ' ');
@@ -171,13 +179,14 @@ void draw_legend(cv::Mat& image) {
 
 Status write_plot(const std::string& path, const std::string& title, std::span<const SceneLadder> scenes) {
     const int n = static_cast<int>(scenes.size()), columns = std::clamp(n, 2, kColumns);
-    cv::Mat image(kHeader + (n + columns - 1) / columns * kRowHeight, 40 + columns * kColumnWidth, CV_8UC3,
+    const int height = row_height(scenes);
+    cv::Mat image(kHeader + (n + columns - 1) / columns * height, 40 + columns * kColumnWidth, CV_8UC3,
                   cv::Scalar::all(255));
     text(image, title, {image.cols / 2, 28}, kTitleSize, 0.5, kInk);
     draw_legend(image);
     for (int k = 0; k < n; ++k) {
         const Panel panel{scenes[static_cast<std::size_t>(k)],
-                          {20 + k % columns * kColumnWidth, kHeader + k / columns * kRowHeight}};
+                          {20 + k % columns * kColumnWidth, kHeader + k / columns * height}};
         draw_errors(image, panel);
         draw_bars(image, panel);
     }

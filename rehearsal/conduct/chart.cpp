@@ -163,7 +163,7 @@ std::string Chart::drawn(const Shape& s, const Frame& f) const {
                 "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" "
                 "fill-opacity=\"0.13\"/>",
                 x0, f.top, x1 - x0, f.bottom - f.top, s.colour);
-            if (x1 - x0 > 5.2 * static_cast<double>(s.words.size()))
+            if (x1 - x0 > 6.5 * static_cast<double>(s.words.size()))
                 out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"note\">{}</text>", x0 + 3, f.top + 12,
                                    escape(s.words));
             return out;

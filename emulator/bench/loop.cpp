@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "emulator/log/report.h"
+#include "emulator/report.h"
 
 namespace narpa {
 namespace {

@@ -8,8 +8,8 @@
 #include "emulator/cli/cli.h"
 #include "emulator/cli/tracker_options.h"
 #include "emulator/emulator.h"
-#include "emulator/log/report.h"
 #include "emulator/realtime.h"
+#include "emulator/report.h"
 
 namespace narpa::cli {
 namespace {

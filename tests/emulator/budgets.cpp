@@ -5,7 +5,7 @@
 #include <numeric>
 #include <thread>
 
-#include "emulator/log/report.h"
+#include "emulator/report.h"
 #include "protocols/video/embedded_line.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"

@@ -1,4 +1,4 @@
-#include "emulator/log/report.h"
+#include "emulator/report.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-/// emulator/log/report.h - how a run went: as one JSON document for programs, as a few lines for people.
+/// emulator/report.h - how a run went: as one JSON document for programs, as a few lines for people.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

@@ -1,7 +1,9 @@
 // narpa rehearse - a docking with everything in the loop, judged.
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 
 #include "emulator/cli/cli.h"
@@ -30,10 +32,21 @@ Result<std::string> shipped_scenario() {
     return Error{"no scenario was given, and the docking that comes with narpa is not beside the program"};
 }
 
+/// Whether a line has come on standard input; where that has ended, ten seconds after it was first asked for.
+bool line_on_stdin() {
+    using Clock = std::chrono::steady_clock;
+    static const Clock::time_point first = Clock::now();
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    if (::poll(&input, 1, 0) <= 0) return false;
+    char c = 0;
+    return ::read(STDIN_FILENO, &c, 1) == 1 ? c == '\n' : Clock::now() - first > std::chrono::seconds(10);
+}
+
 rehearsal::Narrator narrator() {
-    if (!::isatty(STDERR_FILENO)) return {[](std::string_view text) { say(text); }, [](std::string_view) {}};
+    if (!::isatty(STDERR_FILENO))
+        return {[](std::string_view text) { say(text); }, [](std::string_view) {}, line_on_stdin};
     return {[](std::string_view text) { fmt::print(stderr, "\r\033[K{}\n", text); },
-            [](std::string_view text) { fmt::print(stderr, "\r\033[K{}", text); }};
+            [](std::string_view text) { fmt::print(stderr, "\r\033[K{}", text); }, line_on_stdin};
 }
 
 Outcome one(const rehearsal::ConductOptions& options) {
@@ -110,11 +123,12 @@ Command add_rehearse(CLI::App& app) {
         ->allow_extra_args(false);
     c->add_option(
         "--dynamics", r.dynamics,
-        "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it");
+        "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it, "
+        "last");
     c->add_option(
         "--navigation", r.navigation,
         "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
-        "set; says \"ready\" when it listens, or has 10 s; none: you start it");
+        "set; says \"ready\" when it listens, or has 10 s; none: you start it, and press Enter when it listens");
     c->add_option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)")
         ->check(CLI::Range(0, 1024));
     c->add_option("--patience", r.patience_s, "Seconds without progress after which it is given up")

@@ -70,6 +70,9 @@ Result<json> conduct_campaign(const CampaignOptions& o, const Narrator& narrator
             fmt::format("--jobs {}: runs at the same time cannot share a bus or a device, expected --jobs 1 "
                         "with --can or --video",
                         o.jobs)};
+    if (o.run.dynamics == "none" || o.run.navigation == "none")
+        return Error{
+            "many runs with a program \"none\" that you start: expected a command that starts it for each run"};
     const auto scenario = read_scenario(o.run.scenario);
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(scenario->file, scenario->scene);

@@ -205,7 +205,8 @@ private:
                              const std::vector<std::string>& sources) {
         p.ours = replaced.empty();
         if (replaced == "none") {
-            std::string words = fmt::format("start your own {} now:", name);
+            std::string words = fmt::format("start your own {} now{}:", name,
+                                            &p == &navigation_ ? ", and press Enter when it listens" : "");
             for (const auto& [key, value] : environment()) words += fmt::format("\n  {}={}", key, value);
             narrator_.say(words);
             p.command.line = {"none"};
@@ -224,7 +225,8 @@ private:
         return start(p, name);
     }
 
-    /// Goes on when it has said "ready"; another's own need not.
+    /// Goes on when it has said "ready"; another's own need not. What the user starts listens when the user says
+    /// so.
     Status start_navigation() {
         std::vector<std::string> sources;
         for (const auto& [camera, source] : video_)
@@ -234,10 +236,15 @@ private:
         if (o_.threads > 0) sources.insert(sources.end(), {"--threads", std::to_string(o_.threads)});
         if (Status good = start_replaceable(navigation_, "navigation", o_.navigation, sources); !good) return good;
         const auto began = Clock::now();
-        while (navigation_.child &&
-               ("\n" + read_text(navigation_.command.out)).find("\nready") == std::string::npos) {
+        const auto listens = [&] {
+            if (!navigation_.child && narrator_.navigation_listens) return narrator_.navigation_listens();
+            if (!navigation_.child) return seconds_since(began) > kOwnNavigationPatience_s;
+            return ("\n" + read_text(navigation_.command.out)).find("\nready") != std::string::npos;
+        };
+        while (!listens()) {
             pump();
             if (stop_) return interrupted();
+            if (!navigation_.child) continue;
             if (navigation_.over())
                 return Error{fmt::format("{} before it was ready", navigation_.trouble()), navigation_.command.err,
                              0, 0, exit_kind(*navigation_.child->status())};

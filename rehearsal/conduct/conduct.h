@@ -39,9 +39,12 @@ struct Conducted {
     nlohmann::json result;  ///< as in result.json
 };
 
-/// Told words for people as they come, and the line of progress (to be written over).
+/// Told words for people as they come, and the line of progress (to be written over). Asked again and again, where
+/// the navigation is the user's own to start ("none"), whether it listens; unless it can be asked, ten seconds have
+/// to do.
 struct Narrator {
     std::function<void(std::string_view)> say, progress;
+    std::function<bool()> navigation_listens{};
 };
 
 /// Errors: bad input (status 2), a device or program that is missing (3), programs that could not begin. What goes

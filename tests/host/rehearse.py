@@ -3,6 +3,7 @@
 
 Usage: rehearse.py docks       the last ten metres: docks inside the docking standard's box, on 1 and 2 threads byte for byte, and replay agrees
        rehearse.py fails       the three scenarios that must fail do, each at its gate
+       rehearse.py another     with the Python navigation of examples/ in place of narpa's, as docs/interfaces.md says
        rehearse.py flies       around a real small body (the shape of Itokawa), where ../shared/assets has it"""
 import json
 import os
@@ -54,6 +55,27 @@ def fails():
         expect(failed.keys() <= {gate} | too, f"{name} fails at nothing else: {sorted(failed)}")
 
 
+def another():
+    try:
+        import can, cv2, serial  # noqa: F401: what the example needs
+    except ImportError as error:
+        support.skip(f"{error} (python3-can, python3-opencv, python3-serial)")
+    folder = support.work_folder()
+    (folder / "hold.toml").write_text(f"""
+[scenario]
+based_on = "{SCENARIOS}/docking-camera.toml"
+name = "hold"
+duration_s = 10.0
+""")
+    example = Path(__file__).resolve().parents[2] / "examples/navigation.py"
+    command = f"{sys.executable} {example} socket://127.0.0.1:${{BUS#slcan:}} ${{VIDEO#nav=}}"
+    _, verdict = rehearse(folder / "hold.toml", folder / "out", "--navigation", command)
+    expect(verdict["bus"]["commands"] == 10, f"each period has its thruster command: {verdict['bus']}")
+    reasons = failed_gates(verdict)
+    expect(reasons.get("navigation") == "no estimate was on the bus" and "complete" in reasons and "corridor" not in reasons,
+           f"judged by what it does: {reasons}")
+
+
 def flies():
     if not MESH.exists():
         support.skip(f"{MESH} is not there: the shape of Itokawa")
@@ -92,4 +114,4 @@ complete = false
     expect(n["with_frames"] >= 38 and n["with_sweeps"] >= 38, f"frames and sweeps are taken: {n['with_frames']}, {n['with_sweeps']} of {n['estimates']}")
 
 
-{"docks": docks, "fails": fails, "flies": flies}[sys.argv[1]]()
+{"docks": docks, "fails": fails, "another": another, "flies": flies}[sys.argv[1]]()

@@ -2,6 +2,8 @@
 // is said of programs that end too soon.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -113,6 +115,51 @@ TEST(Whole, WhatTheEmulatorRefusesIsBadInput) {
     o = options(folder);
     o.video["nose"] = "/dev/video10";
     EXPECT_NE(conduct(o, kSilent, stop).error().what.find("does not navigate by this camera"), std::string::npos);
+}
+
+/// A navigation that the user starts, some time after it was asked for.
+TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    ConductOptions o = options(folder);
+    o.navigation = "none";
+    std::FILE* own = nullptr;
+    int asked = 0;
+    std::string told;
+    Narrator narrator = kSilent;
+    narrator.say = [&](std::string_view words) {
+        if (words.starts_with("start your own navigation now")) told = words;
+    };
+    const auto value = [&](const std::string& key) {
+        const auto at = told.find("\n  " + key + "=") + key.size() + 4;
+        return told.substr(at, told.find('\n', at) - at);
+    };
+    narrator.navigation_listens = [&] {
+        if (++asked < 20) return false;
+        own = ::popen((NARPA_BUILD_DIR "/bin/narpa-navigation " + value("SCENARIO") + " --can " + value("BUS") +
+                       " --video " + value("VIDEO") + " --lidar " + value("LIDAR") + " --lockstep")
+                          .c_str(),
+                      "r");
+        std::array<char, 80> line{};
+        return std::fgets(line.data(), line.size(), own) != nullptr && std::string_view(line.data()) == "ready\n";
+    };
+    const auto done = conduct(o, narrator, stop);
+    ASSERT_NE(own, nullptr);
+    EXPECT_EQ(::pclose(own), 0);
+    ASSERT_TRUE(done) << done.error().text();
+    EXPECT_EQ(gate(done->verdict, "navigation").state, GateState::passed)
+        << gate(done->verdict, "navigation").reason;
+    EXPECT_EQ(gate(done->verdict, "duration").reason, "the goal was not reached when 1 s were over");
+}
+
+TEST(Whole, ManyRunsNeedCommandsThatStartThem) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    CampaignOptions o{options(folder), 2, 1};
+    o.run.navigation = "none";
+    const auto done = conduct_campaign(o, kSilent, stop);
+    ASSERT_FALSE(done);
+    EXPECT_NE(done.error().what.find("expected a command that starts it"), std::string::npos);
 }
 
 TEST(Whole, RunsAtTheSameTimeShareNoDevice) {

@@ -137,6 +137,11 @@ Result<json> rerun(const std::string& folder, int threads, const std::string& ve
     o.seed = (*record)["seed"].get<std::uint64_t>();
     o.dynamics = record->value("dynamics", "");
     o.navigation = record->value("navigation", "");
+    if (o.dynamics == "none" || o.navigation == "none")
+        return Error{fmt::format("a program was started by hand in it: expected {}/emulator, whose frames can be "
+                                 "replayed alone",
+                                 folder),
+                     folder};
     o.threads = threads;
     o.page = false;
     o.version = version;

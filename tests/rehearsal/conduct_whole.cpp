@@ -150,6 +150,10 @@ TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
     EXPECT_EQ(gate(done->verdict, "navigation").state, GateState::passed)
         << gate(done->verdict, "navigation").reason;
     EXPECT_EQ(gate(done->verdict, "duration").reason, "the goal was not reached when 1 s were over");
+
+    const auto again = rerun(o.folder, 1, "test", kSilent, stop);
+    ASSERT_FALSE(again);
+    EXPECT_NE(again.error().what.find("a program was started by hand"), std::string::npos) << again.error().text();
 }
 
 TEST(Whole, ManyRunsNeedCommandsThatStartThem) {

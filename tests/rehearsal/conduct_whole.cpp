@@ -156,24 +156,18 @@ TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
     EXPECT_NE(again.error().what.find("a program was started by hand"), std::string::npos) << again.error().text();
 }
 
-TEST(Whole, ManyRunsNeedCommandsThatStartThem) {
+TEST(Whole, ManyRunsThatCannotBeAreRefused) {
     const TemporaryFolder folder;
-    const StopFlag stop{false};
-    CampaignOptions o{options(folder), 2, 1};
-    o.run.navigation = "none";
-    const auto done = conduct_campaign(o, kSilent, stop);
-    ASSERT_FALSE(done);
-    EXPECT_NE(done.error().what.find("expected a command that starts it"), std::string::npos);
-}
-
-TEST(Whole, RunsAtTheSameTimeShareNoDevice) {
-    const TemporaryFolder folder;
-    const StopFlag stop{false};
-    CampaignOptions o{options(folder), 2, 2};
-    o.run.bus = "vcan0";
-    const auto done = conduct_campaign(o, kSilent, stop);
-    ASSERT_FALSE(done);
-    EXPECT_NE(done.error().what.find("cannot share a bus"), std::string::npos);
+    const auto refused = [&](const ConductOptions& run, int jobs) {
+        const auto done = conduct_campaign({run, 2, jobs}, kSilent, StopFlag{false});
+        return done ? std::string() : done.error().what;
+    };
+    ConductOptions o = options(folder);
+    o.bus = "vcan0";
+    EXPECT_NE(refused(o, 2).find("cannot share a bus"), std::string::npos);
+    o = options(folder);
+    o.navigation = "none";
+    EXPECT_NE(refused(o, 1).find("expected a command that starts it"), std::string::npos);
 }
 
 }  // namespace

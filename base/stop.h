@@ -18,8 +18,10 @@ inline StopFlag& stop_flag() noexcept {
     return flag;
 }
 
-/// SIGINT and SIGTERM set the flag; one more after a second or longer ends the program at once, with status 130.
-/// (timeout(1) and others signal a process and then its group, which it is in: that is one request, not two.)
+/// SIGINT and SIGTERM set the flag; one more after two seconds or longer ends the program at once, with status 130.
+/// (timeout(1) and others signal a process and then its group, which it is in: that is one request, not two.
+/// Between the two, real-time threads may keep such a sender from its processor for the better part of two
+/// seconds.)
 inline void stop_on_signals() noexcept {
     struct sigaction action {};
     action.sa_handler = [](int) {
@@ -30,7 +32,7 @@ inline void stop_on_signals() noexcept {
         std::int64_t before_ns = 0;
         if (first_ns.compare_exchange_strong(before_ns, now_ns))
             stop_flag() = true;
-        else if (now_ns - before_ns >= 1'000'000'000)
+        else if (now_ns - before_ns >= 2'000'000'000)
             ::_exit(130);
     };
     ::sigaction(SIGINT, &action, nullptr);

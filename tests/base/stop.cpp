@@ -45,7 +45,7 @@ TEST(StopOnSignals, OneMoreLaterEndsTheProgram) {
         {
             stop_on_signals();
             ::raise(SIGINT);
-            std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+            std::this_thread::sleep_for(std::chrono::milliseconds(2100));
             ::raise(SIGINT);
             ::_exit(1);
         },

@@ -102,11 +102,11 @@ TEST(BenchLoop, ATimeBudgetIsTheAllowance) {
 }
 
 TEST(BenchLoop, FailsWhereItWasInterrupted) {
-    // Interrupted as soon as it hears signals, if that is within a minute; twice, as timeout(1) does.
+    // Interrupted as soon as it hears signals, if that is within a minute.
     const char* const until_it_hears =
         "& bench=$!; for try in $(seq 600); do grep -q 'SigCgt:.*[2367abef]$' /proc/$bench/status && break; sleep "
         "0.1; "
-        "done; kill -INT $bench; kill -INT $bench; wait $bench";
+        "done; kill -INT $bench; wait $bench";
     const Done done =
         test::run_command(NARPA_BIN " bench loop --idle-only --duration 60 --late-max 100 --json 2>/dev/null " +
                           std::string(until_it_hears));

@@ -8,7 +8,7 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE RelWithDebInfo)
+  set(CMAKE_BUILD_TYPE Release)
 endif()
 
 set(NARPA_SANITIZE "" CACHE STRING "Sanitizers for every target: address,undefined or thread")
@@ -30,17 +30,47 @@ function(narpa_compile_options target)
   endif()
 endfunction()
 
-# narpa_library(NAME FOLDER SOURCES... ) - one library per folder; its links are the architecture.
-function(narpa_library name)
-  add_library(narpa_${name} STATIC ${ARGN})
+# narpa_export(NAME) - names a library narpa::NAME, here and in the installed package.
+function(narpa_export name)
   add_library(narpa::${name} ALIAS narpa_${name})
-  set_target_properties(narpa_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(narpa_${name} PROPERTIES EXPORT_NAME ${name})
+  install(TARGETS narpa_${name} EXPORT narpaTargets)
+endfunction()
+
+# narpa_room(FOLDER [SIMD] LINKS ROOMS...) - one library of all sources below FOLDER except main.cpp. LINKS names the
+# rooms whose headers it may include; tests/layout holds every #include against these lists. SIMD: the room's loops over
+# the lanes of a ray batch are to become vector code.
+function(narpa_room folder)
+  cmake_parse_arguments(arg "SIMD" "" "LINKS" ${ARGN})
+  string(REPLACE "/" "_" name ${folder})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
+  add_library(narpa_${name} STATIC ${sources})
+  narpa_export(${name})
+  set_target_properties(narpa_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_include_directories(narpa_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                   $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/narpa>)
+  foreach(room ${arg_LINKS})
+    string(REPLACE "/" "_" linked ${room})
+    target_link_libraries(narpa_${name} PUBLIC narpa::${linked})
+  endforeach()
+  list(JOIN arg_LINKS " " links)
+  set_property(GLOBAL APPEND PROPERTY NARPA_ROOMS "${folder}: ${links}")
   narpa_compile_options(narpa_${name})
-  install(TARGETS narpa_${name} EXPORT narpaTargets)
-  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/narpa/${name}
+  if(arg_SIMD)
+    # GCC otherwise leaves most of these loops scalar. Neither option changes a result: no floating-point exception flag
+    # is read, so both sides of a choice may be computed.
+    target_compile_options(narpa_${name} PRIVATE -O3 -fno-trapping-math)
+  endif()
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/narpa/${folder}
           FILES_MATCHING PATTERN "*.h")
+endfunction()
+
+# OpenCV 4.6's headers warn in C++20.
+function(narpa_use_opencv target)
+  target_include_directories(${target} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+  list(TRANSFORM ARGN PREPEND opencv_)
+  target_link_libraries(${target} PRIVATE ${ARGN})
 endfunction()
 
 function(narpa_executable name)

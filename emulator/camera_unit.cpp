@@ -4,7 +4,7 @@
 
 #include "emulator/clock.h"
 #include "protocols/video/embedded_line.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 

@@ -10,7 +10,7 @@
 
 #include "emulator/world.h"
 #include "protocols/ledger.h"
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 
 namespace narpa {
 
@@ -64,7 +64,7 @@ public:
 
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
-    [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
+    [[nodiscard]] const BodyPoses& placement() const noexcept { return placement_; }
     /// Of the last frame.
     [[nodiscard]] const FrameDurations& durations() const noexcept { return durations_; }
     /// Of every body, as the last frame shows it.
@@ -80,7 +80,7 @@ private:
     Camera camera_;
     std::uint8_t index_;
     double full_scale_;
-    Placement placement_;
+    BodyPoses placement_;
     std::vector<Motion> motions_;
     CameraRenderer renderer_;
     RadianceImage radiance_;

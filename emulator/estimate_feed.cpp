@@ -27,7 +27,7 @@ Status EstimateFeed::log_to(const std::string& folder, bool wait_when_full) {
 }
 
 void EstimateFeed::offer(const FrameLedger& ledger, std::span<const std::uint8_t> bytes,
-                         const Placement& at) noexcept {
+                         const BodyPoses& at) noexcept {
     if (slot_.load(std::memory_order_acquire) != empty) {
         ++passed_over_;
         return;
@@ -54,7 +54,7 @@ void EstimateFeed::wake() noexcept {
     slot_.notify_one();
 }
 
-void EstimateFeed::look(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const Placement& at) {
+void EstimateFeed::look(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at) {
     TrackedFrame tracked = tracker_->take(ledger.frame, ledger.t_exposure_mid_ns, bytes, at);
     if (keeps_reports_) (void)reports_.push(tracked.report(index_));
     if (log_) log_->append(estimate_row(tracked));

@@ -26,12 +26,12 @@ public:
     void keep_reports() noexcept { keeps_reports_ = true; }
 
     /// From the camera's thread: copies the frame where the estimator waits for one, and never waits itself.
-    void offer(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const Placement& at) noexcept;
+    void offer(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at) noexcept;
     /// The estimator's thread: looks at what is offered, until `stop` is set and `wake` was called.
     void run(const StopFlag& stop);
     void wake() noexcept;
     /// Looks at a frame at once: in lockstep.
-    void look(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const Placement& at);
+    void look(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
 
     /// For the CAN thread: kept only where there is one.
     SpscRing<EstimateReport, 64>& reports() noexcept { return reports_; }
@@ -55,7 +55,7 @@ private:
     std::atomic<int> slot_{empty};
     FrameLedger ledger_;
     std::vector<std::uint8_t> bytes_;
-    Placement at_;
+    BodyPoses at_;
     std::uint64_t passed_over_ = 0;  ///< the camera's thread only, until the run is over
     bool keeps_reports_ = false;
     SpscRing<EstimateReport, 64> reports_;

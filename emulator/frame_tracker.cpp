@@ -64,9 +64,9 @@ struct FrameTracker::Impl {
         : world(w), camera(c), target(body), options(o), random(o.seed) {}
 
     /// What one frame says, from a guess.
-    void measure(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
-    void measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
-    void measure_by_pixels(const MeasuredImage& image, const Placement& at, TrackedFrame& out);
+    void measure(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
+    void measure_by_points(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
+    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
     void fuse(const PoseMeasurement& measurement, TrackedFrame& out);
     /// Well enough for a render to be compared from there.
     [[nodiscard]] bool knows_where(const Quat& q_frame_chaser) const;
@@ -93,7 +93,7 @@ Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, s
     FeatureSettings features;
     features.spp = options.spp;
     features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
-    impl->by_points.emplace(world.tracer(), camera, *target, Placement(world.scene().bodies.size()), features);
+    impl->by_points.emplace(world.tracer(), camera, *target, BodyPoses(world.scene().bodies.size()), features);
     if (options.method == EstimateMethod::dense) impl->by_pixels.emplace(world.tracer(), camera, *target);
     return std::unique_ptr<FrameTracker>(new FrameTracker(std::move(impl)));
 }
@@ -109,7 +109,7 @@ const TrackerOptions& FrameTracker::options() const noexcept {
 }
 
 TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
-                                const Placement& at) {
+                                const BodyPoses& at) {
     Impl& m = *impl_;
     const auto start = Clock::now();
     TrackedFrame out;
@@ -146,12 +146,12 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
     return out;
 }
 
-void FrameTracker::Impl::measure(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
+void FrameTracker::Impl::measure(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
     measure_by_points(image, at, out);
     if (by_pixels) measure_by_pixels(image, at, out);
 }
 
-void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
+void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
     const FeatureEstimate e = by_points->align(image, at, out.guess);
     out.matches = e.agreeing;
     out.renders = static_cast<int>(e.rounds.size());
@@ -165,7 +165,7 @@ void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Pla
 }
 
 /// From where the points lead; from the guess where they lead nowhere.
-void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Placement& at, TrackedFrame& out) {
+void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
     DenseOptions dense;
     dense.seed = ~options.seed;
     dense.method = world.scene().render.method;

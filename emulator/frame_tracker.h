@@ -77,7 +77,7 @@ public:
     /// frame has given a pose, guesses lie off the truth as the options say. Runs on the calling
     /// thread's TBB arena.
     TrackedFrame take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
-                      const Placement& at);
+                      const BodyPoses& at);
 
 private:
     struct Impl;

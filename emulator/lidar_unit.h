@@ -8,7 +8,7 @@
 #include "emulator/world.h"
 #include "protocols/lidar/position.h"
 #include "protocols/lidar/vlp16.h"
-#include "renderer/trace/camera_image.h"
+#include "renderer/lidar/lidar_shot.h"
 
 namespace narpa {
 
@@ -41,7 +41,7 @@ public:
 private:
     const World& world_;
     Lidar lidar_;
-    Placement placement_;
+    BodyPoses placement_;
     std::size_t returns_ = 0;
     std::array<vlp16::Shot, vlp16::kShots> shots_{};
     std::array<LidarReturn, vlp16::kShots> hits_{};

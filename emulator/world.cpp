@@ -83,7 +83,7 @@ TrackedPose World::pose(std::size_t body, std::int64_t t_ns) const noexcept {
     return {extrapolate(scene_.bodies[body].initial, static_cast<double>(t_ns) * 1e-9), 0, 0, false, false};
 }
 
-PlacementSource World::place(std::int64_t t_ns, int rider, Placement& out,
+PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,
                              std::span<Motion> motions) const noexcept {
     PlacementSource source;
     bool named = false;
@@ -101,7 +101,7 @@ PlacementSource World::place(std::int64_t t_ns, int rider, Placement& out,
     return source;
 }
 
-void World::place_moving(std::int64_t t_ns, Placement& out) const noexcept {
+void World::place_moving(std::int64_t t_ns, BodyPoses& out) const noexcept {
     for (const std::size_t i : moving_) out.set(i, pose(i, t_ns).motion.T_world_body);
 }
 

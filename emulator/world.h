@@ -11,7 +11,7 @@
 #include "emulator/pose_track.h"
 #include "emulator/trajectory.h"
 #include "renderer/scene/scene.h"
-#include "renderer/trace/tracer.h"
+#include "renderer/geometry/tracer.h"
 
 namespace narpa {
 
@@ -40,12 +40,12 @@ public:
     /// Puts every body where it is at t. `rider`: the body whose command the source names first (a sensor's
     /// mount); -1 for none. `motions`: how the bodies move there, as far as it is long; what is asked later may
     /// rest on newer commands. Allocates nothing.
-    PlacementSource place(std::int64_t t_ns, int rider, Placement& out,
+    PlacementSource place(std::int64_t t_ns, int rider, BodyPoses& out,
                           std::span<Motion> motions = {}) const noexcept;
     /// Puts only the bodies that move (all but those at rest without a can_id): after a first `place`.
-    void place_moving(std::int64_t t_ns, Placement& out) const noexcept;
+    void place_moving(std::int64_t t_ns, BodyPoses& out) const noexcept;
 
-    [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const Placement& at) const noexcept {
+    [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const BodyPoses& at) const noexcept {
         return mount < 0 ? T_mount_sensor : at.T_world_body[static_cast<std::size_t>(mount)] * T_mount_sensor;
     }
     [[nodiscard]] std::optional<std::size_t> body_named(std::string_view name) const noexcept;

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 
 namespace narpa {
 

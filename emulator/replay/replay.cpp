@@ -9,26 +9,26 @@
 #include "emulator/log/run_record.h"
 #include "protocols/video/embedded_line.h"
 #include "renderer/scene/scene_file.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {
 
 /// Where the bodies were in each of the frames, in the frames' order.
-Result<std::vector<Placement>> placements_of(const std::vector<LoggedFrame>& frames, const World& world,
+Result<std::vector<BodyPoses>> placements_of(const std::vector<LoggedFrame>& frames, const World& world,
                                              const std::string& ledger_file, const std::string& truth_file) {
     auto rows = read_trajectory(truth_file);
     if (!rows) return rows.error();
     const auto by_time = [](const TrajectoryRow& a, const TrajectoryRow& b) { return a.t_ns < b.t_ns; };
     std::stable_sort(rows->begin(), rows->end(), by_time);
     const std::size_t bodies = world.scene().bodies.size();
-    std::vector<Placement> placements;
+    std::vector<BodyPoses> placements;
     placements.reserve(frames.size());
     for (const LoggedFrame& frame : frames) {
         const std::int64_t t_ns = frame.ledger.t_exposure_mid_ns;
         const auto [begin, end] =
             std::equal_range(rows->begin(), rows->end(), TrajectoryRow{t_ns, {}, {}, 0}, by_time);
-        Placement& at = placements.emplace_back(bodies);
+        BodyPoses& at = placements.emplace_back(bodies);
         for (auto row = begin; row != end; ++row) {
             const auto body = world.body_named(row->body);
             if (!body)
@@ -75,7 +75,7 @@ struct Replay::Impl {
     std::uint8_t index;
     double full_scale;
     std::vector<LoggedFrame> frames;
-    std::vector<Placement> placements;
+    std::vector<BodyPoses> placements;
     CameraRenderer renderer;
     RadianceImage picture, reference;
     Aovs middles;
@@ -122,7 +122,7 @@ const Camera& Replay::camera() const noexcept {
 std::size_t Replay::camera_index() const noexcept {
     return impl_->index;
 }
-const Placement& Replay::placement(std::size_t i) const noexcept {
+const BodyPoses& Replay::placement(std::size_t i) const noexcept {
     return impl_->placements[i];
 }
 std::span<const std::uint8_t> Replay::bytes() const noexcept {

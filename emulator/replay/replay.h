@@ -23,7 +23,7 @@ struct ReferenceComparison {
 /// A logged run of one camera, open to be looked at again.
 ///
 /// A frame follows from the scene, the bodies' poses, its number, the seed, its step and the sizes of its passes
-/// (renderer/trace/frame_budget.h): the log has them all, so that frames made against the clock repeat as well.
+/// (renderer/film/frame_budget.h): the log has them all, so that frames made against the clock repeat as well.
 class Replay {
 public:
     /// `camera` empty: the first of the scene. `scene_file` empty: the one that the run had.
@@ -36,7 +36,7 @@ public:
     [[nodiscard]] const Camera& camera() const noexcept;
     [[nodiscard]] std::size_t camera_index() const noexcept;
     /// Where the bodies were in frame i.
-    [[nodiscard]] const Placement& placement(std::size_t i) const noexcept;
+    [[nodiscard]] const BodyPoses& placement(std::size_t i) const noexcept;
 
     /// Whether frame i has an image of its own: one that did not even get to its coarsest step has none to repeat.
     [[nodiscard]] bool has_image(std::size_t i) const noexcept;

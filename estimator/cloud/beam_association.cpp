@@ -8,11 +8,11 @@ namespace narpa {
 namespace {
 
 /// Sixteen places of even density on a disc of radius 1, the first in its middle.
-const std::array<std::array<double, 2>, kPacket>& disc() {
+const std::array<std::array<double, 2>, kLanes>& disc() {
     static const auto places = [] {
-        std::array<std::array<double, 2>, kPacket> d{};
-        for (std::size_t k = 0; k < kPacket; ++k) {
-            const double r = std::sqrt(static_cast<double>(k) / (kPacket - 1)),
+        std::array<std::array<double, 2>, kLanes> d{};
+        for (std::size_t k = 0; k < kLanes; ++k) {
+            const double r = std::sqrt(static_cast<double>(k) / (kLanes - 1)),
                          a = 2.39996322972865332 * static_cast<double>(k);
             d[k] = {r * std::cos(a), r * std::sin(a)};
         }
@@ -73,11 +73,11 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
 }
 
 void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const {
-    RayPacket rays;
-    HitPacket hits;
+    RayBatch rays;
+    HitBatch hits;
     Lanes<double> range_m{};
     for (std::size_t i = 0; i < beams_.size();) {
-        for (rays.n = 0; rays.n < kPacket && i < beams_.size(); ++rays.n, i += stride) {
+        for (rays.n = 0; rays.n < kLanes && i < beams_.size(); ++rays.n, i += stride) {
             rays.put(rays.n, in_target(T, beams_[i]));
             range_m[rays.n] = beams_[i].range_m;
         }
@@ -95,16 +95,16 @@ void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vect
 
 void BeamAssociation::around_beams(const Rigid3& T, double search_m, std::size_t stride,
                                    std::vector<PointToPlane>& out) const {
-    RayPacket rays;
-    HitPacket hits;
-    rays.n = kPacket;
+    RayBatch rays;
+    HitBatch hits;
+    rays.n = kLanes;
     for (std::size_t i = 0; i < beams_.size(); i += stride) {
         const Ray beam = in_target(T, beams_[i]);
         const Vec3 point = beam.origin + beams_[i].range_m * beam.direction;
         const Vec3& d = beam.direction;
         const Vec3 across = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
         const Vec3 other = cross(d, across);
-        for (std::size_t k = 0; k < kPacket; ++k) {
+        for (std::size_t k = 0; k < kLanes; ++k) {
             const auto& [u, v] = disc()[k];
             rays.put(k, {beam.origin, normalized(point + search_m * (u * across + v * other) - beam.origin)});
         }

@@ -7,7 +7,7 @@
 
 #include "estimator/cloud/range_points.h"
 #include "estimator/pose/pose_estimate.h"
-#include "renderer/trace/tracer.h"
+#include "renderer/geometry/tracer.h"
 
 namespace narpa {
 
@@ -56,7 +56,7 @@ private:
     void around_beams(const Rigid3& T, double search_m, std::size_t stride, std::vector<PointToPlane>& out) const;
 
     const Tracer& tracer_;
-    Placement at_rest_;  ///< target coordinates are the tracer's world
+    BodyPoses at_rest_;  ///< target coordinates are the tracer's world
     std::uint32_t target_;
     bool turning_ = false;
     std::vector<Beam> beams_;

@@ -63,7 +63,7 @@ struct DenseAlignment::Impl {
         }
     }
 
-    LevelView& view_of(int factor, const Camera& level_camera, const Window& window, const Placement& at) {
+    LevelView& view_of(int factor, const Camera& level_camera, const Window& window, const BodyPoses& at) {
         auto& kept = levels[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
         if (!kept || kept->window() != window) kept.emplace(tracer, level_camera, window, target, at);
         kept->place_bodies(at);
@@ -88,7 +88,7 @@ std::vector<float> coarser_variance(std::span<const float> variance, const Camer
 }
 
 Status check_input(const Camera& camera, const MeasuredImage& frame, std::span<const float> frame_variance,
-                   std::size_t bodies, const Placement& at, const Rigid3& guess) {
+                   std::size_t bodies, const BodyPoses& at, const Rigid3& guess) {
     const auto size = [](auto w, auto h) { return std::to_string(w) + " x " + std::to_string(h); };
     const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
     if (frame.width != camera.width || frame.height != camera.height || frame.dn.size() != pixels)
@@ -115,7 +115,7 @@ DenseAlignment::DenseAlignment(const Tracer& tracer, const Camera& camera, std::
     : impl_(std::make_unique<Impl>(tracer, camera, target)) {}
 DenseAlignment::~DenseAlignment() = default;
 
-Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Placement& at,
+Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const BodyPoses& at,
                                             const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                             std::span<const float> frame_variance) {
     Impl& i = *impl_;
@@ -153,7 +153,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Pl
     return e;
 }
 
-Result<Matrix6> DenseAlignment::bound(const Placement& at, const Rigid3& T_camera_body, const DenseOptions& options,
+Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camera_body, const DenseOptions& options,
                                       std::span<const float> frame_variance) {
     Impl& i = *impl_;
     if (const Status good = check(options); !good) return good.error();

@@ -78,7 +78,7 @@ public:
     /// it, its position and the camera's do not matter. `frame_variance`: DN^2 that the frame has beside the
     /// sensor's noise, or empty. Memory is kept from frame to frame as far as the target's place in the image
     /// allows. Errors: sizes, options or a guess that cannot be used.
-    [[nodiscard]] Result<DenseEstimate> align(const MeasuredImage& frame, const Placement& at,
+    [[nodiscard]] Result<DenseEstimate> align(const MeasuredImage& frame, const BodyPoses& at,
                                               const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                               std::span<const float> frame_variance = {});
 
@@ -86,7 +86,7 @@ public:
     /// inverse of sum g g' / s^2, s^2 the sensor's and the frame's as in `align`, with the exposure as unknown as
     /// the options have it. The information in the noise's own strength is left out: it is less by the number of
     /// electrons in a pixel.
-    [[nodiscard]] Result<Matrix6> bound(const Placement& at, const Rigid3& T_camera_body,
+    [[nodiscard]] Result<Matrix6> bound(const BodyPoses& at, const Rigid3& T_camera_body,
                                         const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:

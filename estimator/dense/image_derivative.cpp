@@ -8,9 +8,9 @@
 
 #include "estimator/dense/pixel_patch.h"
 #include "estimator/view/model_view.h"
-#include "renderer/trace/camera_ray.h"
-#include "renderer/trace/flush_denormals.h"
-#include "renderer/trace/shading.h"
+#include "renderer/camera/camera_ray.h"
+#include "renderer/geometry/flush_denormals.h"
+#include "renderer/integrator/shading.h"
 
 namespace narpa {
 namespace {
@@ -170,7 +170,7 @@ Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, cons
 }  // namespace
 
 ImageDerivative::ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target,
-                                 const Placement& at)
+                                 const BodyPoses& at)
     : tracer_(tracer), camera_(camera), target_(target), at_(at) {
     const auto& materials = tracer.scene().materials;
     view_dependent_ = tracer.scene().sun && std::any_of(materials.begin(), materials.end(), depends_on_view);

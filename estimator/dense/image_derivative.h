@@ -28,7 +28,7 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/view/measured_image.h"
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 
 namespace narpa {
 
@@ -38,10 +38,10 @@ using PixelDerivative = Eigen::Matrix<float, 6, 1>;
 class ImageDerivative {
 public:
     /// `camera` is that of the image. `tracer` outlives it.
-    ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at);
+    ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at);
 
     /// As ModelView has it.
-    void place_bodies(const Placement& at) { at_ = at; }
+    void place_bodies(const BodyPoses& at) { at_ = at; }
 
     /// Of the expected DN, but for clipping, at this pose. Row-major; the outermost pixels, beside which nothing is
     /// known, are zero. `fineness` >= 1: rays each way in a pixel where the light changes much. Runs on the calling
@@ -53,7 +53,7 @@ private:
     const Tracer& tracer_;
     const Camera camera_;
     const std::size_t target_;
-    Placement at_;
+    BodyPoses at_;
     bool view_dependent_ = false;  ///< any material
     std::vector<PixelDerivative> derivative_;
 };

@@ -68,7 +68,7 @@ Camera window_camera(const Camera& camera, const Window& window) {
 }
 
 LevelView::LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
-                     const Placement& at)
+                     const BodyPoses& at)
     : window_(window),
       view_(tracer, window_camera(camera, window), target, at),
       derivative_(tracer, window_camera(camera, window), target, at) {
@@ -78,7 +78,7 @@ LevelView::LevelView(const Tracer& tracer, const Camera& camera, const Window& w
     signal_variance_.resize(n);
 }
 
-void LevelView::place_bodies(const Placement& at) {
+void LevelView::place_bodies(const BodyPoses& at) {
     view_.place_bodies(at);
     derivative_.place_bodies(at);
 }

@@ -30,11 +30,11 @@ struct Window {
 class LevelView {
 public:
     LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
-              const Placement& at);
+              const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
     /// As ModelView has it.
-    void place_bodies(const Placement& at);
+    void place_bodies(const BodyPoses& at);
     /// Takes the measured image (of the level's whole camera) and variance (or none) into the window.
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);

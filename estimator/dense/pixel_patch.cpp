@@ -28,7 +28,7 @@ double signal_of(const SensorModel& sensor, const Rgb& L) {
     return k[0] * static_cast<double>(L.x) + k[1] * static_cast<double>(L.y) + k[2] * static_cast<double>(L.z);
 }
 
-FineGrid::FineGrid(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
+FineGrid::FineGrid(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
                    const FrameSettings& settings, int fineness)
     : fineness_(fineness),
       camera_(finer_camera(camera, fineness)),
@@ -49,7 +49,7 @@ void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, in
     samples.sample.fill(0);
     Lanes<std::size_t> place;
     const auto trace = [&] {
-        RgbPerRay radiance;
+        RgbLanes radiance;
         trace_samples(f, samples, f.tracer.all_bodies(), p, radiance);
         for (std::size_t i = 0; i < samples.n; ++i) {
             constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -75,7 +75,7 @@ void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, in
                 static_cast<std::uint32_t>(fine_x);
             place[samples.n++] =
                 static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(i + 1);
-            if (samples.n == kPacket) trace();
+            if (samples.n == kLanes) trace();
         }
     if (samples.n > 0) trace();
 }

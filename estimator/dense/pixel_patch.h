@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimator/view/measured_image.h"
-#include "renderer/trace/camera_packet.h"
+#include "renderer/film/camera_batch.h"
 
 namespace narpa {
 
@@ -15,7 +15,7 @@ namespace narpa {
 class FineGrid {
 public:
     /// All but `camera` outlive it.
-    FineGrid(const Tracer& tracer, const Placement& at, const Camera& camera, const Rigid3& T_world_camera,
+    FineGrid(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
              const FrameSettings& settings, int fineness);
     FineGrid(const FineGrid&) = delete;
     FineGrid& operator=(const FineGrid&) = delete;

@@ -158,7 +158,7 @@ struct FeatureAlignment::Points {
 };
 
 FeatureAlignment::FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target,
-                                   const Placement& at, const FeatureSettings& settings)
+                                   const BodyPoses& at, const FeatureSettings& settings)
     : view_(tracer, camera, target, at),
       sensor_(sensor_model(camera)),
       settings_(settings),
@@ -226,7 +226,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
     round.matches = static_cast<int>(points.size());
 }
 
-FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const Placement& at, const Rigid3& guess) {
+FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess) {
     FeatureEstimate estimate;
     estimate.T_camera_target = guess;
     view_.place_bodies(at);

@@ -63,12 +63,12 @@ struct FeatureEstimate {
 class FeatureAlignment {
 public:
     /// `tracer` outlives it. `target`: index of the body. `at`: as of ModelView.
-    FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at,
+    FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at,
                      const FeatureSettings& settings = {});
 
     /// `at`: where the bodies are when the frame is exposed. Points that the view shows where the frame does not
     /// (occlusion, other light) are outvoted, not told. Runs on the calling thread's TBB arena.
-    [[nodiscard]] FeatureEstimate align(const MeasuredImage& frame, const Placement& at, const Rigid3& guess);
+    [[nodiscard]] FeatureEstimate align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess);
 
 private:
     struct Points;

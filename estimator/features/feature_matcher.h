@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/view/measured_image.h"
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 
 namespace narpa {
 

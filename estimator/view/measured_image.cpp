@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {

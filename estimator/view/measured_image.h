@@ -23,7 +23,7 @@ struct MeasuredImage {
 
 /// What a pixel's digital number tells of radiance: DN = black + sum over bands of dn_per_radiance * L, clipped to
 /// 0 .. top, with the variance of read noise, shot noise and rounding. From the camera's detector
-/// (renderer/sensor/detector.h), or of the ideal sensor that it has without one. In units of the converter's DN,
+/// (renderer/camera/detector.h), or of the ideal sensor that it has without one. In units of the converter's DN,
 /// whatever bits of it the format shows.
 struct SensorModel {
     std::array<double, 3> dn_per_radiance{};  ///< DN per W m^-2 sr^-1 in the red, green, blue band
@@ -40,7 +40,7 @@ struct SensorModel {
 /// RGB24 is read as the mean of its bands, YUYV as its luma.
 [[nodiscard]] SensorModel sensor_model(const Camera& camera);
 
-/// A frame's bytes in the camera's format (renderer/sensor/detector.h) as DN. Of a camera with an embedded line the
+/// A frame's bytes in the camera's format (renderer/camera/detector.h) as DN. Of a camera with an embedded line the
 /// image has one row fewer: the last holds no light. Errors: the number of bytes is not the format's.
 [[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);
 

@@ -4,14 +4,14 @@
 
 namespace narpa {
 
-Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, Placement& at) {
+Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, BodyPoses& at) {
     const Rigid3 T_world_camera = at.T_world_body[target] * inverse(T_camera_target);
     if (camera.mount >= 0)
         at.set(static_cast<std::size_t>(camera.mount), T_world_camera * inverse(camera.T_mount_camera));
     return T_world_camera;
 }
 
-ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at)
+ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at)
     : tracer_(tracer),
       camera_(camera),
       target_(target),

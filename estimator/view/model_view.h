@@ -6,23 +6,23 @@
 
 #include <cstddef>
 
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 
 namespace narpa {
 
 /// Where the camera is if the target, which stays where `at` has it, has this pose. The body that carries the
 /// camera is put there with it.
 [[nodiscard]] Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target,
-                                  Placement& at);
+                                  BodyPoses& at);
 
 class ModelView {
 public:
     /// `tracer` outlives it. `target`: index of the body whose pose is looked for. `at`: where every body is at the
     /// time of the frame; the target's attitude there tells how the light falls on it.
-    ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const Placement& at);
+    ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at);
 
     /// Where every body is from now on: at another frame's time.
-    void place_bodies(const Placement& at) { at_ = at; }
+    void place_bodies(const BodyPoses& at) { at_ = at; }
 
     /// Renders the view at this pose; `aovs` tells whether depth, position, normal and body are wanted too. The
     /// budget of the settings is obeyed. Allocates nothing after the first call of a kind.
@@ -35,7 +35,7 @@ public:
     /// the bodies and the camera were.
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
     [[nodiscard]] const Aovs& aovs() const noexcept { return aovs_; }
-    [[nodiscard]] const Placement& placement() const noexcept { return at_; }
+    [[nodiscard]] const BodyPoses& placement() const noexcept { return at_; }
     [[nodiscard]] const Rigid3& T_world_camera() const noexcept { return T_world_camera_; }
     [[nodiscard]] const Rigid3& T_world_target() const noexcept { return at_.T_world_body[target_]; }
 
@@ -49,7 +49,7 @@ private:
     const Tracer& tracer_;
     Camera camera_;
     std::size_t target_;
-    Placement at_;
+    BodyPoses at_;
     Rigid3 T_world_camera_{};
     CameraRenderer renderer_;
     RadianceImage radiance_;

@@ -57,13 +57,13 @@ Result<std::unique_ptr<SightModel>> SightModel::create(const Scenario& scenario)
     auto tracer = Tracer::create(m->scene_);
     if (!tracer) return tracer.error();
     m->tracer_.emplace(*std::move(tracer));
-    m->at_ = Placement(m->scene_.bodies.size());
+    m->at_ = BodyPoses(m->scene_.bodies.size());
     for (std::size_t i = 0; i < m->scene_.bodies.size(); ++i)
         m->at_.set(i, m->scene_.bodies[i].initial.T_world_body);
     return m;
 }
 
-const Placement& SightModel::place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser) {
+const BodyPoses& SightModel::place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser) {
     const Rigid3 T_world_target{q_world_target, -(q_world_target * target_centre_of_mass_m_)};
     at_.set(target_, T_world_target);
     at_.set(chaser_, T_world_target * T_target_chaser);

@@ -7,7 +7,7 @@
 
 #include "base/result.h"
 #include "rehearsal/scenario/scenario.h"
-#include "renderer/trace/tracer.h"
+#include "renderer/geometry/tracer.h"
 
 namespace narpa::rehearsal {
 
@@ -28,7 +28,7 @@ public:
     /// Where everything is at t_s: the target's centre of mass at the world's origin, the attractor below it along
     /// its orbit, the chaser beside it (`T_target_chaser`: body axes of both); what else there is, as the scene has
     /// it at time 0.
-    [[nodiscard]] const Placement& place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser);
+    [[nodiscard]] const BodyPoses& place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser);
 
 private:
     SightModel() : at_(0) {}
@@ -40,7 +40,7 @@ private:
     std::size_t target_ = 0, chaser_ = 0;
     std::optional<std::size_t> attractor_;
     std::vector<std::size_t> cameras_, lidars_;
-    Placement at_;
+    BodyPoses at_;
 };
 
 }  // namespace narpa::rehearsal

@@ -41,7 +41,7 @@ constexpr double kNear_m = 0.3;
 CameraSight::CameraSight(SightModel& model, std::size_t camera, std::uint64_t seed)
     : model_(model),
       camera_(model.scene().cameras[camera]),
-      alignment_(model.tracer(), camera_, model.target(), Placement(model.scene().bodies.size()),
+      alignment_(model.tracer(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
                  feature_settings(seed)) {}
 
 Sighting CameraSight::look(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
@@ -53,7 +53,7 @@ Sighting CameraSight::look(std::span<const std::uint8_t> bytes, std::int64_t t_n
         out.why = image.error().what;
         return out;
     }
-    const Placement& at =
+    const BodyPoses& at =
         model_.place(t_s, normalized(q_world_chaser * T_chaser_target.q), inverse(T_chaser_target));
     const FeatureEstimate e = alignment_.align(*image, at, inverse(camera_.T_mount_camera) * T_chaser_target);
     out.points = e.agreeing;
@@ -74,13 +74,13 @@ Result<LidarSight> LidarSight::create(SightModel& model, std::size_t lidar) {
 
 /// Beams that end on the chaser itself say nothing of the target.
 void LidarSight::leave_out_own_body(std::span<const RangePoint> points) {
-    Placement at(model_->scene().bodies.size());
+    BodyPoses at(model_->scene().bodies.size());
     const auto own = static_cast<std::uint32_t>(model_->chaser());
     points_.clear();
-    RayPacket rays;
-    HitPacket hits;
-    for (std::size_t i = 0; i < points.size(); i += kPacket) {
-        rays.n = std::min<std::size_t>(kPacket, points.size() - i);
+    RayBatch rays;
+    HitBatch hits;
+    for (std::size_t i = 0; i < points.size(); i += kLanes) {
+        rays.n = std::min<std::size_t>(kLanes, points.size() - i);
         for (std::size_t k = 0; k < rays.n; ++k)
             rays.put(k, {lidar_.T_mount_lidar * points[i + k].origin_m,
                          lidar_.T_mount_lidar.q * points[i + k].direction});

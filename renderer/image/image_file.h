@@ -6,7 +6,8 @@
 #include <string>
 
 #include "base/result.h"
-#include "renderer/trace/camera_image.h"
+#include "renderer/image/radiance_image.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa {
 

@@ -22,7 +22,7 @@
 
 #include <array>
 
-#include "renderer/scene/scene.h"
+#include "renderer/material/material.h"
 
 namespace narpa {
 

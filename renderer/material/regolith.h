@@ -4,7 +4,7 @@
 /// phase, the scattering angle is pi - a.
 #pragma once
 
-#include "renderer/scene/scene.h"
+#include "renderer/material/material.h"
 
 namespace narpa {
 

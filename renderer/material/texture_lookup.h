@@ -7,7 +7,7 @@
 #include <array>
 #include <cstdint>
 
-#include "renderer/scene/scene.h"
+#include "renderer/material/material.h"
 
 namespace narpa {
 

@@ -6,7 +6,8 @@
 #include <filesystem>
 
 #include "renderer/scene/scene_file.h"
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
+#include "renderer/lidar/lidar_shot.h"
 
 namespace narpa {
 namespace {
@@ -29,8 +30,8 @@ protected:
         delete scene;
     }
     /// The chaser on the port's axis, facing it.
-    static Placement at_distance(double x_m) {
-        Placement at(2);
+    static BodyPoses at_distance(double x_m) {
+        BodyPoses at(2);
         at.set(0, scene->bodies[0].initial.T_world_body);
         at.set(1, {{0, 0, 0, 1}, {x_m, 0, 0}});
         return at;
@@ -44,7 +45,7 @@ struct View {
     int station_pixels = 0, chaser_pixels = 0;
     double sunlit_high = 0, shadow_low = 0;  ///< 95th and 5th percentile of the station's radiance
 };
-View look(const Tracer& tracer, const Placement& at, Camera camera) {
+View look(const Tracer& tracer, const BodyPoses& at, Camera camera) {
     camera.width /= 4, camera.height /= 4, camera.fx /= 4, camera.fy /= 4;
     camera.cx = 0.5 * (camera.width - 1), camera.cy = 0.5 * (camera.height - 1);
     RadianceImage image(camera.width, camera.height);
@@ -84,7 +85,7 @@ TEST_F(DockingSensors, StationGrowsInTheCameraLitAndShadowedAndTheChaserStaysOut
 TEST_F(DockingSensors, LidarSeesTheStationAheadAndTheChaserOnlyBehind) {
     const Lidar& lidar = scene->lidars[0];
     for (const double x_m : {60.0, 10.0, 0.0}) {
-        const Placement at = at_distance(x_m);
+        const BodyPoses at = at_distance(x_m);
         const Rigid3 T = at.T_world_body[static_cast<std::size_t>(lidar.mount)] * lidar.T_mount_lidar;
         int on_station = 0;
         for (int elevation = -15; elevation <= 15; elevation += 2)

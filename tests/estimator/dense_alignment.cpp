@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "renderer/scene/scene_file.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {
@@ -53,7 +53,7 @@ protected:
     Scene scene;
     Camera camera;
     std::optional<Tracer> tracer;
-    Placement at{2};
+    BodyPoses at{2};
     Rigid3 truth;
 };
 

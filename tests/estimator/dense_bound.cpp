@@ -9,7 +9,7 @@
 
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {
@@ -141,7 +141,7 @@ TEST(DenseBound, ErrorsAreThoseThatNoiseMakes) {
                                .shot_noise = true,
                                .black_level_dn = 64,
                                .bits = 12};
-    const Placement at(1);
+    const BodyPoses at(1);
     const Rigid3 truth{normalized(Quat{0.9, 0.2, -0.3, 0.1}), {0.1, -0.05, 10}};
     ModelView view(*tracer, camera, 0, at);
     FrameSettings fine;

@@ -31,8 +31,8 @@ SensorModel unit_sensor() {
     return s;
 }
 
-Placement placement_of(const Scene& scene) {
-    Placement at(scene.bodies.size());
+BodyPoses placement_of(const Scene& scene) {
+    BodyPoses at(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) at.set(b, scene.bodies[b].initial.T_world_body);
     return at;
 }
@@ -47,7 +47,7 @@ struct Renders {
 /// the difference.
 std::array<double, 6> relative_errors(const Tracer& tracer, const Camera& camera, std::size_t target,
                                       const Rigid3& pose, const Renders& r) {
-    const Placement at = placement_of(tracer.scene());
+    const BodyPoses at = placement_of(tracer.scene());
     const SensorModel sensor = unit_sensor();
     ImageDerivative derivative(tracer, camera, target, at);
     ModelView view(tracer, camera, target, at);

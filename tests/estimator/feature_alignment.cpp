@@ -7,7 +7,7 @@
 
 #include "estimator/features/flow_noise.h"
 #include "renderer/scene/scene_file.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {
@@ -30,7 +30,7 @@ protected:
 
     /// A frame from x metres before the port, with the detector's noise.
     MeasuredImage frame_at(double x_m, std::uint32_t number, int spp = 16) {
-        at_ = Placement(scene_.bodies.size());
+        at_ = BodyPoses(scene_.bodies.size());
         at_.set(kStation, scene_.bodies[kStation].initial.T_world_body);
         at_.set(kChaser, {scene_.bodies[kChaser].initial.T_world_body.q, {x_m, 0.03 * x_m, -0.02 * x_m}});
         const Rigid3 T_world_camera = at_.T_world_body[kChaser] * camera_.T_mount_camera;
@@ -59,12 +59,12 @@ protected:
     Scene scene_;
     std::optional<Tracer> tracer_;
     Camera camera_;
-    Placement at_{2};
+    BodyPoses at_{2};
     Rigid3 truth_{};
 };
 
 TEST_F(FeatureAlignmentTest, FindsThePoseFromFiveDegreesAndFivePerCentOff) {
-    FeatureAlignment alignment(*tracer_, camera_, kStation, Placement(2));
+    FeatureAlignment alignment(*tracer_, camera_, kStation, BodyPoses(2));
     std::mt19937_64 random(3);
     double nees = 0;
     int frames = 0;
@@ -90,8 +90,8 @@ TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
     const MeasuredImage frame = frame_at(20, 1);
     std::mt19937_64 random(4);
     const Rigid3 guess = off_by(3, random);
-    FeatureAlignment one(*tracer_, camera_, kStation, Placement(2)),
-        other(*tracer_, camera_, kStation, Placement(2));
+    FeatureAlignment one(*tracer_, camera_, kStation, BodyPoses(2)),
+        other(*tracer_, camera_, kStation, BodyPoses(2));
     (void)other.align(frame_at(10, 2), at_, guess);  // what it saw before does not matter
     const MeasuredImage again = frame_at(20, 1);
     EXPECT_EQ(frame.dn, again.dn);
@@ -99,7 +99,7 @@ TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
 }
 
 TEST_F(FeatureAlignmentTest, SaysThatThereIsNothingToMatch) {
-    FeatureAlignment alignment(*tracer_, camera_, kStation, Placement(2));
+    FeatureAlignment alignment(*tracer_, camera_, kStation, BodyPoses(2));
     MeasuredImage dark = frame_at(20, 1);
     std::fill(dark.dn.begin(), dark.dn.end(), 64.f);
     EXPECT_EQ(alignment.align(dark, at_, truth_).status, FeatureStatus::few_matches);
@@ -117,7 +117,7 @@ TEST_F(FeatureAlignmentTest, EachKindOfFeatureLeadsThere) {
         FeatureSettings settings;
         settings.kind = kind;
         settings.renders_max = 4;
-        FeatureAlignment alignment(*tracer_, camera_, kStation, Placement(2), settings);
+        FeatureAlignment alignment(*tracer_, camera_, kStation, BodyPoses(2), settings);
         const FeatureEstimate e = alignment.align(frame, at_, guess);
         ASSERT_TRUE(e.ok()) << name(kind) << ": " << name(e.status);
         EXPECT_LT(error_between(e.T_camera_target, truth_).head<3>().norm(), 0.5 * kDegree) << name(kind);

@@ -49,7 +49,7 @@ struct Bench {
                                                 std::mt19937_64& random) const {
         std::normal_distribution<double> normal;
         std::vector<RangePoint> points;
-        Placement at(1);
+        BodyPoses at(1);
         Vector6 rate;
         rate << to_eigen(motion.rate_rad_s), to_eigen(motion.velocity_m_s);
         for (int column = -150; column <= 150; ++column)

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {

@@ -7,8 +7,9 @@
 #include "estimator/view/model_view.h"
 #include "protocols/lidar/vlp16.h"
 #include "rehearsal/navigation/sight_model.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 #include "tests/rehearsal/navigation_plant.h"
+#include "renderer/lidar/lidar_shot.h"
 
 namespace narpa::rehearsal::test {
 
@@ -24,7 +25,7 @@ inline Rigid3 chaser_target(const Plant& plant) {
 inline std::vector<std::uint8_t> frame(SightModel& model, const Plant& plant, std::uint32_t number) {
     const Camera& camera = model.scene().cameras[model.cameras()[0]];
     const Rigid3 T_chaser_target = chaser_target(plant);
-    const Placement at = model.place(plant.t_s, plant.motion.q_world_target, inverse(T_chaser_target));
+    const BodyPoses at = model.place(plant.t_s, plant.motion.q_world_target, inverse(T_chaser_target));
     FrameSettings settings;
     settings.seed = 77;
     settings.frame = number;
@@ -52,7 +53,7 @@ inline std::vector<std::vector<std::uint8_t>> turn(SightModel& model, Plant& pla
         for (std::size_t i = 0; i < shots.size(); ++i) {
             const double t_s = 1e-9 * static_cast<double>(vlp16::packet_start_ns(packet) + shots[i].t_offset_ns);
             if (t_s > plant.t_s) plant.step({}, {}, t_s - plant.t_s);
-            const Placement& at =
+            const BodyPoses& at =
                 model.place(plant.t_s, plant.motion.q_world_target, inverse(chaser_target(plant)));
             const Rigid3 T = at.T_world_body[model.chaser()] * lidar.T_mount_lidar;
             range_m[i] = shoot(model.tracer(), at, {T * shots[i].origin_m(), T.q * vlp16::direction(shots[i])},

@@ -1,6 +1,6 @@
 // Budgets and error: more rays, less error; the error that a frame estimates is the one that it has; nothing that a
 // frame's own samples show biases it.
-#include "renderer/trace/frame_passes.h"
+#include "renderer/film/frame_passes.h"
 #include "tests/renderer/budget_support.h"
 
 namespace narpa {

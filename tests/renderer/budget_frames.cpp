@@ -2,7 +2,7 @@
 #include <atomic>
 #include <thread>
 
-#include "renderer/trace/frame_passes.h"
+#include "renderer/film/frame_passes.h"
 #include "tests/renderer/budget_support.h"
 #include "tests/support/allocation_counter.h"
 

@@ -10,7 +10,7 @@
 #include <memory>
 #include <optional>
 
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 #include "tests/support/shapes.h"
 
 namespace narpa::test {
@@ -29,7 +29,7 @@ public:
     std::unique_ptr<Scene> scene;  // the tracer keeps its address
     Tracer tracer;
     Camera camera;
-    Placement at;
+    BodyPoses at;
     Rigid3 T_world_camera;
 
     [[nodiscard]] std::uint64_t pixels() const {

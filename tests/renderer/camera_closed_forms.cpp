@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 #include "tests/renderer/camera_support.h"
 #include "tests/support/shapes.h"
 

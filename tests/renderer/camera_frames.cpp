@@ -3,9 +3,9 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "renderer/sensor/detector.h"
-#include "renderer/trace/camera_image.h"
-#include "renderer/trace/camera_ray.h"
+#include "renderer/camera/detector.h"
+#include "renderer/film/camera_image.h"
+#include "renderer/camera/camera_ray.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/shapes.h"
 
@@ -37,7 +37,7 @@ TEST(CameraFrame, AovsAgreeWithTheTracer) {
     const Scene s = craft_over_a_globe();
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     const Camera c = camera(60, 45, 60);
     RadianceImage image(c.width, c.height);
     Aovs aovs;
@@ -198,7 +198,7 @@ TEST(CameraFrame, AllocatesNothingAfterTheFirstFrame) {
     const Scene s = craft_over_a_globe();
     const auto tracer = Tracer::create(s, 2);
     ASSERT_TRUE(tracer);
-    Placement at = placed(s);
+    BodyPoses at = placed(s);
     Camera c = camera(160, 120, 160);
     c.detector = Detector{};
     c.detector->shot_noise = true;

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 
 namespace narpa::test {
 

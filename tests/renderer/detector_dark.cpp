@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "renderer/sensor/dark_levels.h"
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/dark_levels.h"
+#include "renderer/camera/detector.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

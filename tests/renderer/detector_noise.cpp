@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "renderer/sensor/noise.h"
+#include "renderer/camera/noise.h"
 
 namespace narpa {
 namespace {
@@ -50,7 +50,7 @@ TEST(Philox, SideBySideIsTheSame) {
         for (const std::uint32_t first : {0u, 12'345u, 0xfffffff8u})  // the last wraps
             for (const std::uint32_t frame : {0u, 77u, 0xffffffffu}) {
                 const BlockPerLane lanes = philox(PhiloxSchedule(seed), first, frame, 2);
-                for (std::uint32_t i = 0; i < kPacket; ++i)
+                for (std::uint32_t i = 0; i < kLanes; ++i)
                     ASSERT_EQ((Block{lanes.w0[i], lanes.w1[i], lanes.w2[i], lanes.w3[i]}),
                               philox({first + i, frame, 2, 0},
                                      {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}));
@@ -73,12 +73,12 @@ TEST(Noise, FunctionsAreThoseOfTheStandardLibrary) {
 TEST(Noise, NormalsAreThoseOfBoxAndMuller) {
     const std::vector<std::uint32_t> words = telling_words();
     double worst = 0;
-    for (std::size_t k = 0; k + kPacket <= words.size(); k += kPacket) {
+    for (std::size_t k = 0; k + kLanes <= words.size(); k += kLanes) {
         BlockPerLane random{};
-        for (std::size_t i = 0; i < kPacket; ++i)
+        for (std::size_t i = 0; i < kLanes; ++i)
             random.w0[i] = words[k + i], random.w1[i] = words[words.size() - 1 - k - i];
         const NormalsPerLane normal = normals(random);
-        for (std::size_t i = 0; i < kPacket; ++i) {
+        for (std::size_t i = 0; i < kLanes; ++i) {
             const double radius = std::sqrt(-2 * std::log(open_unit(random.w0[i]))),
                          angle = 2 * std::numbers::pi * open_unit(random.w1[i]);
             worst = std::max({worst, std::abs(static_cast<double>(normal.a[i]) - radius * std::cos(angle)),
@@ -90,11 +90,11 @@ TEST(Noise, NormalsAreThoseOfBoxAndMuller) {
 
 TEST(Noise, HasItsDistributions) {
     std::vector<double> a, b, even;
-    for (std::uint32_t first = 0; first < 400'000; first += kPacket) {
+    for (std::uint32_t first = 0; first < 400'000; first += kLanes) {
         const BlockPerLane random = philox(PhiloxSchedule(4), first, 0, 0);
         const NormalsPerLane normal = normals(random);
         const Lanes<double> uniform = uniforms(random);
-        for (std::size_t i = 0; i < kPacket; ++i) {
+        for (std::size_t i = 0; i < kLanes; ++i) {
             a.push_back(static_cast<double>(normal.a[i]));
             b.push_back(static_cast<double>(normal.b[i]));
             even.push_back(uniform[i]);
@@ -123,14 +123,14 @@ double inverted(double mean, double uniform) {
 
 TEST(Poisson, FaintCountsAreExact) {
     std::uint32_t first = 0;
-    for (int round = 0; round < 2000; ++round, first += kPacket) {
+    for (int round = 0; round < 2000; ++round, first += kLanes) {
         const BlockPerLane random = philox(PhiloxSchedule(6), first, 0, 0);
         const Lanes<double> uniform = uniforms(random);
         Lanes<double> mean;
-        for (std::size_t i = 0; i < kPacket; ++i)
+        for (std::size_t i = 0; i < kLanes; ++i)
             mean[i] = i == 3 ? 0 : kPoissonExactBelow * std::pow(open_unit(random.w0[i]), round % 4 + 1);
         const Lanes<double> count = exact_poisson(mean, uniform);
-        for (std::size_t i = 0; i < kPacket; ++i) ASSERT_EQ(count[i], inverted(mean[i], uniform[i])) << mean[i];
+        for (std::size_t i = 0; i < kLanes; ++i) ASSERT_EQ(count[i], inverted(mean[i], uniform[i])) << mean[i];
     }
     Lanes<double> high, mean;
     high.fill(1 - 0x1p-36);
@@ -145,7 +145,7 @@ TEST(Poisson, LanesKnowNothingOfEachOther) {
     const BlockPerLane random = philox(PhiloxSchedule(9), 0, 0, 0);
     const NormalsPerLane normal = normals(random);
     const Lanes<double> together = poisson(means, normal, random);
-    for (std::size_t i = 0; i < kPacket; ++i) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
         Lanes<double> alone{};
         alone[i] = means[i];
         EXPECT_EQ(poisson(alone, normal, random)[i], together[i]) << means[i];
@@ -161,7 +161,7 @@ TEST(Poisson, HasTheDistributionOnBothSidesOfTheThreshold) {
         means.fill(mean);
         std::vector<int> count(600);
         double sum = 0, squares = 0, cubes = 0;
-        for (std::uint32_t first = 0; first < n; first += kPacket) {
+        for (std::uint32_t first = 0; first < n; first += kLanes) {
             const BlockPerLane random = philox(PhiloxSchedule(11), first, 0, 0);
             for (const double k : poisson(means, normals(random), random)) {
                 ASSERT_EQ(k, std::floor(k));

@@ -4,8 +4,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "renderer/sensor/detector.h"
-#include "renderer/sensor/solar_bands.h"
+#include "renderer/camera/detector.h"
+#include "renderer/camera/solar_bands.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -12,7 +12,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "renderer/sensor/detector.h"
+#include "renderer/camera/detector.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

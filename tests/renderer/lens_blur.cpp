@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "renderer/trace/camera_image.h"
-#include "renderer/trace/lens.h"
+#include "renderer/film/camera_image.h"
+#include "renderer/camera/lens.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

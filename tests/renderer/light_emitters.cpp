@@ -1,5 +1,5 @@
 // What emitters send to a surface, against the closed forms of radiometry.
-#include "renderer/trace/lights.h"
+#include "renderer/light/lights.h"
 #include "tests/renderer/path_support.h"
 
 namespace narpa {

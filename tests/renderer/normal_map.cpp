@@ -5,7 +5,7 @@
 #include <random>
 
 #include "renderer/material/texture_lookup.h"
-#include "renderer/trace/shading.h"
+#include "renderer/integrator/shading.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -59,7 +59,7 @@ struct Seen {
 Seen see(const Scene& s, const Vec3& eye, const Vec3& target, double width_m = 1e-3) {
     const auto tracer = Tracer::create(s, 1);
     EXPECT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     const Ray ray{eye, normalized(target - eye)};
     Seen seen;
     seen.hit = tracer->intersect(at, ray, kInfinity);
@@ -238,7 +238,7 @@ TEST(TurnedNormals, StayOnTheViewersSide) {
     add_sphere(s, 1, {3, 0, 0}, 1);
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     int seen = 0, turned_far = 0;
     for (int i = 0; i < 200000 && seen < 100000; ++i) {
         const Vec3 centre{i % 2 ? 3.0 : 0.0, 0, 0};

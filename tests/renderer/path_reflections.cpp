@@ -122,7 +122,7 @@ TEST(RussianRoulette, KeepsTheMeanOfEveryBand) {
 
 /// The way of light through the sphere without reflection: point and direction where it leaves. The path's own
 /// pieces: the tracer's hits, the material's directions, the other side of each surface.
-Ray through_sphere(const Tracer& tracer, const Placement& at, const Ray& in) {
+Ray through_sphere(const Tracer& tracer, const BodyPoses& at, const Ray& in) {
     Hit hit = tracer.intersect(at, in, kInfinity);
     Vec3 d = in.direction;
     for (int surface = 0; surface < 2; ++surface) {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "renderer/trace/sampler.h"
+#include "renderer/integrator/sampler.h"
 
 namespace narpa {
 namespace {

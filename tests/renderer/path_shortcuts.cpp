@@ -1,5 +1,5 @@
 // What paths leave out, or do with a part of the rays alone, changes no mean.
-#include "renderer/trace/guide.h"
+#include "renderer/light/small_body_sampling.h"
 #include "tests/renderer/path_support.h"
 
 namespace narpa {
@@ -24,7 +24,7 @@ TEST(PathShortcuts, TheLastRayIsLeftOutOnlyWhereItWouldFindNothing) {
         glimmering.ambient = {1e-20f, 1e-20f, 1e-20f};  // to be looked for, but too faint to count
         const auto in_the_dark = Tracer::create(dark, 1), all_the_way = Tracer::create(glimmering, 1);
         ASSERT_TRUE(in_the_dark && all_the_way);
-        const Placement at = placed(dark);
+        const BodyPoses at = placed(dark);
         std::uint64_t few = 0, many = 0;
         double sum = 0;
         for (const int depth : {1, 2, 4}) {
@@ -58,8 +58,8 @@ TEST(PathShortcuts, GuidingRaysFromAMeshToASmallBodyChangesNoMean) {
     add_sun(s, {-1, 0, -0.1});
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
-    EXPECT_TRUE(Guide::may_help(*tracer, at));
+    const BodyPoses at = placed(s);
+    EXPECT_TRUE(SmallBodySampling::may_help(*tracer, at));
     const Ray ray = ray_to({-1, 0.1, 2}, {-1.1, 0, 0});
     const PathSettings guided{.max_depth = 2}, left_to_chance{.max_depth = 2, .guided = false};
     const Estimate with = light_along(*tracer, at, ray, guided, 1024, 3);
@@ -76,10 +76,10 @@ TEST(PathShortcuts, NobodyIsGuidedWhereNoBodyLooksSmall) {
     add_mesh(s, plate(4, 4), {{}, {0, 0, 1}});
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    Placement at = placed(s);
-    EXPECT_FALSE(Guide::may_help(*tracer, at));
+    BodyPoses at = placed(s);
+    EXPECT_FALSE(SmallBodySampling::may_help(*tracer, at));
     at.set(1, {{}, {0, 0, 100}});
-    EXPECT_TRUE(Guide::may_help(*tracer, at));
+    EXPECT_TRUE(SmallBodySampling::may_help(*tracer, at));
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 #include <tbb/task_arena.h>
 
 #include "renderer/material/bsdf.h"
-#include "renderer/trace/lights.h"
-#include "renderer/trace/shading.h"
+#include "renderer/light/lights.h"
+#include "renderer/integrator/shading.h"
 #include "tests/renderer/path_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -81,7 +81,7 @@ TEST(SunDisc, GlossySurfacesHaveNoFireflies) {
             const auto tracer = Tracer::create(s, 1);
             ASSERT_TRUE(tracer);
             const Vec3 eye{std::sin(off), 0, std::cos(off)};
-            const Placement at = placed(s);
+            const BodyPoses at = placed(s);
             const Ray ray{eye, -eye};
             const Hit first = tracer->intersect(at, ray, kInfinity);
             double sum = 0, squares = 0;
@@ -185,7 +185,7 @@ Scene workshop() {
 
 constexpr int kSide = 12;
 /// An image of the workshop, its pixels `together` at a time.
-std::vector<Rgb> picture(const Tracer& tracer, const Placement& at, const Vec3& offset, std::size_t together,
+std::vector<Rgb> picture(const Tracer& tracer, const BodyPoses& at, const Vec3& offset, std::size_t together,
                          const PathSettings& settings = {}) {
     std::vector<Rgb> pixels(kSide * kSide);
     tbb::parallel_for(std::size_t{0}, (pixels.size() + together - 1) / together, [&](std::size_t block) {
@@ -216,8 +216,8 @@ TEST(PathRadiance, OfARayDoesNotDependOnItsNeighboursNorOnThreads) {
     const Scene s = workshop();
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
-    const std::vector<Rgb> expected = picture(*tracer, at, {}, kPacket);
+    const BodyPoses at = placed(s);
+    const std::vector<Rgb> expected = picture(*tracer, at, {}, kLanes);
     double lit = 0;
     for (const Rgb& p : expected) {
         EXPECT_TRUE(is_finite(p));
@@ -229,7 +229,7 @@ TEST(PathRadiance, OfARayDoesNotDependOnItsNeighboursNorOnThreads) {
         EXPECT_EQ(picture(*tracer, at, {}, together), expected) << together;
     for (const int threads : {1, 2, 7}) {
         tbb::task_arena arena(threads);
-        arena.execute([&] { EXPECT_EQ(picture(*tracer, at, {}, kPacket), expected) << threads; });
+        arena.execute([&] { EXPECT_EQ(picture(*tracer, at, {}, kLanes), expected) << threads; });
     }
 }
 
@@ -238,7 +238,7 @@ TEST(PathRadiance, AllocatesNothing) {
     const Scene s = workshop();
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     const Ray ray = ray_to({3, -3, 3}, {0.5, -0.75, 0.5});
     const Hit first = tracer->intersect(at, ray, kInfinity);
     const auto trace = [&](std::uint32_t sample) { light_along(*tracer, at, ray, first, {}, 1, 0, sample); };
@@ -254,19 +254,19 @@ TEST(PathRadiance, IsTheSameFarFromTheOrigin) {
     ASSERT_TRUE(tracer);
     for (const bool direct : {false, true}) {
         const PathSettings settings{.direct = direct};
-        const std::vector<Rgb> expected = picture(*tracer, placed(s), {}, kPacket, settings);
+        const std::vector<Rgb> expected = picture(*tracer, placed(s), {}, kLanes, settings);
         // All positions of the workshop are multiples of 1/8 m: added to these offsets they stay exact, and so does
         // all else, for only their differences count.
         for (const double far : {1e7, 3.844e8}) {
             const Vec3 offset{far, -0.5 * far, 0.25 * far};
-            const std::vector<Rgb> moved = picture(*tracer, placed(s, offset), offset, kPacket, settings);
+            const std::vector<Rgb> moved = picture(*tracer, placed(s, offset), offset, kLanes, settings);
             EXPECT_EQ(moved, expected) << far;
         }
     }
 }
 
 /// Paths in their plainest form: only the BSDF says where they go on, and light is found by chance.
-Vec3 plain_path(const Tracer& tracer, const Placement& at, Ray ray, int depth, std::mt19937_64& random) {
+Vec3 plain_path(const Tracer& tracer, const BodyPoses& at, Ray ray, int depth, std::mt19937_64& random) {
     const Scene& scene = tracer.scene();
     const SunDisc sun(*scene.sun);
     std::uniform_real_distribution<double> number;
@@ -307,7 +307,7 @@ TEST(PathRadiance, IsThatOfPathsWhichFindAllLightByChance) {
     s.bodies.push_back(egg);
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     PathSettings settings;
     settings.max_depth = 4;
     std::mt19937_64 random(11);

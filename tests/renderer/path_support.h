@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "renderer/trace/path.h"
+#include "renderer/integrator/path.h"
 #include "tests/support/shapes.h"
 
 namespace narpa::test {
@@ -21,12 +21,12 @@ inline Lanes<std::uint32_t> the_same(std::uint32_t sample) {
 /// 0, 1, 2 ...: a pixel of its own for each lane.
 inline const Lanes<std::uint32_t> kOwnPixels = [] {
     Lanes<std::uint32_t> all;
-    for (std::uint32_t i = 0; i < kPacket; ++i) all[i] = i;
+    for (std::uint32_t i = 0; i < kLanes; ++i) all[i] = i;
     return all;
 }();
 
 /// Radiance along one ray by one sample.
-inline Rgb light_along(const Tracer& tracer, const Placement& at, const Ray& ray, const Hit& first,
+inline Rgb light_along(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const Hit& first,
                        const PathSettings& settings, std::uint64_t seed, std::uint32_t pixel,
                        std::uint32_t sample) {
     Rgb radiance;
@@ -48,25 +48,25 @@ struct Estimate {
     double error = 0;  ///< standard error of the mean of the first band
 };
 
-/// Mean of kPacket independent pixels' means of `samples` each; their scatter tells the error.
-inline Estimate light_along(const Tracer& tracer, const Placement& at, const Ray& ray, const PathSettings& settings,
+/// Mean of kLanes independent pixels' means of `samples` each; their scatter tells the error.
+inline Estimate light_along(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const PathSettings& settings,
                             std::uint32_t samples, std::uint64_t seed = 1) {
-    std::array<Ray, kPacket> rays;
+    std::array<Ray, kLanes> rays;
     rays.fill(ray);
-    std::array<Hit, kPacket> first;
+    std::array<Hit, kLanes> first;
     first.fill(tracer.intersect(at, ray, kInfinity));
-    std::array<Vec3, kPacket> sum{};
+    std::array<Vec3, kLanes> sum{};
     for (std::uint32_t s = 0; s < samples; ++s) {
-        std::array<Rgb, kPacket> radiance;
+        std::array<Rgb, kLanes> radiance;
         const Lanes<std::uint32_t> sample = the_same(s);
         path_radiance(tracer, at, settings, rays, first, {seed, 0, kOwnPixels, sample}, radiance);
-        for (std::size_t i = 0; i < kPacket; ++i) sum[i] += vec_cast<double>(radiance[i]);
+        for (std::size_t i = 0; i < kLanes; ++i) sum[i] += vec_cast<double>(radiance[i]);
     }
     Estimate e;
-    for (const Vec3& lane : sum) e.mean += lane / (samples * static_cast<double>(kPacket));
+    for (const Vec3& lane : sum) e.mean += lane / (samples * static_cast<double>(kLanes));
     double deviations = 0;
     for (const Vec3& lane : sum) deviations += std::pow(lane.x / samples - e.mean.x, 2);
-    e.error = std::sqrt(deviations / (kPacket * (kPacket - 1.0)));
+    e.error = std::sqrt(deviations / (kLanes * (kLanes - 1.0)));
     return e;
 }
 inline Estimate light_along(const Scene& scene, const Ray& ray, const PathSettings& settings, std::uint32_t samples,

@@ -1,12 +1,12 @@
 // What a pixel's samples say of its truth: sums, variances, intervals.
-#include "renderer/trace/pixel_samples.h"
+#include "renderer/film/pixel_samples.h"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 #include <vector>
 
-#include "renderer/trace/camera_image.h"
+#include "renderer/film/camera_image.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -6,8 +6,8 @@
 #include <random>
 
 #include "renderer/material/texture_lookup.h"
-#include "renderer/trace/camera_ray.h"
-#include "renderer/trace/shading.h"
+#include "renderer/camera/camera_ray.h"
+#include "renderer/integrator/shading.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -68,7 +68,7 @@ public:
 private:
     std::unique_ptr<Scene> scene_;
     Tracer tracer_;
-    Placement at_;
+    BodyPoses at_;
 };
 
 struct Spread {

@@ -5,12 +5,13 @@
 
 #include "renderer/material/bsdf.h"
 #include "renderer/material/texture_lookup.h"
-#include "renderer/trace/camera_image.h"
-#include "renderer/trace/camera_ray.h"
-#include "renderer/trace/sampler.h"
-#include "renderer/trace/shading.h"
-#include "renderer/trace/sun_disc.h"
+#include "renderer/film/camera_image.h"
+#include "renderer/camera/camera_ray.h"
+#include "renderer/integrator/sampler.h"
+#include "renderer/integrator/shading.h"
+#include "renderer/light/sun_disc.h"
 #include "tests/support/shapes.h"
+#include "renderer/lidar/lidar_shot.h"
 
 namespace narpa {
 namespace {
@@ -102,7 +103,7 @@ TEST(Sun, SetSunLightsNothingAndABodyCastsAShadow) {
     add_sun(s, {0, 0, 1});
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     const auto lit = [&](double x) {
         const Ray ray{{x, 5, 5}, normalized(Vec3{0, -5, -5})};
         const Hit hit = tracer->intersect(at, ray, kInfinity);
@@ -234,7 +235,7 @@ TEST(ShadowTerminator, SmoothSpheresHaveNoFalseShadows) {
         add_sun(s, {std::cos(phase), std::sin(phase), 0});
         const auto tracer = Tracer::create(s, 1);
         ASSERT_TRUE(tracer);
-        const Placement at = placed(s);
+        const BodyPoses at = placed(s);
         const Camera c = camera(300, 300, 2900);
         const Rigid3 T = looking({20, 0, 0}, {});
         int lit = 0, dark = 0;
@@ -331,7 +332,7 @@ TEST(Lidar, PlateReturnsItsRangeBodyAndReflectance) {
     add_mesh(s, plate(10, 10));
     const auto tracer = Tracer::create(s, 1);
     ASSERT_TRUE(tracer);
-    const Placement at = placed(s);
+    const BodyPoses at = placed(s);
     const double tilt = 0.7;
     const Ray beam{20.0 * Vec3{std::sin(tilt), 0, std::cos(tilt)}, {-std::sin(tilt), 0, -std::cos(tilt)}};
     const LidarReturn hit = shoot(*tracer, at, beam, 100);

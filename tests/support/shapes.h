@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "renderer/scene/scene.h"
-#include "renderer/trace/tracer.h"
+#include "renderer/geometry/tracer.h"
 
 namespace narpa::test {
 
@@ -146,8 +146,8 @@ inline Camera camera(int width, int height, double focal_px) {
 }
 
 /// All bodies where the scene puts them at time 0, moved by `offset`.
-inline Placement placed(const Scene& s, const Vec3& offset = {}) {
-    Placement at(s.bodies.size());
+inline BodyPoses placed(const Scene& s, const Vec3& offset = {}) {
+    BodyPoses at(s.bodies.size());
     for (std::size_t i = 0; i < s.bodies.size(); ++i) {
         Rigid3 T = s.bodies[i].initial.T_world_body;
         T.t += offset;

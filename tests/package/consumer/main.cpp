@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
     if (!scene) return std::puts(scene.error().text().c_str()), 2;
     auto world = narpa::World::create(*std::move(scene));
     if (!world) return std::puts(world.error().text().c_str()), 2;
-    narpa::Placement at((*world)->scene().bodies.size());
+    narpa::BodyPoses at((*world)->scene().bodies.size());
     (*world)->place(0, -1, at);
     const narpa::Hit hit = (*world)->tracer().intersect(at, {{50, 0, 0}, {-1, 0, 0}}, 1e3);
     std::printf("%zu triangles; along the port's axis from 50 m: %.3f m\n", (*world)->tracer().triangle_count(),

@@ -1,0 +1,322 @@
+// narpa bench estimate - each estimator: error against its bound, failures, time.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "bench/approach.h"
+#include "bench/estimate_plots.h"
+#include "bench/pnp.h"
+#include "bench/stereo.h"
+#include "apps/bench.h"
+#include "apps/bench_scene.h"
+
+namespace narpa::cli {
+namespace {
+
+struct Options {
+    std::vector<std::string> only;
+    std::string pictures;  ///< folder; empty: none
+    std::string scene, camera, target;
+    std::vector<double> along, up;
+    bool quick = false;
+    int threads = 0, size = 320;
+    PnpBenchOptions pnp;
+    ApproachOptions approach;
+};
+
+/// What the parts put together: what is wrong, and what goes on the plot of all.
+struct Findings {
+    std::vector<std::string> faults;
+    std::vector<TimeAndError> estimators;
+};
+
+/// One estimator's part of the bench: says what it found and returns its document.
+using Part = Outcome (*)(const Options&, Findings&);
+
+Status picture(const Options& o, const std::string& name, const std::function<Status(const std::string&)>& write) {
+    if (o.pictures.empty()) return Ok{};
+    return write(o.pictures + "/" + name);
+}
+
+Outcome bench_pnp(const Options& o, Findings& findings) {
+    const Progress progress;
+    PnpBenchOptions options = o.pnp;
+    if (o.quick) options.trials = 20, options.points = {10}, options.ranges_m = {30}, options.hard_cases = false;
+    const std::vector<PnpCell> cells = run_pnp_bench(
+        options,
+        [&](std::size_t done, std::size_t of) {
+            progress.tell(fmt::format("points: cell {} of {}", done + 1, of));
+        },
+        stop_flag());
+    const PnpVerdict verdict = judge(cells);
+    say(in_words(cells) + in_words(verdict));
+    // Times are told, not judged: the machine may have other work.
+    constexpr double kWorstRms = 1.1;
+    if (verdict.worst_rms > kWorstRms)
+        findings.faults.push_back(
+            fmt::format("points: RMS of {:.3f} bounds, expected at most {:g}", verdict.worst_rms, kWorstRms));
+    for (const PnpCell& cell : cells)
+        if (cell.rows.front().trials == 0 && !stop_flag())
+            findings.faults.push_back(fmt::format("points: {} of them at {:g} m and {:g} px determine no pose",
+                                                  cell.points, cell.range_m, cell.noise_px));
+    if (verdict.more_failures > 0)
+        findings.faults.push_back(
+            fmt::format("points: more failures than {} in {} cells", kPnpPeerCold, verdict.more_failures));
+    // On the plot of all: thirty points at half a pixel from 30 m, or what is nearest.
+    const auto distance = [](const PnpCell& c) {
+        return std::abs(std::log(c.points / 30.0)) + std::abs(std::log(c.noise_px / 0.5)) +
+               std::abs(std::log(c.range_m / 30)) + (c.name == "nominal" ? 0 : 10);
+    };
+    const auto cell = std::min_element(cells.begin(), cells.end(),
+                                       [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+    if (cell != cells.end())
+        for (const PnpRow& row : cell->rows)
+            findings.estimators.push_back(
+                {row.method, "points", 1e-3 * row.median_us, cell->bound_position * row.position_rms});
+    return nlohmann::json{{"cells", to_json(cells)}, {"verdict", to_json(verdict)}};
+}
+
+/// A world as the approach and the LiDAR need it.
+Result<std::unique_ptr<World>> standing_world(const std::string& scene_file, int size) {
+    std::string file = scene_file;
+    if (file.empty()) {
+        auto shipped = shipped_scene("docking/docking.toml");
+        if (!shipped) return shipped.error();
+        file = *shipped;
+    }
+    auto scene = load_scene(file);
+    if (!scene) return scene.error();
+    for (Camera& c : scene->cameras) resize_longer_side(c, size);
+    return World::create(*std::move(scene));
+}
+
+Outcome bench_approach(const Options& o, Findings& findings) {
+    auto world = standing_world(o.scene, o.size);
+    if (!world) return world.error();
+    const Scene& scene = (*world)->scene();
+    const auto camera = sensor_named(scene.cameras, o.camera, "camera", scene.file);
+    if (!camera) return camera.error();
+    const Camera& looking = scene.cameras[*camera];
+    const auto meant = target_of(**world, looking.mount, looking.name, o.target);
+    if (!meant) return meant.error();
+    const std::size_t target = *meant;
+    ApproachOptions options = o.approach;
+    if (!o.along.empty()) options.along = {o.along[0], o.along[1], o.along[2]};
+    if (!o.up.empty()) options.up = {o.up[0], o.up[1], o.up[2]};
+    if (!(norm(cross(options.along, options.up)) > 1e-6 * norm(options.along) * norm(options.up)))
+        return Error{"--along and --up, expected directions that are not parallel"};
+    if (o.quick) options.frames = 4, options.basin = {5}, options.basin_trials = 1;
+    TracingThreads threads(o.threads);
+    const Progress progress;
+    auto runs = run_approach(
+        **world, *camera, target, options, threads, [&](const std::string& step) { progress.tell(step); },
+        stop_flag());
+    if (!runs) return runs.error();
+    say(in_words(*runs));
+    const std::string title = fmt::format("{}: {} from {:g} m to {:g} m", scene.name, scene.bodies[target].name,
+                                          options.from_m, options.to_m);
+    if (auto drawn =
+            picture(o, "approach.png", [&](const std::string& path) { return plot_approach(path, title, *runs); });
+        !drawn)
+        return drawn.error();
+    if (auto drawn = picture(o, "frames.png",
+                             [&](const std::string& path) {
+                                 return picture_of_frames(path, **world, *camera, target, options, threads);
+                             });
+        !drawn)
+        return drawn.error();
+    nlohmann::json document = nlohmann::json::array();
+    for (const ApproachRun& run : *runs) {
+        document.push_back(to_json(run));
+        if (run.bands.empty()) continue;
+        double squares = 0;
+        int found = 0;
+        for (const ApproachFrame& f : run.frames)
+            if (f.found) squares += std::pow(f.position_m / f.range_m, 2), ++found;
+        const std::string name(kEstimateMethods[static_cast<std::size_t>(run.method)]);
+        if (found > 0)
+            findings.estimators.push_back(
+                {name, "render and compare", run.bands.back().ms_median, std::sqrt(squares / found)});
+    }
+    return document;
+}
+
+Outcome bench_stereo(const Options& o, Findings& findings) {
+    auto file = shipped_scene("descent/descent.toml");
+    if (!file) return file.error();
+    auto scene = load_scene(*file);
+    if (!scene) return scene.error();
+    const Progress progress;
+    StereoBenchSettings settings;
+    if (o.quick) settings.points = 20;
+    const auto stereo =
+        measure_stereo(*scene, settings, [&](const std::string& step) { progress.tell("stereo: " + step); });
+    if (!stereo) return stereo.error();
+    say(in_words(*stereo));
+    if (!o.quick)
+        for (const std::string& fault : stereo_faults(*stereo, settings.points))
+            findings.faults.push_back("stereo: " + fault);
+    if (auto drawn = picture(o, "stereo.png", [&](const std::string& path) { return write_plot(path, *stereo); });
+        !drawn)
+        return drawn.error();
+    const double ms = 1e3 * stereo->match_s;
+    findings.estimators.push_back({fmt::format("{} points, whole pixels", stereo->points.size()), "stereo", ms,
+                                   stereo->errors(false, 2, true).rms});
+    findings.estimators.push_back({fmt::format("{} points, between pixels", stereo->points.size()), "stereo", ms,
+                                   stereo->errors(true, 2, true).rms});
+    return to_json(*stereo);
+}
+
+Outcome bench_icp(const Options& o, Findings& findings) {
+    auto world = standing_world("", o.size);
+    if (!world) return world.error();
+    const auto target = (*world)->body_named("station");
+    if (!target) return Error{"no body \"station\" in the docking scene", (*world)->scene().file};
+    const Progress progress;
+    const int count = o.quick ? 10 : 1000;
+    IcpBenchSettings settings;
+    const std::vector<IcpStarts> starts{
+        {5, 0.05, count}, {10, 0.1, count / 5}, {20, 0.2, count / 5}, {30, 0.3, count / 5}};
+    const auto runs = run_icp(**world, *target, settings, starts,
+                              [&](int done, int of) { progress.tell(fmt::format("ICP: start {}/{}", done, of)); });
+    if (!runs) return runs.error();
+    say(in_words(*runs));
+    if (auto drawn = picture(o, "icp.png",
+                             [&](const std::string& path) {
+                                 return write_icp_plot(path, "VLP-16 sweeps of the docking station", *runs);
+                             });
+        !drawn)
+        return drawn.error();
+    const double range_m = 0.5 * (settings.distance_min_m + settings.distance_max_m);
+    findings.estimators.push_back({"ICP of a VLP-16 sweep", "LiDAR", 1e-3 * runs->front().microseconds_p50,
+                                   runs->front().translation_rms_m / range_m});
+    nlohmann::json document = nlohmann::json::array();
+    for (const IcpRun& run : *runs) document.push_back(to_json(run));
+    return document;
+}
+
+Outcome bench_filter(const Options& o, Findings& findings) {
+    FilterBenchSettings settings;
+    if (o.quick) settings.runs = 10, settings.seconds = 10;
+    const auto runs = run_filter(filter_cases(), settings);
+    if (!runs) return runs.error();
+    say(in_words(*runs));
+    if (auto drawn = picture(o, "filter.png",
+                             [&](const std::string& path) {
+                                 return write_filter_plot(path, "Kalman filter: NEES over time", *runs);
+                             });
+        !drawn)
+        return drawn.error();
+    constexpr double kRange_m = 30;  // of the cases
+    nlohmann::json document = nlohmann::json::array();
+    for (const FilterRun& run : *runs) {
+        document.push_back(to_json(run));
+        findings.estimators.push_back({"filter: " + run.name, "filter", 1e-3 * run.update_microseconds,
+                                       run.times.back().position_rms_m / kRange_m});
+    }
+    return document;
+}
+
+constexpr std::pair<const char*, Part> kParts[] = {{"pnp", bench_pnp},
+                                                   {"approach", bench_approach},
+                                                   {"stereo", bench_stereo},
+                                                   {"icp", bench_icp},
+                                                   {"filter", bench_filter}};
+
+Outcome bench(const Options& o) {
+    stop_on_signals();
+    if (!o.pictures.empty()) {
+        std::error_code error;
+        std::filesystem::create_directories(o.pictures, error);
+        if (error) return Error{"cannot be made a folder: " + error.message(), o.pictures};
+    }
+    Findings findings;
+    nlohmann::json document;
+    for (const auto& [name, part] : kParts) {
+        const bool wanted = o.only.empty() || std::find(o.only.begin(), o.only.end(), name) != o.only.end();
+        if (!wanted || stop_flag()) continue;
+        auto done = part(o, findings);
+        if (!done) return done.error();
+        document[name] = *std::move(done);
+    }
+    nlohmann::json all = nlohmann::json::array();
+    for (const TimeAndError& e : findings.estimators)
+        all.push_back({{"estimator", e.name},
+                       {"family", e.family},
+                       {"ms", e.ms},
+                       {"position_error_of_range", e.position_of_range}});
+    document["time_and_error"] = all;
+    if (auto drawn = picture(o, "time_error.png",
+                             [&](const std::string& path) { return write_time_plot(path, findings.estimators); });
+        !drawn)
+        return drawn.error();
+    if (stop_flag()) findings.faults.emplace_back("interrupted before the end");
+    for (const std::string& fault : findings.faults) say("failed: " + fault);
+    document["passed"] = findings.faults.empty();
+    document["faults"] = findings.faults;
+    return document;
+}
+
+}  // namespace
+
+Command add_bench_estimate(CLI::App& bench_command) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c = bench_command.add_subcommand(
+        "estimate", "Estimators of the relative pose: error against the Cramer-Rao bound, failures, time");
+    std::vector<std::string> names;
+    for (const auto& [name, part] : kParts) names.emplace_back(name);
+    c->add_option("--only", o->only,
+                  fmt::format("Only these parts, separated by commas: {}", fmt::join(names, ", ")))
+        ->delimiter(',')
+        ->check(CLI::IsMember(names));
+    c->add_option("--trials", o->pnp.trials, "pnp: draws of each cell")
+        ->check(CLI::Range(1, 1'000'000))
+        ->capture_default_str();
+    c->add_option("--points", o->pnp.points, "pnp: numbers of points")->delimiter(',')->check(CLI::Range(4, 1000));
+    c->add_option("--noise-px", o->pnp.noise_px, "pnp: standard deviations of a pixel")
+        ->delimiter(',')
+        ->check(CLI::Range(1e-6, 100.0))
+        ->check(finite_number());
+    c->add_option("--ranges", o->pnp.ranges_m, "pnp: metres to the body")
+        ->delimiter(',')
+        ->check(CLI::Range(1.0, 1e6))
+        ->check(finite_number());
+    CLI::Option* nominal = c->add_flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
+    c->add_flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases")->excludes(nominal);
+    c->add_option("--seed", o->pnp.seed, "pnp: of all draws")->capture_default_str();
+    c->add_option("--scene", o->scene, "approach: scene file (default: the docking scene that narpa brings along)");
+    c->add_option("--camera", o->camera, "approach: name of the camera (default: the first)");
+    c->add_option("--target", o->target, "approach: name of the body (default: the first that it can be)");
+    c->add_option("--size", o->size, "approach: pixels of the camera's longer side")
+        ->check(CLI::Range(32, 10'000))
+        ->capture_default_str();
+    c->add_option("--frames", o->approach.frames, "approach: frames")->check(CLI::Range(2, 100'000));
+    c->add_option("--from", o->approach.from_m, "approach: m from the target's origin")
+        ->check(CLI::Range(0.01, 1e7))
+        ->check(finite_number());
+    c->add_option("--to", o->approach.to_m, "approach: m from the target's origin")
+        ->check(CLI::Range(0.01, 1e7))
+        ->check(finite_number());
+    c->add_option("--along", o->along, "approach: X,Y,Z from the target towards the camera, target axes")
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--up", o->up, "approach: X,Y,Z that is up in the picture, target axes")
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--basin-trials", o->approach.basin_trials, "approach: starts of each distance; 0: none")
+        ->check(CLI::Range(0, 100'000));
+    c->add_option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")
+        ->check(CLI::Range(0.01, 1e7))
+        ->check(finite_number());
+    c->add_flag("--quick", o->quick, "Few draws of all, to see that it works");
+    c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
+    c->add_option("-o,--output", o->pictures, "Folder for pictures: of each part, and of time against error");
+    c->footer(
+        "Exit status 1 where points or stereo are less exact than they must be, or the bench was interrupted.");
+    return [o] { return bench(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,30 @@
+/// apps/bench_ladder.h - `narpa bench render --scenes`: what budgets buy on the standing scenes, and the
+/// ratios that frames are judged by.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bench/gates.h"
+#include "apps/cli.h"
+
+namespace narpa::cli {
+
+struct LadderOptions {
+    std::vector<std::string> scenes;
+    std::string plot;  ///< PNG; empty: none
+    int threads = 0;
+    bool quick = false, gates = false;
+};
+
+/// The names that --scenes takes.
+[[nodiscard]] std::vector<std::string> standing_scenes();
+
+Outcome bench_ladder(const LadderOptions& options);
+
+void tell_ladder(const SceneLadder& l);
+void tell_ratios(const CraftRatios& r);
+[[nodiscard]] nlohmann::json describe(const SceneLadder& l);
+[[nodiscard]] nlohmann::json describe(const CraftRatios& r);
+
+}  // namespace narpa::cli

@@ -1,0 +1,137 @@
+// narpa bench loop - the real-time loop, alone and beside competing load: jitter, latency, deadlines.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bench/loop.h"
+#include "apps/bench.h"
+#include "apps/bench_scene.h"
+#include "apps/budget_options.h"
+#include "emulator/realtime.h"
+
+namespace narpa::cli {
+namespace {
+
+constexpr int kCpusMax = 1024;
+
+struct Options {
+    std::string scene, cpus, plot;
+    std::vector<int> load;
+    int busy = 0;  ///< processors to keep busy, where `load` does not name them
+    bool idle_only = false;
+    double late_max_percent = 0.1;
+    BudgetOptions budget;
+    RunOptions run;
+};
+
+/// `busy` processes, or one where nothing is asked for: on the first processors that this process may use, over
+/// again where these are fewer.
+Status choose_load(Options& o) {
+    for (const int cpu : o.load)
+        if (!parse_cpus(std::to_string(cpu)))
+            return Error{fmt::format("--load {}: this processor is not there, or not for this process", cpu)};
+    if (!o.load.empty() || o.idle_only) return Ok{};
+    std::vector<int> usable;
+    for (int cpu = 0; cpu < kCpusMax; ++cpu)
+        if (parse_cpus(std::to_string(cpu))) usable.push_back(cpu);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(1, o.busy)); ++i)
+        o.load.push_back(usable[i % usable.size()]);
+    return Ok{};
+}
+
+Result<std::vector<LoopRun>> measure(const Options& o, const Scene& scene) {
+    RunOptions options = o.run;
+    for (const Camera& c : scene.cameras) options.video.emplace_back(c.name, "none");
+    for (const Lidar& l : scene.lidars) options.lidar.emplace_back(l.name, "none");
+    const Progress progress;
+    std::vector<LoopRun> runs;
+    for (const bool loaded : {false, true}) {
+        if ((loaded && o.load.empty()) || stop_flag()) continue;
+        const std::string name = loaded ? "loaded" : "idle";
+        progress.tell(fmt::format("{}: {:g} s", name, options.duration_s));
+        auto run = run_loop(name, scene, options, loaded ? o.load : std::vector<int>{}, stop_flag());
+        if (!run) return run.error();
+        runs.push_back(*std::move(run));
+    }
+    return runs;
+}
+
+Outcome bench(Options o) {
+    stop_on_signals();
+    if (auto good = choose_load(o); !good) return good.error();
+    if (!o.cpus.empty()) {
+        auto cpus = parse_cpus(o.cpus);
+        if (!cpus) return cpus.error();
+        o.run.cpus = *std::move(cpus);
+    }
+    if (o.scene.empty()) {
+        auto shipped = shipped_scene("docking/docking.toml");
+        if (!shipped) return shipped.error();
+        o.scene = *shipped;
+    }
+    keep_heap();
+    auto scene = load_scene(o.scene);
+    if (!scene) return scene.error();
+    if (scene->cameras.empty()) return Error{"has no camera, expected one at least", scene->file};
+    o.budget.override_scene(scene->render);
+
+    auto runs = measure(o, *scene);
+    if (!runs) return runs.error();
+
+    std::vector<std::string> faults = loop_faults(*runs, o.late_max_percent / 100);
+    if (stop_flag()) faults.emplace_back("interrupted before the end");
+    const std::string title =
+        fmt::format("{}, {:g} s; load on processors {}", scene->name, o.run.duration_s, fmt::join(o.load, ", "));
+    say(title);
+    say(in_words(*runs));
+    for (const std::string& fault : faults) say("failed: " + fault);
+    if (!o.plot.empty())
+        if (auto written = write_plot(o.plot, title, *runs); !written) return written.error();
+
+    nlohmann::json of_runs = nlohmann::json::array();
+    for (const LoopRun& run : *runs) of_runs.push_back(to_json(run));
+    return nlohmann::json{{"passed", faults.empty()},
+                          {"faults", faults},
+                          {"scene", scene->file},
+                          {"duration_s", o.run.duration_s},
+                          {"threads", o.run.threads},
+                          {"cpus", o.run.cpus},
+                          {"late_max_percent", o.late_max_percent},
+                          {"runs", of_runs}};
+}
+
+}  // namespace
+
+Command add_bench_loop(CLI::App& bench_command) {
+    auto o = std::make_shared<Options>();
+    o->run.duration_s = 10;
+    CLI::App* c = bench_command.add_subcommand(
+        "loop",
+        "The real-time loop, alone and beside processes that keep processors busy: jitter, latency, deadlines");
+    c->add_option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that narpa brings along)");
+    c->add_option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
+        ->check(CLI::Range(0.1, 86400.0))
+        ->capture_default_str();
+    CLI::Option* load = c->add_option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)")
+                            ->delimiter(',')
+                            ->allow_extra_args(false);
+    CLI::Option* busy = c->add_option("--busy", o->busy, "So many processes that keep processors busy (default: 1)")
+                            ->check(CLI::Range(1, kCpusMax))
+                            ->excludes(load);
+    c->add_flag("--idle-only", o->idle_only, "No run beside load")->excludes(load)->excludes(busy);
+    o->budget.add_to(*c);
+    c->add_option("--cpus", o->cpus,
+                  "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one");
+    c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
+        ->check(CLI::Range(0, 1024));
+    c->add_option("--late-max", o->late_max_percent, "Percent of the frames that may be handed over late")
+        ->check(CLI::Range(0.0, 100.0))
+        ->capture_default_str();
+    c->add_option("-o,--output", o->plot, "FILE.png: how many frames exceed which time");
+    c->footer(
+        "Exit status 1 where a frame is not whole, more frames are late than --late-max, none fell due, or the "
+        "bench was interrupted.");
+    return [o] { return bench(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,44 @@
+#include "apps/bench_scene.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+namespace narpa::cli {
+
+Result<std::string> shipped_scene(const std::string& name) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
+    for (const char* folder : {"../scenes", "../share/narpa/scenes"})
+        if (const fs::path file = (program / folder / name).lexically_normal(); fs::exists(file, error))
+            return file.string();
+    return Error{"is not beside the program, expected the name of a SCENE", name};
+}
+
+void resize(Camera& c, int width, int height) {
+    const double x = static_cast<double>(width) / c.width, y = static_cast<double>(height) / c.height;
+    c.cx = (c.cx + 0.5) * x - 0.5;
+    c.cy = (c.cy + 0.5) * y - 0.5;
+    c.fx *= x, c.fy *= y;
+    c.width = width, c.height = height;
+}
+
+void resize_longer_side(Camera& c, int pixels) {
+    const double scale = static_cast<double>(pixels) / std::max(c.width, c.height);
+    resize(c, std::max(1, static_cast<int>(c.width * scale + 0.5)),
+           std::max(1, static_cast<int>(c.height * scale + 0.5)));
+}
+
+Progress::Progress() : terminal_(::isatty(STDERR_FILENO) == 1) {}
+Progress::~Progress() {
+    if (terminal_) fmt::print(stderr, "\r{:<60}\r", "");
+}
+void Progress::tell(const std::string& text) const {
+    if (terminal_) fmt::print(stderr, "\r{:<60}", text), std::fflush(stderr);
+}
+
+}  // namespace narpa::cli

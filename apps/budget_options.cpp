@@ -1,0 +1,27 @@
+#include "apps/budget_options.h"
+
+#include <cmath>
+
+namespace narpa::cli {
+
+void BudgetOptions::add_to(CLI::App& app) {
+    CLI::Option* samples =
+        app.add_option("--spp", spp, "Samples per pixel instead of the scene's")->check(CLI::Range(1, 65535));
+    CLI::Option* time =
+        app.add_option("--budget-ms", budget_ms, "A frame as good as it gets in so many milliseconds, instead")
+            ->check(CLI::Range(0.001, 1e6));
+    CLI::Option* rays =
+        app.add_option("--budget-rays", budget_rays, "A frame as good as it gets with so many rays, instead")
+            ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000}));
+    samples->excludes(time)->excludes(rays);
+    time->excludes(rays);
+}
+
+void BudgetOptions::override_scene(RenderSettings& render) const {
+    if (!spp && !budget_ms && !budget_rays) return;
+    render.spp = spp.value_or(render.spp);
+    render.budget_ns = budget_ms ? std::llround(*budget_ms * 1e6) : 0;
+    render.budget_rays = budget_rays.value_or(0);
+}
+
+}  // namespace narpa::cli

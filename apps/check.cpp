@@ -1,0 +1,252 @@
+// narpa check - is the scene good, and can this machine run it? Names what is missing, and what mends it.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "drivers/can/can_bus.h"
+#include "drivers/video/video_sink.h"
+#include "apps/cli.h"
+#include "emulator/world.h"
+#include "protocols/can/dbc.h"
+#include "renderer/scene/kind_names.h"
+
+namespace narpa::cli {
+namespace {
+
+struct Options {
+    std::string scene, dbc;
+    std::vector<std::string> devices;
+};
+
+/// One thing that a run may want of this machine.
+struct Finding {
+    std::string name;
+    bool there = false;
+    std::string detail, remedy;
+};
+
+Finding socketcan() {
+    const int fd = ::socket(PF_CAN, SOCK_RAW, 1);  // CAN_RAW
+    if (fd < 0)
+        return {"SocketCAN", false, std::strerror(errno),
+                "sudo modprobe can-raw (or use --can slcan:29537, which needs no kernel support)"};
+    ::close(fd);
+    return {"SocketCAN", true, "the kernel has it", ""};
+}
+
+Finding video_devices() {
+    std::string found;
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator("/dev", error)) {
+        const std::string name = entry.path().filename().string();
+        if (name.starts_with("video")) found += (found.empty() ? "/dev/" : " /dev/") + name;
+    }
+    if (found.empty())
+        return {
+            "V4L2 devices", false, "no /dev/video*",
+            "sudo modprobe v4l2loopback video_nr=10 exclusive_caps=1 max_buffers=8 (or --video CAMERA=FILE.y4m)"};
+    return {"V4L2 devices", true, found, ""};
+}
+
+Finding real_time() {
+    rlimit limit{};
+    ::getrlimit(RLIMIT_RTPRIO, &limit);
+    if (::geteuid() == 0 || limit.rlim_cur >= 60)
+        return {"real-time priority", true, "SCHED_FIFO is permitted", ""};
+    return {
+        "real-time priority", false, "SCHED_FIFO is not permitted: deadlines may slip under load",
+        fmt::format("echo \"{} - rtprio 90\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
+                    ::getenv("USER") ? ::getenv("USER") : "USER")};
+}
+
+Finding locked_memory() {
+    rlimit limit{};
+    ::getrlimit(RLIMIT_MEMLOCK, &limit);
+    if (::geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY)
+        return {"locked memory", true, "mlockall is permitted", ""};
+    return {
+        "locked memory", false, fmt::format("limit {} KiB: page faults may cost deadlines", limit.rlim_cur / 1024),
+        fmt::format(
+            "echo \"{} - memlock unlimited\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
+            ::getenv("USER") ? ::getenv("USER") : "USER")};
+}
+
+/// How many materials there are of each kind that the scene has.
+std::map<std::string_view, int> material_kinds(const Scene& scene) {
+    std::map<std::string_view, int> count;
+    for (const Material& m : scene.materials) ++count[name_of(m.kind, kMaterialKinds)];
+    return count;
+}
+
+nlohmann::json describe_shape(const Scene& scene, const Body& body) {
+    if (const auto* sphere = std::get_if<Sphere>(&body.shape)) return {{"sphere_radius_m", sphere->radius_m}};
+    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&body.shape)) {
+        const Vec3& axes = ellipsoid->semi_axes_m;
+        return {{"ellipsoid_semi_axes_m", {axes.x, axes.y, axes.z}}};
+    }
+    return {{"triangles", scene.meshes[static_cast<std::size_t>(std::get<int>(body.shape))].faces.size()}};
+}
+
+nlohmann::json describe(const World& world) {
+    const Scene& s = world.scene();
+    nlohmann::json bodies = nlohmann::json::array(), cameras = nlohmann::json::array(),
+                   lidars = nlohmann::json::array(), lights = nlohmann::json::array();
+    for (const Body& b : s.bodies) {
+        nlohmann::json body{{"name", b.name},
+                            {"can_id", b.can_id ? nlohmann::json(*b.can_id) : nlohmann::json(nullptr)}};
+        body.update(describe_shape(s, b));
+        bodies.push_back(body);
+    }
+    for (const Camera& c : s.cameras)
+        cameras.push_back({{"name", c.name},
+                           {"width", c.width},
+                           {"height", c.height},
+                           {"format", std::string(name(c.format))},
+                           {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
+                           {"detector", c.detector.has_value()},
+                           {"lens", c.lens.has_value()}});
+    for (const Lidar& l : s.lidars)
+        lidars.push_back({{"name", l.name}, {"model", l.model}, {"rate_hz", l.rate_hz}});
+    for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
+    nlohmann::json render{{"method", name_of(s.render.method, kMethods)}};
+    if (s.render.budget_rays > 0)
+        render["budget_rays"] = s.render.budget_rays;
+    else if (s.render.budget_ns > 0)
+        render["budget_ms"] = static_cast<double>(s.render.budget_ns) * 1e-6;
+    else
+        render["spp"] = s.render.spp;
+    if (s.render.method == RenderSettings::Method::path) render["max_depth"] = s.render.max_depth;
+    return {{"name", s.name},
+            {"render", render},
+            {"lights", lights},
+            {"bodies", bodies},
+            {"cameras", cameras},
+            {"lidars", lidars},
+            {"triangles", world.tracer().triangle_count()},
+            {"materials", s.materials.size()},
+            {"material_kinds", material_kinds(s)},
+            {"textures", s.textures.size()},
+            {"warnings", s.warnings}};
+}
+
+std::string light_words(const Light& l) {
+    switch (l.kind) {
+        case Light::Kind::rectangle: return fmt::format("rectangle of {:g} x {:g} m", l.width_m, l.height_m);
+        case Light::Kind::disc: return fmt::format("disc of radius {:g} m", l.radius_m);
+        case Light::Kind::point:
+        case Light::Kind::directional: break;
+    }
+    return std::string(name_of(l.kind, kLightKinds));
+}
+
+std::string budget_words(const RenderSettings& r) {
+    if (r.budget_rays > 0) return fmt::format("at most {} rays a frame", r.budget_rays);
+    if (r.budget_ns > 0)
+        return fmt::format("{:g} ms from the end of an exposure to the hand-over",
+                           static_cast<double>(r.budget_ns) * 1e-6);
+    return fmt::format("{} sample{} a pixel", r.spp, r.spp > 1 ? "s" : "");
+}
+
+void tell_light(const Scene& s) {
+    const bool path = s.render.method == RenderSettings::Method::path;
+    say(fmt::format(
+        "  render: {}, {}",
+        path ? fmt::format("path tracing over at most {} surfaces", s.render.max_depth) : "direct light",
+        budget_words(s.render)));
+    std::string kinds;
+    for (const auto& [kind, count] : material_kinds(s))
+        kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", count, kind);
+    if (!kinds.empty()) say("  materials: " + kinds);
+    for (const Light& l : s.lights)
+        say(fmt::format("  light {}: {}{}", l.name, light_words(l),
+                        l.mount < 0 ? "" : " on body " + s.bodies[static_cast<std::size_t>(l.mount)].name));
+}
+
+void tell(const World& world) {
+    const Scene& s = world.scene();
+    say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
+                    world.tracer().triangle_count(), s.materials.size(), s.textures.size()));
+    tell_light(s);
+    for (const Body& b : s.bodies)
+        say(fmt::format("  body {}{}", b.name,
+                        b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
+    for (const Camera& c : s.cameras)
+        say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
+                        1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
+    for (const Lidar& l : s.lidars)
+        say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model, l.rate_hz));
+}
+
+Status save_dbc(const Scene& scene, const std::string& path) {
+    std::vector<DbcBody> bodies;
+    for (const Body& b : scene.bodies)
+        if (b.can_id) bodies.push_back({b.name, *b.can_id});
+    std::ofstream out(path, std::ios::binary);
+    out << write_dbc(bodies, static_cast<int>(scene.cameras.size()));
+    if (!out.flush()) return Error{"cannot be written", path};
+    return Ok{};
+}
+
+/// Tries the very devices that a run would use.
+Result<Finding> try_device(const std::string& spec) {
+    if (spec.starts_with("/dev/video")) {
+        auto sink = open_video_sink(spec, {640, 480, PixelFormat::grey, 100'000'000}, WhenFull::drop);
+        if (!sink) return Finding{spec, false, sink.error().what, sink.error().remedy};
+        return Finding{spec, true, (*sink)->description(), ""};
+    }
+    auto bus = open_can_bus(spec, CanRole::hub);
+    if (bus) return Finding{spec, true, (*bus)->description(), ""};
+    if (bus.error().kind == ErrorKind::bad_input) return bus.error();
+    return Finding{spec, false, bus.error().what, bus.error().remedy};
+}
+
+Outcome check(const Options& o) {
+    auto scene = load_scene(o.scene);
+    if (!scene) return scene.error();
+    auto world = World::create(*std::move(scene));
+    if (!world) return world.error();
+    tell(**world);
+    if (!o.dbc.empty())
+        if (auto written = save_dbc((*world)->scene(), o.dbc); !written) return written.error();
+
+    std::vector<Finding> findings{socketcan(), video_devices(), real_time(), locked_memory()};
+    const std::size_t general = findings.size();
+    for (const std::string& spec : o.devices) {
+        auto finding = try_device(spec);
+        if (!finding) return finding.error();
+        findings.push_back(*std::move(finding));
+    }
+    nlohmann::json machine = nlohmann::json::array();
+    for (const Finding& f : findings) {
+        say(fmt::format("  [{}] {}: {}{}", f.there ? "ok" : "--", f.name, f.detail,
+                        f.remedy.empty() ? "" : "\n         try: " + f.remedy));
+        machine.push_back({{"name", f.name}, {"there", f.there}, {"detail", f.detail}, {"remedy", f.remedy}});
+    }
+    for (std::size_t i = general; i < findings.size(); ++i)  // what was asked for by name must be there
+        if (!findings[i].there)
+            return Error{findings[i].detail, findings[i].name, 0, 0, ErrorKind::missing, findings[i].remedy};
+    return nlohmann::json{{"scene", describe(**world)}, {"machine", machine}};
+}
+
+}  // namespace
+
+Command add_check(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c =
+        app.add_subcommand("check", "Is the scene good, and can this machine run it? Names what is missing");
+    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
+    c->add_option("DEVICE", o->devices,
+                  "Devices that the run will need, to be tried: vcan0, slcan:PORT, /dev/video10 ...");
+    c->add_option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
+    return [o] { return check(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,42 @@
+/// apps/cli.h - the subcommands of `narpa`, one file each. Words for people go to standard error, the one
+/// JSON document of --json to standard output; exit status: base/result.h.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa::cli {
+
+/// What a subcommand found out, for --json; or why it could not. Where it judges, the document says `passed`, and
+/// false is exit status 1.
+using Outcome = Result<nlohmann::json>;
+using Command = std::function<Outcome()>;
+
+/// Each adds its subcommand and returns what runs when it is chosen.
+Command add_check(CLI::App& app);
+Command add_run(CLI::App& app);
+Command add_fly(CLI::App& app);
+Command add_render(CLI::App& app);
+Command add_scan(CLI::App& app);
+Command add_bench(CLI::App& app);
+Command add_replay(CLI::App& app);
+Command add_estimate(CLI::App& app);
+Command add_rehearse(CLI::App& app);
+
+/// For numbers: CLI::Range lets NaN through.
+[[nodiscard]] CLI::Validator finite_number();
+/// Words for people, on standard error.
+void say(std::string_view text);
+/// Reads a scene, with another method than its own if one is given, and tells its warnings.
+Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
+/// "NAME=VALUE" -> {NAME, VALUE}; an Error that says what was expected.
+Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);
+
+}  // namespace narpa::cli

@@ -1,0 +1,216 @@
+// narpa fly - plays a trajectory as pose commands on a bus, in step with the emulator's clock or in lockstep.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "drivers/can/can_bus.h"
+#include "drivers/can/remote_clock.h"
+#include "apps/cli.h"
+#include "emulator/clock.h"
+#include "emulator/trajectory.h"
+#include "protocols/can/messages.h"
+
+namespace narpa::cli {
+namespace {
+
+struct Options {
+    std::string trajectory, bus;
+    std::vector<std::string> ids;
+    std::optional<double> start_s;
+    double lead_s = 0.05, wait_s = 15;
+    bool lockstep = false, classic = false;
+};
+
+constexpr std::uint32_t kDefaultId = 0x100;
+constexpr std::int64_t kMs = 1'000'000;
+
+/// One body's commands on the wire.
+struct Commander {
+    std::uint32_t base_id = 0;
+    std::uint8_t counter = 0;
+    std::int64_t newest_ns = std::numeric_limits<std::int64_t>::min();
+};
+
+Result<std::map<std::string, Commander>> commanders(const Options& o, const std::vector<TrajectoryRow>& rows) {
+    std::map<std::string, Commander> all;
+    for (const TrajectoryRow& r : rows) all.try_emplace(r.body);
+    if (o.ids.empty()) {
+        if (all.size() > 1)
+            return Error{fmt::format("{} bodies, expected --id BODY=ID for each", all.size()), o.trajectory};
+        all.begin()->second.base_id = kDefaultId;
+        return all;
+    }
+    for (const std::string& text : o.ids) {
+        auto pair = split_pair(text, "BODY=ID, like chaser=0x100");
+        if (!pair) return pair.error();
+        const auto at = all.find(pair->first);
+        if (at == all.end())
+            return Error{fmt::format("--id {}: no such body in the trajectory", text), o.trajectory};
+        char* end = nullptr;
+        const long id = std::strtol(pair->second.c_str(), &end, 0);
+        if (*end != 0) return Error{fmt::format("--id {}, expected BODY=ID, like chaser=0x100", text)};
+        if (auto good = check_body_base_id(id); !good)
+            return Error{fmt::format("--id {}: {}", text, good.error().what)};
+        at->second.base_id = static_cast<std::uint32_t>(id);
+    }
+    for (const auto& [name, c] : all)
+        if (c.base_id == 0 && o.ids.size() < all.size())
+            return Error{fmt::format("body \"{}\" has no identifier, expected --id {}=ID", name, name),
+                         o.trajectory};
+    return all;
+}
+
+class Player {
+public:
+    Player(const Options& o, CanBus& bus, std::map<std::string, Commander>& who)
+        : options_(o), bus_(bus), who_(who), fd_(bus.carries_fd() && !o.classic) {}
+
+    Status play(const std::vector<TrajectoryRow>& rows) {
+        if (auto ready = synchronise(); !ready) return ready;
+        for (const TrajectoryRow& row : rows) {
+            if (stop_flag()) break;
+            const std::int64_t t = row.t_ns + start_ns_;
+            if (!options_.lockstep) wait_for(t - std::llround(options_.lead_s * 1e9));
+            if (auto sent = send(row, t); !sent) return sent;
+            if (options_.lockstep)
+                if (auto reached = wait_in_lockstep(); !reached) return reached;
+        }
+        return Ok{};
+    }
+
+    std::uint64_t commands = 0, frames_dropped = 0;
+    std::int64_t start_ns() const { return start_ns_; }
+
+private:
+    /// Real time: the trajectory's time 0 is a round tenth of a second ahead, unless --start says when.
+    Status synchronise() {
+        const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
+        if (!options_.lockstep) {
+            while (!clock_.heard() && monotonic_ns() < deadline && !stop_flag()) {
+                bus_.wait(50 * kMs);
+                clock_.listen(bus_);
+            }
+            if (!clock_.heard()) {
+                say(fmt::format("no heartbeat in {} s: time 0 is now", options_.wait_s));
+                clock_.start_here();
+            }
+        }
+        if (options_.start_s) {
+            start_ns_ = std::llround(*options_.start_s * 1e9);
+        } else if (!options_.lockstep) {
+            start_ns_ = (clock_.now_ns() + 300 * kMs) / (100 * kMs) * (100 * kMs);
+        }
+        return Ok{};
+    }
+
+    void wait_for(std::int64_t t_ns) {
+        for (std::int64_t left; (left = t_ns - clock_.now_ns()) > 0 && !stop_flag();) {
+            bus_.wait(std::min<std::int64_t>(left, 100 * kMs));
+            clock_.listen(bus_);
+        }
+    }
+
+    Status send(const TrajectoryRow& row, std::int64_t t_ns) {
+        Commander& c = who_.at(row.body);
+        const PoseCommand command{c.counter++, t_ns, row.motion};
+        PoseFrames classic;
+        CanFrame fd;
+        const EncodeStatus encoded =
+            fd_ ? encode_fd(command, c.base_id, fd) : encode_classic(command, c.base_id, classic);
+        if (!encoded)
+            return Error{fmt::format("row at {} s of \"{}\": {}", static_cast<double>(row.t_ns) * 1e-9, row.body,
+                                     encoded.text()),
+                         options_.trajectory};
+        if (fd_) {
+            frames_dropped += !bus_.send(fd);
+        } else {
+            for (const CanFrame& f : classic) frames_dropped += !bus_.send(f);
+        }
+        c.newest_ns = t_ns;
+        ++commands;
+        return Ok{};
+    }
+
+    /// Until the emulator's clock stands where the commands let it go.
+    Status wait_in_lockstep() {
+        std::int64_t granted = std::numeric_limits<std::int64_t>::max();
+        for (const auto& [name, c] : who_) granted = std::min(granted, c.newest_ns);
+        if (granted <= last_granted_) return Ok{};
+        last_granted_ = granted;
+        const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
+        while (!clock_.reached(granted)) {
+            clock_.listen(bus_);
+            if (clock_.reached(granted)) break;
+            if (stop_flag()) return Ok{};
+            if (monotonic_ns() > deadline)
+                return Error{
+                    fmt::format("no heartbeat of {:.6f} s in {} s: is `narpa run --lockstep` there, and are all of "
+                                "its scene's commanded bodies in the trajectory?",
+                                static_cast<double>(granted) * 1e-9, options_.wait_s),
+                    options_.bus, 0, 0, ErrorKind::failed};
+            bus_.wait(20 * kMs);
+        }
+        return Ok{};
+    }
+
+    const Options& options_;
+    CanBus& bus_;
+    std::map<std::string, Commander>& who_;
+    bool fd_;
+    RemoteClock clock_;
+    std::int64_t start_ns_ = 0, last_granted_ = std::numeric_limits<std::int64_t>::min();
+};
+
+Outcome fly(const Options& o) {
+    auto rows = read_trajectory(o.trajectory);
+    if (!rows) return rows.error();
+    auto who = commanders(o, *rows);
+    if (!who) return who.error();
+    std::stable_sort(rows->begin(), rows->end(), [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
+
+    stop_on_signals();
+    auto bus = join_can_bus(o.bus, o.wait_s, stop_flag());
+    if (!bus) return bus.error();
+    say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), who->size(),
+                    (*bus)->description()));
+    Player player(o, **bus, *who);
+    if (auto played = player.play(*rows); !played) return played.error();
+
+    const CanCounters& c = (*bus)->counters();
+    say(fmt::format("{} commands sent from {:.3f} s on, {} frames dropped, {} frames heard", player.commands,
+                    static_cast<double>(player.start_ns()) * 1e-9, player.frames_dropped, c.received));
+    return nlohmann::json{{"commands", player.commands},   {"start_ns", player.start_ns()},
+                          {"frames_sent", c.sent},         {"frames_dropped", player.frames_dropped},
+                          {"frames_received", c.received}, {"rows", rows->size()},
+                          {"stopped", stop_flag().load()}};
+}
+
+}  // namespace
+
+Command add_fly(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c = app.add_subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
+    c->add_option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)")->required();
+    c->add_option("--can", o->bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE")->required();
+    c->add_option("--id", o->ids,
+                  "BODY=ID: base identifier of a body's commands, the scene's can_id (default: 0x100)")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_option("--start", o->start_s,
+                  "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)");
+    c->add_option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
+    c->add_option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
+        ->check(CLI::Range(0.0, 3600.0))
+        ->capture_default_str();
+    c->add_flag("--lockstep", o->lockstep,
+                "Send the next command when the emulator's clock has reached the last one");
+    c->add_flag("--classic", o->classic, "Nine classic frames a command even where the bus carries CAN FD");
+    return [o] { return fly(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,108 @@
+// narpa - hardware-in-the-loop camera and LiDAR emulator. This file: subcommands, --json, exit status.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+#include "apps/cli.h"
+#include "renderer/scene/scene_file.h"
+
+namespace narpa::cli {
+
+CLI::Validator finite_number() {
+    return {[](std::string& text) {
+                return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+            },
+            ""};
+}
+
+void say(std::string_view text) {
+    fmt::print(stderr, "{}\n", text);
+}
+
+Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method) {
+    auto scene = read_scene(path);
+    if (!scene) return scene;
+    if (method)
+        if (const Status good = use_method(*scene, *method); !good) return good.error();
+    for (const std::string& w : scene->warnings) say("warning: " + w);
+    return scene;
+}
+
+Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected) {
+    const std::size_t at = text.find('=');
+    if (at == std::string::npos || at == 0 || at + 1 == text.size())
+        return Error{fmt::format("\"{}\", expected {}", text, expected)};
+    return std::pair{text.substr(0, at), text.substr(at + 1)};
+}
+
+namespace {
+
+nlohmann::json to_json(const Error& e) {
+    return {{"error",
+             {{"what", e.what},
+              {"file", e.file},
+              {"line", e.line},
+              {"column", e.column},
+              {"remedy", e.remedy},
+              {"exit_status", exit_status(e.kind)}}}};
+}
+
+void print_json(const nlohmann::json& document) {
+    fmt::print("{}\n", document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+int finish(const Outcome& outcome, bool json) {
+    if (!outcome) {
+        say("narpa: " + outcome.error().text());
+        if (json) print_json(to_json(outcome.error()));
+        return exit_status(outcome.error().kind);
+    }
+    if (json) print_json(*outcome);
+    return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
+}
+
+int run(int argc, char** argv) {
+    CLI::App app{
+        "narpa stands where a spacecraft's camera and LiDAR would stand: poses in on CAN, camera frames out "
+        "on V4L2, LiDAR packets out on UDP."};
+    app.set_version_flag("--version", NARPA_VERSION);
+    app.require_subcommand(1);
+    app.fallthrough();
+    app.footer(
+        "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.");
+    constexpr const char* kJsonHelp = "Put one JSON document on standard output";
+    bool json = false;
+    app.add_flag("--json", json, kJsonHelp);
+
+    Command chosen;
+    for (const auto& add :
+         {add_check, add_run, add_fly, add_render, add_scan, add_replay, add_estimate, add_rehearse, add_bench}) {
+        const Command command = add(app);
+        CLI::App* subcommand = app.get_subcommands([](const CLI::App*) { return true; }).back();
+        subcommand->add_flag("--json", json, kJsonHelp);
+        for (CLI::App* part : subcommand->get_subcommands({})) part->add_flag("--json", json, kJsonHelp);
+        subcommand->final_callback([&chosen, command] { chosen = command; });
+    }
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        const int asked_for_help = app.exit(e, std::cout, std::cerr);
+        return asked_for_help == 0 ? 0 : exit_status(ErrorKind::bad_input);
+    }
+    return finish(chosen(), json);
+}
+
+}  // namespace
+}  // namespace narpa::cli
+
+int main(int argc, char** argv) {
+    try {
+        return narpa::cli::run(argc, argv);
+    } catch (const std::exception& e) {  // out of memory and the like: nothing of ours throws
+        fmt::print(stderr, "narpa: {}\n", e.what());
+        return 1;
+    }
+}

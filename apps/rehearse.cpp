@@ -1,0 +1,141 @@
+// narpa rehearse - a docking with everything in the loop, judged.
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "apps/cli.h"
+#include "rehearsal/conduct/campaign.h"
+#include "rehearsal/conduct/child.h"
+#include "rehearsal/conduct/conduct.h"
+
+namespace narpa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using rehearsal::Conducted;
+
+struct Options {
+    rehearsal::ConductOptions conduct;
+    std::vector<std::string> video;
+    std::size_t runs = 0;  ///< 0: one, without a summary
+    int jobs = 1;
+};
+
+/// The docking that comes with narpa: beside the program in a build, or installed.
+Result<std::string> shipped_scenario() {
+    const std::string bin = rehearsal::program_folder();
+    for (const char* at : {"/../scenes/rehearsal/docking.toml", "/../share/narpa/scenes/rehearsal/docking.toml"})
+        if (std::error_code none; fs::exists(bin + at, none)) return fs::path(bin + at).lexically_normal().string();
+    return Error{"no scenario was given, and the docking that comes with narpa is not beside the program"};
+}
+
+/// Whether a line has come on standard input; where that has ended, ten seconds after it was first asked for.
+bool line_on_stdin() {
+    using Clock = std::chrono::steady_clock;
+    static const Clock::time_point first = Clock::now();
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    if (::poll(&input, 1, 0) <= 0) return false;
+    char c = 0;
+    return ::read(STDIN_FILENO, &c, 1) == 1 ? c == '\n' : Clock::now() - first > std::chrono::seconds(10);
+}
+
+rehearsal::Narrator narrator() {
+    if (!::isatty(STDERR_FILENO))
+        return {[](std::string_view text) { say(text); }, [](std::string_view) {}, line_on_stdin};
+    return {[](std::string_view text) { fmt::print(stderr, "\r\033[K{}\n", text); },
+            [](std::string_view text) { fmt::print(stderr, "\r\033[K{}", text); }, line_on_stdin};
+}
+
+Outcome one(const rehearsal::ConductOptions& options) {
+    const auto done = rehearsal::conduct(options, narrator(), stop_flag());
+    if (!done) return done.error();
+    for (const rehearsal::GateResult& g : done->verdict.gates)
+        say(fmt::format("  {:<10} {:<12} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
+                        g.reason));
+    say(done->verdict.headline);
+    if (!done->page.empty()) say("page: " + done->page);
+    return done->result;
+}
+
+Outcome many(const rehearsal::CampaignOptions& options) {
+    auto summary = rehearsal::conduct_campaign(options, narrator(), stop_flag());
+    if (!summary) return summary;
+    const nlohmann::json& s = *summary;
+    say(fmt::format("{} of {} runs succeeded: {:.1f} %, with 95 % confidence {:.1f} to {:.1f} %",
+                    s["succeeded"].get<std::size_t>(), s["judged"].get<std::size_t>(),
+                    s["success_rate"].get<double>() * 100, s["success_interval_95"][0].get<double>() * 100,
+                    s["success_interval_95"][1].get<double>() * 100));
+    for (const auto& c : s["contact"])
+        say(fmt::format("  {:<22} {:>8.4f} +- {:.4f}, at most {:.4f} {}; asked {:g} to {:g}",
+                        c["title"].get<std::string>(), c["mean"].get<double>(), c["sigma"].get<double>(),
+                        c["max"].get<double>(), c["unit"].get<std::string>(), c["asked_min"].get<double>(),
+                        c["asked_max"].get<double>()));
+    for (const auto& [gate, list] : s["failures"].items()) say(fmt::format("  {}: {} runs", gate, list.size()));
+    say("page: " + options.run.folder + "/index.html");
+    return summary;
+}
+
+Outcome rehearse(const Options& given) {
+    rehearsal::ConductOptions o = given.conduct;
+    for (const std::string& text : given.video) {
+        auto pair = split_pair(text, "CAMERA=DEVICE, like nav=/dev/video10");
+        if (!pair) return pair.error();
+        o.video.insert(*std::move(pair));
+    }
+    if (o.scenario.empty()) {
+        auto shipped = shipped_scenario();
+        if (!shipped) return shipped.error();
+        o.scenario = *shipped;
+    }
+    auto scenario = rehearsal::read_scenario(o.scenario);
+    if (!scenario) return scenario.error();
+    if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name;
+    stop_on_signals();
+    return given.runs > 0 ? many({o, given.runs, given.jobs}) : one(o);
+}
+
+}  // namespace
+
+Command add_rehearse(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    rehearsal::ConductOptions& r = o->conduct;
+    r.version = NARPA_VERSION;
+    CLI::App* c = app.add_subcommand(
+        "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");
+    c->add_option("SCENARIO", r.scenario, "Scenario file (default: the docking that comes with narpa)");
+    c->add_option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
+    c->add_flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
+    c->add_option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
+    CLI::Option* runs =
+        c->add_option("--runs", o->runs,
+                      "So many runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
+                      "goes on where it was interrupted")
+            ->check(CLI::Range(1, 100000));
+    c->add_option("--jobs", o->jobs, "Runs at the same time")->check(CLI::Range(1, 256))->needs(runs);
+    c->add_option("--can", r.bus, "BUS: slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
+        ->capture_default_str();
+    c->add_option("--video", o->video,
+                  "CAMERA=DEVICE instead of a FIFO, like nav=/dev/video10; may be given many times")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_option(
+        "--dynamics", r.dynamics,
+        "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it, "
+        "last");
+    c->add_option(
+        "--navigation", r.navigation,
+        "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
+        "set; says \"ready\" when it listens, or has 10 s; none: you start it, and press Enter when it listens");
+    c->add_option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)")
+        ->check(CLI::Range(0, 1024));
+    c->add_option("--patience", r.patience_s, "Seconds without progress after which it is given up")
+        ->check(CLI::Range(1.0, 86400.0))
+        ->capture_default_str();
+    c->footer("Exit status: 0 all gates passed; 1 one failed; 2 bad input; 3 a device is missing.");
+    return [o] { return rehearse(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,218 @@
+// narpa render - one frame of one camera, as the run would make it, to an image file.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "emulator/camera_unit.h"
+#include "apps/budget_options.h"
+#include "apps/cli.h"
+#include "apps/pose_options.h"
+#include "emulator/clock.h"
+#include "emulator/threads.h"
+#include "renderer/image/image_file.h"
+
+namespace narpa::cli {
+namespace {
+
+using Method = RenderSettings::Method;
+
+struct Options {
+    std::string scene, camera, format, out, aov, method;
+    PoseOptions pose;
+    std::optional<double> time_s;
+    std::optional<std::uint32_t> frame;
+    BudgetOptions budget;
+    std::optional<int> max_depth;
+    std::optional<std::uint64_t> seed;
+    int threads = 0;
+};
+
+/// What the command line says differently from the scene.
+Status override_scene(const Options& o, Scene& scene, Camera& camera) {
+    o.budget.override_scene(scene.render);
+    if (o.seed) scene.render.seed = *o.seed;
+    if (o.max_depth && scene.render.method == Method::direct)
+        return Error{"--max-depth belongs to --method path, and the method is \"direct\""};
+    if (o.max_depth) scene.render.max_depth = *o.max_depth;
+    if (!o.format.empty()) {
+        const auto format = pixel_format_from(o.format);
+        if (!format) return Error{fmt::format("--format {}, expected GREY, Y16, YUYV or RGB24", o.format)};
+        if (*format == PixelFormat::yuyv && camera.width % 2 != 0)
+            return Error{
+                fmt::format("--format YUYV needs an even width, camera \"{}\" has {}", camera.name, camera.width)};
+        camera.format = *format;
+    }
+    return o.pose.place(scene);
+}
+
+constexpr std::array<std::string_view, 8> kOutputs{"radiance", "depth", "range",  "normal",
+                                                   "position", "body",  "albedo", "variance"};
+
+/// The names in "depth,normal"; an Error for one that is not known.
+Result<std::set<std::string>> parse_outputs(const std::string& list) {
+    std::set<std::string> names;
+    for (std::size_t start = 0; start < list.size();) {
+        const std::size_t comma = std::min(list.find(',', start), list.size());
+        const std::string name = list.substr(start, comma - start);
+        start = comma + 1;
+        if (std::find(kOutputs.begin(), kOutputs.end(), name) == kOutputs.end())
+            return Error{fmt::format("--aov \"{}\", expected some of {}", name, fmt::join(kOutputs, ","))};
+        names.insert(name);
+    }
+    return names;
+}
+
+/// The image file holds what is not empty.
+void keep_only(const std::set<std::string>& names, Aovs& a) {
+    if (!names.contains("depth")) a.depth_m.clear();
+    if (!names.contains("range")) a.range_m.clear();
+    if (!names.contains("normal")) a.normal.clear();
+    if (!names.contains("position")) a.position.clear();
+    if (!names.contains("body")) a.body.clear();
+    if (!names.contains("albedo")) a.albedo.clear();
+    if (!names.contains("variance")) a.variance.clear();
+}
+
+std::string_view name(Method m) {
+    return m == Method::path ? "path" : "direct";
+}
+
+/// Shows on standard error how far a long frame is, where that is a terminal.
+class Progress {
+public:
+    explicit Progress(std::size_t pixels) : pixels_(pixels) {
+        if (isatty(STDERR_FILENO) != 0)
+            watcher_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
+    }
+    std::atomic<std::size_t> pixels_done{0};
+
+private:
+    void watch(const std::stop_token& stop) {
+        using namespace std::chrono_literals;
+        std::mutex m;
+        std::unique_lock lock(m);
+        std::condition_variable_any woken;
+        const auto wait = [&](auto time) { return woken.wait_for(lock, stop, time, [] { return false; }); };
+        for (wait(2s); !stop.stop_requested(); wait(500ms)) {
+            const double part = static_cast<double>(pixels_done) / static_cast<double>(pixels_);
+            fmt::print(stderr, "\r{:5.1f} % ", 100 * part);
+            shown_ = true;
+        }
+        if (shown_) fmt::print(stderr, "\r        \r");
+    }
+
+    std::size_t pixels_;
+    bool shown_ = false;
+    std::jthread watcher_;  // last: it is joined before what it looks at goes
+};
+
+Outcome render(const Options& o) {
+    std::optional<Method> method;
+    if (!o.method.empty()) method = o.method == "path" ? Method::path : Method::direct;
+    auto scene = load_scene(o.scene, method);
+    if (!scene) return scene.error();
+    auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
+    if (!index) return index.error();
+    Camera& camera = scene->cameras[*index];
+    if (auto good = override_scene(o, *scene, camera); !good) return good.error();
+    auto outputs = parse_outputs(o.aov);
+    if (!outputs) return outputs.error();
+    if (!outputs->empty() && !o.out.ends_with(".exr"))
+        return Error{fmt::format(
+            "--aov with {}, expected FILE.exr: other files hold radiance or digital numbers alone", o.out)};
+
+    const std::int64_t period_ns = camera.period_ns;
+    const std::int64_t t_ns = o.time_s ? std::llround(*o.time_s * 1e9) : o.frame.value_or(0) * period_ns;
+    const auto frame =
+        o.frame.value_or(static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period_ns / 2) / period_ns)));
+
+    TracingThreads threads(o.threads);
+    auto world = World::create(*std::move(scene));
+    if (!world) return world.error();
+    if (auto loaded = o.pose.load(**world, t_ns, t_ns); !loaded) return loaded.error();
+    CameraUnit unit(**world, *index);
+    Aovs values;
+    Aovs* const aovs = outputs->empty() ? nullptr : &values;
+    const std::int64_t budget_ns = (*world)->scene().render.budget_ns;
+    // A run's frames have others before them, which show how fast the machine is and what the way out takes.
+    if (budget_ns > 0)
+        threads.arena.execute([&] {
+            unit.embed(unit.expose(frame, t_ns, monotonic_ns() + budget_ns));
+            unit.handed_over(monotonic_ns());
+        });
+    const std::int64_t start_ns = monotonic_ns();
+    FrameLedger ledger;
+    {
+        Progress progress(unit.radiance().pixels.size());
+        threads.arena.execute([&] {
+            ledger = unit.expose(frame, t_ns, start_ns + budget_ns, aovs, &progress.pixels_done);
+            unit.embed(ledger);
+        });
+    }
+    const double seconds = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
+    keep_only(*outputs, values);
+
+    auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
+    if (!written) return written.error();
+    const RenderSettings& settings = (*world)->scene().render;
+    say(fmt::format("{}: {} x {}, {}, {:.6g} spp, {}, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
+                    unit.camera().width, unit.camera().height, name(settings.method), ledger.samples_per_pixel,
+                    kStepNames[ledger.step], frame, static_cast<double>(t_ns) * 1e-9,
+                    (*world)->tracer().triangle_count(), 1e3 * seconds));
+    nlohmann::json document{{"file", o.out},
+                            {"camera", unit.camera().name},
+                            {"frame", frame},
+                            {"t_ns", t_ns},
+                            {"width", unit.camera().width},
+                            {"height", unit.camera().height},
+                            {"method", name(settings.method)},
+                            {"samples_per_pixel", ledger.samples_per_pixel},
+                            {"samples", ledger.samples},
+                            {"rays", ledger.rays},
+                            {"passes", ledger.passes},
+                            {"step", kStepNames[ledger.step]},
+                            {"triangles", (*world)->tracer().triangle_count()},
+                            {"render_s", seconds}};
+    if (ledger.expected_error >= 0) document["expected_error"] = ledger.expected_error;
+    if (settings.method == Method::path) document["max_depth"] = settings.max_depth;
+    return document;
+}
+
+}  // namespace
+
+Command add_render(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c = app.add_subcommand(
+        "render", "Render one frame of a camera, byte for byte as `run` would put it out but for a budget in time");
+    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
+    c->add_option("--camera", o->camera, "Name of the camera (default: the first)");
+    c->add_option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)")
+        ->check(CLI::Range(-9e9, 9e9));
+    c->add_option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
+    o->pose.add_to(*c);
+    c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
+    o->budget.add_to(*c);
+    c->add_option("--method", o->method, "direct: light straight from its sources; path: all light")
+        ->check(CLI::IsMember({"direct", "path"}));
+    c->add_option("--max-depth", o->max_depth, "With path: surfaces that light may meet on its way")
+        ->check(CLI::Range(1, 40));
+    c->add_option("--seed", o->seed, "Seed instead of the scene's");
+    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
+        ->check(CLI::Range(0, 1024));
+    c->add_option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance");
+    c->add_option("-o,--output", o->out,
+                  "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
+        ->required();
+    return [o] { return render(*o); };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,186 @@
+// narpa replay - the frames of a logged run once more: bit for bit, and beside what an unlimited budget would have
+// shown.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/bench_scene.h"
+#include "apps/cli.h"
+#include "emulator/replay/replay_report.h"
+#include "emulator/threads.h"
+#include "rehearsal/conduct/rerun.h"
+
+namespace narpa::cli {
+namespace {
+
+constexpr std::size_t kDifferencesTold = 10;
+constexpr int kFramesCompared = 10;  ///< where nobody says how many
+
+struct Options {
+    std::string folder, camera, scene, picture;
+    int reference = 0, frames = 0, threads = 0;
+};
+
+struct Replayed {
+    std::vector<ReplayedFrame> frames;
+    std::size_t not_whole = 0;
+    std::vector<ReplayedFrame> forged;  ///< of those that are not whole, what cannot be so
+    /// The frame that is farthest from its reference.
+    std::size_t worst = 0;
+    std::optional<RadianceImage> worst_picture, worst_reference;
+};
+
+/// Evenly spread over the run, first and last among them.
+std::vector<std::size_t> chosen_frames(std::size_t frames, std::size_t wanted) {
+    const std::size_t n = std::min(frames, wanted);
+    std::vector<std::size_t> chosen;
+    for (std::size_t k = 0; k < n; ++k) chosen.push_back(n > 1 ? k * (frames - 1) / (n - 1) : 0);
+    return chosen;
+}
+
+std::vector<std::size_t> frames_for(const Options& o, std::size_t logged) {
+    if (o.frames > 0) return chosen_frames(logged, static_cast<std::size_t>(o.frames));
+    return chosen_frames(logged, o.reference > 0 ? std::size_t{kFramesCompared} : logged);
+}
+
+Replayed make_again(const Options& o, Replay& run) {
+    TracingThreads threads(o.threads);
+    const Progress progress;
+    const std::vector<std::size_t> chosen = frames_for(o, run.frames().size());
+    Replayed done;
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+        progress.tell(fmt::format("{}/{}", k, chosen.size()));
+        const std::size_t i = chosen[k];
+        if (!run.has_image(i)) {
+            ++done.not_whole;
+            if (auto differs = run.make(i); !differs.empty())
+                done.forged.push_back({run.frames()[i], std::move(differs), {}});
+            continue;
+        }
+        ReplayedFrame frame{run.frames()[i], {}, {}};
+        threads.arena.execute([&] {
+            frame.differs = run.make(i);
+            if (o.reference > 0) frame.compared = run.against(o.reference);
+        });
+        done.frames.push_back(std::move(frame));
+        if (!done.frames.back().compared) continue;
+        const auto error = [&](std::size_t at) { return done.frames[at].compared->difference.rmse; };
+        if (!done.worst_picture || error(done.frames.size() - 1) > error(done.worst)) {
+            done.worst = done.frames.size() - 1;
+            done.worst_picture = run.picture();
+            done.worst_reference = run.reference();
+        }
+    }
+    return done;
+}
+
+/// "nav.ledger.csv:12: frame 10: rays: 512, logged 513" for each, as far as anyone wants to read.
+std::string differences_in_words(const Replayed& done, const std::string& log) {
+    std::string out;
+    std::size_t told = 0, differing = 0;
+    for (const auto* frames : {&done.frames, &done.forged})
+        for (const ReplayedFrame& f : *frames) {
+            if (f.differs.empty() || ++differing > kDifferencesTold) continue;
+            out += fmt::format("{}:{}: frame {}: {}\n", log, f.logged.line, f.logged.ledger.frame,
+                               fmt::join(f.differs, "; "));
+            ++told;
+        }
+    if (done.frames.empty())
+        out += fmt::format("{}: no frame to repeat, expected one with an image at least\n", log);
+    if (differing > told) out += fmt::format("and {} frames more\n", differing - told);
+    if (differing > 0)
+        out +=
+            "expected the scene, its meshes and the program as they were in the run, and a processor of its kind\n";
+    return out;
+}
+
+Outcome replay(const Options& o) {
+    if (!o.picture.empty() && o.reference == 0)
+        return Error{
+            fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
+    auto run = Replay::open(o.folder, o.camera, o.scene);
+    if (!run) return run.error();
+    const std::string& camera = (*run)->camera().name;
+    const std::string log = o.folder + "/" + camera + ".ledger.csv";
+    if ((*run)->frames().empty()) return Error{fmt::format("holds no frame of camera \"{}\"", camera), log};
+
+    const Replayed done = make_again(o, **run);
+    const auto repeated = static_cast<std::size_t>(
+        std::count_if(done.frames.begin(), done.frames.end(), [](const auto& f) { return f.differs.empty(); }));
+    const bool passed = repeated > 0 && repeated == done.frames.size() && done.forged.empty();
+    say(fmt::format("{}: camera {}: {} of {} frames repeat bit for bit; {} in the log{}", o.folder, camera,
+                    repeated, done.frames.size(), (*run)->frames().size(),
+                    done.not_whole > 0 ? fmt::format("; {} had no whole image", done.not_whole) : ""));
+    if (!passed) say(differences_in_words(done, log));
+
+    nlohmann::json frames = nlohmann::json::array();
+    for (const ReplayedFrame& f : done.forged) frames.push_back(to_json(f, (*run)->world().scene()));
+    for (const ReplayedFrame& f : done.frames)
+        if (f.compared || !f.differs.empty()) frames.push_back(to_json(f, (*run)->world().scene()));
+    nlohmann::json document{{"passed", passed},
+                            {"log", o.folder},
+                            {"camera", camera},
+                            {"frames_logged", (*run)->frames().size()},
+                            {"frames_replayed", done.frames.size()},
+                            {"frames_not_whole", done.not_whole},
+                            {"frames_repeated", repeated},
+                            {"frames", frames}};
+    if (o.reference == 0 || done.frames.empty()) return document;
+    const BudgetCost cost = budget_cost(done.frames);
+    say(in_words(done.frames, cost));
+    document["reference_spp"] = o.reference;
+    document["full_scale_w_m2_sr"] = done.frames.front().compared->difference.full_scale;
+    document["cost"] = to_json(cost);
+    if (!o.picture.empty()) {
+        const std::string title = fmt::format("{}, camera {}: the frame farthest from {} samples per pixel",
+                                              (*run)->world().scene().name, camera, o.reference);
+        const auto written =
+            write_picture(o.picture, title, done.frames[done.worst], *done.worst_picture, *done.worst_reference);
+        if (!written) return written.error();
+    }
+    return document;
+}
+
+/// In lockstep all of it can be run again; what was run in real time has the emulator's frames to repeat.
+Outcome replay_any(const Options& o) {
+    std::error_code none;
+    if (!std::filesystem::exists(o.folder + "/rehearsal.json", none)) return replay(o);
+    const auto record = rehearsal::read_record(o.folder);
+    if (!record) return record.error();
+    const bool frames_alone = o.reference > 0 || o.frames > 0 || !o.camera.empty();
+    if ((*record)["mode"] != "lockstep" || frames_alone) {
+        Options emulator = o;
+        emulator.folder += "/emulator";
+        return replay(emulator);
+    }
+    stop_on_signals();
+    return rehearsal::rerun(o.folder, o.threads, NARPA_VERSION,
+                            {[](std::string_view text) { say(text); }, [](std::string_view) {}}, stop_flag());
+}
+
+}  // namespace
+
+Command add_replay(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c = app.add_subcommand(
+        "replay", "Render the frames of a logged run once more, bit for bit, and tell what their budget cost");
+    c->add_option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written")->required();
+    c->add_option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
+    c->add_option("--scene", o->scene, "Scene file (default: the one that the run had)");
+    c->add_option("--reference", o->reference,
+                  "Compare with so many samples per pixel: error, similarity, shifts of bodies and edges")
+        ->check(CLI::Range(2, 65535));
+    c->add_option("--frames", o->frames,
+                  "Frames to look at, spread over the run (default: all; 10 with --reference)")
+        ->check(CLI::Range(1, 1000000));
+    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
+        ->check(CLI::Range(0, 1024));
+    c->add_option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
+    c->footer(
+        "Exit status 1 where a frame does not repeat bit for bit, or none has an image to repeat. RMSE, bias and "
+        "errors are of the mean of the bands, as parts of the radiance that fills the sensor's scale.");
+    return [o] { return replay_any(*o); };
+}
+
+}  // namespace narpa::cli

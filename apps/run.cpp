@@ -1,0 +1,133 @@
+// narpa run - the emulator: poses in on CAN, frames and packets out, until the time is over or a signal comes.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <thread>
+
+#include "apps/budget_options.h"
+#include "apps/cli.h"
+#include "apps/tracker_options.h"
+#include "emulator/emulator.h"
+#include "emulator/realtime.h"
+#include "emulator/report.h"
+
+namespace narpa::cli {
+namespace {
+
+struct Options {
+    std::string scene;
+    std::vector<std::string> video, lidar;
+    std::string cpus;
+    BudgetOptions budget;
+    bool estimates = false;
+    TrackerFlags estimator;
+    RunOptions run;
+};
+
+Status split_outputs(const std::vector<std::string>& texts, std::string_view expected,
+                     std::vector<std::pair<std::string, std::string>>& out) {
+    for (const std::string& text : texts) {
+        auto pair = split_pair(text, expected);
+        if (!pair) return pair.error();
+        out.push_back(*std::move(pair));
+    }
+    return Ok{};
+}
+
+/// One line that is written over once a second, for a person who watches.
+void show_progress(const Emulator& emulator, const StopFlag& done) {
+    if (!::isatty(STDERR_FILENO)) return;
+    while (!done) {
+        for (int i = 0; i < 10 && !done; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        fmt::print(stderr, "\r  t = {:.1f} s ", static_cast<double>(emulator.t_ns()) * 1e-9);
+        if (done) fmt::print(stderr, "\r{:20}\r", "");
+    }
+}
+
+Outcome run(const Options& options) {
+    RunOptions o = options.run;
+    if (auto good = split_outputs(options.video, "CAMERA=SINK, like nav=/dev/video10", o.video); !good)
+        return good.error();
+    if (auto good = split_outputs(options.lidar, "LIDAR=SINK, like top=udp:127.0.0.1:2368", o.lidar); !good)
+        return good.error();
+    if (!options.cpus.empty()) {
+        auto cpus = parse_cpus(options.cpus);
+        if (!cpus) return cpus.error();
+        o.cpus = *std::move(cpus);
+    }
+    if (options.estimates) {
+        auto estimator = options.estimator.options();
+        if (!estimator) return estimator.error();
+        o.estimate = *estimator;
+    }
+    if (!o.lockstep) keep_heap();
+    auto scene = load_scene(options.scene);
+    if (!scene) return scene.error();
+    options.budget.override_scene(scene->render);
+    auto emulator = Emulator::create(*std::move(scene), o);
+    if (!emulator) return emulator.error();
+
+    stop_on_signals();
+    if (CanNode* can = (*emulator)->can()) say("commands: " + can->bus().description());
+    for (const auto& feed : (*emulator)->cameras())
+        for (const auto& sink : feed->sinks())
+            say(fmt::format("camera {} -> {}", feed->unit().camera().name, sink->description()));
+    for (const auto& feed : (*emulator)->lidars())
+        for (const auto& sink : feed->sinks())
+            say(fmt::format("lidar {} -> {}", feed->unit().lidar().name, sink->description()));
+
+    if (const EstimateFeed* estimates = (*emulator)->estimates())
+        say(fmt::format("pose of {} from camera {}", estimates->target(), estimates->camera().name));
+
+    StopFlag done{false};
+    std::thread progress([&] { show_progress(**emulator, done); });
+    const Status status = (*emulator)->run(stop_flag());
+    done = true;
+    progress.join();
+    const nlohmann::json summary = report(**emulator);
+    say(in_words(summary));
+    if (!status) return status.error();
+    return summary;
+}
+
+}  // namespace
+
+Command add_run(CLI::App& app) {
+    auto o = std::make_shared<Options>();
+    CLI::App* c =
+        app.add_subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
+    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
+    c->add_option("--can", o->run.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE");
+    c->add_option("--video", o->video,
+                  "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
+        ->take_all()
+        ->allow_extra_args(false);
+    c->add_option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")
+        ->take_all()
+        ->allow_extra_args(false);
+    CLI::Option* lockstep = c->add_flag("--lockstep", o->run.lockstep,
+                                        "The clock advances only with commands; no wall time enters any result");
+    c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
+        ->check(CLI::Range(0.0, 9e9));
+    c->add_option("--log", o->run.log_folder, "Folder for run.json, truth, ledger, CAN log and contact sheet");
+    CLI::Option* estimate =
+        c->add_option(
+             "--estimate", o->run.estimate_camera,
+             "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
+            ->expected(0, 1);
+    o->estimator.add_to(*c, "estimate-");
+    for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-seed"})
+        c->get_option(name)->needs(estimate);
+    o->budget.add_to(*c);
+    c->add_option("--cpus", o->cpus,
+                  "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
+        ->excludes(lockstep);
+    c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
+        ->check(CLI::Range(0, 1024));
+    return [o, estimate] {
+        o->estimates = estimate->count() > 0;
+        return run(*o);
+    };
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,38 @@
+#include "apps/tracker_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace narpa::cli {
+
+void TrackerFlags::add_to(CLI::App& app, const std::string& prefix) {
+    const std::string dashes = "--" + prefix;
+    app.add_option(dashes + "target", tracker.target,
+                   "Body whose pose is looked for (default: the first with a mesh that does not carry the camera)");
+    app.add_option(dashes + "method", method,
+                   "features: points of the frame and of a render; dense: all pixels, from where the points lead")
+        ->check(CLI::IsMember({"features", "dense"}))
+        ->capture_default_str();
+    app.add_option(dashes + "start", start,
+                   "DEG,PERCENT: how far the first guess is off the truth, in attitude and of the range")
+        ->capture_default_str();
+    app.add_option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders")
+        ->capture_default_str();
+}
+
+Result<TrackerOptions> TrackerFlags::options() const {
+    TrackerOptions o = tracker;
+    double deg = 0, percent = 0;
+    int used = 0;
+    const bool read = std::sscanf(start.c_str(), "%lf,%lf%n", &deg, &percent, &used) == 2 &&
+                      used == static_cast<int>(start.size());
+    if (!read || !(deg >= 0 && deg <= 180) || !(percent >= 0 && percent <= 100))
+        return Error{fmt::format("start \"{}\", expected DEG,PERCENT from 0,0 to 180,100, like 5,5", start)};
+    o.start_deg = deg, o.start_percent = percent;
+    o.method = method == "dense" ? EstimateMethod::dense : EstimateMethod::features;
+    return o;
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,167 @@
+#include "bench/approach.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <random>
+
+#include "bench/approach_frames.h"
+#include "estimator/dense/dense_alignment.h"
+#include "estimator/features/feature_alignment.h"
+
+namespace narpa {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+/// Stretches of the approach that are told apart, m.
+constexpr std::array kBandEnds{std::numeric_limits<double>::infinity(), 30.0, 10.0, 3.0, 0.0};
+/// Of the start's error, so much may be left where the pose counts as found.
+constexpr double kFoundPart = 0.2;
+
+double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/// One method, ready for frames.
+class Method {
+public:
+    Method(EstimateMethod method, const World& world, const Camera& camera, std::size_t target,
+           const ApproachOptions& o)
+        : method_(method) {
+        const BodyPoses at(world.scene().bodies.size());
+        if (method == EstimateMethod::features) {
+            FeatureSettings settings;
+            settings.seed = o.seed;
+            points_.emplace(world.tracer(), camera, target, at, settings);
+        } else {
+            dense_.seed = o.seed;
+            dense_.method = world.scene().render.method;
+            dense_.max_depth = world.scene().render.max_depth;
+            pixels_.emplace(world.tracer(), camera, target);
+        }
+    }
+
+    /// From a guess so far off.
+    ApproachFrame look(const ApproachView& view, const Rigid3& guess, const Vector6& off, bool with_bound) {
+        ApproachFrame out;
+        out.range_m = norm(view.truth.t);
+        const auto start = Clock::now();
+        Rigid3 T{};
+        Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
+        if (method_ == EstimateMethod::features) {
+            const FeatureEstimate e = points_->align(view.image, view.at, guess);
+            out.claimed = e.ok(), out.renders = static_cast<int>(e.rounds.size());
+            T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
+        } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
+            out.claimed = e->status == DenseStatus::converged, out.renders = static_cast<int>(e->steps.size());
+            T = e->T_camera_body, covariance = e->covariance;
+        }
+        out.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        if (!out.claimed) return out;
+        const Vector6 error = error_between(T, view.truth);
+        out.rotation_rad = error.head<3>().norm(), out.position_m = error.tail<3>().norm();
+        out.nees = normalised_error_squared(error, covariance);
+        out.found = out.rotation_rad < kFoundPart * off.head<3>().norm() &&
+                    out.position_m < kFoundPart * off.tail<3>().norm();
+        if (method_ == EstimateMethod::dense && with_bound && out.found)
+            if (const auto least = pixels_->bound(view.at, view.truth, dense_, view.variance_dn2)) bound = *least;
+        out.bound_rotation_rad = rotation_sigma(bound), out.bound_position_m = position_sigma(bound);
+        return out;
+    }
+
+private:
+    EstimateMethod method_;
+    std::optional<FeatureAlignment> points_;
+    std::optional<DenseAlignment> pixels_;
+    DenseOptions dense_;
+};
+
+ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, double to_m) {
+    ApproachBand b{from_m, to_m};
+    double turn = 0, shift = 0, turn_of_bound = 0, shift_of_bound = 0, renders = 0;
+    int bounded = 0;
+    std::vector<double> ms, nees;
+    for (const ApproachFrame& f : frames) {
+        if (f.range_m >= from_m || f.range_m < to_m) continue;
+        ++b.frames;
+        b.wrong += f.claimed && !f.found;
+        ms.push_back(f.ms);
+        renders += f.renders;
+        if (!f.found) continue;
+        ++b.found;
+        turn += f.rotation_rad * f.rotation_rad, shift += f.position_m * f.position_m;
+        nees.push_back(f.nees);
+        if (!(f.bound_rotation_rad > 0)) continue;
+        ++bounded;
+        turn_of_bound += std::pow(f.rotation_rad / f.bound_rotation_rad, 2);
+        shift_of_bound += std::pow(f.position_m / f.bound_position_m, 2);
+    }
+    if (b.found > 0) b.rotation_rms_rad = std::sqrt(turn / b.found), b.position_rms_m = std::sqrt(shift / b.found);
+    if (bounded > 0) {
+        b.rotation_of_bound = std::sqrt(turn_of_bound / bounded);
+        b.position_of_bound = std::sqrt(shift_of_bound / bounded);
+    }
+    b.nees_median = median(nees), b.ms_median = median(ms);
+    b.renders_mean = b.frames > 0 ? renders / b.frames : 0;
+    return b;
+}
+
+}  // namespace
+
+Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t camera_index, std::size_t target,
+                                              const ApproachOptions& o, TracingThreads& threads,
+                                              const std::function<void(const std::string&)>& tell,
+                                              const StopFlag& stop) {
+    const Camera& camera = world.scene().cameras[camera_index];
+    ApproachFrames frames(world, camera, target, o);
+    std::vector<ApproachRun> runs;
+    std::deque<Method> methods;  // they stay where they are
+    for (const EstimateMethod m : o.methods) {
+        methods.emplace_back(m, world, camera, target, o);
+        runs.push_back({m, {}, {}, {}});
+    }
+    // All methods see the same frames from the same starts.
+    std::mt19937_64 random(o.seed);
+    for (int k = 0; k < o.frames && !stop; ++k) {
+        tell(fmt::format("approach: frame {}/{}", k, o.frames));
+        threads.arena.execute([&] {
+            const ApproachView& view = frames.make(k, o.frames);
+            const Vector6 off =
+                random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(view.truth.t), random);
+            for (std::size_t m = 0; m < methods.size(); ++m)
+                runs[m].frames.push_back(methods[m].look(view, displaced(view.truth, off), off, true));
+        });
+    }
+    for (const double deg : o.basin_trials > 0 ? o.basin : std::vector<double>{}) {
+        std::vector<BasinCell> cells(methods.size(), {deg, 0, 0});
+        for (int k = 0; k < o.basin_trials && !stop; ++k) {
+            tell(fmt::format("basin: {} deg, trial {}/{}", deg, k, o.basin_trials));
+            threads.arena.execute([&] {
+                const ApproachView& view =
+                    frames.make_at(o.basin_range_m, static_cast<std::uint32_t>(o.frames + k));
+                const Vector6 off = random_error(deg * kDegree, 0.01 * deg * norm(view.truth.t), random);
+                for (std::size_t m = 0; m < methods.size(); ++m) {
+                    cells[m].found += methods[m].look(view, displaced(view.truth, off), off, false).found;
+                    ++cells[m].trials;
+                }
+            });
+        }
+        for (std::size_t m = 0; m < methods.size(); ++m) runs[m].basin.push_back(cells[m]);
+    }
+    for (ApproachRun& run : runs) {
+        for (std::size_t b = 1; b < kBandEnds.size(); ++b)
+            run.bands.push_back(band_of(run.frames, kBandEnds[b - 1], kBandEnds[b]));
+        run.bands.push_back(band_of(run.frames, std::numeric_limits<double>::infinity(), 0));
+        std::erase_if(run.bands, [](const ApproachBand& b) { return b.frames == 0; });
+    }
+    return runs;
+}
+
+}  // namespace narpa

@@ -1,0 +1,60 @@
+/// bench/filter.h - is the filter as good as it says? Simulated flights, and the normalised estimation
+/// error squared (NEES) over time.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "estimator/filter/pose_filter.h"
+
+namespace narpa {
+
+/// A target 30 m ahead that comes closer and turns, its attitude beginning half a turn from the sensor's. Poses
+/// come once a second from each sensor, with the errors that their covariances say.
+struct FilterCase {
+    std::string name;
+    MotionModel motion{};
+    bool camera = true, lidar = false;  ///< a camera: range ten times worse than direction; a LiDAR: all alike
+    double lidar_late_s = 0;            ///< its poses come so long after they were true
+};
+/// Free and in orbit, camera and LiDAR, and both of them on a tumbling target, the LiDAR's poses late.
+[[nodiscard]] std::vector<FilterCase> filter_cases();
+
+struct FilterBenchSettings {
+    int runs = 100;
+    int seconds = 60;
+    std::uint64_t seed = 1;
+};
+
+struct FilterTime {
+    double t_s = 0;
+    double nees = 0;                                  ///< mean over the runs; twelve where the covariance is right
+    double position_rms_m = 0, position_sigma_m = 0;  ///< what the error is, what the filter says: three axes
+    double attitude_rms_rad = 0, attitude_sigma_rad = 0;
+};
+struct FilterRun {
+    std::string name;
+    int runs = 0;
+    std::vector<FilterTime> times;  ///< each second
+    double nis = 0;                 ///< mean; six
+    std::uint64_t updates = 0, gated = 0;
+    double update_microseconds = 0;  ///< time of the thread, mean, with the prediction before it
+
+    /// Half the width of the band around twelve that holds 95 % of the means over so many runs.
+    [[nodiscard]] double band() const;
+    [[nodiscard]] double nees() const;         ///< mean over the times
+    [[nodiscard]] double inside_band() const;  ///< part of the times
+};
+
+/// Errors: no runs or no time.
+[[nodiscard]] Result<std::vector<FilterRun>> run_filter(const std::vector<FilterCase>& cases,
+                                                        const FilterBenchSettings& settings);
+
+[[nodiscard]] nlohmann::json to_json(const FilterRun& run);
+/// A table, a line for each case.
+[[nodiscard]] std::string in_words(const std::vector<FilterRun>& runs);
+
+}  // namespace narpa

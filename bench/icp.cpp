@@ -1,0 +1,249 @@
+#include "bench/icp.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "estimator/cloud/sweep_points.h"
+#include "renderer/film/camera_image.h"
+
+namespace narpa {
+namespace {
+
+/// Found: within so many standard deviations of the bound at the truth. Other minima lie hundreds of them away.
+constexpr double kFoundSigma = 10;
+
+class Sweeps {
+public:
+    Sweeps(const World& world, std::size_t target, const IcpBenchSettings& settings, std::uint64_t stream)
+        : world_(world),
+          target_(target),
+          settings_(settings),
+          random_(settings.seed * 1'000'003 + stream),
+          placement_(world.scene().bodies.size()) {}
+
+    [[nodiscard]] double even(double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random_);
+    }
+    [[nodiscard]] double normal() { return std::normal_distribution<double>()(random_); }
+    [[nodiscard]] Vec3 direction() { return normalized(Vec3{normal(), normal(), normal()}); }
+
+    /// The target's x axis points back at the LiDAR, within the cone; any roll; somewhat off the middle.
+    [[nodiscard]] Rigid3 pose() {
+        const double distance = even(settings_.distance_min_m, settings_.distance_max_m);
+        const Vec3 aim = normalized(Vec3{even(-0.05, 0.05), 1, even(-0.05, 0.05)});
+        const double off = std::acos(even(std::cos(settings_.cone_deg * kDegree), 1));
+        const Vec3 x = -aim, side = normalized(cross(x, direction())), up = cross(x, side);
+        const Vec3 axis = std::cos(off) * x + std::sin(off) * side;
+        return {exp_rotation(even(-3.14, 3.14) * axis) *
+                    quat_from_columns(axis, normalized(cross(up, axis)), cross(axis, normalized(cross(up, axis)))),
+                distance * aim};
+    }
+    [[nodiscard]] SweepMotion motion() {
+        const double v = settings_.velocity_m_s, w = settings_.rate_rad_s;
+        return {{even(-v, v), even(-v, v), even(-v, v)}, {even(-w, w), even(-w, w), even(-w, w)}};
+    }
+    [[nodiscard]] Rigid3 beside(const Rigid3& T, const IcpStarts& starts) {
+        Vector6 e;
+        e << to_eigen(starts.angle_deg * kDegree * direction()),
+            to_eigen(starts.distance_fraction * norm(T.t) * direction());
+        return displaced(T, e);
+    }
+
+    /// One turn, from behind to behind; the pose is that of its middle, when the rotor points ahead. Packets are
+    /// written and read again.
+    void fire(const Rigid3& T_lidar_target, const SweepMotion& motion, std::vector<RangePoint>& out) {
+        const auto turn_ns = static_cast<std::int64_t>(1e9 / settings_.rotation_hz);
+        out.clear();
+        const std::int64_t first = turn_ns / 2 / vlp16::kPacketPeriodNs,
+                           last = 3 * turn_ns / 2 / vlp16::kPacketPeriodNs;
+        Vector6 rate;
+        rate << to_eigen(motion.rate_rad_s), to_eigen(motion.velocity_m_s);
+        for (std::int64_t packet = first; packet < last; ++packet) {
+            vlp16::shots(packet, settings_.rotation_hz, shots_);
+            const std::int64_t after_ns = vlp16::packet_start_ns(packet) - turn_ns;
+            for (std::size_t i = 0; i < shots_.size(); ++i) {
+                const double t_s = 1e-9 * static_cast<double>(after_ns + shots_[i].t_offset_ns);
+                placement_.set(target_, displaced(T_lidar_target, t_s * rate));
+                range_m_[i] = range_of({shots_[i].origin_m(), vlp16::direction(shots_[i])});
+            }
+            vlp16::encode(packet, settings_.rotation_hz, 0, range_m_, reflectivity_, bytes_);
+            append_points(*vlp16::decode(bytes_), after_ns, out);
+        }
+    }
+
+private:
+    /// Of the target alone, with noise; 0: none.
+    double range_of(const Ray& beam) {
+        RayBatch rays;
+        HitBatch hits;
+        rays.n = 1;
+        rays.put(0, beam);
+        const auto only = static_cast<std::uint32_t>(target_);
+        world_.tracer().intersect(placement_, rays, {&only, 1}, hits);
+        if (hits.met == 0 || hits.range_m[0] > settings_.range_max_m) return 0;
+        return std::max(0.0, hits.range_m[0] + settings_.range_noise_m * normal());
+    }
+
+    const World& world_;
+    std::size_t target_;
+    const IcpBenchSettings& settings_;
+    std::mt19937_64 random_;
+    BodyPoses placement_;
+    std::array<vlp16::Shot, vlp16::kShots> shots_{};
+    std::array<double, vlp16::kShots> range_m_{};
+    std::array<float, vlp16::kShots> reflectivity_{};
+    std::array<std::uint8_t, vlp16::kDataPacketBytes> bytes_{};
+};
+
+/// What this thread has computed: an alignment keeps to it, and whatever else the machine does is left out.
+double thread_microseconds() {
+    std::timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
+}
+
+double quantile(std::vector<double>& values, double p) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    return values[static_cast<std::size_t>(p * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+Status check(const IcpBenchSettings& s, const std::vector<IcpStarts>& starts) {
+    if (!(s.distance_min_m > 0 && s.distance_max_m >= s.distance_min_m && s.range_max_m > s.distance_max_m))
+        return Error{"expected 0 < distance_min_m <= distance_max_m < range_max_m"};
+    if (!(s.rotation_hz >= vlp16::kRotationHzMin && s.rotation_hz <= vlp16::kRotationHzMax))
+        return Error{fmt::format("rotation_hz = {}: expected {} to {}", s.rotation_hz, vlp16::kRotationHzMin,
+                                 vlp16::kRotationHzMax)};
+    if (!(s.range_noise_m >= 0 && s.cone_deg >= 0 && s.cone_deg <= 180))
+        return Error{"expected range_noise_m >= 0 and cone_deg 0 to 180"};
+    for (const IcpStarts& at : starts)
+        if (at.count < 1 || !(at.angle_deg >= 0) || !(at.distance_fraction >= 0))
+            return Error{"expected at least one start, an angle and a part of the distance >= 0"};
+    return Ok{};
+}
+
+/// Sums over the starts of one run.
+struct Sums {
+    double rotation2 = 0, translation2 = 0, rotation_to_bound2 = 0, translation_to_bound2 = 0, nees = 0, points = 0,
+           iterations = 0;
+    std::vector<double> microseconds;
+    int compared = 0;
+
+    void add(const CloudEstimate& e, const Rigid3& truth) {
+        const Vector6 error = error_between(e.T_lidar_target, truth);
+        ++compared;
+        rotation2 += error.head<3>().squaredNorm();
+        translation2 += error.tail<3>().squaredNorm();
+        rotation_to_bound2 += error.head<3>().cwiseAbs2().cwiseQuotient(e.bound.diagonal().head<3>()).sum() / 3;
+        translation_to_bound2 += error.tail<3>().cwiseAbs2().cwiseQuotient(e.bound.diagonal().tail<3>()).sum() / 3;
+        nees += normalised_error_squared(error, e.covariance);
+    }
+    void put_into(IcpRun& run) {
+        const auto rms = [&](double sum) { return std::sqrt(sum / std::max(1, compared)); };
+        run.rotation_rms_deg = rms(rotation2) / kDegree;
+        run.translation_rms_m = rms(translation2);
+        run.rotation_to_bound = rms(rotation_to_bound2);
+        run.translation_to_bound = rms(translation_to_bound2);
+        run.nees = nees / std::max(1, compared);
+        run.points = points / run.starts.count;
+        run.iterations = iterations / run.starts.count;
+        run.microseconds_p50 = quantile(microseconds, 0.5);
+        run.microseconds_p99 = quantile(microseconds, 0.99);
+    }
+};
+
+}  // namespace
+
+Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target, const IcpBenchSettings& settings,
+                                    const std::vector<IcpStarts>& starts,
+                                    const std::function<void(int, int)>& tell) {
+    if (auto good = check(settings, starts); !good) return good.error();
+    IcpSettings icp_settings = settings.icp;
+    icp_settings.noise.range_m = std::hypot(settings.range_noise_m, vlp16::kRangeQuantumM / std::sqrt(12.0));
+    auto made = CloudIcp::create(world.tracer(), target, icp_settings);
+    if (!made) return made.error();
+    CloudIcp& icp = *made;
+
+    int done = 0, all = 0;
+    for (const IcpStarts& at : starts) all += at.count;
+    std::vector<IcpRun> runs;
+    std::vector<RangePoint> points;
+    for (const IcpStarts& at : starts) {
+        Sweeps sweeps(world, target, settings, runs.size());
+        IcpRun run{at};
+        Sums sums;
+        for (int i = 0; i < at.count; ++i) {
+            const Rigid3 truth = sweeps.pose();
+            const SweepMotion motion = sweeps.motion();
+            sweeps.fire(truth, motion, points);
+            const Rigid3 start = sweeps.beside(truth, at);
+            const double reach_m = world.tracer().bounding_radius_m(target);
+            const double search_m = at.distance_fraction * norm(truth.t) + at.angle_deg * kDegree * reach_m;
+            const double from_us = thread_microseconds();
+            const auto e = icp.align(points, motion, start, search_m);
+            const double took_us = thread_microseconds() - from_us;
+            const auto known = icp.align(points, motion, truth);
+            if (tell) tell(++done, all);
+            sums.points += static_cast<double>(points.size());
+            if (!e || !known) {
+                ++run.told;
+                continue;
+            }
+            sums.microseconds.push_back(took_us);
+            sums.iterations += e->iterations;
+            const Vector6 error = error_between(e->T_lidar_target, truth);
+            if (!(normalised_error_squared(error, known->bound) < kFoundSigma * kFoundSigma)) {
+                run.told += !e->credible;
+                continue;
+            }
+            ++run.found;
+            if (e->observability.unobserved > 0)
+                ++run.unobserved;
+            else
+                sums.add(*e, truth);
+        }
+        sums.put_into(run);
+        runs.push_back(std::move(run));
+    }
+    return runs;
+}
+
+nlohmann::json to_json(const IcpRun& r) {
+    return {{"start_angle_deg", r.starts.angle_deg},
+            {"start_distance_fraction", r.starts.distance_fraction},
+            {"starts", r.starts.count},
+            {"found", r.found},
+            {"told", r.told},
+            {"unobserved", r.unobserved},
+            {"rotation_rms_deg", r.rotation_rms_deg},
+            {"translation_rms_m", r.translation_rms_m},
+            {"rotation_to_bound", r.rotation_to_bound},
+            {"translation_to_bound", r.translation_to_bound},
+            {"nees", r.nees},
+            {"points", r.points},
+            {"iterations", r.iterations},
+            {"microseconds_p50", r.microseconds_p50},
+            {"microseconds_p99", r.microseconds_p99}};
+}
+
+std::string in_words(const std::vector<IcpRun>& runs) {
+    std::string text =
+        "start deg      %  starts   found  silent  unseen  rot mdeg    mm  to bound: rot, trans  nees"
+        "  points  steps   us p50      p99\n";
+    for (const IcpRun& r : runs)
+        text += fmt::format(
+            "{:9.1f} {:6.1f} {:7} {:6.1f}% {:7} {:7} {:9.1f} {:5.1f} {:14.2f} {:6.2f} {:5.2f} {:7.0f} {:6.1f} "
+            "{:8.0f} {:8.0f}\n",
+            r.starts.angle_deg, 100 * r.starts.distance_fraction, r.starts.count, 100 * r.found_fraction(),
+            r.starts.count - r.found - r.told, r.unobserved, 1e3 * r.rotation_rms_deg, 1e3 * r.translation_rms_m,
+            r.rotation_to_bound, r.translation_to_bound, r.nees, r.points, r.iterations, r.microseconds_p50,
+            r.microseconds_p99);
+    return text;
+}
+
+}  // namespace narpa

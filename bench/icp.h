@@ -1,0 +1,60 @@
+/// bench/icp.h - ICP of a VLP-16's sweeps against the model, from many starts: how often it finds the
+/// pose, how far off it is beside its bound, how long it takes.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "emulator/world.h"
+#include "estimator/cloud/cloud_icp.h"
+
+namespace narpa {
+
+/// So many starts, each of a sweep of its own, the given angle about a random axis and the given part of the
+/// distance in a random direction beside the truth.
+struct IcpStarts {
+    double angle_deg = 5;
+    double distance_fraction = 0.05;
+    int count = 1000;
+};
+
+/// Where the LiDAR stands, how the target moves, what noise its ranges have.
+struct IcpBenchSettings {
+    double distance_min_m = 10, distance_max_m = 40;  ///< from the target's origin
+    double cone_deg = 20;  ///< the LiDAR is seen from the target so far off its x axis at most; 180: anywhere
+    double velocity_m_s = 0.1, rate_rad_s = 0.02;  ///< of the target during the sweep, on each axis at most
+    double rotation_hz = 10;
+    double range_max_m = 100;
+    double range_noise_m = 0.02;  ///< before ranges are rounded to 2 mm
+    std::uint64_t seed = 1;
+    IcpSettings icp{};  ///< but for the noise of its ranges, which is that above
+};
+
+/// RMS over its bound: of the root mean square of error over the bound's standard deviation, three axes together.
+struct IcpRun {
+    IcpStarts starts;
+    int found = 0;       ///< within ten standard deviations of the bound that a start at the truth tells
+    int told = 0;        ///< of the others, those that were told to be wrong: not credible
+    int unobserved = 0;  ///< of the found, those that report motions that cannot be seen; not in what follows
+    double rotation_rms_deg = 0, translation_rms_m = 0;
+    double rotation_to_bound = 0, translation_to_bound = 0;
+    double nees = 0;                                    ///< mean; six where the covariance is right
+    double points = 0, iterations = 0;                  ///< mean
+    double microseconds_p50 = 0, microseconds_p99 = 0;  ///< of an alignment: time of its one thread
+
+    [[nodiscard]] double found_fraction() const { return static_cast<double>(found) / starts.count; }
+};
+
+/// `target`: the body's index. `tell`: hears the starts done and the starts there are. Errors: settings.
+[[nodiscard]] Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target,
+                                                  const IcpBenchSettings& settings,
+                                                  const std::vector<IcpStarts>& starts,
+                                                  const std::function<void(int, int)>& tell = {});
+
+[[nodiscard]] nlohmann::json to_json(const IcpRun& run);
+/// A table, a line for each.
+[[nodiscard]] std::string in_words(const std::vector<IcpRun>& runs);
+
+}  // namespace narpa

@@ -1,0 +1,213 @@
+#include "bench/loop.h"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "emulator/report.h"
+
+namespace narpa {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<std::pair<const char*, double>, 5> kPercentiles{
+    {{"p50", 0.5}, {"p90", 0.9}, {"p99", 0.99}, {"p99.9", 0.999}, {"max", 1.0}}};
+
+/// The child's whole life. It has a copy of the parent's memory and touches nothing of it.
+[[noreturn]] void keep_busy(int cpu, pid_t parent) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(0);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(static_cast<std::size_t>(cpu), &one);
+    if (::sched_setaffinity(0, sizeof one, &one) != 0) ::_exit(1);
+    for (volatile std::uint64_t n = 0;;) n = n + 1;
+}
+
+template <class PercentileOf>
+json percentiles(PercentileOf value) {
+    json out = json::object();
+    for (const auto& [name, p] : kPercentiles) out[name] = value(p);
+    return out;
+}
+template <class H>
+json percentiles_ms(const H& h) {
+    return percentiles([&](double p) { return h.percentile_ns(p) * 1e-6; });
+}
+
+json to_json(const CameraRun& c) {
+    const CameraStats& s = c.stats;
+    json steps = json::object();
+    for (std::size_t i = 0; i < kStepNames.size(); ++i) steps[std::string(kStepNames[i])] = s.steps[i];
+    return {{"name", c.name},
+            {"period_ms", static_cast<double>(c.period_ns) * 1e-6},
+            {"allowance_ms", static_cast<double>(c.allowance_ns) * 1e-6},
+            {"frames", s.frames},
+            {"handed_over", s.handed_over},
+            {"skipped", s.skipped},
+            {"late", s.deadline_missed},
+            {"late_fraction", c.late_fraction()},
+            {"incomplete", c.incomplete()},
+            {"steps", steps},
+            {"wake_late_ms", percentiles_ms(s.wake_late)},
+            {"render_ms", percentiles_ms(s.render)},
+            {"radiance_ms", percentiles_ms(s.radiance)},
+            {"sensor_ms", percentiles_ms(s.sensor)},
+            {"send_ms", percentiles_ms(s.send)},
+            {"samples_per_pixel", percentiles([&](double p) { return s.samples_1e3.percentile_ns(p) * 1e-3; })},
+            {"expected_error", s.error_1e9.count() > 0
+                                   ? percentiles([&](double p) { return s.error_1e9.percentile_ns(p) * 1e-9; })
+                                   : json(nullptr)},
+            {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
+            {"hand_over_after_deadline_ms", lateness(s.late)},
+            {"allowance_used", percentiles([&](double p) { return c.allowance_used(p); })}};
+}
+
+json to_json(const LidarRun& l) {
+    return {{"name", l.name},
+            {"packets", l.stats.packets},
+            {"skipped", l.stats.skipped},
+            {"wake_late_ms", percentiles_ms(l.stats.wake_late)},
+            {"fire_ms", percentiles_ms(l.stats.fire)},
+            {"due_to_sent_ms", percentiles_ms(l.stats.hand_over)}};
+}
+
+/// "1.23 / 4.56 / 7.89": median, 99.9 of 100 and the largest, ms.
+template <class H>
+std::string ms(const H& h) {
+    return fmt::format("{:.2f} / {:.2f} / {:.2f}", h.percentile_ns(0.5) * 1e-6, h.percentile_ns(0.999) * 1e-6,
+                       h.percentile_ns(1) * 1e-6);
+}
+
+/// Where the time went, and what it was good for.
+std::string frames_in_words(const CameraStats& s) {
+    std::string steps;
+    for (std::size_t i = 0; i < kStepNames.size(); ++i)
+        if (s.steps[i] > 0) steps += fmt::format("{}{} {}", steps.empty() ? "" : ", ", s.steps[i], kStepNames[i]);
+    std::string out =
+        fmt::format("radiance {}; sensor {}; sinks {}; samples per pixel p50 {:.2f}; {}", ms(s.radiance),
+                    ms(s.sensor), ms(s.send), s.samples_1e3.percentile_ns(0.5) * 1e-3, steps);
+    if (s.error_1e9.count() > 0)
+        out += fmt::format("; expected error p50 {:.3g} % of scale", s.error_1e9.percentile_ns(0.5) * 1e-7);
+    return out;
+}
+
+CameraRun of(const CameraFeed& feed, const RenderSettings& render) {
+    const CameraUnit& unit = feed.unit();
+    const std::int64_t period = unit.camera().period_ns;
+    return {unit.camera().name, period, render.budget_ns > 0 ? render.budget_ns : period - unit.exposure_ns() / 2,
+            feed.stats()};
+}
+
+}  // namespace
+
+Result<CompetingLoad> CompetingLoad::start(const std::vector<int>& cpus) {
+    CompetingLoad load;
+    const pid_t parent = ::getpid();
+    for (const int cpu : cpus) {
+        const pid_t child = ::fork();
+        if (child == 0) keep_busy(cpu, parent);
+        if (child < 0)
+            return Error{fmt::format("no process to keep processor {} busy: {}", cpu, std::strerror(errno))};
+        load.processes_.push_back(child);
+    }
+    return load;
+}
+
+CompetingLoad::~CompetingLoad() {
+    for (const pid_t child : processes_) ::kill(child, SIGKILL);
+    for (const pid_t child : processes_) ::waitpid(child, nullptr, 0);
+}
+
+double CameraRun::late_fraction() const noexcept {
+    const std::uint64_t due = stats.frames + stats.skipped;
+    return due == 0 ? 0 : static_cast<double>(stats.deadline_missed + stats.skipped) / static_cast<double>(due);
+}
+
+double CameraRun::allowance_used(double p) const noexcept {
+    return 1 + stats.late.percentile_ns(p) / static_cast<double>(allowance_ns);
+}
+
+Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunOptions& options,
+                         const std::vector<int>& load, const StopFlag& stop) {
+    // Before the run's own memory is there: a copy of it would make its pages fault once more.
+    auto competing = CompetingLoad::start(load);
+    if (!competing) return competing.error();
+    auto emulator = Emulator::create(scene, options);
+    if (!emulator) return emulator.error();
+    if (auto done = (*emulator)->run(stop); !done) return done.error();
+
+    LoopRun run{name, load, {}, {}, (*emulator)->page_faults(), (*emulator)->notices()};
+    for (const auto& feed : (*emulator)->cameras()) run.cameras.push_back(of(*feed, scene.render));
+    for (const auto& feed : (*emulator)->lidars()) run.lidars.push_back({feed->unit().lidar().name, feed->stats()});
+    return run;
+}
+
+std::vector<std::string> loop_faults(const std::vector<LoopRun>& runs, double late_max) {
+    std::vector<std::string> faults;
+    for (const LoopRun& run : runs)
+        for (const CameraRun& c : run.cameras) {
+            if (c.stats.frames + c.stats.skipped == 0)
+                faults.push_back(
+                    fmt::format("{}, camera {}: no frame fell due, expected one at least", run.name, c.name));
+            if (c.incomplete() > 0)
+                faults.push_back(fmt::format("{}, camera {}: {} frames without a whole image, expected none",
+                                             run.name, c.name, c.incomplete()));
+            if (c.late_fraction() > late_max)
+                faults.push_back(
+                    fmt::format("{}, camera {}: {:.3g} % of the frames late, expected at most {:.3g} %", run.name,
+                                c.name, 100 * c.late_fraction(), 100 * late_max));
+        }
+    return faults;
+}
+
+json to_json(const LoopRun& run) {
+    json cameras = json::array(), lidars = json::array();
+    for (const CameraRun& c : run.cameras) cameras.push_back(to_json(c));
+    for (const LidarRun& l : run.lidars) lidars.push_back(to_json(l));
+    return {{"name", run.name},
+            {"load", run.load},
+            {"cameras", cameras},
+            {"lidars", lidars},
+            {"page_faults", {{"minor", run.page_faults.minor}, {"major", run.page_faults.major}}},
+            {"notices", run.notices}};
+}
+
+std::string in_words(const std::vector<LoopRun>& runs) {
+    std::string out = "times in ms: p50 / p99.9 / max\n";
+    out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>8}\n", "run", "sensor",
+                       "frames", "late", "lost", "part", "woken late", "render", "mid-exposure to out",
+                       "out after the deadline", "used p50");
+    for (const LoopRun& run : runs) {
+        for (const CameraRun& c : run.cameras) {
+            const CameraStats& s = c.stats;
+            out +=
+                fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>7.1f}%\n", run.name,
+                            c.name, s.frames, s.deadline_missed, s.skipped, c.incomplete(), ms(s.wake_late),
+                            ms(s.render), ms(s.hand_over), ms(s.late), 100 * c.allowance_used(0.5));
+            out += fmt::format("{:>7} {:>8} {}\n", "", "", frames_in_words(s));
+            out +=
+                fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_in_words(lateness(s.late)));
+        }
+        for (const LidarRun& l : run.lidars)
+            out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24}\n", run.name, l.name,
+                               l.stats.packets, "", l.stats.skipped, "", ms(l.stats.wake_late), ms(l.stats.fire),
+                               ms(l.stats.hand_over));
+        out += fmt::format("{:>7} page faults while frames were made: {} minor, {} major\n", run.name,
+                           run.page_faults.minor, run.page_faults.major);
+        for (const std::string& notice : run.notices) out += fmt::format("{:>7} {}\n", run.name, notice);
+    }
+    return out;
+}
+
+}  // namespace narpa

@@ -1,0 +1,75 @@
+/// bench/pnp.h - poses from points: narpa's solver beside OpenCV's and Ceres's, error against the bound,
+/// failures, and time.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "base/stop.h"
+
+namespace narpa {
+
+struct PnpBenchOptions {
+    int trials = 1000;  ///< of each cell; a fifth of it where half the points are outliers
+    std::vector<int> points{4, 6, 10, 30, 100};
+    std::vector<double> noise_px{0.1, 0.5, 1};
+    std::vector<double> ranges_m{2, 10, 30, 100, 200};
+    bool nominal = true;     ///< every number of points with every noise and range
+    bool hard_cases = true;  ///< half a turn, planes, lines, far and near bodies, outliers
+    std::uint64_t seed = 1;
+};
+
+/// One method in one cell. Errors are in units of the trial's own Cramer-Rao bound (the root of the summed
+/// variances), of the trials that did not fail; efficient means an RMS of 1 and a median of about 0.88.
+struct PnpRow {
+    std::string method;
+    int trials = 0;
+    double rotation_median = 0, rotation_rms = 0;
+    double position_median = 0, position_rms = 0;
+    double failed = 0;   ///< part of the trials without an answer, or more than ten times the bound off in either
+    double flagged = 0;  ///< part of the failures that the solver itself called ambiguous or imprecise
+    double median_us = 0;
+};
+
+/// All methods on the same trials, taking turns.
+struct PnpCell {
+    std::string name;  ///< "nominal", or the hard case
+    int points = 0;
+    double noise_px = 0, range_m = 0, outliers = 0;
+    double bound_rotation_deg = 0, bound_position = 0;  ///< medians over trials; the latter as a part of the range
+    std::vector<PnpRow> rows;
+
+    [[nodiscard]] const PnpRow* row(const std::string& method) const;
+};
+
+/// Names of the rows that conclusions are drawn from.
+inline constexpr const char* kPnpCold = "narpa cold";
+inline constexpr const char* kPnpWarm = "narpa warm";
+inline constexpr const char* kPnpPeerCold = "SQPNP + Ceres LM";
+inline constexpr const char* kPnpPeerWarm = "Ceres LM warm";
+inline constexpr const char* kPnpPeerOutliers = "RANSAC EPNP + RefineLM";
+
+/// `progress`: (cells done, cells in all), before each cell. What was done so far where `stop` is set.
+[[nodiscard]] std::vector<PnpCell> run_pnp_bench(const PnpBenchOptions& options,
+                                                 const std::function<void(std::size_t, std::size_t)>& progress,
+                                                 const StopFlag& stop);
+
+/// What the cells show as a whole; ratios of times are of medians within a cell.
+struct PnpVerdict {
+    double worst_rms = 0;           ///< narpa cold, nominal cells with ten points or more: either RMS, in bounds
+    int more_failures = 0;          ///< cells where narpa cold fails more often than SQPNP and Ceres, beyond chance
+    double cold_time_ratio = 0;     ///< worst nominal cell: narpa cold / (SQPNP + Ceres LM)
+    double warm_time_ratio = 0;     ///< worst nominal cell: narpa warm / Ceres LM warm
+    double outlier_time_ratio = 0;  ///< worst cell with 20 % outliers: narpa / RANSAC EPNP + RefineLM
+};
+[[nodiscard]] PnpVerdict judge(const std::vector<PnpCell>& cells);
+
+[[nodiscard]] std::string in_words(const std::vector<PnpCell>& cells);
+[[nodiscard]] std::string in_words(const PnpVerdict& verdict);
+[[nodiscard]] nlohmann::json to_json(const std::vector<PnpCell>& cells);
+[[nodiscard]] nlohmann::json to_json(const PnpVerdict& verdict);
+
+}  // namespace narpa

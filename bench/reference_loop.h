@@ -1,0 +1,37 @@
+/// bench/reference_loop.h - a renderer without ideas, to measure narpa's against: the loop that one writes
+/// over Embree in an afternoon. Sixteen rays to a packet; so many samples for each pixel of the frame, jittered in
+/// strata; random numbers by a counter; Lambert and Phong; Sun with shadows; by paths: directions by the cosine,
+/// the Sun and one of the surfaces that shine asked at each point. Nothing in it knows where samples are needed,
+/// and no number knows of another.
+///
+/// It converges to narpa's image of the same scene, which is what makes their times at equal error comparable.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "base/result.h"
+#include "renderer/film/camera_image.h"
+
+namespace narpa {
+
+class ReferenceLoop {
+public:
+    /// Meshes of flat faces, Lambert and Phong without textures, Sun, ambient and surfaces that shine; an Error for
+    /// anything else. Both outlive it; the bodies stay where `at` has them now.
+    static Result<ReferenceLoop> create(const Scene& scene, const BodyPoses& at);
+    ReferenceLoop(ReferenceLoop&&) noexcept;
+    ~ReferenceLoop();
+
+    /// Of the settings: spp (each somewhere in the pixel, also where it is one), seed, frame, method, max_depth.
+    /// Returns the number of rays. On the calling thread's TBB arena; same bytes on any number of threads.
+    std::uint64_t render(const Camera& camera, const Rigid3& T_world_camera, const FrameSettings& settings,
+                         RadianceImage& out) const;
+
+private:
+    struct Impl;
+    explicit ReferenceLoop(std::unique_ptr<Impl>);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,84 @@
+/// bench/stereo.h - depth from two frames of a scene, to the whole pixel as in the paper's section V and
+/// between pixels, beside what the tracer knows.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "estimator/stereo/stereo_matcher.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+struct StereoBenchSettings {
+    int points = 100;
+    int spp = 0;              ///< 0: the scene's
+    std::uint32_t frame = 0;  ///< of the detectors' noise; two frames take two numbers
+    double seconds = 0;       ///< the time that the scene shows
+    /// Depths that are searched, in parts of the depth in the middle of the left frame: what an altimeter would
+    /// give.
+    double nearest_part = 0.75, farthest_part = 1.5;
+};
+
+/// One feature. Positions in the left camera's frame, m; the truth is where the ray through the left pixel meets
+/// the scene.
+struct StereoBenchPoint {
+    Eigen::Vector2d left_px{0, 0}, right_px{0, 0};
+    Eigen::Vector3d truth_m = Eigen::Vector3d::Zero();
+    Eigen::Vector3d whole_error_m = Eigen::Vector3d::Zero();  ///< the printed formula, whole pixels
+    Eigen::Vector3d fine_error_m = Eigen::Vector3d::Zero();   ///< maximum likelihood, between pixels
+    double sigma_depth_m = 0;                                 ///< predicted for the latter
+    double normalised_squared =
+        0;  ///< of its depth error: chi-square with one degree of freedom where that is right
+    double epipolar_sigmas = 0;
+};
+
+/// Of absolute values: quartiles; whiskers to the last value within 1.5 interquartile ranges of the box (Tukey
+/// 1977); the number beyond.
+struct Spread {
+    double low = 0, lower_quartile = 0, median = 0, upper_quartile = 0, high = 0;
+    double largest = 0, rms = 0;
+    int outliers = 0;
+};
+[[nodiscard]] Spread spread(std::vector<double> values);
+
+struct StereoBench {
+    std::string scene;
+    StereoPair pair;
+    MeasuredImage left;
+    double left_top_dn = 1;
+    std::vector<StereoBenchPoint> points;
+    StereoCounts counts;
+    double render_s = 0, match_s = 0;
+
+    /// Of one axis (0 x, 1 y, 2 z), m; divided by the point's range: `relative`.
+    [[nodiscard]] Spread errors(bool fine, int axis, bool relative) const;
+    /// RMS depth error over range: whole pixels over between pixels.
+    [[nodiscard]] double gain() const;
+    /// Means of the squared errors in predicted standard deviations, along the ray and across the epipolar line; 1
+    /// is expected.
+    [[nodiscard]] double mean_normalised_squared() const;
+    [[nodiscard]] double mean_epipolar_squared() const;
+};
+
+/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches them. `tell` hears
+/// how far it is. Errors: no such cameras; no surface in the middle of the left frame; what match_stereo says; a
+/// match whose left pixel sees no surface.
+[[nodiscard]] Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings& settings,
+                                                 const std::function<void(const std::string&)>& tell);
+
+/// What is wrong, one sentence each: fewer points than this, a gain below 5, errors that are not as predicted
+/// (means off 1 by a factor of 1.5 and beyond three standard errors). Empty: nothing.
+inline constexpr double kLeastStereoGain = 5, kVarianceFactor = 1.5;
+[[nodiscard]] std::vector<std::string> stereo_faults(const StereoBench& bench, int points);
+
+[[nodiscard]] nlohmann::json to_json(const StereoBench& bench);
+/// A table.
+[[nodiscard]] std::string in_words(const StereoBench& bench);
+/// Writes a PNG: the matches over the left frame; boxes of the errors in x, y and z, absolute and over range, with
+/// whole pixels and between pixels side by side.
+[[nodiscard]] Status write_plot(const std::string& path, const StereoBench& bench);
+
+}  // namespace narpa

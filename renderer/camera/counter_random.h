@@ -1,0 +1,76 @@
+/// renderer/camera/counter_random.h - random numbers by position, not by order: any pixel's noise can be drawn
+/// alone, on any thread, and is the same.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "renderer/geometry/lanes.h"
+
+namespace narpa {
+
+using Block = std::array<std::uint32_t, 4>;
+
+/// Philox4x32-10: J. Salmon, M. Moraes, R. Dror, D. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11.
+inline constexpr int kPhiloxRounds = 10;
+inline constexpr std::array<std::uint32_t, 2> kPhiloxMultiplier{0xd2511f53u, 0xcd9e8d57u};
+inline constexpr std::array<std::uint32_t, 2> kPhiloxWeyl{0x9e3779b9u, 0xbb67ae85u};
+
+constexpr Block philox(Block c, std::array<std::uint32_t, 2> key) noexcept {
+    for (int round = 0; round < kPhiloxRounds; ++round) {
+        const std::uint64_t a = std::uint64_t{kPhiloxMultiplier[0]} * c[0],
+                            b = std::uint64_t{kPhiloxMultiplier[1]} * c[2];
+        c = {static_cast<std::uint32_t>(b >> 32) ^ c[1] ^ key[0], static_cast<std::uint32_t>(b),
+             static_cast<std::uint32_t>(a >> 32) ^ c[3] ^ key[1], static_cast<std::uint32_t>(a)};
+        key[0] += kPhiloxWeyl[0];
+        key[1] += kPhiloxWeyl[1];
+    }
+    return c;
+}
+
+/// Its key in every round, laid out for sixteen counters side by side. The multipliers stand beside the keys
+/// because GCC turns a multiplication by a constant it knows into a dozen shifts and additions.
+struct PhiloxSchedule {
+    std::array<std::uint64_t, 2> multiplier{kPhiloxMultiplier[0], kPhiloxMultiplier[1]};
+    std::array<std::array<std::uint64_t, 2>, kPhiloxRounds> key;
+
+    explicit PhiloxSchedule(std::uint64_t seed) noexcept {
+        auto k0 = static_cast<std::uint32_t>(seed), k1 = static_cast<std::uint32_t>(seed >> 32);
+        for (auto& of_round : key) {
+            of_round = {k0, k1};
+            k0 += kPhiloxWeyl[0];
+            k1 += kPhiloxWeyl[1];
+        }
+    }
+};
+
+struct alignas(64) BlockPerLane {
+    Lanes<std::uint32_t> w0, w1, w2, w3;
+};
+
+/// The blocks of the counters {first + lane, c1, c2, 0}. Words are kept in 64 bits, of which the upper half is left
+/// as the products leave it: the next product takes the lower half alone.
+inline BlockPerLane philox(const PhiloxSchedule& schedule, std::uint32_t first, std::uint32_t c1,
+                           std::uint32_t c2) noexcept {
+    constexpr std::uint64_t low = 0xffffffffu;
+    const auto [m0, m1] = schedule.multiplier;
+    BlockPerLane out;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        std::uint64_t w0 = first + static_cast<std::uint32_t>(i), w1 = c1, w2 = c2, w3 = 0;
+#pragma GCC unroll 10
+        for (std::size_t round = 0; round < kPhiloxRounds; ++round) {
+            const std::uint64_t a = m0 * (w0 & low), b = m1 * (w2 & low);
+            w0 = b >> 32 ^ w1 ^ schedule.key[round][0];
+            w2 = a >> 32 ^ w3 ^ schedule.key[round][1];
+            w1 = b;
+            w3 = a;
+        }
+        out.w0[i] = static_cast<std::uint32_t>(w0);
+        out.w1[i] = static_cast<std::uint32_t>(w1);
+        out.w2[i] = static_cast<std::uint32_t>(w2);
+        out.w3[i] = static_cast<std::uint32_t>(w3);
+    }
+    return out;
+}
+
+}  // namespace narpa

@@ -1,0 +1,94 @@
+#include "renderer/camera/detector.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "base/each_isa.h"
+#include "renderer/camera/digitise.h"
+#include "renderer/camera/solar_bands.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::size_t kPixelsPerTask = 1024 * kLanes;
+
+NARPA_EACH_ISA void write(const Sensor& sensor, PixelFormat format, std::span<const Rgb> radiance,
+                          std::size_t first_pixel, std::uint8_t* out) noexcept {
+    write_pixels(sensor, format, radiance, first_pixel, out);
+}
+
+/// The camera's own detector.
+void take_detector(const Detector& d, Sensor& s) {
+    for (int b = 0; b < 3; ++b)
+        s.electrons_per_radiance[static_cast<std::size_t>(b)] = electrons_per_radiance(d, b);
+    s.full_well_e = d.full_well_e;
+    s.read_noise_e = d.read_noise_e;
+    s.dn_per_e = 1 / gain_e_per_dn(d);
+    s.black_dn = d.black_level_dn;
+    s.bits = d.bits;
+    s.shot_noise = d.shot_noise;
+}
+
+/// Without noise, as many bits as the format shows, white at the top.
+void take_ideal(const Camera& c, Sensor& s) {
+    s.bits = c.format == PixelFormat::y16 ? 16 : 8;
+    s.electrons_per_radiance.fill((is_mono(c.format) ? 1.0 / 3 : 1.0) / c.white_radiance);
+    s.full_well_e = std::numeric_limits<double>::infinity();
+    s.dn_per_e = (1 << s.bits) - 1;
+}
+
+}  // namespace
+
+Sensor sensor_over_frame(const Camera& c, std::uint64_t seed, std::uint32_t frame) noexcept {
+    Sensor s;
+    if (c.detector) {
+        take_detector(*c.detector, s);
+    } else {
+        take_ideal(c, s);
+    }
+    const double limit_e = 0x1p28 / s.dn_per_e;
+    for (std::size_t b = 0; b < 3; ++b)
+        s.radiance_max[b] = static_cast<float>(std::min(limit_e / s.electrons_per_radiance[b], 1e30));
+    s.full_well_e = std::min(s.full_well_e, limit_e);
+    s.read_noise_e = std::min(s.read_noise_e, limit_e);
+    s.top_dn = (1 << s.bits) - 1;
+    s.full_dn = std::min(s.top_dn, static_cast<std::int32_t>(s.full_well_e * s.dn_per_e + (s.black_dn + 0.5)));
+    s.dark = DarkLevels(s.black_dn, s.read_noise_e * s.dn_per_e, s.top_dn);
+    s.frame = frame;
+    s.random = PhiloxSchedule(seed);
+    return s;
+}
+
+double electrons_per_radiance(const Detector& d, int band) noexcept {
+    const SolarBand& b = kSolarBands[static_cast<std::size_t>(band)];
+    const double irradiance = std::numbers::pi * b.fraction / (4 * d.f_number * d.f_number);
+    const double energy_j = irradiance * d.pixel_pitch_m * d.pixel_pitch_m * d.exposure_s;
+    return energy_j * b.mean_wavelength_m / (kPlanck_j_s * kLightSpeed_m_s) * d.quantum_efficiency;
+}
+
+double gain_e_per_dn(const Detector& d) noexcept {
+    return d.gain_e_per_dn > 0 ? d.gain_e_per_dn : d.full_well_e / (std::exp2(d.bits) - 1 - d.black_level_dn);
+}
+
+void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
+            std::span<std::uint8_t> out) noexcept {
+    const Sensor sensor = sensor_over_frame(camera, seed, frame);
+    const std::span<const Rgb> pixels = radiance.pixels;
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, (pixels.size() + kPixelsPerTask - 1) / kPixelsPerTask),
+        [&](const tbb::blocked_range<std::size_t>& tasks) {
+            for (std::size_t task = tasks.begin(); task != tasks.end(); ++task) {
+                const std::size_t first = task * kPixelsPerTask;
+                write(sensor, camera.format, pixels.subspan(first, std::min(kPixelsPerTask, pixels.size() - first)),
+                      first, out.data() + first * bytes_per_pixel(camera.format));
+            }
+        },
+        tbb::simple_partitioner());
+}
+
+}  // namespace narpa

@@ -1,0 +1,138 @@
+#include "renderer/film/camera_batch.h"
+
+#include "base/each_isa.h"
+#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/lens.h"
+#include "renderer/integrator/batch_sampler.h"
+
+namespace narpa {
+namespace {
+
+// Lanes from the packet's `n` on are computed along with the others from what stands there: nobody looks at them.
+// Results are gathered in arrays of the functions' own, which the compiler knows to overlap with nothing.
+
+using Points = BatchSampler::Points;
+
+BatchSampler sampler_of(const Frame& f, const CameraSamples& s) noexcept {
+    return {f.settings.seed, f.settings.frame, s.n, s.number, s.sample};
+}
+
+NARPA_EACH_ISA void aim_at_middles(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
+    Vec3Lanes direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 d = camera_ray(f.camera, f.T_world_camera, s.x[i], s.y[i]).direction;
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    rays.direction = direction;
+    rays.origin.fill(f.T_world_camera.t);
+}
+
+/// Where in its pixel each passes, and two coordinates more.
+inline void points_of_pixels(const Frame& f, const CameraSamples& s, Points& u) noexcept {
+    sampler_of(f, s).points(u);
+    if (!s.middle) return;
+    u[0].fill(0.5);
+    u[1].fill(0.5);
+}
+
+/// Each at its own point of the pixel. `u`: out, coordinates of which the last two are left.
+NARPA_EACH_ISA void aim_in_pixels(const Frame& f, const CameraSamples& s, RayBatch& rays, Points& u) noexcept {
+    points_of_pixels(f, s, u);
+    Vec3Lanes direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const double x = s.x[i] + u[0][i] - 0.5, y = s.y[i] + u[1][i] - 0.5;
+        const Vec3 d = camera_ray(f.camera, f.T_world_camera, x, y).direction;
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    rays.direction = direction;
+    rays.origin.fill(f.T_world_camera.t);
+}
+
+/// Each at its own point of the pixel and of the lens.
+NARPA_EACH_ISA void aim_through_lens(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
+    Points u;
+    points_of_pixels(f, s, u);
+    Vec3Lanes origin, direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const double x = s.x[i] + u[0][i] - 0.5, y = s.y[i] + u[1][i] - 0.5;
+        const auto [o, d] =
+            lens_ray(f.camera, *f.lens, f.T_world_camera, x, y, aperture_point(*f.lens, u[2][i], u[3][i]));
+        origin.x[i] = o.x, origin.y[i] = o.y, origin.z[i] = o.z;
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    rays.origin = origin;
+    rays.direction = direction;
+}
+
+NARPA_EACH_ISA void next_points(const Frame& f, const CameraSamples& s, std::uint32_t group, Points& u) noexcept {
+    sampler_of(f, s).points(group, u);
+}
+
+NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const Lanes<double>& v,
+                               Vec3Lanes& to_sun) noexcept {
+    Vec3Lanes direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 d = sun.sample(u[i], v[i]);
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    to_sun = direction;
+}
+
+/// Random numbers with which a path would choose its point of the Sun from the first surface: free where that is
+/// chosen here.
+constexpr std::uint32_t kPathsOwn = 2;
+
+/// Most paths choose their own points of the Sun.
+void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
+    const bool sun = f.sun && (f.quick || f.sun_first);
+    p.rays.n = s.n;
+    if (s.middle && f.one_sample()) {
+        aim_at_middles(f, s, p.rays);
+        if (f.quick && sun) p.to_sun.fill(f.sun->centre());
+        if (f.quick || !sun) return;
+        Points u;
+        next_points(f, s, kPathsOwn, u);
+        aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
+        return;
+    }
+    Points u;
+    if (f.lens == nullptr) {
+        aim_in_pixels(f, s, p.rays, u);
+        if (sun) aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
+    } else {
+        aim_through_lens(f, s, p.rays);
+        if (!sun) return;
+        next_points(f, s, kPathsOwn, u);
+        aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
+    }
+}
+
+}  // namespace
+
+void trace_samples(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p,
+                   RgbLanes& radiance) {
+    trace_rays(f, s, bodies, p);
+    light_along(f, p, radiance);
+}
+
+void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p) {
+    PhaseClock clock(p.times);
+    aim(f, s, p);
+    p.number = s.number;
+    p.sample = s.sample;
+    clock.ends(Phase::aim);
+    f.tracer.intersect(f.at, p.rays, bodies, p.hits);
+    p.rays_traced += s.n;
+    if (f.tiny.any())
+        for (std::size_t i = 0; i < s.n; ++i) p.hits.put(i, f.tiny.beyond(p.rays[i], p.hits[i]));
+    clock.ends(Phase::rays);
+}
+
+void trace_middles(const Frame& f, const CameraSamples& s, Packet& p) {
+    p.rays.n = s.n;
+    aim_at_middles(f, s, p.rays);
+    f.tracer.intersect(f.at, p.rays, f.tracer.all_bodies(), p.hits);
+    p.rays_traced += s.n;
+}
+
+}  // namespace narpa

@@ -1,0 +1,89 @@
+#include "renderer/film/camera_image.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "renderer/film/budgeted_frame.h"
+#include "renderer/film/camera_batch.h"
+#include "renderer/integrator/first_hit.h"
+#include "renderer/geometry/flush_denormals.h"
+
+namespace narpa {
+namespace {
+
+/// The rays through the pixels' middles: what the outputs beside the radiance show.
+void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
+    tbb::parallel_for(0, (height + kTile - 1) / kTile, [&](int row) {
+        const FlushDenormals flush;
+        Packet p;
+        CameraSamples s;
+        s.middle = true;
+        s.sample.fill(0);
+        const auto store = [&] {
+            trace_middles(f, s, p);
+            for (std::size_t i = 0; i < s.n; ++i) store_first_hit(f, p.rays[i], p.hits[i], s.number[i], aovs);
+            s.n = 0;
+        };
+        const int y_end = std::min((row + 1) * kTile, height);
+        for (int x_first = 0; x_first < width; x_first += 2) {  // packets of 2 x 8 pixels
+            for (int y = row * kTile; y < y_end; ++y)
+                for (int x = x_first; x < std::min(x_first + 2, width); ++x) {
+                    s.x[s.n] = x, s.y[s.n] = y;
+                    s.number[s.n++] = static_cast<std::uint32_t>(y * width + x);
+                }
+            store();
+        }
+    });
+}
+
+}  // namespace
+
+struct CameraRenderer::Impl {
+    Impl(const Tracer& the_tracer, const Camera& the_camera)
+        : tracer(the_tracer), camera(the_camera), passes(the_tracer, the_camera) {}
+
+    FrameAccount render_uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+        passes.begin(f, f.lens);
+        const PassCount count = passes.uniform(f, out, variance);
+        FrameAccount account;
+        account.samples = count.samples;
+        account.rays = count.rays;
+        account.standard_error = passes.standard_error();
+        account.phase_ns = passes.times();
+        return account;
+    }
+
+    const Tracer& tracer;
+    const Camera& camera;
+    FramePasses passes;
+    PassCosts costs;
+};
+
+CameraRenderer::CameraRenderer(const Tracer& tracer, const Camera& camera)
+    : impl_(std::make_unique<Impl>(tracer, camera)) {}
+CameraRenderer::~CameraRenderer() = default;
+
+FrameAccount CameraRenderer::render(const BodyPoses& at, const Rigid3& T_world_camera,
+                                    const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
+    Impl& i = *impl_;
+    std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
+    const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
+    if (!uniform && aovs == nullptr)
+        return render_within_budget(i.passes, i.costs, i.tracer, i.camera, at, T_world_camera, settings, out,
+                                    nullptr);
+    const Frame frame = make_frame(i.tracer, at, i.camera, T_world_camera, settings);
+    if (aovs != nullptr) {
+        resize(*aovs, out.pixels.size());
+        store_first_hits(frame, out.width, out.height, *aovs);
+    }
+    if (uniform) return i.render_uniform(frame, out, variance);
+    return render_within_budget(i.passes, i.costs, i.tracer, i.camera, at, T_world_camera, settings, out, variance);
+}
+
+void render_radiance(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
+                     const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
+    CameraRenderer(tracer, camera).render(at, T_world_camera, settings, out, aovs);
+}
+
+}  // namespace narpa

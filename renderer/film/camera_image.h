@@ -1,0 +1,63 @@
+/// renderer/film/camera_image.h - a camera's linear radiance image, and the exact outputs beside it.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "renderer/film/frame_budget.h"
+#include "renderer/image/radiance_image.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa {
+
+struct FrameSettings {
+    int spp = 1;             ///< 1: the ray through each pixel's centre
+    std::uint64_t seed = 0;  ///< scene seed; samples depend on (seed, frame, pixel, sample) and nothing else
+    std::uint32_t frame = 0;
+    RenderSettings::Method method = RenderSettings::Method::direct;
+    int max_depth = 8;                                ///< of method path
+    std::atomic<std::size_t>* pixels_done = nullptr;  ///< counted up while the frame is made; null: nobody looks
+    FrameBudget budget{};                             ///< kind samples: spp
+    bool times = false;                               ///< tell where the time goes
+};
+
+/// The light that reaches the camera.
+///
+/// Method direct: light that comes to a surface straight from the Sun and the scene's lights, with shadows;
+/// ambient, never shadowed; emission of what is seen; lamps of some size too, and these in mirrors and glass; black
+/// where nothing is hit, and where mirrors and glass would show other surfaces. Method path: all light (path.h),
+/// with the ambient as a sky.
+///
+/// One sample a pixel goes through the middle of the pixel and of the lens, and where the method is direct and the
+/// Sun the only light, to the middle of the Sun: the image of a pinhole, without noise, with hard shadows. With
+/// more, each takes a point of the pixel, of the lens and of the Sun: edges are smooth, what is out of focus is
+/// blurred, shadows have their penumbra.
+///
+/// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: tiny_bodies.h.
+///
+/// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. Takes its memory anew with
+/// each call: for many frames there is CameraRenderer. `aovs` may be null; they show a pinhole's view, tiny bodies
+/// among the rest.
+void render_radiance(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
+                     const FrameSettings& settings, RadianceImage& out, Aovs* aovs = nullptr);
+
+/// The same, for a camera's frames one after another: keeps memory and measures from frame to frame, and knows
+/// budgets. What a frame looks like depends on neither. Allocates nothing after the first frame of a kind. Tiles
+/// that stay empty from frame to frame are not written again: nobody else may write to `out` in between.
+class CameraRenderer {
+public:
+    /// Both outlive it.
+    CameraRenderer(const Tracer& tracer, const Camera& camera);
+    ~CameraRenderer();
+
+    FrameAccount render(const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+                        RadianceImage& out, Aovs* aovs = nullptr);
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,55 @@
+/// renderer/film/frame_error.h - how far a frame is from the truth, told by the frame itself.
+///
+/// Sums over all pixels, by how each was made: its middle (pixel_looks.h says what that costs), or a power of two
+/// of samples. Of these, each doubling of the samples moves the mean by a step whose mean square
+/// is v(n/2) - v(n), v(n) being the variance of the mean of n: the halves of an Owen-scrambled sequence are each as
+/// good as the first, and the whole is their mean (A. Owen, "Scrambled net variance for integrals of smooth
+/// functions", Ann. Stat. 25, 1997). If v falls by the same ratio q each time, what is left after the last step is
+/// q / (1 - q) of it: all of it for independent samples (q = 1/2), 0.55 of it for edges (q = 2^-1.5). The last two
+/// steps, squared and summed over the pixels, tell the ratio.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "renderer/film/g_buffer.h"
+#include "renderer/film/pixel_samples.h"
+
+namespace narpa {
+
+class FrameError {
+public:
+    /// A tile whose pixels show their middles, and that stands for so many.
+    void add_middles(const TileContrast& contrast, double tiles = 1) noexcept;
+    /// A tile whose pixels have samples, as many as each has; where it has none, it shows its middle.
+    void add_tile(const TileContrast& contrast, const PerPixel<PixelMeans>& means) noexcept;
+    /// A pixel of two samples or more.
+    void add(const PixelMeans& means) noexcept;
+    FrameError& operator+=(const FrameError& b) noexcept;
+
+    /// Of the mean band, root mean square over this many pixels; those that were not added have none.
+    [[nodiscard]] double standard_error(std::size_t pixels) const noexcept;
+
+private:
+    static constexpr std::size_t kDoublings = 24;
+    struct Steps {
+        double last = 0, before = 0;  ///< squared
+    };
+
+    /// Of one part of the light.
+    struct Part {
+        std::array<Steps, kDoublings> steps{};
+        std::array<double, kDoublings> shares{};  ///< of the last power of two in the number of samples, summed
+        std::array<std::uint64_t, kDoublings> pixels{};
+
+        void add(const PixelMean& mean) noexcept;
+        Part& operator+=(const Part& b) noexcept;
+        [[nodiscard]] double squared_error() const noexcept;
+    };
+
+    double middles_ = 0;  ///< squared errors
+    Part first_, by_paths_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,99 @@
+/// renderer/film/frame_passes.h - one after another, the passes of which a frame is made.
+///
+/// A pass goes over the tiles in which something may be seen; the others show the background. It comes to its end
+/// or is thrown away: what it made is shown by `show_...`, afterwards.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "renderer/film/frame_error.h"
+#include "renderer/film/g_buffer.h"
+#include "renderer/film/sample_plan.h"
+#include "renderer/film/tile_culling.h"
+
+namespace narpa {
+
+/// Where a pass is given up.
+struct PassLimit {
+    std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();  ///< CLOCK_MONOTONIC
+    std::uint64_t rays = std::numeric_limits<std::uint64_t>::max();
+};
+
+struct PassCount {
+    bool complete = true;
+    std::uint64_t samples = 0, rays = 0;
+    std::uint64_t paths = 0, path_rays = 0;  ///< samples of these that paths follow; rays beyond first surfaces
+    std::int64_t wall_ns = 0;
+};
+
+class FramePasses {
+public:
+    /// Both outlive it.
+    FramePasses(const Tracer& tracer, const Camera& camera);
+
+    /// Makes ready for a frame: finds the tiles in which something may be seen. `lens` may blur it; null: none
+    /// does.
+    void begin(const Frame& f, const Lens* lens);
+    /// Pixels in which something may be seen.
+    [[nodiscard]] std::uint64_t pixels() const noexcept { return pixels_; }
+
+    /// Each pixel with `spp` samples, shown at once. Its variance goes to `variance`, if that is not null.
+    PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance);
+
+    /// Which tiles a pass goes over: a sixteenth lie spread evenly.
+    enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
+    /// Middles of the pixels that stand for squares of `stride` (1, 2 or 4) pixels, but for those that a pass of
+    /// stride `made` has seen to (0: none has).
+    PassCount middles(const Frame& f, int stride, int made, const PassLimit& limit, Tiles which = Tiles::all);
+    void show_middles(const Frame& f, int stride, RadianceImage& out);
+
+    /// Chooses where samples go; after all middles.
+    void make_plan(const Frame& f);
+    [[nodiscard]] const SamplePlan& plan() const noexcept { return *plan_; }
+    /// The samples that stage `to` has beyond stage `from`.
+    PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit);
+    void show_means(const Frame& f, RadianceImage& out, std::vector<float>* variance);
+
+    /// Of the picture that `uniform` or `show_means` has shown last, or of the middles that were planned from.
+    [[nodiscard]] double standard_error() const noexcept;
+
+    /// Where the time went since this was last asked, where the frames' settings want to know.
+    [[nodiscard]] PhaseTimes times() noexcept;
+
+private:
+    struct Worker;
+    struct Tile;
+    enum class Sums : std::uint8_t { counts, errors };
+    template <class Work>
+    PassCount over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work);
+    [[nodiscard]] Tile tile(std::uint32_t index) const noexcept;
+    void find_background(const Frame& f);
+    void fill_background(RadianceImage& out);
+    void show_one_sample(Worker& w, const Tile& t, RadianceImage& out);
+    [[nodiscard]] bool estimates(std::uint32_t tile) const noexcept;
+    [[nodiscard]] bool looks_serve(std::uint32_t tile) const noexcept;
+    void estimate_middles(const Frame& f);
+
+    const Camera& camera_;
+    TileCulling cover_;
+    GBuffer looks_;
+    std::vector<std::uint32_t> tiles_;  ///< in which something may be seen
+    std::uint64_t pixels_ = 0;
+    Rgb background_{};                ///< of the others
+    std::vector<FrameError> errors_;  ///< of each chunk of tiles
+
+    std::optional<SamplePlan> plan_;  ///< made when a frame first needs it, as are:
+    std::vector<PerPixel<PixelMeans>> means_;
+
+    // Tiles that still have the background in the image that was last written, and which that was.
+    std::vector<std::uint8_t> blank_;
+    const Rgb* blank_image_ = nullptr;
+    Rgb blank_background_{};
+    std::array<std::atomic<std::int64_t>, kPhases> phase_ns_{};
+};
+
+}  // namespace narpa

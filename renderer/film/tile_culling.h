@@ -1,0 +1,54 @@
+/// renderer/film/tile_culling.h - which bodies a part of the image can show at all.
+///
+/// Rays are sent only through tiles of the image that some body's surface may cover, and are tried against those
+/// bodies alone: what a frame costs goes with the pixels that bodies cover, not with the sensor's size.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "renderer/geometry/box_tree.h"
+#include "renderer/film/tile_mask.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa {
+
+inline constexpr int kTileSize = 8;  ///< pixels a side
+
+class TileCulling {
+public:
+    /// Both outlive it. All memory is taken here: about 80 bytes a tile, whatever the number of bodies.
+    TileCulling(const Tracer& tracer, const Camera& camera);
+
+    /// For the bodies at these places. Conservative: a ray through any point of a tile, and through any point of
+    /// the lens (null: a pinhole), that meets a body finds it in the tile's list, also where the body is as near as
+    /// the camera, behind it in part, or around it. Allocates nothing.
+    void update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept;
+
+    /// Bodies that rays through any of the tile's pixels may meet, in ascending order; empty: nothing is there.
+    /// Where more than kMostListed crowd in one tile, its list is of all bodies.
+    [[nodiscard]] std::span<const std::uint32_t> bodies(int tile_x, int tile_y) const noexcept;
+    static constexpr std::size_t kMostListed = 16;
+
+    [[nodiscard]] int tiles_x() const noexcept { return tiles_x_; }
+    [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
+
+private:
+    void list(std::uint32_t body) noexcept;
+    [[nodiscard]] std::size_t index(int tile_x, int tile_y) const noexcept {
+        return static_cast<std::size_t>(tile_y) * static_cast<std::size_t>(tiles_x_) +
+               static_cast<std::size_t>(tile_x);
+    }
+
+    const Tracer& tracer_;
+    const Camera& camera_;
+    int tiles_x_, tiles_y_;
+    std::vector<std::vector<BoxNode>> trees_;  ///< one for each mesh
+    TileMask mask_;                            ///< of one body at a time
+    std::size_t most_listed_;
+    std::vector<std::uint8_t> listed_;  ///< bodies in each tile's list; most_listed_ + 1: more than it holds
+    std::vector<std::uint32_t> lists_;  ///< most_listed_ for each tile
+};
+
+}  // namespace narpa

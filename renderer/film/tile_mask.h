@@ -1,0 +1,65 @@
+/// renderer/film/tile_mask.h - some of the tiles of an image, a bit each.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+namespace narpa {
+
+/// Tiles of an image, corners included.
+struct TileRect {
+    int x_first, y_first, x_last, y_last;
+};
+
+class TileMask {
+public:
+    TileMask(int tiles_x, int tiles_y)
+        : words_per_row_((static_cast<std::size_t>(tiles_x) + 63) / 64),
+          words_(words_per_row_ * static_cast<std::size_t>(tiles_y)),
+          row_first_(tiles_y) {}
+
+    void mark(const TileRect& r) noexcept {
+        row_first_ = std::min(row_first_, r.y_first), row_last_ = std::max(row_last_, r.y_last);
+        for_each_word(r, [](std::uint64_t& word, std::uint64_t bits) {
+            word |= bits;
+            return true;
+        });
+    }
+    [[nodiscard]] bool all_marked(const TileRect& r) noexcept {
+        return for_each_word(r, [](std::uint64_t& word, std::uint64_t bits) { return (word & bits) == bits; });
+    }
+
+    /// Calls f(column, row) for each that is marked, row by row, and wipes it.
+    template <class F>
+    void drain(const F& f) noexcept {
+        for (int row = row_first_; row <= row_last_; ++row)
+            for (std::size_t w = 0; w < words_per_row_; ++w) {
+                std::uint64_t& word = words_[static_cast<std::size_t>(row) * words_per_row_ + w];
+                for (; word != 0; word &= word - 1) f(static_cast<int>(64 * w) + std::countr_zero(word), row);
+            }
+        row_first_ = static_cast<int>(words_.size() / words_per_row_), row_last_ = -1;
+    }
+
+private:
+    /// f(word, its bits within the rectangle) until it returns false.
+    template <class F>
+    bool for_each_word(const TileRect& r, const F& f) noexcept {
+        const auto first = static_cast<unsigned>(r.x_first), last = static_cast<unsigned>(r.x_last);
+        for (int row = r.y_first; row <= r.y_last; ++row)
+            for (std::size_t w = first / 64; w <= last / 64; ++w) {
+                std::uint64_t bits = ~0ull;
+                if (w == first / 64) bits &= ~0ull << first % 64;
+                if (w == last / 64) bits &= ~0ull >> (63 - last % 64);
+                if (!f(words_[static_cast<std::size_t>(row) * words_per_row_ + w], bits)) return false;
+            }
+        return true;
+    }
+
+    std::size_t words_per_row_;
+    std::vector<std::uint64_t> words_;
+    int row_first_, row_last_ = -1;  ///< where any is marked
+};
+
+}  // namespace narpa

@@ -1,0 +1,55 @@
+/// renderer/geometry/sphere_roots.h - where a line meets a sphere, in double, without cancellation.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "base/vec3.h"
+
+namespace narpa {
+
+struct SphereRoots {
+    double near = 0, far = 0;  ///< multiples of the direction, near <= far; negative is behind the origin
+
+    [[nodiscard]] bool any() const noexcept { return near <= far; }  ///< else both are not a number
+};
+
+/// The line o + t d against the sphere of this radius about the origin; d of any length but zero. The discriminant
+/// is the squared half chord, from the point of closest approach; the smaller root comes from the product of the
+/// roots. Source: E. Haines, J. Gunther, T. Akenine-Moller, "Precision Improvements for Ray/Sphere
+/// Intersection", Ray Tracing Gems (2019), chapter 7. Without a branch, for loops over many rays.
+inline SphereRoots sphere_roots(const Vec3& o, const Vec3& d, double radius) noexcept {
+    const double a = dot(d, d), b = -dot(o, d);
+    const Vec3 closest = o + (b / a) * d;
+    const double half_chord2 = radius * radius - dot(closest, closest);  // negative: its root is not a number
+    const double q = b + std::copysign(std::sqrt(a * half_chord2), b);
+    const double far_from_zero = q / a;
+    const double by_product = (dot(o, o) - radius * radius) / q;
+    const double near_zero = q == 0 ? 0 : by_product;
+    const bool in_order = near_zero <= far_from_zero;
+    return {in_order ? near_zero : far_from_zero, in_order ? far_from_zero : near_zero};
+}
+
+/// Where a ray is inside a bounding sphere about the origin: a coarse interval, for a unit direction.
+struct SphereSpan {
+    double entry = 1, exit = -1;
+};
+/// exit < 0 when the line misses, or the sphere is behind.
+inline SphereSpan bounding_span(const Vec3& o, const Vec3& unit_d, double radius) noexcept {
+    const double b = -dot(o, unit_d);
+    const Vec3 closest = o + b * unit_d;
+    const double half_chord2 = radius * radius - dot(closest, closest);
+    if (!(half_chord2 >= 0)) return {};
+    const double half_chord = std::sqrt(half_chord2);
+    return {b - half_chord, b + half_chord};
+}
+/// Where the ray enters it, without a branch; infinity where it misses.
+inline double bounding_entry(const Vec3& o, const Vec3& unit_d, double radius) noexcept {
+    const double b = -dot(o, unit_d);
+    const Vec3 closest = o + b * unit_d;
+    const double half_chord =
+        std::sqrt(radius * radius - dot(closest, closest));  // not a number where the line misses
+    return b + half_chord >= 0 ? b - half_chord : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace narpa

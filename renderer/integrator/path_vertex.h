@@ -1,0 +1,113 @@
+/// renderer/integrator/path_vertex.h - a point of a surface as a path meets it, and how it sends light on.
+#pragma once
+
+#include <limits>
+#include <numbers>
+
+#include "renderer/material/directions.h"
+#include "renderer/integrator/shading.h"
+
+namespace narpa {
+
+/// Light falls in from one side of a plane: that of the face, or of the smooth surface that vertex normals describe
+/// where rays leave from that surface (Hit::departure_body).
+///
+/// A normal of any other direction - from a map, or of vertices about a hollow - gives part of the BSDF to
+/// directions behind the plane, from where no light can come: dark seams, and energy lost. That part is folded back
+/// here, to the mirror image of each direction in the plane. Mirroring keeps solid angles, so what the surface
+/// reflects in all is exactly what its material reflects about its normal, and a white surface in an even light
+/// stays white whatever its normals are. (Its kin: the upright mirror that sends on what a tilted facet would lose
+/// in V. Schuessler, E. Heitz, J. Hanika, C. Dachsbacher, "Microfacet-based normal mapping for robust Monte Carlo
+/// path tracing", ACM TOG 36(6), 2017.)
+class PathPoint {
+public:
+    PathPoint() = default;
+    /// Seen along a unit direction with a beam of this width (see surface_at). Unless `fold`, light counts as it
+    /// does in the quick direct light: by the surface's normal alone.
+    PathPoint(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction, double width_m,
+              bool fold) noexcept
+        : surface_(surface_at(tracer, at, hit, ray_direction, width_m)),
+          plane_(surface_.normal),
+          view_(-ray_direction) {
+        if (!fold) return;
+        plane_ = hit.geometric_normal;
+        if (hit.shading_normal != hit.geometric_normal) {
+            const Vec3 flat = at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body;
+            if (flat != hit.position) plane_ = hit.shading_normal;
+        }
+        // Vertex normals that face away from the viewer say nothing of what he sees.
+        if (dot(surface_.normal, view_) <= 0) surface_.normal = hit.geometric_normal;
+        bent_ = surface_.normal != plane_;
+        plain_ = !bent_ && surface_.material->kind == Material::Kind::lambert && dot(plane_, view_) > 0;
+    }
+
+    [[nodiscard]] const Surface& surface() const noexcept { return surface_; }
+    /// Normal of the plane, unit, on the viewer's side but for silhouettes of smooth meshes.
+    [[nodiscard]] const Vec3& plane() const noexcept { return plane_; }
+
+    /// Unit, to where the light is wanted.
+    [[nodiscard]] const Vec3& view() const noexcept { return view_; }
+    /// Is the surface's normal not the plane's?
+    [[nodiscard]] bool bent() const noexcept { return bent_; }
+    /// Lambert's law about the plane's normal: most of most scenes.
+    [[nodiscard]] bool plain() const noexcept { return plain_; }
+
+    /// Does light turn in single directions only (bsdf.h)?
+    [[nodiscard]] bool specular() const noexcept { return is_specular(*surface_.material); }
+    /// Lambert's law alone, about whatever normal?
+    [[nodiscard]] bool has_no_lobe() const noexcept {
+        return surface_.material->kind <= Material::Kind::phong && surface_.specular == Rgb{};
+    }
+
+    struct Response {
+        Rgb f_cos{};     ///< BSDF times the cosine of the incidence, 1/sr
+        double pdf = 0;  ///< density per solid angle with which `scatter` finds the direction
+    };
+    /// For light from the unit direction l.
+    [[nodiscard]] Response respond(const Vec3& l) const noexcept {
+        const double cosine = dot(l, plane_);
+        if (cosine <= 0) return {};
+        if (plain_) return {surface_.diffuse * kInvPi * static_cast<float>(cosine), cosine * std::numbers::inv_pi};
+        const Response straight = unfolded(l);
+        if (!bent_) return straight;
+        const Response image = unfolded(folded(l));
+        return {straight.f_cos + image.f_cos, straight.pdf + image.pdf};
+    }
+
+    /// Chooses where a path goes on. The density is infinite where nothing else could find the direction.
+    [[nodiscard]] BsdfSample scatter(const std::array<double, 3>& u) const noexcept {
+        if (plain_) {
+            BsdfSample s;
+            s.l = narpa::folded(cosine_direction(plane_, u[1], u[2]), plane_);
+            s.pdf = dot(s.l, plane_) * std::numbers::inv_pi;
+            s.weight = surface_.diffuse;
+            return s;
+        }
+        BsdfSample s = sample_bsdf(surface_, surface_.normal, view_, u);
+        const Vec3 image = folded(s.l);
+        if (s.specular)
+            s.pdf = std::numeric_limits<double>::infinity();
+        else if (bent_)
+            s.pdf += bsdf_pdf(surface_, surface_.normal, image, view_);
+        const double height = dot(s.l, plane_);
+        if (s.transmitted ? height > 0 : height < 0) s.l = image;
+        return s;
+    }
+
+private:
+    static constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
+
+    [[nodiscard]] Vec3 folded(const Vec3& l) const noexcept { return l - 2 * dot(l, plane_) * plane_; }
+    [[nodiscard]] Response unfolded(const Vec3& l) const noexcept {
+        const double cosine = dot(surface_.normal, l);
+        if (cosine <= 0) return {};
+        return {bsdf(surface_, surface_.normal, l, view_) * static_cast<float>(cosine),
+                bsdf_pdf(surface_, surface_.normal, l, view_)};
+    }
+
+    Surface surface_{};
+    Vec3 plane_{}, view_{};
+    bool bent_ = false, plain_ = false;
+};
+
+}  // namespace narpa

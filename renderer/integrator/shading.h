@@ -1,0 +1,29 @@
+/// renderer/integrator/shading.h - the surface at a hit: material, textures, shading normal.
+#pragma once
+
+#include "renderer/material/bsdf.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa {
+
+/// Multiplies the material's colours by their textures at the hit and turns the normal by its normal and height
+/// maps.
+void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction,
+                    double width_m, Surface& surface) noexcept;
+
+/// What stands at the hit, seen along `ray_direction` (unit, world, towards the surface) with a beam that is
+/// `width_m` wide there, measured across the ray: textures are averaged over what the beam covers. Normal and
+/// height maps turn Surface::normal, never to the far side of the ray. Inline, so that a material without textures
+/// costs no more than to copy it.
+[[nodiscard]] inline Surface surface_at(const Tracer& tracer, const BodyPoses& at, const Hit& hit,
+                                        const Vec3& ray_direction, double width_m) noexcept {
+    const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];
+    const bool no_lobe = m.kind == Material::Kind::lambert;
+    Surface s{m.diffuse, no_lobe ? Rgb{} : m.specular, m.emission, m.exponent, &m, hit.shading_normal, hit.outside};
+    const bool textured =
+        m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0;
+    if (textured) apply_textures(tracer, at, hit, ray_direction, width_m, s);
+    return s;
+}
+
+}  // namespace narpa

@@ -1,0 +1,121 @@
+/// renderer/light/lights.h - the emitters of a scene: Sun, lights, surfaces that shine by themselves.
+///
+/// A light of `Scene::lights` is a source and nothing else: it hides nothing, reflects nothing and lets all other
+/// light pass. A surface that shines is a body like any other, and shines from both its sides.
+///
+/// The Sun is asked at every point. Of all the others one is chosen, with a probability that follows what it could
+/// send to the point if nothing were in the way and that is zero only where it can send nothing. Everything is
+/// measured from the point itself, differences of positions first, so that a common offset of the whole scene
+/// cancels.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "renderer/light/sun_disc.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa {
+
+/// Where light is wanted: at `anchor` + `offset`, metres in the world's axes. The two are never added.
+struct Receiver {
+    Vec3 anchor{}, offset{};
+    Vec3 up{};      ///< unit: only light from directions with a positive part along it counts
+    int body = -1;  ///< the one that the point lies on; -1: none
+};
+/// Of a camera, say.
+[[nodiscard]] Receiver receiver_at(const Vec3& position) noexcept;
+/// Where rays leave the hit.
+[[nodiscard]] Receiver receiver_at(const BodyPoses& at, const Hit& from, const Vec3& up) noexcept;
+
+/// A direction towards the chosen emitter.
+struct LightSample {
+    Vec3 direction{};
+    // Of a light:
+    double range_m = 0;      ///< how far a ray must see for the light to arrive
+    Rgb radiance_per_pdf{};  ///< or the irradiance on a surface that faces it, of a light without extent
+    double pdf = 0;          ///< per solid angle; infinite for a light without extent, which no ray meets
+    // Of a surface, which the ray itself finds:
+    int body = -1;           ///< -1: a light
+    std::uint32_t face = 0;  ///< light counts only from this one
+};
+
+/// Weight of a sample whose density is `own` where `other` is the other technique's: Veach's power heuristic with
+/// exponent 2 (Robust Monte Carlo Methods for Light Transport Simulation, 1997, section 9.2). An infinite `own` is
+/// a direction that only this technique can find.
+[[nodiscard]] double power_heuristic(double own, double other) noexcept;
+
+class Lights {
+public:
+    /// `scene` must outlive it.
+    explicit Lights(const Scene& scene);
+
+    /// Are there lights beside the Sun and the ambient? Then method "direct" needs `path_radiance`. Surfaces that
+    /// shine do not count: they light nothing in that method.
+    [[nodiscard]] bool beyond_the_sun() const noexcept { return lights_ > 0; }
+    /// Lights that a ray can meet?
+    [[nodiscard]] bool any_with_extent() const noexcept { return any_with_extent_; }
+    [[nodiscard]] const std::optional<SunDisc>& sun() const noexcept { return sun_; }
+
+    /// Which emitters beside the Sun take part.
+    enum class Group : std::uint8_t { lights, all };
+    [[nodiscard]] bool any(Group group) const noexcept { return !emitters(group).empty(); }
+
+    /// Chooses an emitter by the first number and a point of it by the others; none where no light can come from
+    /// any.
+    [[nodiscard]] std::optional<LightSample> sample(const BodyPoses& at, const Receiver& to, Group group,
+                                                    double choice, double u, double v) const noexcept;
+    /// Density per solid angle with which `sample` finds the point of a body that a ray from the receiver met, at
+    /// range_m in this direction; 0 where it never does.
+    [[nodiscard]] double pdf(const BodyPoses& at, const Receiver& to, Group group, const Vec3& direction,
+                             const Hit& met) const noexcept;
+    /// Radiance of all lights that a ray meets before range_m, each weighted against `sample` by the density with
+    /// which the ray's direction was chosen (infinite: `sample` could not have found it).
+    [[nodiscard]] Rgb met_before(double range_m, const BodyPoses& at, const Receiver& to, Group group,
+                                 const Vec3& direction, double direction_pdf) const noexcept;
+
+private:
+    struct Emitter {
+        int light = -1;  ///< index into Scene::lights
+        int body = -1;   ///< or into Scene::bodies
+        int mount = -1;  ///< body whose frame the rest stands in; -1: the world
+        Vec3 centre{};   ///< of a sphere that holds what shines
+        double radius_m = 0;
+        double power = 0;       ///< mean band of radiance times area, or intensity, or irradiance
+        double touching_m = 0;  ///< what stands closer before it is its mounting
+    };
+    /// Faces of a mesh that shine, each to be chosen in proportion to its area times its radiance.
+    struct Faces {
+        std::vector<std::uint32_t> face;
+        std::vector<double> cumulative;  ///< of area times radiance, W/sr; the last is the sum
+    };
+
+    void add_light(std::size_t index);
+    void add_body(std::size_t index);
+    [[nodiscard]] Faces shining_faces(const Mesh& mesh) const;
+    [[nodiscard]] std::span<const Emitter> emitters(Group group) const noexcept;
+    /// What the emitter could send to the receiver, W m^-2, if all of it stood at its centre; 0 only where it sends
+    /// nothing.
+    [[nodiscard]] double importance(const BodyPoses& at, const Receiver& to, const Emitter& e) const noexcept;
+    /// Probability that `sample` chooses this emitter.
+    [[nodiscard]] double chance(const BodyPoses& at, const Receiver& to, Group group,
+                                const Emitter& e) const noexcept;
+    [[nodiscard]] LightSample sample_light(const BodyPoses& at, const Receiver& to, const Emitter& e, double u,
+                                           double v) const noexcept;
+    [[nodiscard]] LightSample sample_mesh(const BodyPoses& at, const Receiver& to, const Emitter& e, double choice,
+                                          double u, double v) const noexcept;
+    [[nodiscard]] LightSample sample_exact(const BodyPoses& at, const Receiver& to, const Emitter& e, double u,
+                                           double v) const noexcept;
+
+    const Scene* scene_;
+    std::optional<SunDisc> sun_;
+    std::vector<Emitter> emitters_;  ///< the lights, then the bodies
+    std::size_t lights_ = 0;
+    bool any_with_extent_ = false;
+    std::vector<int> emitter_of_body_;  ///< -1: does not shine
+    std::vector<Faces> faces_;          ///< one for each mesh of the scene; empty where no body of it shines
+};
+
+}  // namespace narpa

@@ -1,0 +1,102 @@
+#include "renderer/light/small_body_sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <variant>
+
+namespace narpa {
+namespace {
+
+/// Squared sine of a cone's half angle, which is the part of a Lambert surface's rays that find it overhead: wider
+/// ones need no guide.
+constexpr double kWide = 0.25;
+/// Bodies that fill less of the sky than this send next to nothing: not worth many rays.
+constexpr double kNegligible = 1e-6;
+/// A mesh may fill so much of its own sky, and leaves so much of the guidance whatever it is: enough for its dark
+/// side, and little lost on the lit one.
+constexpr double kOwnMesh = 0.25, kLeastGuidance = 0.1;
+
+/// A body's bounding sphere in the sky of the receiver.
+struct Cone {
+    Vec3 to_centre{};
+    double distance2 = 0;
+    double sine2 = 0;       ///< squared sine of the half angle, 1 from within the sphere
+    double importance = 0;  ///< roughly the part of a Lambert surface's rays that find it
+
+    [[nodiscard]] bool is_guide() const { return importance > 0 && sine2 < kWide; }
+    [[nodiscard]] double one_minus_cosine() const { return sine2 / (1 + std::sqrt(1 - sine2)); }
+    [[nodiscard]] double pdf() const { return 1 / (2 * std::numbers::pi * one_minus_cosine()); }
+    [[nodiscard]] bool holds(const Vec3& direction) const {
+        const Vec3 across = cross(direction, to_centre);  // its length is the sine's, without cancellation
+        return dot(direction, to_centre) > 0 && dot(across, across) < sine2 * distance2;
+    }
+};
+
+Cone cone_of(const Tracer& tracer, const BodyPoses& at, const Receiver& to, std::size_t body) {
+    Cone c;
+    if (static_cast<int>(body) == to.body) return c;
+    const double radius_m = tracer.bounding_radius_m(body);
+    c.to_centre = (at.T_world_body[body].t - to.anchor) - to.offset;
+    c.distance2 = dot(c.to_centre, c.to_centre);
+    const double highest = dot(c.to_centre, to.up) + radius_m;
+    if (highest <= 0) return c;
+    c.sine2 = c.distance2 > radius_m * radius_m ? radius_m * radius_m / c.distance2 : 1;
+    c.importance = c.sine2 == 1 ? 1 : c.sine2 * std::min(1.0, highest / std::sqrt(c.distance2));
+    return c;
+}
+
+}  // namespace
+
+SmallBodySampling::SmallBodySampling(const Tracer& tracer, const BodyPoses& at, const Receiver& to) noexcept {
+    const bool own_mesh =
+        to.body >= 0 && std::holds_alternative<int>(tracer.scene().bodies[static_cast<std::size_t>(to.body)].shape);
+    double wide = own_mesh ? kOwnMesh : 0;
+    for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
+        const Cone c = cone_of(tracer, at, to, body);
+        (c.is_guide() ? sum_ : wide) += c.importance;
+    }
+    if (!(sum_ > 0)) return;
+    const double guidance = std::max(sum_ / (sum_ + wide), own_mesh ? kLeastGuidance : 0);
+    share_ = 0.5 * guidance * std::min(1.0, sum_ / kNegligible);
+}
+
+bool SmallBodySampling::may_help(const Tracer& tracer, const BodyPoses& at) noexcept {
+    const std::size_t n = at.T_world_body.size();
+    for (std::size_t seen = 0; seen < n; ++seen)
+        for (std::size_t from = 0; from < n; ++from) {
+            if (from == seen) continue;
+            const double radius_m = tracer.bounding_radius_m(seen),
+                         farthest_m = norm(at.T_world_body[seen].t - at.T_world_body[from].t) +
+                                      tracer.bounding_radius_m(from);
+            if (radius_m * radius_m < kWide * farthest_m * farthest_m) return true;
+        }
+    return false;
+}
+
+Vec3 SmallBodySampling::direction(const Tracer& tracer, const BodyPoses& at, const Receiver& to, double choice, double u,
+                      double v) const noexcept {
+    double left = choice * sum_;
+    Cone chosen;
+    for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
+        const Cone c = cone_of(tracer, at, to, body);
+        if (!c.is_guide()) continue;
+        chosen = c;
+        if (left < c.importance) break;
+        left -= c.importance;
+    }
+    const double drop = u * chosen.one_minus_cosine();  // 1 - cosine of the angle from the axis
+    return Basis(normalized(chosen.to_centre)).to_world(direction_at(std::sqrt(drop * (2 - drop)), 1 - drop, v));
+}
+
+double SmallBodySampling::pdf(const Tracer& tracer, const BodyPoses& at, const Receiver& to,
+                  const Vec3& direction) const noexcept {
+    double density = 0;
+    for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
+        const Cone c = cone_of(tracer, at, to, body);
+        if (c.is_guide() && c.holds(direction)) density += c.importance / sum_ * c.pdf();
+    }
+    return density;
+}
+
+}  // namespace narpa

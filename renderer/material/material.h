@@ -1,0 +1,70 @@
+/// renderer/material/material.h - how a surface scatters light, as plain data: materials and their textures.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/vec3.h"
+
+namespace narpa {
+
+/// Image in linear light, 16 bits a band (65535 = 1.0), rows from the top; with the same picture at half, a quarter
+/// ... of the size, each texel the mean of what it covers, down to 1 x 1: what a distant surface is looked up in.
+struct Texture {
+    enum class Wrap : std::uint8_t { repeat, clamp };
+    struct Level {
+        int width = 0, height = 0;
+        std::vector<std::uint16_t> rgb;  ///< 3 * width * height
+    };
+    std::string name;
+    int width = 0, height = 0;
+    std::vector<std::uint16_t> rgb;  ///< 3 * width * height
+    Wrap wrap = Wrap::repeat;
+    std::vector<Level> coarser{};  ///< empty: filtered from the finest alone
+};
+
+/// Parameters of B. Hapke's model (Theory of Reflectance and Emittance Spectroscopy, 2nd ed. 2012) beside the
+/// single scattering albedo w, which is Material::diffuse.
+struct Hapke {
+    float phase_b = 0.25f, phase_c = 0.4f;          ///< double Henyey-Greenstein: width, backward (> 0) or forward
+    float opposition_b0 = 0, opposition_h = 0.05f;  ///< shadow hiding: amplitude, width
+    float roughness_rad = 0;                        ///< macroscopic mean slope, theta-bar
+};
+
+/// How a surface sends light on. Directions and forms: renderer/material/bsdf.h. What a kind does not name it does
+/// not use.
+struct Material {
+    enum class Kind : std::uint8_t {
+        lambert,          ///< diffuse
+        phong,            ///< diffuse, specular, exponent: Lafortune and Willems 1994, diffuse + specular <= 1
+        phong_classic,    ///< diffuse, specular, exponent, ambient: the paper's, no BRDF; direct light only
+        mirror,           ///< specular
+        dielectric,       ///< smooth glass: ior, schlick
+        ggx,              ///< diffuse (base colour), metallic, roughness, ior
+        lommel_seeliger,  ///< diffuse (single scattering albedo w), asymmetry
+        lunar_lambert,    ///< diffuse (normal albedo): McEwen 1996
+        hapke,            ///< diffuse (single scattering albedo w), hapke
+    };
+    std::string name;
+    Kind kind = Kind::lambert;
+    Rgb diffuse{0.5f, 0.5f, 0.5f};  ///< kd, or what the kind says
+    Rgb specular{};                 ///< ks
+    float exponent = 1;             ///< n of Phong's lobe
+    Rgb emission{};                 ///< radiance that the surface sends out by itself, W m^-2 sr^-1
+    Rgb ambient{};                  ///< ka
+    float roughness = 0.5f;         ///< perceptual: GGX alpha = roughness^2
+    float metallic = 0;             ///< 0 dielectric over Lambert, 1 metal
+    float ior = 1.5f;               ///< refractive index inside over outside
+    bool schlick = false;           ///< Schlick's approximation in place of Fresnel's equations
+    float asymmetry = 0;            ///< Henyey-Greenstein's g of the single particle: negative is backward
+    Hapke hapke{};
+    int texture = -1;           ///< index into Scene::textures: multiplies `diffuse`; -1 is none
+    int emission_texture = -1;  ///< multiplies `emission`
+    int normal_texture = -1;    ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
+    int height_texture = -1;    ///< bumps: height in metres = bump_height_m * mean of rgb
+    float normal_scale = 1;
+    float bump_height_m = 0;
+};
+
+}  // namespace narpa

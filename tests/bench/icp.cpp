@@ -1,0 +1,105 @@
+// ICP of VLP-16 sweeps of the docking station: of the emulated instrument's own packets, and the bench in small.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "bench/icp.h"
+#include "emulator/lidar_unit.h"
+#include "estimator/cloud/sweep_points.h"
+#include "renderer/scene/scene_file.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::size_t kStation = 0, kChaser = 1;
+
+Scene docking_scene() {
+    auto scene = read_scene(std::string(NARPA_BUILD_DIR) + "/scenes/docking/docking.toml");
+    EXPECT_TRUE(scene) << scene.error().text();
+    return *std::move(scene);
+}
+
+/// From packets as the emulator sends them, without noise but for their rounding; the chaser coasts and turns.
+TEST(SweepPoints, OfTheEmulatedLidarFitTheStation) {
+    Scene scene = docking_scene();
+    scene.bodies[kChaser].can_id.reset();
+    scene.bodies[kChaser].initial = {{{0, 0, 0, 1}, {30, 2, -1}}, {-1, 0.3, 0.2}, {0.02, -0.03, 0.05}};
+    auto world = World::create(std::move(scene));
+    ASSERT_TRUE(world) << world.error().text();
+    LidarUnit unit(**world, 0);
+
+    // Where the station is from the LiDAR as its rotor points ahead, and how it moves there.
+    const std::int64_t turn_ns = 100'000'000;
+    BodyPoses at(2);
+    const auto pose_at = [&](std::int64_t t_ns) {
+        (*world)->place(t_ns, -1, at);
+        return inverse((*world)->sensor_pose(unit.lidar().mount, unit.lidar().T_mount_lidar, at)) *
+               at.T_world_body[kStation];
+    };
+    const Rigid3 truth = pose_at(turn_ns);
+    const Vector6 per_ms = error_between(pose_at(turn_ns - 500'000), pose_at(turn_ns + 500'000));
+    const SweepMotion motion{1e3 * Vec3{per_ms[3], per_ms[4], per_ms[5]},
+                             1e3 * Vec3{per_ms[0], per_ms[1], per_ms[2]}};
+
+    std::vector<RangePoint> points;
+    for (std::int64_t packet = turn_ns / 2 / vlp16::kPacketPeriodNs;
+         packet < 3 * turn_ns / 2 / vlp16::kPacketPeriodNs; ++packet) {
+        unit.fire(packet);
+        const auto data = vlp16::decode(unit.bytes());
+        ASSERT_TRUE(data);
+        append_points(*data, vlp16::packet_start_ns(packet) - turn_ns, points);
+    }
+    std::erase_if(points, [](const RangePoint& p) { return p.range_m < 10; });  // the chaser's own nose
+    ASSERT_GT(points.size(), 500u);
+
+    IcpSettings settings;
+    settings.noise.range_m = vlp16::kRangeQuantumM / std::sqrt(12.0);
+    auto icp = CloudIcp::create((*world)->tracer(), kStation, settings);
+    ASSERT_TRUE(icp) << icp.error().text();
+    Vector6 off;
+    off << 0.03, -0.02, 0.04, 0.5, -0.8, 0.4;
+    const auto e = icp->align(points, motion, displaced(truth, off), 1.5);
+    ASSERT_TRUE(e) << e.error().text();
+    EXPECT_TRUE(e->credible);
+    const Vector6 error = error_between(e->T_lidar_target, truth);
+    EXPECT_LT(error.head<3>().norm(), 1e-4);
+    EXPECT_LT(error.tail<3>().norm(), 1e-3) << "half the step of the ranges";
+}
+
+TEST(BenchIcp, FindsTheDockingStation) {
+    auto world = World::create(docking_scene());
+    ASSERT_TRUE(world) << world.error().text();
+    int told = 0;
+    const std::vector<IcpStarts> starts{{5, 0.05, 15}, {15, 0.1, 8}};
+    const auto runs = run_icp(**world, kStation, {}, starts, [&](int done, int all) {
+        EXPECT_EQ(done, ++told);
+        EXPECT_EQ(all, 23);
+    });
+    ASSERT_TRUE(runs) << runs.error().text();
+    ASSERT_EQ(runs->size(), 2u);
+    for (const IcpRun& run : *runs) {
+        EXPECT_EQ(run.found, run.starts.count);
+        EXPECT_GT(run.points, 500);
+        // Three axes each, that are not independent: half of them count.
+        const double chance = 4 / std::sqrt(2.0 * 1.5 * run.starts.count);
+        EXPECT_NEAR(run.rotation_to_bound, 1.03, chance);
+        EXPECT_NEAR(run.translation_to_bound, 1.03, chance);
+        EXPECT_LT(run.nees, 6 * 1.1 * 1.1 + 4 * std::sqrt(12.0 / run.starts.count));
+    }
+    EXPECT_EQ(told, 23);
+    EXPECT_EQ(to_json(runs->front()).at("found"), 15);
+    EXPECT_NE(in_words(*runs).find("100.0%"), std::string::npos);
+}
+
+TEST(BenchIcp, SaysWhatIsWrong) {
+    auto world = World::create(docking_scene());
+    ASSERT_TRUE(world) << world.error().text();
+    EXPECT_FALSE(run_icp(**world, 7, {}, {{5, 0.05, 1}}));
+    EXPECT_FALSE(run_icp(**world, kStation, {}, {{5, 0.05, 0}}));
+    EXPECT_FALSE(run_icp(**world, kStation, {.distance_min_m = 0}, {{5, 0.05, 1}}));
+    EXPECT_FALSE(run_icp(**world, kStation, {.rotation_hz = 50}, {{5, 0.05, 1}}));
+    EXPECT_FALSE(run_icp(**world, kStation, {.cone_deg = 200}, {{5, 0.05, 1}}));
+}
+
+}  // namespace
+}  // namespace narpa

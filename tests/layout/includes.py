@@ -1,0 +1,48 @@
+"""Checks that every #include of a room's files points to the room itself or to a room that it links.
+
+Usage: includes.py ROOMS SOURCE_DIR    ROOMS: lines of "folder: linked linked ..."
+"""
+import pathlib
+import re
+import sys
+
+lists, root = pathlib.Path(sys.argv[1]).read_text(), pathlib.Path(sys.argv[2])
+links = {}
+for line in lists.splitlines():
+    room, _, linked = line.partition(":")
+    links[room.strip()] = linked.split()
+
+
+def reachable(room):
+    """The room and all that it links, directly or through others; "renderer" stands for every room below it."""
+    seen, todo = set(), [room]
+    while todo:
+        here = todo.pop()
+        if here in seen:
+            continue
+        seen.add(here)
+        todo += links.get(here) or [r for r in links if r.startswith(here + "/")]
+    return seen
+
+
+def room_of(path):
+    parts = path.split("/")
+    for depth in (2, 1):
+        candidate = "/".join(parts[:depth])
+        if candidate in links or candidate == "base":
+            return candidate
+    return None
+
+
+wrong = []
+for room in links:
+    allowed = reachable(room)
+    for file in sorted((root / room).rglob("*")):
+        if file.suffix not in (".h", ".cpp"):
+            continue
+        for number, line in enumerate(file.read_text().splitlines(), 1):
+            include = re.match(r'#include "([^"]+)"', line)
+            if include and (target := room_of(include[1])) and target not in allowed:
+                wrong.append(f"{file.relative_to(root)}:{number}: {room} does not link {target}: {include[1]}")
+print("\n".join(wrong) or f"{len(links)} rooms: every include points down")
+sys.exit(bool(wrong))

@@ -1,0 +1,187 @@
+// Rays that leave surfaces: outwards nothing is met twice, inwards nothing is missed, whatever the size and place.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <numbers>
+
+#include "tests/support/shapes.h"
+
+namespace narpa {
+namespace {
+
+using namespace test;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr int kFewer = 20;  // the sanitizers are that much slower
+#else
+constexpr int kFewer = 1;
+#endif
+
+constexpr std::uint32_t kAll = (1u << kLanes) - 1;
+
+bool is_set(std::uint32_t bits, std::size_t i) {
+    return (bits >> i & 1u) != 0;
+}
+
+void add_ellipsoid(Scene& s, const Vec3& semi_axes_m, const Rigid3& T_world_body) {
+    Body b;
+    b.name = "ellipsoid";
+    b.shape = Ellipsoid{semi_axes_m, 0};
+    b.initial.T_world_body = T_world_body;
+    s.bodies.push_back(b);
+}
+
+/// On the side of the hit's normal; every fourth within a thousandth of its horizon.
+Vec3 leaving(const Hit& hit, std::mt19937_64& random, int i) {
+    Vec3 d = random_direction(random);
+    const Vec3& n = hit.geometric_normal;
+    if (dot(d, n) < 0) d = -d;
+    if (i % 4 == 0) d = normalized(d + (1e-3 * std::abs(d.x) - dot(d, n)) * n);
+    return d;
+}
+
+/// The body alone, of a size and at a place.
+Scene alone(const std::string& shape, double radius_m, std::mt19937_64& random) {
+    Scene s;
+    s.materials.push_back(lambert(0.5f));
+    const Rigid3 T{random_attitude(random), {}};
+    if (shape == "sphere") {
+        add_sphere(s, radius_m, {});
+    } else if (shape == "ellipsoid") {
+        add_ellipsoid(s, radius_m * Vec3{1, 0.7, 0.4}, T);
+    } else if (shape == "smooth") {
+        add_mesh(s, icosphere(4, radius_m, true), T);
+    } else {
+        add_mesh(s, icosphere(4, radius_m), T);
+    }
+    return s;
+}
+
+class LeavingAConvexBody : public testing::TestWithParam<std::string> {};
+
+TEST_P(LeavingAConvexBody, OutwardsMissesItAndInwardsMeetsItFromInside) {
+    std::mt19937_64 random(31);
+    int outward = 0, met_again = 0, dark = 0, inward = 0, missed = 0, bright = 0;
+    for (const double radius : {5e-4, 0.3, 40.0, 6378137.0})
+        for (const Vec3 offset : {Vec3{}, Vec3{7e6, -1e3, 2}, Vec3{-3.844e8, 1e7, 3}}) {
+            const Scene s = alone(GetParam(), radius, random);
+            const auto tracer = Tracer::create(s, 1);
+            ASSERT_TRUE(tracer) << tracer.error().text();
+            const BodyPoses at = placed(s, offset);
+            for (int k = 0; k < 7500 / kFewer; ++k) {
+                Lanes<Hit> from, met;
+                Lanes<Vec3> out, in;
+                std::uint32_t seen = 0;
+                for (std::size_t i = 0; i < kLanes; ++i) {
+                    const Vec3 eye = offset + 5 * radius * random_direction(random);
+                    const Ray ray{eye, normalized(offset + 0.95 * radius * random_direction(random) - eye)};
+                    from[i] = tracer->intersect(at, ray, kInfinity);
+                    if (from[i].body < 0) continue;
+                    seen |= 1u << i;
+                    ASSERT_TRUE(from[i].outside);
+                    out[i] = leaving(from[i], random, k);
+                    in[i] = -leaving(from[i], random, k);
+                }
+                outward += std::popcount(seen);
+                tracer->intersect(at, from, out, seen, met);
+                for (std::size_t i = 0; i < kLanes; ++i) met_again += is_set(seen, i) && met[i].body >= 0;
+                dark += std::popcount(tracer->occluded(at, from, out, seen));
+
+                for (std::size_t i = 0; i < kLanes; ++i)
+                    if (is_set(seen, i)) from[i] = other_side(from[i]);
+                inward += std::popcount(seen);
+                tracer->intersect(at, from, in, seen, met);
+                for (std::size_t i = 0; i < kLanes; ++i)
+                    missed += is_set(seen, i) && (met[i].body != 0 || met[i].outside);
+                bright += std::popcount(seen & ~tracer->occluded(at, from, in, seen));
+            }
+        }
+    EXPECT_GE(outward, 500'000 / kFewer);
+    EXPECT_EQ(met_again, 0) << "of " << outward;
+    EXPECT_EQ(dark, 0) << "of " << outward;
+    EXPECT_EQ(missed, 0) << "of " << inward;
+    EXPECT_EQ(bright, 0) << "of " << inward;
+}
+INSTANTIATE_TEST_SUITE_P(Shapes, LeavingAConvexBody, testing::Values("mesh", "smooth", "sphere", "ellipsoid"),
+                         [](const auto& shape) { return shape.param; });
+
+TEST(LeavingAPlate, ItsInnerSideIsAsFreeAsItsOuterSide) {
+    std::mt19937_64 random(34);
+    Scene s;
+    s.materials.push_back(lambert(0.5f));
+    add_mesh(s, plate(4, 4, 8), {random_attitude(random), {7e6, 0, 0}});
+    const auto tracer = Tracer::create(s, 1);
+    ASSERT_TRUE(tracer);
+    const BodyPoses at = placed(s);
+    const Rigid3& T = at.T_world_body[0];
+    std::uniform_real_distribution<double> within(-1.9, 1.9);
+    int met = 0, dark = 0;
+    for (int k = 0; k < 4000; ++k) {
+        Lanes<Hit> from, next;
+        Lanes<Vec3> directions;
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            const Vec3 above{within(random), within(random), 1};
+            from[i] = other_side(tracer->intersect(at, {T * above, T.q * Vec3{0, 0, -1}}, kInfinity));
+            ASSERT_EQ(from[i].body, 0);
+            ASSERT_FALSE(from[i].outside);
+            directions[i] = leaving(from[i], random, k);  // every fourth packet within a milliradian of the plate
+        }
+        tracer->intersect(at, from, directions, kAll, next);
+        for (const Hit& h : next) met += h.body >= 0;
+        dark += std::popcount(tracer->occluded(at, from, directions, kAll));
+    }
+    EXPECT_EQ(met, 0);
+    EXPECT_EQ(dark, 0);
+}
+
+/// Sixteen paths that bounce about inside a closed body. Counts those that get out; each of them starts anew.
+struct Bounces {
+    int bounces = 0, escapes = 0;
+};
+Bounces bounce_inside(const Scene& s, const Vec3& offset, int wanted) {
+    const auto tracer = Tracer::create(s, 1);
+    EXPECT_TRUE(tracer);
+    const BodyPoses at = placed(s, offset);
+    std::mt19937_64 random(32);
+    const auto start = [&] {
+        return tracer->intersect(at, {at.T_world_body[0].t, random_direction(random)}, kInfinity);
+    };
+    Lanes<Hit> hits;
+    for (Hit& h : hits) h = start();
+    Bounces b;
+    Lanes<Vec3> directions;
+    while (b.bounces < wanted) {
+        for (std::size_t i = 0; i < kLanes; ++i) directions[i] = leaving(hits[i], random, b.bounces);
+        tracer->intersect(at, hits, directions, kAll, hits);
+        b.bounces += static_cast<int>(kLanes);
+        for (Hit& h : hits)
+            if (h.body < 0 || h.outside) {
+                ++b.escapes;
+                h = start();
+            }
+    }
+    return b;
+}
+
+TEST(BouncingInside, NothingEscapes) {
+    std::mt19937_64 random(33);
+    const Rigid3 T{random_attitude(random), {}};
+    const auto body = [&](Mesh mesh) {
+        Scene s;
+        s.materials.push_back(lambert(0.5f));
+        add_mesh(s, std::move(mesh), T);
+        return s;
+    };
+    const std::vector<std::pair<std::string, Scene>> bodies{
+        {"icosphere", body(icosphere(3, 1))},   {"smooth icosphere", body(icosphere(3, 1, true))},
+        {"bumpy", body(bumpy(4, 2.5, 0.3))},    {"box", body(box(1, 2, 3))},
+        {"1 mm", body(icosphere(3, 5e-4))},     {"Earth", body(icosphere(3, 6378137))},
+        {"sphere", alone("sphere", 1, random)}, {"ellipsoid", alone("ellipsoid", 1, random)}};
+    for (const auto& [name, scene] : bodies) {
+        const Bounces b = bounce_inside(scene, {3.844e8, -7e6, 5}, 1'000'000 / kFewer);
+        EXPECT_EQ(b.escapes, 0) << name << " of " << b.bounces;
+    }
+}
+
+}  // namespace
+}  // namespace narpa

@@ -1,4 +1,5 @@
 // Image files, read back by libraries that others wrote.
+#include "renderer/film/camera_image.h"
 #include "renderer/image/image_file.h"
 
 #include <ImfChannelList.h>

@@ -7,18 +7,18 @@
 #include <filesystem>
 
 #include "apps/cli.h"
-#include "rehearsal/conduct/campaign.h"
-#include "rehearsal/conduct/child.h"
-#include "rehearsal/conduct/conduct.h"
+#include "rehearsal/runner/campaign.h"
+#include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/rehearsal.h"
 
 namespace narpa::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using rehearsal::Conducted;
+using rehearsal::RehearsalResult;
 
 struct Options {
-    rehearsal::ConductOptions conduct;
+    rehearsal::RehearsalOptions run;
     std::vector<std::string> video;
     std::size_t runs = 0;  ///< 0: one, without a summary
     int jobs = 1;
@@ -42,15 +42,15 @@ bool line_on_stdin() {
     return ::read(STDIN_FILENO, &c, 1) == 1 ? c == '\n' : Clock::now() - first > std::chrono::seconds(10);
 }
 
-rehearsal::Narrator narrator() {
+rehearsal::Console console() {
     if (!::isatty(STDERR_FILENO))
         return {[](std::string_view text) { say(text); }, [](std::string_view) {}, line_on_stdin};
     return {[](std::string_view text) { fmt::print(stderr, "\r\033[K{}\n", text); },
             [](std::string_view text) { fmt::print(stderr, "\r\033[K{}", text); }, line_on_stdin};
 }
 
-Outcome one(const rehearsal::ConductOptions& options) {
-    const auto done = rehearsal::conduct(options, narrator(), stop_flag());
+Outcome one(const rehearsal::RehearsalOptions& options) {
+    const auto done = rehearsal::run_rehearsal(options, console(), stop_flag());
     if (!done) return done.error();
     for (const rehearsal::GateResult& g : done->verdict.gates)
         say(fmt::format("  {:<10} {:<12} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
@@ -61,7 +61,7 @@ Outcome one(const rehearsal::ConductOptions& options) {
 }
 
 Outcome many(const rehearsal::CampaignOptions& options) {
-    auto summary = rehearsal::conduct_campaign(options, narrator(), stop_flag());
+    auto summary = rehearsal::run_campaign(options, console(), stop_flag());
     if (!summary) return summary;
     const nlohmann::json& s = *summary;
     say(fmt::format("{} of {} runs succeeded: {:.1f} %, with 95 % confidence {:.1f} to {:.1f} %",
@@ -79,7 +79,7 @@ Outcome many(const rehearsal::CampaignOptions& options) {
 }
 
 Outcome rehearse(const Options& given) {
-    rehearsal::ConductOptions o = given.conduct;
+    rehearsal::RehearsalOptions o = given.run;
     for (const std::string& text : given.video) {
         auto pair = split_pair(text, "CAMERA=DEVICE, like nav=/dev/video10");
         if (!pair) return pair.error();
@@ -101,7 +101,7 @@ Outcome rehearse(const Options& given) {
 
 Command add_rehearse(CLI::App& app) {
     auto o = std::make_shared<Options>();
-    rehearsal::ConductOptions& r = o->conduct;
+    rehearsal::RehearsalOptions& r = o->run;
     r.version = NARPA_VERSION;
     CLI::App* c = app.add_subcommand(
         "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");

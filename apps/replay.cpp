@@ -9,7 +9,7 @@
 #include "apps/cli.h"
 #include "emulator/replay/replay_report.h"
 #include "emulator/threads.h"
-#include "rehearsal/conduct/rerun.h"
+#include "rehearsal/runner/rerun.h"
 
 namespace narpa::cli {
 namespace {

@@ -35,7 +35,7 @@ std::vector<ContactCondition> contact_conditions(const Gates::Contact& limits, c
     };
 }
 
-std::string leg_in_words(const Scenario& scenario, std::size_t leg) {
+std::string leg_text(const Scenario& scenario, std::size_t leg) {
     if (leg >= scenario.legs.size() || scenario.legs[leg].name.empty()) return fmt::format("leg {}", leg + 1);
     return fmt::format("leg {} \"{}\"", leg + 1, scenario.legs[leg].name);
 }
@@ -45,7 +45,7 @@ std::string when(const Scenario& scenario, const BusRecord& bus, std::int64_t t_
     const ActuatorCommand* command = bus.command_before(t_ns);
     if (!command) return text + " before the first thruster command";
     const std::string_view phase = kGuidancePhases[static_cast<std::size_t>(command->phase)];
-    return text + fmt::format(" ({}, {})", leg_in_words(scenario, command->leg), phase);
+    return text + fmt::format(" ({}, {})", leg_text(scenario, command->leg), phase);
 }
 
 /// In lockstep each waits for the one before: poses, then the emulator's heartbeat of their time, then the command.

@@ -38,7 +38,7 @@ struct Watch {
 /// "at t = 12.300 s in leg 2 \"hold\"".
 [[nodiscard]] std::string when(const Scenario& scenario, const BusRecord& bus, std::int64_t t_ns);
 /// "leg 2 \"hold\"", of an index as the commands carry it.
-[[nodiscard]] std::string leg_in_words(const Scenario& scenario, std::size_t leg);
+[[nodiscard]] std::string leg_text(const Scenario& scenario, std::size_t leg);
 
 /// Who was to speak next and did not: why a run broke off.
 [[nodiscard]] std::string who_fell_silent(const Scenario& scenario, const BusRecord& bus);

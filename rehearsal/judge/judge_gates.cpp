@@ -196,9 +196,9 @@ GateResult Judge::complete() const {
     const bool gave_up = aborted != bus_.commands.end();
     if (gave_up) {
         gate.t_first_s = bus_.seconds(aborted->t_ns);
-        gate.reason = fmt::format("the navigation gave up at t = {:.2f} s in {}: {}", *gate.t_first_s,
-                                  leg_in_words(scenario_, aborted->leg),
-                                  kAbortReasons[static_cast<std::size_t>(aborted->abort)]);
+        gate.reason =
+            fmt::format("the navigation gave up at t = {:.2f} s in {}: {}", *gate.t_first_s,
+                        leg_text(scenario_, aborted->leg), kAbortReasons[static_cast<std::size_t>(aborted->abort)]);
     }
     if (gave_up && scenario_.gates.complete) return gate;
     const DynamicsReport* finished = bus_.first_report(DynamicsPhase::finished);
@@ -220,7 +220,7 @@ GateResult Judge::complete() const {
     }
     if (!gate.reason.empty()) gate.reason += "; ";
     gate.reason += fmt::format("over at t = {:.2f} s", t_end_s);
-    if (!bus_.commands.empty()) gate.reason += " in " + leg_in_words(scenario_, bus_.commands.back().leg);
+    if (!bus_.commands.empty()) gate.reason += " in " + leg_text(scenario_, bus_.commands.back().leg);
     if (!bus_.truth.empty()) gate.reason += fmt::format(", the ports {:.2f} m apart", bus_.truth.back().range_m());
     if (docks && t_contact_ns_) gate.reason += ", after a contact that bounced";
     return gate;

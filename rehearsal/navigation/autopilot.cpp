@@ -5,14 +5,14 @@
 namespace narpa::rehearsal {
 namespace {
 
-SightingRecord::Outcome outcome_of(UpdateOutcome o) {
+MeasurementRecord::Outcome outcome_of(UpdateOutcome o) {
     switch (o) {
-        case UpdateOutcome::taken: return SightingRecord::Outcome::taken;
-        case UpdateOutcome::gated: return SightingRecord::Outcome::gated;
-        case UpdateOutcome::too_late: return SightingRecord::Outcome::too_late;
-        case UpdateOutcome::bad: return SightingRecord::Outcome::bad;
+        case UpdateOutcome::taken: return MeasurementRecord::Outcome::taken;
+        case UpdateOutcome::gated: return MeasurementRecord::Outcome::gated;
+        case UpdateOutcome::too_late: return MeasurementRecord::Outcome::too_late;
+        case UpdateOutcome::bad: return MeasurementRecord::Outcome::bad;
     }
-    return SightingRecord::Outcome::bad;
+    return MeasurementRecord::Outcome::bad;
 }
 
 }  // namespace
@@ -20,14 +20,14 @@ SightingRecord::Outcome outcome_of(UpdateOutcome o) {
 Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, std::uint64_t seed) {
     std::unique_ptr<Autopilot> a(new Autopilot);
     a->scenario_ = scenario;
-    auto model = SightModel::create(scenario);
+    auto model = SceneModel::create(scenario);
     if (!model) return model.error();
     a->model_ = *std::move(model);
     for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
     for (const std::size_t lidar : a->model_->lidars()) {
-        auto sight = LidarSight::create(*a->model_, lidar);
-        if (!sight) return sight.error();
-        a->lidars_.push_back(*std::move(sight));
+        auto estimator = LidarPoseEstimator::create(*a->model_, lidar);
+        if (!estimator) return estimator.error();
+        a->lidars_.push_back(*std::move(estimator));
     }
     return a;
 }
@@ -69,29 +69,32 @@ Autopilot::Before Autopilot::before(std::int64_t t_ns) {
 
 void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
     const Before b = before(t_ns);
-    CameraSight& sight = cameras_[camera];
-    take(sight.camera().name, t_ns, sight.look(bytes, t_ns, b.t_s, b.q_world_chaser, b.T_chaser_target), frames_);
+    CameraPoseEstimator& estimator = cameras_[camera];
+    take(estimator.camera().name, t_ns, estimator.look(bytes, t_ns, b.t_s, b.q_world_chaser, b.T_chaser_target),
+         frames_);
 }
 
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {
     const Before b = before(t_ns);
-    LidarSight& sight = lidars_[lidar];
-    take(sight.lidar().name, t_ns,
-         sight.look(points, t_ns, b.motion, b.T_chaser_target, b.position_sigma_m, b.rotation_sigma_rad), sweeps_);
+    LidarPoseEstimator& estimator = lidars_[lidar];
+    take(estimator.lidar().name, t_ns,
+         estimator.look(points, t_ns, b.motion, b.T_chaser_target, b.position_sigma_m, b.rotation_sigma_rad),
+         sweeps_);
 }
 
-void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting, std::uint8_t& count) {
-    SightingRecord record{sensor,          t_ns,       SightingRecord::Outcome::no_pose, 0, sighting.why,
-                          sighting.points, sighting.ms};
+void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,
+                     std::uint8_t& count) {
+    MeasurementRecord record{
+        sensor, t_ns, MeasurementRecord::Outcome::no_pose, 0, measurement.why, measurement.points, measurement.ms};
     const std::lock_guard lock(mutex_);
-    if (sighting.pose) {
-        const UpdateResult result = estimator_->take(*sighting.pose);
+    if (measurement.pose) {
+        const UpdateResult result = estimator_->take(*measurement.pose);
         record.outcome = outcome_of(result.outcome);
         record.nis = result.nis;
         record.why = result.why;
         if (result.outcome == UpdateOutcome::taken && count < 255) ++count;
     }
-    sightings_.push_back(std::move(record));
+    measurements_.push_back(std::move(record));
 }
 
 CycleRecord Autopilot::cycle(std::int64_t t_ns) {
@@ -127,7 +130,7 @@ CycleRecord Autopilot::cycle(std::int64_t t_ns) {
                    guidance_->phase(),
                    static_cast<std::uint8_t>(guidance_->leg()),
                    guidance_->abort()};
-    out.sightings = std::exchange(sightings_, {});
+    out.measurements = std::exchange(measurements_, {});
     frames_ = sweeps_ = 0;
     ++cycle_;
     return out;

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/autopilot.h - the chaser's computer without its wires: sightings in, estimates and commands
-/// out.
+/// rehearsal/navigation/autopilot.h - the chaser's computer without its wires: measurements in, estimates and
+/// commands out.
 ///
 /// Sightings may be taken by one thread while another runs the cycles. One after the other, what comes out depends
 /// on what went in and in what order alone.
@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "rehearsal/navigation/guidance.h"
-#include "rehearsal/navigation/sightings.h"
+#include "rehearsal/navigation/measurements.h"
 
 namespace narpa::rehearsal {
 
 /// What became of a frame or a sweep.
-struct SightingRecord {
+struct MeasurementRecord {
     enum class Outcome : std::uint8_t { taken, gated, too_late, bad, no_pose };
     std::string sensor;
     std::int64_t t_ns = 0;
@@ -26,7 +26,8 @@ struct SightingRecord {
     int points = 0;
     double ms = 0;
 };
-inline constexpr std::array<std::string_view, 5> kSightingOutcomes{"taken", "gated", "too_late", "bad", "no_pose"};
+inline constexpr std::array<std::string_view, 5> kMeasurementOutcomes{"taken", "gated", "too_late", "bad",
+                                                                      "no_pose"};
 
 /// One control period.
 struct CycleRecord {
@@ -36,7 +37,7 @@ struct CycleRecord {
     PortState port;
     Reference reference;
     double position_sigma_m = 0;
-    std::vector<SightingRecord> sightings;  ///< since the cycle before
+    std::vector<MeasurementRecord> measurements;  ///< since the cycle before
 };
 
 class Autopilot {
@@ -45,7 +46,7 @@ public:
     static Result<std::unique_ptr<Autopilot>> create(const Scenario& scenario, std::uint64_t seed);
 
     [[nodiscard]] const Scenario& scenario() const noexcept { return scenario_; }
-    [[nodiscard]] const SightModel& model() const noexcept { return *model_; }
+    [[nodiscard]] const SceneModel& model() const noexcept { return *model_; }
 
     /// The scenario's time 0 is t_start_ns; that is the chaser's attitude then. Errors: the filter's.
     Status start(std::int64_t t_start_ns, const AttitudeReport& attitude);
@@ -54,15 +55,15 @@ public:
     // What follows needs a start.
 
     void take(const AttitudeReport& report);
-    /// What the dynamics are doing at t_ns; before the sightings of that time.
+    /// What the dynamics are doing at t_ns; before the measurements of that time.
     void take(DynamicsPhase phase, std::int64_t t_ns);
     /// `camera`, `lidar`: indices in the scenario's lists. A frame: its bytes and mid-exposure. Returns of a turn:
     /// their times count from t_ns, its end.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
     void take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points);
     /// What any other sensor saw at t_ns; counts as a frame.
-    void take(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting) {
-        take(sensor, t_ns, sighting, frames_);
+    void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement) {
+        take(sensor, t_ns, measurement, frames_);
     }
     /// Where it stands at t_ns, and what is to be done from then on; times grow by control periods.
     CycleRecord cycle(std::int64_t t_ns);
@@ -70,7 +71,7 @@ public:
     [[nodiscard]] std::uint64_t restarts() const noexcept { return estimator_ ? estimator_->restarts() : 0; }
 
 private:
-    /// What a sighting starts from.
+    /// What a measurement starts from.
     struct Before {
         double t_s = 0;
         Quat q_world_chaser{};
@@ -80,18 +81,19 @@ private:
     };
     Autopilot() = default;
     [[nodiscard]] Before before(std::int64_t t_ns);
-    void take(const std::string& sensor, std::int64_t t_ns, const Sighting& sighting, std::uint8_t& count);
+    void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,
+              std::uint8_t& count);
 
     Scenario scenario_;
-    std::unique_ptr<SightModel> model_;
-    std::deque<CameraSight> cameras_;  ///< they do not move
-    std::vector<LidarSight> lidars_;
+    std::unique_ptr<SceneModel> model_;
+    std::deque<CameraPoseEstimator> cameras_;  ///< they do not move
+    std::vector<LidarPoseEstimator> lidars_;
 
     std::mutex mutex_;  ///< of what follows
     std::optional<StateEstimator> estimator_;
     std::optional<Guidance> guidance_;
     std::optional<FlightControl> control_;
-    std::vector<SightingRecord> sightings_;
+    std::vector<MeasurementRecord> measurements_;
     DynamicsPhase dynamics_ = DynamicsPhase::flying;
     std::uint8_t frames_ = 0, sweeps_ = 0;
     std::uint32_t cycle_ = 0;

@@ -16,7 +16,7 @@ constexpr std::int64_t kFrameWait_ns = 10 * kSecond_ns, kPacketWait_ns = 1 * kSe
 
 class LockstepLoop {
 public:
-    explicit LockstepLoop(const Loop& loop) : loop_(loop), newest_(loop.wires.cameras.size()) {}
+    explicit LockstepLoop(const Loop& loop) : loop_(loop), newest_(loop.inputs.cameras.size()) {}
 
     Status fly() {
         if (auto began = wait_for([&] { return loop_.link.dynamics() && loop_.link.attitude(); },
@@ -59,12 +59,12 @@ private:
     Status read_frames() {
         for (const FrameNotice& notice : loop_.link.take_notices()) {
             if (notice.delivery == Delivery::nothing) continue;
-            for (std::size_t i = 0; i < loop_.wires.cameras.size(); ++i) {
-                CameraWire& wire = loop_.wires.cameras[i];
-                if (wire.camera != notice.camera) continue;
-                buffer_.resize(wire.frame_bytes);
-                if (!wire.source->receive(buffer_, kFrameWait_ns)) {
-                    if (!wire.source->status()) return wire.source->status();
+            for (std::size_t i = 0; i < loop_.inputs.cameras.size(); ++i) {
+                CameraInput& input = loop_.inputs.cameras[i];
+                if (input.camera != notice.camera) continue;
+                buffer_.resize(input.frame_bytes);
+                if (!input.source->receive(buffer_, kFrameWait_ns)) {
+                    if (!input.source->status()) return input.source->status();
                     ++loop_.counts.frames_missing;
                     continue;
                 }
@@ -76,11 +76,11 @@ private:
     }
 
     void read_packets() {
-        for (LidarWire& wire : loop_.wires.lidars)
-            while (const std::size_t n = wire.source->receive(packet_, 0)) take_packet(wire, n);
+        for (LidarInput& input : loop_.inputs.lidars)
+            while (const std::size_t n = input.source->receive(packet_, 0)) take_packet(input, n);
     }
-    void take_packet(LidarWire& wire, std::size_t bytes) {
-        wire.buffer.take({packet_.data(), bytes}, loop_.link.clock().newest().t_ns);
+    void take_packet(LidarInput& input, std::size_t bytes) {
+        input.buffer.take({packet_.data(), bytes}, loop_.link.clock().newest().t_ns);
     }
 
     void cycle(std::int64_t t_ns, bool first) {
@@ -93,26 +93,26 @@ private:
             newest_[i].reset();
         }
         if (!first)  // no packet has been completed yet
-            for (std::size_t i = 0; i < loop_.wires.lidars.size(); ++i) look_at_turn(i, t_ns);
+            for (std::size_t i = 0; i < loop_.inputs.lidars.size(); ++i) look_at_turn(i, t_ns);
         loop_.say(loop_.autopilot.cycle(t_ns));
     }
 
     void look_at_turn(std::size_t i, std::int64_t t_ns) {
-        LidarWire& wire = loop_.wires.lidars[i];
+        LidarInput& input = loop_.inputs.lidars[i];
         const std::int64_t deadline = monotonic_ns() + kPacketWait_ns;
-        while (!wire.buffer.complete_to(t_ns)) {
+        while (!input.buffer.complete_to(t_ns)) {
             const std::int64_t left_ns = deadline - monotonic_ns();
-            const std::size_t n = left_ns > 0 ? wire.source->receive(packet_, left_ns) : 0;
+            const std::size_t n = left_ns > 0 ? input.source->receive(packet_, left_ns) : 0;
             if (n == 0) break;
-            take_packet(wire, n);
+            take_packet(input, n);
         }
-        if (!wire.buffer.complete_to(t_ns)) ++loop_.counts.turns_incomplete;
-        wire.buffer.turn(t_ns, points_);
+        if (!input.buffer.complete_to(t_ns)) ++loop_.counts.turns_incomplete;
+        input.buffer.turn(t_ns, points_);
         if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
     }
 
     [[nodiscard]] const Camera& camera(std::size_t i) const {
-        return loop_.autopilot.model().scene().cameras[loop_.wires.cameras[i].camera];
+        return loop_.autopilot.model().scene().cameras[loop_.inputs.cameras[i].camera];
     }
 
     const Loop& loop_;

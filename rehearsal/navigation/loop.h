@@ -5,13 +5,13 @@
 #include "rehearsal/navigation/autopilot.h"
 #include "rehearsal/navigation/bus_link.h"
 #include "rehearsal/navigation/navigation_log.h"
-#include "rehearsal/navigation/sensor_wires.h"
+#include "rehearsal/navigation/sensor_inputs.h"
 
 namespace narpa::rehearsal {
 
 struct Loop {
     Autopilot& autopilot;
-    SensorWires& wires;
+    SensorInputs& inputs;
     BusLink& link;
     NavigationLog* log;  ///< null: none
     const StopFlag& stop;

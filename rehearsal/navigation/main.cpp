@@ -71,7 +71,8 @@ int main_of(int argc, char** argv) {
     app.add_option("--wait", a.node.wait_s, "Seconds to wait for the bus")
         ->check(CLI::Range(0.0, 3600.0))
         ->capture_default_str();
-    app.add_option("--log", a.node.log, "Folder for navigation.csv, sightings.csv, navigation.json and pictures");
+    app.add_option("--log", a.node.log,
+                   "Folder for navigation.csv, measurements.csv, navigation.json and pictures");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {

@@ -16,7 +16,7 @@ constexpr const char* kCycleHeader =
     "ref_z_m,off_x_m,off_y_m,off_z_m,off_attitude_deg,sigma_position_m,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_deg,"
     "sigma_ry_deg,sigma_rz_deg,impulse_x_n_s,impulse_y_n_s,impulse_z_n_s,angular_x_n_m_s,angular_y_n_m_s,"
     "angular_z_n_m_s,frames,sweeps\n";
-constexpr const char* kSightingHeader = "t_ns,sensor,outcome,nis,points,ms,why\n";
+constexpr const char* kMeasurementHeader = "t_ns,sensor,outcome,nis,points,ms,why\n";
 
 std::string numbers(const Vec3& v, const char* form = "{:.6g}") {
     return fmt::format(fmt::runtime(fmt::format("{0},{0},{0}", form)), v.x, v.y, v.z);
@@ -47,10 +47,10 @@ Result<std::unique_ptr<NavigationLog>> NavigationLog::create(const std::string& 
     for (const Leg& leg : scenario.legs) log->legs_.push_back(leg.name);
     auto cycles = begin(folder + "/navigation.csv", kCycleHeader);
     if (!cycles) return cycles.error();
-    auto sightings = begin(folder + "/sightings.csv", kSightingHeader);
-    if (!sightings) return sightings.error();
+    auto measurements = begin(folder + "/measurements.csv", kMeasurementHeader);
+    if (!measurements) return measurements.error();
     log->cycles_ = *std::move(cycles);
-    log->sightings_ = *std::move(sightings);
+    log->measurements_ = *std::move(measurements);
     return log;
 }
 
@@ -62,11 +62,11 @@ void NavigationLog::frame(const Camera& camera, std::span<const std::uint8_t> by
 }
 
 void NavigationLog::cycle(const CycleRecord& r) {
-    for (const SightingRecord& s : r.sightings) {
+    for (const MeasurementRecord& s : r.measurements) {
         const auto outcome = static_cast<std::size_t>(s.outcome);
         ++outcomes_[s.sensor][outcome];
-        fmt::print(sightings_, "{},{},{},{:.3f},{},{:.2f},\"{}\"\n", s.t_ns, s.sensor, kSightingOutcomes[outcome],
-                   s.nis, s.points, s.ms, s.why);
+        fmt::print(measurements_, "{},{},{},{:.3f},{},{:.2f},\"{}\"\n", s.t_ns, s.sensor,
+                   kMeasurementOutcomes[outcome], s.nis, s.points, s.ms, s.why);
     }
     const Rigid3& port = r.port.T_port_chaser_port;
     const auto phase = static_cast<std::size_t>(r.command.phase), abort = static_cast<std::size_t>(r.command.abort);
@@ -101,7 +101,7 @@ Status NavigationLog::finish(const NodeCounts& c, std::uint64_t restarts, const 
     nlohmann::json sensors = nlohmann::json::object();
     for (const auto& [sensor, counts] : outcomes_)
         for (std::size_t i = 0; i < counts.size(); ++i)
-            sensors[sensor][std::string(kSightingOutcomes[i])] = counts[i];
+            sensors[sensor][std::string(kMeasurementOutcomes[i])] = counts[i];
     const nlohmann::json document{
         {"version", version},
         {"cycles", c.cycles},
@@ -122,7 +122,7 @@ Status NavigationLog::finish(const NodeCounts& c, std::uint64_t restarts, const 
     std::ofstream file(folder_ + "/navigation.json");
     file << document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
     if (!file.flush()) return Error{"cannot be written", folder_ + "/navigation.json"};
-    if (!cycles_.flush() || !sightings_.flush()) return Error{"cannot be written", folder_ + "/navigation.csv"};
+    if (!cycles_.flush() || !measurements_.flush()) return Error{"cannot be written", folder_ + "/navigation.csv"};
     return pictures_written_;
 }
 

@@ -1,5 +1,5 @@
 /// rehearsal/navigation/navigation_log.h - what the navigation leaves behind: navigation.csv (a line for each
-/// cycle), sightings.csv (one for each frame and sweep), pictures of what the cameras saw as holds began and at
+/// cycle), measurements.csv (one for each frame and sweep), pictures of what the cameras saw as holds began and at
 /// last before contact, navigation.json (counts). Frames may come from another thread than the rest.
 #pragma once
 
@@ -44,10 +44,10 @@ private:
     };
     std::string folder_;
     std::vector<std::string> legs_;
-    std::ofstream cycles_, sightings_;
+    std::ofstream cycles_, measurements_;
     std::mutex mutex_;  ///< of what was seen
     std::map<std::string, Seen> seen_;
-    std::map<std::string, std::array<std::uint64_t, kSightingOutcomes.size()>> outcomes_;
+    std::map<std::string, std::array<std::uint64_t, kMeasurementOutcomes.size()>> outcomes_;
     GuidancePhase phase_ = GuidancePhase::moving;
     AbortReason abort_ = AbortReason::none;
     Status pictures_written_{Ok{}};

@@ -9,8 +9,8 @@ Status navigate(const Scenario& scenario, const NodeOptions& options, const Stop
                 const std::function<void()>& ready) {
     auto autopilot = Autopilot::create(scenario, options.seed);
     if (!autopilot) return autopilot.error();
-    auto wires = open_sensor_wires(scenario, (*autopilot)->model(), options.video, options.lidar);
-    if (!wires) return wires.error();
+    auto inputs = open_sensor_inputs(scenario, (*autopilot)->model(), options.video, options.lidar);
+    if (!inputs) return inputs.error();
     std::unique_ptr<NavigationLog> log;
     if (!options.log.empty()) {
         auto made = NavigationLog::create(options.log, scenario);
@@ -23,13 +23,13 @@ Status navigate(const Scenario& scenario, const NodeOptions& options, const Stop
     ready();
 
     NodeCounts counts;
-    const Loop loop{**autopilot, *wires, link, log.get(), stop, counts};
+    const Loop loop{**autopilot, *inputs, link, log.get(), stop, counts};
     Status flown = options.lockstep ? fly_in_lockstep(loop) : fly_in_real_time(loop);
     counts.bad_messages = link.bad_messages();
     counts.send_drops = link.counters().send_drops;
-    for (const LidarWire& wire : wires->lidars) {
-        counts.packets += wire.buffer.received();
-        counts.packets_bad += wire.buffer.bad();
+    for (const LidarInput& input : inputs->lidars) {
+        counts.packets += input.buffer.received();
+        counts.packets_bad += input.buffer.bad();
     }
     if (log)
         if (auto written = log->finish(counts, (*autopilot)->restarts(), options.version); !written && flown)

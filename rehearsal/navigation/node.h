@@ -1,8 +1,8 @@
 /// rehearsal/navigation/node.h - the navigation on its wires: frames and packets in, CAN both ways.
 ///
 /// In lockstep each cycle waits for the emulator's clock and for every frame and packet that falls due; nothing
-/// depends on wall time. In real time the cycle runs on the emulator's clock whatever the sightings do, which have
-/// a thread of their own and take the newest frame and turn there is.
+/// depends on wall time. In real time the cycle runs on the emulator's clock whatever the measurements do, which
+/// have a thread of their own and take the newest frame and turn there is.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 #include "base/stop.h"
 #include "rehearsal/navigation/navigation_log.h"
-#include "rehearsal/navigation/sensor_wires.h"
+#include "rehearsal/navigation/sensor_inputs.h"
 
 namespace narpa::rehearsal {
 

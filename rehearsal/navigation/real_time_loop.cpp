@@ -7,7 +7,7 @@
 
 #include "drivers/can/descriptor.h"
 #include "estimator/features/feature_matcher.h"
-#include "rehearsal/navigation/intake.h"
+#include "rehearsal/navigation/sensor_receiver.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -22,7 +22,7 @@ class RealTimeLoop {
 public:
     explicit RealTimeLoop(const Loop& loop)
         : loop_(loop),
-          intake_(loop.wires, loop.autopilot.model()),
+          receiver_(loop.inputs, loop.autopilot.model()),
           period_ns_(loop.autopilot.scenario().period_ns()) {}
 
     Status fly() {
@@ -37,7 +37,7 @@ public:
         }
         changed_.notify_all();
         looking.join();
-        loop_.counts.frames = intake_.frames();
+        loop_.counts.frames = receiver_.frames();
         return flown;
     }
 
@@ -46,7 +46,7 @@ private:
         const std::int64_t heard_ns = loop_.link.clock().newest().t_ns;
         loop_.link.listen(timeout_ns);
         if (loop_.link.clock().newest().t_ns != heard_ns) t_heard_ns_ = monotonic_ns();
-        intake_.hear(loop_.link.take_notices(), loop_.link.clock().now_ns() - monotonic_ns());
+        receiver_.hear(loop_.link.take_notices(), loop_.link.clock().now_ns() - monotonic_ns());
     }
 
     Status wait_for_the_start() {
@@ -108,7 +108,7 @@ private:
         return attitude.t_ns;
     }
 
-    /// The thread of the sightings.
+    /// The thread of the measurements.
     void look() {
         const OnePictureThread pictures;
         tbb::task_arena arena;
@@ -129,25 +129,25 @@ private:
     }
 
     void look_at(std::int64_t t_ns) {
-        for (std::size_t i = 0; i < loop_.wires.lidars.size(); ++i) {
-            if (!intake_.turn(i, t_ns, points_)) ++loop_.counts.turns_incomplete;
+        for (std::size_t i = 0; i < loop_.inputs.lidars.size(); ++i) {
+            if (!receiver_.turn(i, t_ns, points_)) ++loop_.counts.turns_incomplete;
             if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
         }
-        for (std::size_t i = 0; i < loop_.wires.cameras.size(); ++i) {
-            const auto frame = intake_.newest_frame(i, t_ns);
+        for (std::size_t i = 0; i < loop_.inputs.cameras.size(); ++i) {
+            const auto frame = receiver_.newest_frame(i, t_ns);
             if (!frame) {
                 ++loop_.counts.frames_missing;
                 continue;
             }
             if (loop_.log)
-                loop_.log->frame(loop_.autopilot.model().scene().cameras[loop_.wires.cameras[i].camera],
+                loop_.log->frame(loop_.autopilot.model().scene().cameras[loop_.inputs.cameras[i].camera],
                                  frame->bytes);
             loop_.autopilot.take_frame(i, frame->t_mid_ns, frame->bytes);
         }
     }
 
     const Loop& loop_;
-    Intake intake_;
+    SensorReceiver receiver_;
     std::int64_t period_ns_, t_start_ns_ = 0, t_heard_ns_ = 0;
     std::mutex mutex_;
     std::condition_variable changed_;

@@ -59,8 +59,9 @@ Matrix12 first_covariance(const Scenario& s, const RelativeMotion& motion) {
 
 }  // namespace
 
-PoseMeasurement about_masses(const TargetSighting& s, const Vec3& chaser_centre_m, const Vec3& target_centre_m,
-                             const Quat& q_frame_chaser, double attitude_sigma_rad) {
+PoseMeasurement at_centres_of_mass(const TargetMeasurement& s, const Vec3& chaser_centre_m,
+                                   const Vec3& target_centre_m, const Quat& q_frame_chaser,
+                                   double attitude_sigma_rad) {
     const Rigid3 T_target_mass{{}, target_centre_m};
     PoseMeasurement m;
     m.t_ns = s.t_ns;
@@ -152,11 +153,11 @@ void StateEstimator::met(std::int64_t t_ns, bool held) {
         filter_ = *std::move(anew);
 }
 
-UpdateResult StateEstimator::take(const TargetSighting& sighting) {
-    if (sighting.t_ns > t_ns()) advance(sighting.t_ns);
-    const PoseMeasurement m =
-        about_masses(sighting, scenario_.chaser.centre_of_mass_m, scenario_.target.centre_of_mass_m,
-                     q_frame_chaser(sighting.t_ns), kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
+UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
+    if (measurement.t_ns > t_ns()) advance(measurement.t_ns);
+    const PoseMeasurement m = at_centres_of_mass(
+        measurement, scenario_.chaser.centre_of_mass_m, scenario_.target.centre_of_mass_m,
+        q_frame_chaser(measurement.t_ns), kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
     UpdateResult result = filter_.update(m);
     if (result.outcome == UpdateOutcome::gated && filter_.counts().gated_in_a_row >= kContradictions) {
         auto anew = PoseFilter::create(filter_settings(scenario_), m, kAnewVelocity_m_s, kAnewRate_rad_s);
@@ -166,7 +167,7 @@ UpdateResult StateEstimator::take(const TargetSighting& sighting) {
             result = {UpdateOutcome::taken, 0, ""};
         }
     }
-    if (result.outcome == UpdateOutcome::taken) taken_ns_ = std::max(taken_ns_, sighting.t_ns);
+    if (result.outcome == UpdateOutcome::taken) taken_ns_ = std::max(taken_ns_, measurement.t_ns);
     return result;
 }
 

@@ -12,7 +12,7 @@
 namespace narpa::rehearsal {
 
 /// A sensor's word: the target's body axes from the sensor's, errors as in estimator/pose/pose_estimate.h.
-struct TargetSighting {
+struct TargetMeasurement {
     std::int64_t t_ns = 0;
     Rigid3 T_sensor_target{};
     Matrix6 covariance = Matrix6::Zero();
@@ -28,9 +28,9 @@ struct TargetEstimate {
 /// About the centres of mass: the target's point is shifted, and its rotation's error shifts it (t' = t + R c, so
 /// dt' = dt + dr x R c). The star tracker's error, `attitude_sigma_rad` on each axis, is added: it turns the target
 /// about the chaser.
-[[nodiscard]] PoseMeasurement about_masses(const TargetSighting& sighting, const Vec3& chaser_centre_m,
-                                           const Vec3& target_centre_m, const Quat& q_frame_chaser,
-                                           double attitude_sigma_rad);
+[[nodiscard]] PoseMeasurement at_centres_of_mass(const TargetMeasurement& measurement, const Vec3& chaser_centre_m,
+                                                 const Vec3& target_centre_m, const Quat& q_frame_chaser,
+                                                 double attitude_sigma_rad);
 
 class StateEstimator {
 public:
@@ -45,14 +45,14 @@ public:
     void thrust(std::int64_t t_ns, const Vec3& impulse_n_s);
     /// Late ones are set in at their own time. So many in a row that contradict the filter are right, and it is
     /// wrong: it begins anew from the last of them.
-    UpdateResult take(const TargetSighting& sighting);
+    UpdateResult take(const TargetMeasurement& measurement);
     /// The ports met shortly before t_ns: velocities are not what they were. `held`: the docking system holds, the
     /// ports' origins lie in one plane and rest against each other; otherwise they part, at an unknown speed.
     void met(std::int64_t t_ns, bool held);
     /// Moves on.
     void advance(std::int64_t t_ns);
 
-    /// At the time that it was moved on to, or of the newest sighting where that is later.
+    /// At the time that it was moved on to, or of the newest measurement where that is later.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return filter_.t_ns(); }
     [[nodiscard]] RelativeMotion motion() const;
     [[nodiscard]] AttitudeTrack::At attitude(std::int64_t t_ns) const noexcept { return attitude_.at(t_ns); }
@@ -66,7 +66,7 @@ public:
     }
 
     [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
-    /// When a sighting was taken last; the start before there was one.
+    /// When a measurement was taken last; the start before there was one.
     [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
 
 private:

@@ -47,9 +47,9 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
         if (seen(1e-9 * static_cast<double>(t_ns))) {
             Vector6 error;
             for (int i = 0; i < 6; ++i) error[i] = sigma[i] * normal(random);
-            Sighting sighting;
-            sighting.pose = {t_ns, displaced(T_chaser_target, error), sigma.cwiseAbs2().asDiagonal(), {}};
-            (*autopilot)->take("noise", t_ns, sighting);
+            MeasurementResult measurement;
+            measurement.pose = {t_ns, displaced(T_chaser_target, error), sigma.cwiseAbs2().asDiagonal(), {}};
+            (*autopilot)->take("noise", t_ns, measurement);
         }
         flight.cycles.push_back((*autopilot)->cycle(t_ns));
         const NavigationEstimate& e = flight.cycles.back().estimate;

@@ -13,7 +13,7 @@
 #include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
-#include "tests/rehearsal/navigation_stage.h"
+#include "tests/rehearsal/simulated_sensors.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
@@ -44,7 +44,7 @@ struct Heard {
 
 Heard fly(const std::string& folder, std::int64_t cycles) {
     const Scenario s = docking();
-    auto model = SightModel::create(s);
+    auto model = SceneModel::create(s);
     EXPECT_TRUE(model);
     const Camera& camera = (*model)->scene().cameras[0];
     const std::string fifo = folder + "/nav.y4m";

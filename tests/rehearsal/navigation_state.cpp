@@ -6,7 +6,7 @@
 #include <random>
 
 #include "rehearsal/navigation/state_estimator.h"
-#include "rehearsal/navigation/turn_buffer.h"
+#include "rehearsal/navigation/sweep_buffer.h"
 #include "tests/rehearsal/navigation_plant.h"
 
 namespace narpa::rehearsal {
@@ -25,8 +25,8 @@ AttitudeReport attitude(const test::Plant& plant) {
     return {0, std::llround(1e9 * plant.t_s), plant.motion.q_world_chaser, plant.motion.chaser_rate_rad_s};
 }
 
-/// Draws a sighting's error and a star tracker's, and looks at where the masses come out.
-TEST(AboutMasses, TheCovarianceIsThatOfTheDraws) {
+/// Draws a measurement's error and a star tracker's, and looks at where the masses come out.
+TEST(CentresOfMass, TheCovarianceIsThatOfTheDraws) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     const Vec3 chaser_centre{-3, 0.2, 0.1}, target_centre{-12, 1, 0.5};
@@ -36,8 +36,8 @@ TEST(AboutMasses, TheCovarianceIsThatOfTheDraws) {
     Vector6 sigma;
     sigma << 1e-3, 2e-3, 5e-4, 0.01, 0.02, 0.05;
     constexpr double kStar = 1e-3;
-    TargetSighting sighting{0, T_sensor_target, sigma.cwiseAbs2().asDiagonal(), T_chaser_sensor};
-    const PoseMeasurement m = about_masses(sighting, chaser_centre, target_centre, q_frame_chaser, kStar);
+    TargetMeasurement measurement{0, T_sensor_target, sigma.cwiseAbs2().asDiagonal(), T_chaser_sensor};
+    const PoseMeasurement m = at_centres_of_mass(measurement, chaser_centre, target_centre, q_frame_chaser, kStar);
     // Where the filter has the target's mass: in frame axes, by the attitude it believes.
     const auto masses = [&](const Rigid3& T, const Vec3& star) {
         const Rigid3 seen = T_chaser_sensor * T * Rigid3{{}, target_centre};
@@ -130,7 +130,7 @@ TEST(StateEstimator, TellsTheMotionOfASweep) {
 
 TEST(StateEstimator, BelievesWhatContradictsItOftenEnough) {
     Estimated e;
-    TargetSighting seen;
+    TargetMeasurement seen;
     Rigid3 T = chaser_target(e.plant);
     T.t.y += 8;
     seen.T_sensor_target = T;
@@ -159,7 +159,7 @@ TEST(StateEstimator, DoesNotKnowHowFastItBounced) {
     EXPECT_NEAR(port.velocity_m_s.x, 0, 1e-9);
     EXPECT_NEAR(port.velocity_m_s.y, 0.01, 1e-3);
     // Seen for two seconds where a bounce of half its speed takes it: that contradicts nothing, and is believed.
-    TargetSighting seen;
+    TargetMeasurement seen;
     seen.T_sensor_target = e.estimator->estimate().T_chaser_target;
     seen.covariance = 1e-6 * Matrix6::Identity();
     for (const int second : {1, 2}) {
@@ -194,11 +194,11 @@ std::vector<std::uint8_t> packet(std::int64_t number, std::int64_t epoch_unix_ns
     return bytes;
 }
 
-TEST(TurnBuffer, HasTheLastTurnEvenAcrossTheHour) {
+TEST(SweepBuffer, HasTheLastTurnEvenAcrossTheHour) {
     Lidar lidar;
     lidar.rate_hz = 10;
     const std::int64_t epoch = 1'772'366'399'500'000'000;  // half a second before the hour
-    TurnBuffer buffer(lidar, epoch);
+    SweepBuffer buffer(lidar, epoch);
     const std::int64_t t_ns = 1'000'000'000, last = t_ns / vlp16::kPacketPeriodNs - 1;
     EXPECT_FALSE(buffer.complete_to(t_ns));
     for (std::int64_t p = 0; p < last; ++p) ASSERT_TRUE(buffer.take(packet(p, epoch), t_ns));
@@ -216,8 +216,8 @@ TEST(TurnBuffer, HasTheLastTurnEvenAcrossTheHour) {
     EXPECT_GT(points.back().t_s, -0.003);
 }
 
-TEST(TurnBuffer, CountsWhatIsNoPacket) {
-    TurnBuffer buffer(Lidar{}, 0);
+TEST(SweepBuffer, CountsWhatIsNoPacket) {
+    SweepBuffer buffer(Lidar{}, 0);
     const std::vector<std::uint8_t> noise(vlp16::kDataPacketBytes, 0x5a), empty;
     EXPECT_FALSE(buffer.take(noise, 0));
     EXPECT_FALSE(buffer.take(empty, 0));

@@ -1,0 +1,66 @@
+/// rehearsal/navigation/measurements.h - from what a sensor put out to where the target stands.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/cloud/cloud_icp.h"
+#include "estimator/features/feature_alignment.h"
+#include "rehearsal/navigation/scene_model.h"
+#include "rehearsal/navigation/state_estimator.h"
+
+namespace narpa::rehearsal {
+
+/// Nothing, and why, where the sensor told no pose that can be trusted.
+struct MeasurementResult {
+    std::optional<TargetMeasurement> pose;
+    std::string why;
+    int points = 0;  ///< matches that agree, or beams that were used
+    double ms = 0;   ///< wall time that it took
+};
+
+/// Frames of one camera: the model is rendered where the target should be, and its points are found in the frame.
+class CameraPoseEstimator {
+public:
+    /// `model` outlives it. `camera`: index in the scene.
+    CameraPoseEstimator(SceneModel& model, std::size_t camera, std::uint64_t seed);
+
+    [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
+    /// `bytes`: in the camera's format. `t_ns`: mid-exposure, t_s after the scenario's time 0. `T_chaser_target`:
+    /// where the target should be, body axes. Runs on the calling thread's TBB arena.
+    [[nodiscard]] MeasurementResult look(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
+                                         const Quat& q_world_chaser, const Rigid3& T_chaser_target);
+
+private:
+    SceneModel& model_;
+    Camera camera_;
+    FeatureAlignment alignment_;
+};
+
+/// Sweeps of one LiDAR: the last turn's returns, moved to the time of its end.
+class LidarPoseEstimator {
+public:
+    /// `model` outlives it. `lidar`: index in the scene. Errors: ICP's.
+    static Result<LidarPoseEstimator> create(SceneModel& model, std::size_t lidar);
+
+    [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
+    /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
+    /// `position_sigma_m`, `rotation_sigma_rad`: how far off `T_chaser_target` may be.
+    [[nodiscard]] MeasurementResult look(std::span<const RangePoint> points, std::int64_t t_ns,
+                                         const SweepMotion& motion, const Rigid3& T_chaser_target,
+                                         double position_sigma_m, double rotation_sigma_rad);
+
+private:
+    LidarPoseEstimator(SceneModel& model, std::size_t lidar, CloudIcp icp)
+        : model_(&model), lidar_(model.scene().lidars[lidar]), icp_(std::move(icp)) {}
+    void leave_out_own_body(std::span<const RangePoint> points);
+
+    SceneModel* model_;
+    Lidar lidar_;
+    CloudIcp icp_;
+    std::vector<RangePoint> points_;
+};
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,46 @@
+/// rehearsal/navigation/scene_model.h - what the navigation knows of what its sensors see: the scene, with the
+/// target where it believes it to be.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "base/result.h"
+#include "rehearsal/scenario/scenario.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa::rehearsal {
+
+class SceneModel {
+public:
+    /// Reads the scenario's scene and makes it ready for rays. Errors: of the scene; a body or a sensor that it
+    /// does not have; a sensor that does not ride on the chaser.
+    static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
+
+    [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
+    [[nodiscard]] const Tracer& tracer() const noexcept { return *tracer_; }
+    [[nodiscard]] std::size_t target() const noexcept { return target_; }
+    [[nodiscard]] std::size_t chaser() const noexcept { return chaser_; }
+    /// Of the scene, those that the scenario navigates by, in its order.
+    [[nodiscard]] const std::vector<std::size_t>& cameras() const noexcept { return cameras_; }
+    [[nodiscard]] const std::vector<std::size_t>& lidars() const noexcept { return lidars_; }
+
+    /// Where everything is at t_s: the target's centre of mass at the world's origin, the attractor below it along
+    /// its orbit, the chaser beside it (`T_target_chaser`: body axes of both); what else there is, as the scene has
+    /// it at time 0.
+    [[nodiscard]] const BodyPoses& place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser);
+
+private:
+    SceneModel() : at_(0) {}
+
+    Scene scene_;
+    std::optional<Tracer> tracer_;
+    Orbit orbit_;
+    Vec3 target_centre_of_mass_m_{};
+    std::size_t target_ = 0, chaser_ = 0;
+    std::optional<std::size_t> attractor_;
+    std::vector<std::size_t> cameras_, lidars_;
+    BodyPoses at_;
+};
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,134 @@
+#include "rehearsal/runner/campaign.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "rehearsal/runner/child_process.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+json read_json(const std::string& file) {
+    json document = json::parse(read_text(file), nullptr, false);
+    return document.is_discarded() ? json(nullptr) : document;
+}
+
+std::string run_folder(std::size_t run) {
+    return fmt::format("runs/{:04}", run);
+}
+
+ChildProcess::Command command_for(const CampaignOptions& o, const std::string& folder, std::uint64_t seed) {
+    const RehearsalOptions& r = o.run;
+    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const int threads = r.threads > 0 ? r.threads : std::max(1, cores / o.jobs);
+    ChildProcess::Command c;
+    c.name = "the rehearsal";
+    c.line = {(r.programs.empty() ? program_folder() : r.programs) + "/narpa",
+              "rehearse",
+              r.scenario,
+              "-o",
+              folder,
+              "--seed",
+              std::to_string(seed),
+              "--threads",
+              std::to_string(threads),
+              "--patience",
+              fmt::format("{:g}", r.patience_s)};
+    c.line.insert(c.line.end(), {"--can", r.bus});
+    for (const auto& [camera, device] : r.video) c.line.insert(c.line.end(), {"--video", camera + "=" + device});
+    if (r.real_time) c.line.emplace_back("--real-time");
+    if (!r.dynamics.empty()) c.line.insert(c.line.end(), {"--dynamics", r.dynamics});
+    if (!r.navigation.empty()) c.line.insert(c.line.end(), {"--navigation", r.navigation});
+    c.out = c.err = folder + ".log";
+    return c;
+}
+
+struct Running {
+    std::size_t run;
+    ChildProcess child;
+    std::string log;
+};
+
+}  // namespace
+
+bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed) {
+    const json result = read_json(folder + "/result.json");
+    return result.is_object() && result.value("scenario_hash", "") == scenario_hash &&
+           result.value("seed", std::uint64_t{0}) == seed && result.value("trouble", "") != "interrupted";
+}
+
+Result<json> run_campaign(const CampaignOptions& o, const Console& console, const StopFlag& stop) {
+    if (o.jobs > 1 && (o.run.bus != "slcan:0" || !o.run.video.empty()))
+        return Error{
+            fmt::format("--jobs {}: runs at the same time cannot share a bus or a device, expected --jobs 1 "
+                        "with --can or --video",
+                        o.jobs)};
+    if (o.run.dynamics == "none" || o.run.navigation == "none")
+        return Error{
+            "many runs with a program \"none\" that you start: expected a command that starts it for each run"};
+    const auto scenario = read_scenario(o.run.scenario);
+    if (!scenario) return scenario.error();
+    const auto texts = scenario_texts(scenario->file, scenario->scene);
+    if (!texts) return texts.error();
+    if (Status good = claim_folder(o.run.folder, "runs"); !good) return good.error();
+    std::error_code failed;
+    fs::create_directories(o.run.folder + "/runs", failed);
+    const std::uint64_t first_seed = o.run.seed.value_or(scenario->seed);
+    std::vector<RunResult> runs;
+    for (std::size_t k = 1; k <= o.runs; ++k) runs.push_back({k, first_seed + k - 1, run_folder(k), nullptr});
+
+    const auto folder_of = [&](const RunResult& r) { return o.run.folder + "/" + r.folder; };
+    std::size_t next = 0, done = 0;
+    std::vector<Running> running;
+    while ((next < runs.size() && !stop) || !running.empty()) {
+        while (next < runs.size() && running.size() < static_cast<std::size_t>(o.jobs) && !stop) {
+            const RunResult& r = runs[next++];
+            if (is_done(folder_of(r), texts->hash, r.seed)) {
+                ++done;
+                continue;
+            }
+            fs::remove(folder_of(r) + ".log", failed);
+            const ChildProcess::Command command = command_for(o, folder_of(r), r.seed);
+            auto child = ChildProcess::start(command);
+            if (!child) return child.error();
+            running.push_back({r.run, std::move(*child), command.err});
+        }
+        std::erase_if(running, [&](Running& r) {
+            const auto status = r.child.status();
+            if (!status) return false;
+            ++done;
+            if (*status != 0)
+                console.say(fmt::format(
+                    "run {} failed: {}", r.run,
+                    read_json(folder_of(runs[r.run - 1]) + "/result.json").value("headline", last_line(r.log))));
+            return true;
+        });
+        console.progress(fmt::format("{} of {} runs", done, runs.size()));
+        if (stop)
+            for (Running& r : running) r.child.terminate();
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    console.progress("");
+
+    for (RunResult& r : runs)
+        if (is_done(folder_of(r), texts->hash, r.seed)) r.result = read_json(folder_of(r) + "/result.json");
+    json summary = summarise(*scenario, runs);
+    summary["scenario_hash"] = texts->hash;
+    summary["version"] = o.run.version;
+    const std::string page = o.run.folder + "/index.html";
+    if (Status good = write_text(page, campaign_page(*scenario, summary, runs)); !good) return good.error();
+    if (Status good = write_junit(o.run.folder + "/junit.xml", campaign_junit(scenario->name, runs)); !good)
+        return good.error();
+    if (Status good = write_text(o.run.folder + "/summary.json", summary.dump(2) + "\n"); !good)
+        return good.error();
+    return summary;
+}
+
+}  // namespace narpa::rehearsal

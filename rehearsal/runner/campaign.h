@@ -1,0 +1,42 @@
+/// rehearsal/runner/campaign.h - many runs of one scenario over its dispersions, and what they come to.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/stop.h"
+#include "rehearsal/runner/rehearsal.h"
+
+namespace narpa::rehearsal {
+
+struct CampaignOptions {
+    RehearsalOptions run;    ///< of each; seed: of run 1, run k has that + k - 1
+    std::size_t runs = 100;  ///< each in FOLDER/runs/0001 ...
+    int jobs = 1;            ///< at the same time
+};
+
+/// Starts `narpa rehearse` for each run that has no result of this scenario and seed yet, and summarises all:
+/// summary.json, junit.xml, index.html in the folder. The document is that of summary.json.
+Result<nlohmann::json> run_campaign(const CampaignOptions& options, const Console& console, const StopFlag& stop);
+
+/// What is known of one run.
+struct RunResult {
+    std::size_t run = 0;
+    std::uint64_t seed = 0;
+    std::string folder;     ///< within the campaign's
+    nlohmann::json result;  ///< as in its result.json; null: it has none
+};
+/// True where a run's folder has a result of this scenario and seed.
+[[nodiscard]] bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed);
+
+/// Success rate with its interval, failures by gate and reason, contact conditions, navigation.
+[[nodiscard]] nlohmann::json summarise(const Scenario& scenario, const std::vector<RunResult>& runs);
+[[nodiscard]] std::string campaign_page(const Scenario& scenario, const nlohmann::json& summary,
+                                        const std::vector<RunResult>& runs);
+/// A test case for each run, by its first failed gate.
+[[nodiscard]] std::string campaign_junit(const std::string& suite, const std::vector<RunResult>& runs);
+
+}  // namespace narpa::rehearsal

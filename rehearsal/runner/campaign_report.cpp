@@ -1,0 +1,243 @@
+// What many runs come to, as numbers, test cases and a page.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "rehearsal/judge/statistics.h"
+#include "rehearsal/runner/campaign.h"
+#include "rehearsal/runner/chart.h"
+#include "rehearsal/runner/report_page.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+using nlohmann::json;
+
+/// The gate that a run failed at first; the trouble or the lack of a result where there is none.
+std::pair<std::string, std::string> cause(const RunResult& run) {
+    if (!run.result.is_object()) return {"no result", fmt::format("see {}.log", run.folder)};
+    if (const std::string trouble = run.result.value("trouble", ""); !trouble.empty()) return {"trouble", trouble};
+    std::pair<std::string, std::string> first{"", run.result.value("headline", "")};
+    double t_first = 1e300;
+    for (const json& g : run.result.value("gates", json::array())) {
+        if (g.value("state", "") != "failed") continue;
+        const double t =
+            g.contains("t_first_s") && g["t_first_s"].is_number() ? g["t_first_s"].get<double>() : 1e299;
+        if (t < t_first) t_first = t, first = {g.value("name", ""), g.value("reason", "")};
+    }
+    return first;
+}
+
+bool passed(const RunResult& run) {
+    return run.result.is_object() && run.result.value("passed", false);
+}
+
+/// A value of each contact condition over the runs, in the order of the standard's table.
+struct Condition {
+    std::string name, title, unit;
+    double min = 0, max = 0;
+    std::vector<double> values;
+};
+std::vector<Condition> conditions_over(const std::vector<RunResult>& runs) {
+    std::vector<Condition> all;
+    for (const RunResult& run : runs) {
+        if (!run.result.is_object() || !run.result["contact"].is_object()) continue;
+        const json& conditions = run.result["contact"]["conditions"];
+        if (all.empty())
+            for (const json& c : conditions)
+                all.push_back({c["name"], c["title"], c["unit"], c["min"], c["max"], {}});
+        for (std::size_t i = 0; i < all.size() && i < conditions.size(); ++i)
+            all[i].values.push_back(conditions[i]["value"]);
+    }
+    return all;
+}
+
+}  // namespace
+
+json summarise(const Scenario& scenario, const std::vector<RunResult>& runs) {
+    std::size_t good = 0, known = 0;
+    std::map<std::string, json> failures;
+    std::vector<double> nees, position, attitude, duration;
+    json each = json::array();
+    for (const RunResult& run : runs) {
+        if (run.result.is_null()) continue;
+        ++known;
+        good += passed(run);
+        each.push_back({{"run", run.run}, {"seed", run.seed}, {"folder", run.folder}, {"passed", passed(run)}});
+        if (!passed(run)) {
+            const auto [gate, reason] = cause(run);
+            each.back()["gate"] = gate;
+            each.back()["reason"] = reason;
+            failures[gate].push_back(
+                {{"run", run.run}, {"seed", run.seed}, {"folder", run.folder}, {"reason", reason}});
+        }
+        const json& n = run.result["navigation"];
+        if (n.value("estimates", 0) == 0) continue;
+        nees.push_back(n["nees"]);
+        position.push_back(n["position_m"]["max"]);
+        attitude.push_back(n["attitude_deg"]["max"]);
+        duration.push_back(run.result["t_end_s"]);
+    }
+    json contact = json::array();
+    for (const Condition& c : conditions_over(runs)) {
+        json d = to_json(distribution(c.values));
+        d.update(
+            {{"name", c.name}, {"title", c.title}, {"unit", c.unit}, {"asked_min", c.min}, {"asked_max", c.max}});
+        contact.push_back(d);
+    }
+    const auto [low, high] = known > 0 ? success_interval(good, known) : std::pair{0.0, 1.0};
+    return {{"passed", known == runs.size() && good == known},
+            {"scenario", scenario.name},
+            {"runs", runs.size()},
+            {"judged", known},
+            {"succeeded", good},
+            {"success_rate", known > 0 ? static_cast<double>(good) / static_cast<double>(known) : 0.0},
+            {"success_interval_95", {low, high}},
+            {"failures", failures},
+            {"contact", contact},
+            {"navigation",
+             {{"nees", to_json(distribution(nees))},
+              {"largest_position_error_m", to_json(distribution(position))},
+              {"largest_attitude_error_deg", to_json(distribution(attitude))}}},
+            {"duration_s", to_json(distribution(duration))},
+            {"each", each}};
+}
+
+std::string campaign_junit(const std::string& suite, const std::vector<RunResult>& runs) {
+    std::size_t failed = 0, missing = 0;
+    for (const RunResult& run : runs)
+        failed += !passed(run) && !run.result.is_null(), missing += run.result.is_null();
+    std::string out =
+        fmt::format("  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\">\n",
+                    escape(suite), runs.size(), failed, missing);
+    for (const RunResult& run : runs) {
+        out +=
+            fmt::format("    <testcase classname=\"{}\" name=\"run {} seed {}\"", escape(suite), run.run, run.seed);
+        if (run.result.is_null()) {
+            out += "><skipped message=\"it has no result\"/></testcase>\n";
+        } else if (passed(run)) {
+            out += "/>\n";
+        } else {
+            const auto [gate, reason] = cause(run);
+            out += fmt::format("><failure type=\"{}\" message=\"{}\">{}</failure></testcase>\n", escape(gate),
+                               escape(reason), escape(run.folder));
+        }
+    }
+    return out + "  </testsuite>\n";
+}
+
+// --- The page ---------------------------------------------------------------------------------------------------
+
+namespace {
+
+std::string contact_plots(const std::vector<RunResult>& runs) {
+    Points where[2], rates[2], angles[2];  // within, beyond
+    double lateral = 0.1, closing_min = 0.05, closing_max = 0.1, lateral_rate = 0.04, pitch = 4, roll = 4;
+    for (const RunResult& run : runs) {
+        if (!run.result.is_object() || !run.result["contact"].is_object()) continue;
+        const json& c = run.result["contact"];
+        const auto value = [&](std::size_t i) { return c["conditions"][i]["value"].get<double>(); };
+        const auto limit = [&](std::size_t i) { return c["conditions"][i]["max"].get<double>(); };
+        bool within = true;
+        for (const json& k : c["conditions"]) within &= k["within"].get<bool>();
+        const int i = within ? 0 : 1;
+        where[i].emplace_back(c["position_m"][1].get<double>() * 100, c["position_m"][2].get<double>() * 100);
+        rates[i].emplace_back(value(0) * 100, value(1) * 100);
+        angles[i].emplace_back(value(3), value(4));
+        closing_min = c["conditions"][0]["min"], closing_max = limit(0), lateral_rate = limit(1),
+        lateral = limit(2);
+        pitch = limit(3), roll = limit(4);
+    }
+    Chart a("Where the ports met", "y [cm]", "z [cm]", 360, 350),
+        b("Rates", "closing [cm/s]", "lateral [cm/s]", 360, 350),
+        c("Angles", "pitch and yaw [deg]", "roll [deg]", 360, 350);
+    a.equal_scales();
+    a.range_x(-130 * lateral, 130 * lateral);
+    a.range_y(-130 * lateral, 130 * lateral);
+    a.circle(0, 0, lateral * 100, kGreen, "asked");
+    b.range_x(0, closing_max * 140);
+    b.range_y(0, lateral_rate * 140);
+    b.area({{closing_min * 100, 0},
+            {closing_max * 100, 0},
+            {closing_max * 100, lateral_rate * 100},
+            {closing_min * 100, lateral_rate * 100}},
+           kGreen, "asked");
+    c.range_x(0, pitch * 1.3);
+    c.range_y(0, roll * 1.3);
+    c.area({{0, 0}, {pitch, 0}, {pitch, roll}, {0, roll}}, kGreen, "asked");
+    const auto put = [](Chart& chart, const Points(&points)[2]) {
+        chart.dots(points[0], kBlue, 2.4, "within");
+        if (!points[1].empty()) chart.dots(points[1], kVermilion, 2.8, "beyond");
+    };
+    put(a, where);
+    put(b, rates);
+    put(c, angles);
+    return "<div class=\"charts\">" + a.svg() + b.svg() + c.svg() + "</div>\n";
+}
+
+}  // namespace
+
+std::string campaign_page(const Scenario& scenario, const json& s, const std::vector<RunResult>& runs) {
+    const auto percent = [](const json& v) { return v.get<double>() * 100; };
+    std::string body = fmt::format(
+        "<h1>{}</h1>\n<p class=\"lead\">{} {} of {} runs succeeded: {:.1f} %, with 95 % confidence between {:.1f} "
+        "and "
+        "{:.1f} % (Clopper and Pearson)</p>\n",
+        escape(scenario.title), badge(s["passed"], s["passed"].get<bool>() ? "passed" : "failed"),
+        s["succeeded"].get<int>(), s["judged"].get<int>(), percent(s["success_rate"]),
+        percent(s["success_interval_95"][0]), percent(s["success_interval_95"][1]));
+    if (s["judged"] != s["runs"])
+        body += fmt::format("<p>{} of {} runs have no result yet.</p>\n",
+                            s["runs"].get<int>() - s["judged"].get<int>(), s["runs"].get<int>());
+    if (!s["contact"].empty()) {
+        body += "<h2>Contact</h2>\n" + contact_plots(runs) +
+                "<table><tr><th>condition</th><th class=\"n\">asked</th><th class=\"n\">mean</th><th "
+                "class=\"n\">sigma</th><th class=\"n\">least</th><th class=\"n\">p99</th><th "
+                "class=\"n\">most</th><th></th>"
+                "</tr>\n";
+        for (const json& c : s["contact"])
+            body += fmt::format(
+                "<tr><td>{}</td><td class=\"n\">{:g} to {:g}</td><td class=\"n\">{:.4f}</td><td "
+                "class=\"n\">{:.4f}</td>"
+                "<td class=\"n\">{:.4f}</td><td class=\"n\">{:.4f}</td><td "
+                "class=\"n\">{:.4f}</td><td>{}</td></tr>\n",
+                c["title"].get<std::string>(), c["asked_min"].get<double>(), c["asked_max"].get<double>(),
+                c["mean"].get<double>(), c["sigma"].get<double>(), c["min"].get<double>(), c["p99"].get<double>(),
+                c["max"].get<double>(), c["unit"].get<std::string>());
+        body += "</table>\n";
+    }
+    body +=
+        "<h2>Navigation</h2>\n<table><tr><th>of each run</th><th class=\"n\">mean</th><th class=\"n\">p50</th><th "
+        "class=\"n\">p99</th><th class=\"n\">most</th></tr>\n";
+    const auto row = [&](const char* title, const json& d) {
+        if (d.is_object())
+            body += fmt::format(
+                "<tr><td>{}</td><td class=\"n\">{:.3f}</td><td class=\"n\">{:.3f}</td><td "
+                "class=\"n\">{:.3f}</td><td class=\"n\">{:.3f}</td></tr>\n",
+                title, d["mean"].get<double>(), d["p50"].get<double>(), d["p99"].get<double>(),
+                d["max"].get<double>());
+    };
+    row("squared errors over variances (6 is right)", s["navigation"]["nees"]);
+    row("largest position error [m]", s["navigation"]["largest_position_error_m"]);
+    row("largest attitude error [deg]", s["navigation"]["largest_attitude_error_deg"]);
+    row("time until the end [s]", s["duration_s"]);
+    body += "</table>\n<h2>Failures</h2>\n";
+    if (s["failures"].empty()) body += "<p>None.</p>\n";
+    for (const auto& [gate, list] : s["failures"].items()) {
+        body += fmt::format("<h3>{}: {} runs</h3>\n<table><tr><th>run</th><th>seed</th><th>reason</th></tr>\n",
+                            escape(gate), list.size());
+        for (const json& f : list)
+            body += fmt::format("<tr><td><a href=\"{0}/index.html\">{1}</a></td><td>{2}</td><td>{3}</td></tr>\n",
+                                f["folder"].get<std::string>(), f["run"].get<int>(), f["seed"].get<std::uint64_t>(),
+                                escape(f["reason"].get<std::string>()));
+        body += "</table>\n";
+    }
+    body += "<h2>All runs</h2>\n<p>";
+    for (const json& run : s["each"])
+        body += fmt::format("<a href=\"{}/index.html\">{}{}</a> ", run["folder"].get<std::string>(),
+                            run["run"].get<int>(), run["passed"].get<bool>() ? "" : " (failed)");
+    return page_around(scenario.title, body + "</p>\n");
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,145 @@
+#include "rehearsal/runner/child_process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+namespace narpa::rehearsal {
+namespace {
+
+using namespace std::chrono_literals;
+
+int open_for_output(const std::string& file) {
+    return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+}
+
+/// Between fork and exec: nothing here allocates.
+[[noreturn]] void become(char* const* line, char* const* environment, int in, int out, int err) {
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    ::signal(SIGPIPE, SIG_DFL);
+    ::signal(SIGINT, SIG_DFL);
+    ::signal(SIGTERM, SIG_DFL);
+    ::dup2(in, STDIN_FILENO);
+    ::dup2(out, STDOUT_FILENO);
+    ::dup2(err, STDERR_FILENO);
+    ::execve(line[0], line, environment);
+    ::_exit(127);
+}
+
+std::vector<char*> pointers(const std::vector<std::string>& texts) {
+    std::vector<char*> out;
+    for (const std::string& t : texts) out.push_back(const_cast<char*>(t.c_str()));
+    out.push_back(nullptr);
+    return out;
+}
+
+std::vector<std::string> environment_with(const std::vector<std::pair<std::string, std::string>>& added) {
+    std::vector<std::string> out;
+    for (char** e = environ; *e != nullptr; ++e) {
+        const std::string entry = *e;
+        bool replaced = false;
+        for (const auto& [name, value] : added) replaced |= entry.starts_with(name + "=");
+        if (!replaced) out.push_back(entry);
+    }
+    for (const auto& [name, value] : added) out.push_back(fmt::format("{}={}", name, value));
+    return out;
+}
+
+}  // namespace
+
+std::string ChildProcess::shell_line(const Command& command) {
+    std::string out;
+    for (const auto& [name, value] : command.environment) out += fmt::format("{}='{}' ", name, value);
+    for (const std::string& part : command.line) {
+        const bool plain = !part.empty() && part.find_first_of(" \t\n'\"$&;|<>*?()#~`\\") == std::string::npos;
+        std::string quoted;
+        for (const char c : part) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        out += plain ? part : "'" + quoted + "'";
+        out += ' ';
+    }
+    if (!out.empty()) out.pop_back();
+    return out;
+}
+
+Result<ChildProcess> ChildProcess::start(const Command& command) {
+    const std::vector<std::string> environment = environment_with(command.environment);
+    const std::vector<char*> line = pointers(command.line), variables = pointers(environment);
+    if (::access(line[0], X_OK) != 0)
+        return Error{
+            fmt::format("cannot start {}: {}, expected an executable program", command.name, std::strerror(errno)),
+            command.line[0]};
+    const int in = ::open("/dev/null", O_RDONLY | O_CLOEXEC), out = open_for_output(command.out),
+              err = open_for_output(command.err);
+    const pid_t pid = in < 0 || out < 0 || err < 0 ? -1 : ::fork();
+    if (pid == 0) become(line.data(), variables.data(), in, out, err);
+    const int reason = errno;
+    for (const int fd : {in, out, err})
+        if (fd >= 0) ::close(fd);
+    if (pid < 0)
+        return Error{fmt::format("cannot start {}: {}", command.name, std::strerror(reason)), command.err, 0, 0,
+                     ErrorKind::failed};
+    ::setpgid(pid, pid);  // whoever is first
+    return ChildProcess(pid);
+}
+
+ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
+    end(0);
+    pid_ = std::exchange(other.pid_, -1);
+    status_ = other.status_;
+    return *this;
+}
+
+std::optional<int> ChildProcess::status() {
+    if (pid_ < 0 || status_) return status_;
+    int how = 0;
+    const pid_t ended = ::waitpid(pid_, &how, WNOHANG);
+    if (ended == 0 || (ended < 0 && errno == EINTR)) return std::nullopt;
+    status_ = WIFEXITED(how) ? WEXITSTATUS(how) : 128 + WTERMSIG(how);
+    return status_;
+}
+
+void ChildProcess::terminate() const {
+    if (pid_ > 0 && !status_) ::kill(-pid_, SIGTERM);
+}
+
+void ChildProcess::end(double patience_s) {
+    if (pid_ < 0) return;
+    terminate();
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience_s);
+    while (!status() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(5ms);
+    ::kill(-pid_, SIGKILL);  // what it started and left behind, too
+    while (!status()) std::this_thread::sleep_for(1ms);
+    pid_ = -1;
+}
+
+std::string program_folder() {
+    std::error_code unknown;
+    return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
+}
+
+std::string read_text(const std::string& file) {
+    std::ifstream in(file);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::string last_line(const std::string& file) {
+    const std::string text = read_text(file);
+    const std::size_t end = text.find_last_not_of(" \t\r\n");
+    if (end == std::string::npos) return "";
+    const std::size_t start = text.find_last_of("\r\n", end);
+    return text.substr(start == std::string::npos ? 0 : start + 1, end - (start == std::string::npos ? -1 : start));
+}
+
+}  // namespace narpa::rehearsal

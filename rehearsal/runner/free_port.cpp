@@ -1,0 +1,51 @@
+#include "rehearsal/runner/free_port.h"
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr int kLastDataPort = 65535 - 5940;
+
+/// Bound to any free port; -1: none.
+int bind_any(int fd) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    const bool good = fd >= 0 && ::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+                      ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0;
+    return good ? ntohs(address.sin_port) : -1;
+}
+
+}  // namespace
+
+Result<int> free_lidar_port() {
+    constexpr int kTries = 200;
+    std::vector<int> held;  // ports that are too high stay taken while others are tried
+    int port = 0;
+    for (int k = 0; k < kTries; ++k) {
+        held.push_back(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+        port = bind_any(held.back());
+        if (port <= kLastDataPort) break;
+    }
+    const int reason = errno;
+    for (const int fd : held)
+        if (fd >= 0) ::close(fd);
+    if (port < 0)
+        return Error{fmt::format("no UDP port on the loopback: {}", std::strerror(reason)), "", 0, 0,
+                     ErrorKind::missing};
+    if (port > kLastDataPort)
+        return Error{fmt::format("no free UDP port up to {} on the loopback", kLastDataPort), "", 0, 0,
+                     ErrorKind::missing};
+    return port;
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,100 @@
+// What every page has.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "rehearsal/runner/chart.h"
+#include "rehearsal/runner/report_page.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+constexpr std::string_view kStyle = R"(
+:root{--ink:#1d232b;--soft:#5b6470;--rule:#dfe3e8;--good:#00724f;--bad:#b3430a;--paper:#fff}
+*{box-sizing:border-box}
+body{margin:0;background:#f3f5f7;color:var(--ink);font:15px/1.5 system-ui,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
+main{max-width:1200px;margin:0 auto;padding:28px 32px 60px;background:var(--paper);min-height:100vh}
+h1{font-size:26px;line-height:1.25;margin:0 0 6px;font-weight:650}
+h2{font-size:18px;margin:38px 0 10px;padding-bottom:5px;border-bottom:1px solid var(--rule);font-weight:650}
+p{margin:6px 0;max-width:78ch}.lead{font-size:16px}.soft{color:var(--soft)}
+table{border-collapse:collapse;width:100%;font-size:14px}
+th{text-align:left;color:var(--soft);font-weight:600;border-bottom:1px solid var(--rule);padding:5px 12px 5px 0}
+td{vertical-align:top;border-bottom:1px solid #eef0f3;padding:6px 12px 6px 0}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+.badge{display:inline-block;padding:1px 9px;border-radius:10px;font-size:13px;font-weight:600;color:#fff;white-space:nowrap}
+.good{background:var(--good)}.bad{background:var(--bad)}.none{background:#8a8f98}
+.charts{display:flex;flex-wrap:wrap;gap:14px 16px}
+figure{margin:0}figcaption{font-size:13px;color:var(--soft);max-width:360px}
+svg{display:block;max-width:100%;height:auto;font:11px system-ui,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;fill:#3c444f}
+svg .grid{stroke:#e6e9ed;stroke-width:1;fill:none}svg .title{font-size:13px;font-weight:650;fill:var(--ink)}
+svg .note{font-size:10.5px;fill:#3c444f}
+img{max-width:360px;width:100%;border:1px solid var(--rule);border-radius:3px;display:block}
+code,pre{font:12.5px/1.5 ui-monospace,"DejaVu Sans Mono",monospace}
+pre{background:#f6f8fa;padding:10px 12px;border-radius:4px;white-space:pre-wrap;overflow-wrap:anywhere;margin:6px 0}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:3px 16px;margin:8px 0;font-size:14px}dt{color:var(--soft)}dd{margin:0}
+)";
+
+}  // namespace
+
+std::string page_around(std::string_view title, std::string_view body) {
+    return fmt::format(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" "
+        "content=\"width=device-width, initial-scale=1\"/><title>{}</title><style>{}</style></head>\n"
+        "<body><main>\n{}</main></body></html>\n",
+        escape(title), kStyle, body);
+}
+
+std::string badge(bool good, std::string_view words) {
+    return fmt::format("<span class=\"badge {}\">{}</span>", good ? "good" : "bad", escape(words));
+}
+
+std::string base64(std::string_view bytes) {
+    constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string out;
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        std::uint32_t group = 0;
+        const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
+        for (std::size_t k = 0; k < 3; ++k)
+            group = group << 8 | (k < n ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
+        for (std::size_t k = 0; k < 4; ++k) out += k <= n ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+    }
+    return out;
+}
+
+std::string contact_bars(const std::vector<ContactCondition>& conditions) {
+    std::string out;
+    constexpr double kWidth = 900, kRow = 34, kLeft = 190, kBar = 430;
+    double y = 8;
+    for (const ContactCondition& c : conditions) {
+        // Full scale is a third beyond the limit, or what there is.
+        const double scale = kBar / std::max(c.max * 1.33, c.value * 1.05);
+        const char* colour = c.within() ? kBlue : kVermilion;
+        out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\" style=\"font-size:13px\">{}</text>",
+                           kLeft - 12, y + 15, escape(c.title));
+        out += fmt::format(
+            "<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"18\" fill=\"{}\" fill-opacity=\"0.16\"/>",
+            kLeft + c.min * scale, y + 1, (c.max - c.min) * scale, kGreen);
+        out += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"8\" fill=\"{}\"/>", kLeft, y + 6,
+                           std::max(1.5, c.value * scale), colour);
+        for (const double limit : {c.min, c.max})
+            if (limit > 0)
+                out += fmt::format("<path d=\"M{:.1f},{}v22\" stroke=\"#1d232b\" stroke-width=\"1.5\"/>",
+                                   kLeft + limit * scale, y - 1);
+        const std::string asked =
+            c.min > 0 ? fmt::format("{:g} to {:g}", c.min, c.max) : fmt::format("at most {:g}", c.max);
+        out += fmt::format(
+            "<text x=\"{}\" y=\"{}\" style=\"font-size:13px\"><tspan font-weight=\"650\" "
+            "fill=\"{}\">{:.4g} {}</tspan><tspan dx=\"10\">{} {}</tspan></text>",
+            kLeft + kBar + 16, y + 15, c.within() ? "#1d232b" : kVermilion, c.value, escape(c.unit), asked,
+            c.within() ? "" : "- beyond");
+        y += kRow;
+    }
+    return fmt::format(
+        "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" role=\"img\" aria-label=\"contact conditions\">{2}"
+        "</svg>\n",
+        kWidth, y, out);
+}
+
+}  // namespace narpa::rehearsal

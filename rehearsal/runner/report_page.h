@@ -1,0 +1,25 @@
+/// rehearsal/runner/report_page.h - what a rehearsal has shown, as one HTML page that needs nothing else.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "rehearsal/judge/bus_record.h"
+#include "rehearsal/judge/verdict.h"
+
+namespace narpa::rehearsal {
+
+/// `record` as in rehearsal.json; pictures that stand in FOLDER/navigation and FOLDER/emulator become part of it.
+[[nodiscard]] std::string rehearsal_page(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict,
+                                         const nlohmann::json& record, const std::string& folder);
+
+/// Head with styles and title, and what closes it: for every page.
+[[nodiscard]] std::string page_around(std::string_view title, std::string_view body);
+[[nodiscard]] std::string base64(std::string_view bytes);
+/// "passed", "failed" as a coloured word.
+[[nodiscard]] std::string badge(bool good, std::string_view words);
+/// Each condition as a bar beside its limits.
+[[nodiscard]] std::string contact_bars(const std::vector<ContactCondition>& conditions);
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,170 @@
+#include "rehearsal/runner/rerun.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "protocols/can/candump.h"
+#include "protocols/can/closed_loop.h"
+#include "protocols/can/messages.h"
+#include "rehearsal/runner/child_process.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// Gone with the object.
+class TemporaryFolder {
+public:
+    TemporaryFolder() {
+        std::error_code unknown;
+        std::string pattern = (fs::temp_directory_path(unknown) / "narpa-replay-XXXXXX").string();
+        if (::mkdtemp(pattern.data())) path_ = pattern;
+    }
+    ~TemporaryFolder() {
+        std::error_code ignored;
+        if (!path_.empty()) fs::remove_all(path_, ignored);
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+    [[nodiscard]] const std::string& path() const { return path_; }
+
+private:
+    std::string path_;
+};
+
+bool is_starting(const std::string& line) {
+    CandumpLine parsed;
+    Heartbeat beat;
+    return parse_candump(line, parsed) == nullptr && decode(parsed.frame, 0, beat) == DecodeStatus::complete &&
+           beat.state == RunState::starting;
+}
+
+bool next_line(std::ifstream& file, std::string& line) {
+    while (std::getline(file, line))
+        if (!is_starting(line)) return true;
+    line.clear();
+    return false;
+}
+
+/// Files of both folders that wall time does not enter.
+std::vector<std::string> comparable(const std::string& folder) {
+    std::vector<std::string> files{"emulator/can.log"};
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder + "/emulator", none)) {
+        const std::string name = entry.path().filename().string();
+        if (name.ends_with(".ledger.csv") || name.ends_with(".truth.csv")) files.push_back("emulator/" + name);
+    }
+    for (const char* own : {"dynamics/truth.csv", "navigation/navigation.csv"})
+        if (fs::exists(folder + "/" + own, none)) files.emplace_back(own);
+    std::sort(files.begin() + 1, files.end());
+    return files;
+}
+
+}  // namespace
+
+std::optional<Difference> first_difference(const std::string& is, const std::string& was) {
+    std::ifstream a(is, std::ios::binary), b(was, std::ios::binary);
+    Difference d;
+    for (;;) {
+        ++d.line;
+        const bool more_a = next_line(a, d.is), more_b = next_line(b, d.was);
+        if (!more_a && !more_b) return std::nullopt;
+        if (more_a != more_b || d.is != d.was) return d;
+    }
+}
+
+std::string describe_message(const Scenario& s, const std::string& line) {
+    CandumpLine parsed;
+    if (line.empty()) return "nothing more";
+    if (parse_candump(line, parsed) != nullptr) return line;
+    struct Kind {
+        std::uint32_t base;
+        std::string name;
+    };
+    std::vector<Kind> kinds{
+        {s.target.can_id, "pose of " + s.target.body}, {s.chaser.can_id, "pose of " + s.chaser.body},
+        {kEstimateBaseId, "emulator's estimate"},      {kActuatorBaseId, "thruster command"},
+        {kNavigationBaseId, "navigation estimate"},    {kAttitudeBaseId, "attitude report"},
+        {kDynamicsBaseId, "dynamics report"}};
+    if (s.attractor) kinds.push_back({s.attractor->second, "pose of " + s.attractor->first});
+    const std::uint32_t id = parsed.frame.id;
+    std::string what = "frame";
+    if (id == kHeartbeatId) what = "heartbeat";
+    if (id >= kTelemetryBaseId && id < kHeartbeatId - 1)
+        what = fmt::format("ledger of camera {}, part {}", (id - kTelemetryBaseId) / kBaseIdStep, id % kBaseIdStep);
+    for (const Kind& k : kinds)
+        if (id / kBaseIdStep == k.base / kBaseIdStep) what = fmt::format("{}, part {}", k.name, id % kBaseIdStep);
+    return fmt::format("t = {:.6f} s: {} ({})", static_cast<double>(parsed.t_ns) * 1e-9, what,
+                       line.substr(line.rfind(' ') + 1));
+}
+
+Result<json> read_record(const std::string& folder) {
+    const std::string file = folder + "/rehearsal.json";
+    json record = json::parse(read_text(file), nullptr, false);
+    const bool good = record.is_object() && record.value("format", 0) == 1 && record.contains("scenario") &&
+                      record["scenario"].is_string() && record.contains("scenario_hash") &&
+                      record.contains("mode") && record["mode"].is_string() && record.contains("seed") &&
+                      record["seed"].is_number_unsigned();
+    if (!good) return Error{"is not the record of a rehearsal", file};
+    return record;
+}
+
+Result<json> rerun(const std::string& folder, int threads, const std::string& version, const Console& console,
+                   const StopFlag& stop) {
+    const auto record = read_record(folder);
+    if (!record) return record.error();
+    const auto scenario = read_scenario((*record)["scenario"].get<std::string>());
+    if (!scenario) return scenario.error();
+    const auto texts = scenario_texts(scenario->file, scenario->scene);
+    if (!texts) return texts.error();
+    if (texts->hash != (*record)["scenario_hash"])
+        return Error{
+            fmt::format("has changed since it was run, or its scene: expected what stands in {}/scenario.toml "
+                        "and scene.toml",
+                        folder),
+            scenario->file, 0, 0, ErrorKind::failed};
+    const TemporaryFolder again;
+    RehearsalOptions o;
+    o.scenario = scenario->file;
+    o.folder = again.path();
+    o.seed = (*record)["seed"].get<std::uint64_t>();
+    o.dynamics = record->value("dynamics", "");
+    o.navigation = record->value("navigation", "");
+    if (o.dynamics == "none" || o.navigation == "none")
+        return Error{fmt::format("a program was started by hand in it: expected {}/emulator, whose frames can be "
+                                 "replayed alone",
+                                 folder),
+                     folder};
+    o.threads = threads;
+    o.page = false;
+    o.version = version;
+    const auto done = run_rehearsal(o, console, stop);
+    if (!done) return done.error();
+
+    json files = json::array();
+    bool same = true;
+    for (const std::string& name : comparable(folder)) {
+        const auto difference = first_difference(again.path() + "/" + name, folder + "/" + name);
+        files.push_back({{"file", name}, {"same", !difference}});
+        if (!difference) continue;
+        same = false;
+        const bool bus = name.ends_with("can.log");
+        const auto words = [&](const std::string& line) { return bus ? describe_message(*scenario, line) : line; };
+        files.back().update(
+            {{"line", difference->line}, {"is", words(difference->is)}, {"was", words(difference->was)}});
+        console.say(fmt::format("{}/{}: line {} differs first\n  was {}\n  is  {}", folder, name, difference->line,
+                                words(difference->was), words(difference->is)));
+    }
+    console.say(same ? fmt::format("{}: {} files repeat byte for byte", folder, files.size())
+                     : fmt::format("{}: expected the scene, its meshes and the programs as they were", folder));
+    return json{{"passed", same}, {"log", folder}, {"mode", "lockstep"}, {"files", files}};
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,71 @@
+// What a rehearsal reads and leaves behind, as files.
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "rehearsal/runner/rehearsal.h"
+#include "renderer/scene/based_on.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// G. Fowler, L. Noll, K.-P. Vo: FNV-1a, 64 bits.
+std::uint64_t fnv1a(std::string_view text, std::uint64_t hash = 0xcbf29ce484222325ULL) {
+    for (const char c : text) hash = (hash ^ static_cast<std::uint8_t>(c)) * 0x100000001b3ULL;
+    return hash;
+}
+
+}  // namespace
+
+Result<ScenarioTexts> scenario_texts(const std::string& scenario_file, const std::string& scene_file) {
+    ScenarioTexts texts;
+    const auto read = [](const std::string& file, const char* what, std::string& out) -> Status {
+        try {
+            auto table = parse_based_on(file, what);
+            if (!table) return table.error();
+            std::ostringstream text;
+            text << toml::toml_formatter(*table) << '\n';
+            out = text.str();
+            return Ok{};
+        } catch (const toml::parse_error& e) {
+            return Error{std::string(e.description()), file, static_cast<int>(e.source().begin.line),
+                         static_cast<int>(e.source().begin.column)};
+        }
+    };
+    if (Status good = read(scenario_file, "scenario", texts.scenario); !good) return good.error();
+    if (Status good = read(scene_file, "scene", texts.scene); !good) return good.error();
+    texts.hash = fmt::format("{:016x}", fnv1a(texts.scene, fnv1a(texts.scenario)));
+    return texts;
+}
+
+Status write_text(const std::string& file, std::string_view text) {
+    std::ofstream out(file, std::ios::binary);
+    out << text;
+    if (!out.flush()) return Error{"cannot be written", file, 0, 0, ErrorKind::failed};
+    return Ok{};
+}
+
+Status write_junit(const std::string& file, const std::string& suites) {
+    return write_text(file,
+                      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n" + suites + "</testsuites>\n");
+}
+
+Status claim_folder(const std::string& folder, const char* mark) {
+    std::error_code failed;
+    fs::create_directories(folder, failed);
+    if (failed) return Error{"cannot be made: " + failed.message(), folder};
+    const bool empty = fs::is_empty(folder, failed);
+    if (failed) return Error{"cannot be read: " + failed.message(), folder};
+    if (!empty && !fs::exists(folder + "/" + mark, failed))
+        return Error{
+            fmt::format("holds other files and no {}, expected a new or empty folder, or a rehearsal's", mark),
+            folder};
+    return Ok{};
+}
+
+}  // namespace narpa::rehearsal

@@ -1,0 +1,136 @@
+// From rendered frames and simulated sweeps of the docking to where the target stands.
+#include <gtest/gtest.h>
+
+#include "rehearsal/navigation/measurements.h"
+#include "rehearsal/navigation/sweep_buffer.h"
+#include "tests/rehearsal/simulated_sensors.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+struct Stage {
+    Scenario scenario;
+    std::unique_ptr<SceneModel> model;
+};
+
+/// The scene is read once.
+Stage& stage() {
+    static Stage s = [] {
+        auto scenario = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
+        EXPECT_TRUE(scenario) << scenario.error().text();
+        auto model = SceneModel::create(*scenario);
+        EXPECT_TRUE(model) << model.error().text();
+        return Stage{*scenario, *std::move(model)};
+    }();
+    return s;
+}
+
+test::Plant plant_at(const Vec3& port_m, const Vec3& off_rad) {
+    test::Plant plant{stage().scenario};
+    plant.stand(port_m, off_rad);
+    return plant;
+}
+
+Rigid3 beside(const Rigid3& T) {
+    Vector6 e;
+    e << 0.5 * kDegree, -0.4 * kDegree, 0.3 * kDegree, 0.15, -0.1, 0.1;
+    return displaced(T, e);
+}
+
+TEST(CameraPoseEstimator, FindsTheTargetWhereItIs) {
+    CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], 1);
+    std::uint32_t number = 0;
+    for (const double x_m : {25.0, 6.0}) {
+        const test::Plant plant = plant_at({x_m, 0.3, -0.2}, {0.01, -0.02, 0.01});
+        const Rigid3 truth = test::chaser_target(plant);
+        const auto bytes = test::frame(*stage().model, plant, ++number);
+        const MeasurementResult s = estimator.look(bytes, 0, 0, plant.motion.q_world_chaser, beside(truth));
+        ASSERT_TRUE(s.pose) << s.why;
+        EXPECT_GT(s.points, 30);
+        const Rigid3 T_camera_target = inverse(s.pose->T_chaser_sensor) * truth;
+        const Vector6 error = error_between(s.pose->T_sensor_target, T_camera_target);
+        EXPECT_LT(normalised_error_squared(error, s.pose->covariance), 27.9) << x_m;
+        EXPECT_LT(error.tail<3>().norm(), 2e-3 * x_m);
+    }
+}
+
+TEST(CameraPoseEstimator, SaysWhyThereIsNoPose) {
+    CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], 1);
+    const test::Plant plant = plant_at({20, 0, 0}, {});
+    const Rigid3 truth = test::chaser_target(plant);
+    auto bytes = test::frame(*stage().model, plant, 9);
+    std::fill(bytes.begin(), bytes.end(), std::uint8_t{4});  // the Earth's shadow
+    const MeasurementResult dark = estimator.look(bytes, 0, 0, plant.motion.q_world_chaser, truth);
+    EXPECT_FALSE(dark.pose);
+    EXPECT_NE(dark.why.find("few matches"), std::string::npos) << dark.why;
+    bytes.pop_back();
+    EXPECT_FALSE(estimator.look(bytes, 0, 0, plant.motion.q_world_chaser, truth).why.empty());
+}
+
+TEST(LidarPoseEstimator, FindsTheTargetWhileTheChaserMoves) {
+    auto estimator = LidarPoseEstimator::create(*stage().model, stage().model->lidars()[0]);
+    ASSERT_TRUE(estimator);
+    test::Plant plant = plant_at({15, 0.5, -0.3}, {0.01, 0.02, -0.01});
+    plant.motion.chaser_rate_rad_s = plant.motion.chaser_rate_rad_s + Vec3{0.01, -0.02, 0.03};
+    plant.motion.velocity_m_s = plant.motion.velocity_m_s + Vec3{-0.4, 0.1, 0.05};
+    plant.t_s = 10;
+    const std::int64_t epoch = stage().model->scene().epoch_unix_ns;
+    SweepBuffer buffer(estimator->lidar(), epoch);
+    for (const auto& bytes : test::turn(*stage().model, plant, epoch))
+        ASSERT_TRUE(buffer.take(bytes, 10'000'000'000));
+    const auto t_ns = std::llround(1e9 * plant.t_s);
+    std::vector<RangePoint> points;
+    buffer.turn(t_ns, points);
+    ASSERT_GT(points.size(), 500u);
+
+    // As the chaser sees the target move.
+    const Rigid3 truth = test::chaser_target(plant);
+    test::Plant later = plant;
+    later.step({}, {}, 1e-3);
+    const Vector6 rate = error_between(truth, test::chaser_target(later)) / 1e-3;
+    const SweepMotion motion{to_vec3(rate.tail<3>()), to_vec3(rate.head<3>())};
+    const MeasurementResult s = estimator->look(points, t_ns, motion, beside(truth), 0.1, 0.2 * kDegree);
+    ASSERT_TRUE(s.pose) << s.why;
+    const Vector6 error = error_between(s.pose->T_sensor_target, inverse(s.pose->T_chaser_sensor) * truth);
+    EXPECT_LT(error.head<3>().norm(), 0.02 * kDegree);
+    EXPECT_LT(error.tail<3>().norm(), 3e-3);
+    EXPECT_LT(normalised_error_squared(error, s.pose->covariance), 22.5);
+    // Taken to stand still, the turn does not fit the model, and that is told.
+    const MeasurementResult still = estimator->look(points, t_ns, {}, beside(truth), 0.1, 0.2 * kDegree);
+    EXPECT_FALSE(still.pose);
+    EXPECT_NE(still.why.find("points lie on the model"), std::string::npos) << still.why;
+}
+
+TEST(LidarPoseEstimator, SaysWhyThereIsNoPose) {
+    auto estimator = LidarPoseEstimator::create(*stage().model, stage().model->lidars()[0]);
+    ASSERT_TRUE(estimator);
+    const MeasurementResult s =
+        estimator->look({}, 0, {}, test::chaser_target(plant_at({15, 0, 0}, {})), 0.1, 0.01);
+    EXPECT_FALSE(s.pose);
+    EXPECT_NE(s.why.find("beams"), std::string::npos) << s.why;
+}
+
+TEST(SceneModel, NamesWhatIsNotThere) {
+    Scenario s = stage().scenario;
+    s.navigation.cameras = {"left"};
+    const auto camera = SceneModel::create(s);
+    ASSERT_FALSE(camera);
+    EXPECT_NE(camera.error().what.find("\"left\""), std::string::npos);
+    s = stage().scenario;
+    s.chaser.body = "earth";
+    const auto mount = SceneModel::create(s);
+    ASSERT_FALSE(mount);
+    EXPECT_NE(mount.error().what.find("does not ride on the chaser"), std::string::npos) << mount.error().what;
+}
+
+TEST(SceneModel, TheEarthGoesRound) {
+    SceneModel& model = *stage().model;
+    const Orbit& orbit = stage().scenario.orbit;
+    const double half_s = 3.14159265358979323846 / orbit.rate_rad_s();
+    const auto earth_z = [&](double t_s) { return model.place(t_s, {}, {}).T_world_body[2].t.z; };
+    EXPECT_NEAR(earth_z(0), -orbit.radius_m, 1);
+    EXPECT_NEAR(earth_z(half_s), orbit.radius_m, 1);
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal

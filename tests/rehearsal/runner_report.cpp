@@ -1,0 +1,146 @@
+// The page and the test reports: well-formed, whole, and telling what there was.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "rehearsal/runner/campaign.h"
+#include "rehearsal/runner/chart.h"
+#include "rehearsal/runner/report_page.h"
+#include "tests/rehearsal/judge_support.h"
+#include "tests/rehearsal/markup.h"
+#include "tests/support/temporary_folder.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+using namespace test;
+
+Scenario full_scenario() {
+    Scenario s = small_scenario();
+    s.title = "Docking <\"small\"> & simple";
+    s.gates.corridor = Gates::Corridor{};
+    s.gates.keep_out_m = 5;
+    s.gates.navigation = Gates::NavigationError{};
+    s.gates.contact = Gates::Contact{};
+    s.faults.push_back({Fault::Kind::thruster_off, 3, 5, "+fx", {}});
+    return s;
+}
+
+std::string page_of(const Scenario& s, const Messages& m, const std::string& folder) {
+    Judge judge(s);
+    for (const CanFrame& f : m.frames) judge.accept(f, m.ns(0));
+    const nlohmann::json record{{"mode", "lockstep"}, {"seed", 3}, {"command_lines", {{"dynamics", "a < b"}}}};
+    return rehearsal_page(s, judge.bus(), judge.finish(), record, folder);
+}
+
+TEST(Page, IsWellFormedAndNeedsNoNetwork) {
+    const Scenario s = full_scenario();
+    const narpa::test::TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "navigation");
+    std::ofstream(folder / "navigation/hold_far_nav.png") << "not looked at";
+    const std::string page =
+        page_of(s, docking(s, chaser_at(s, {}, {-0.2, 0, 0}), DynamicsPhase::captured, 4), folder / "");
+    EXPECT_EQ(markup_error(page), "");
+    for (const char* outside : {"http://", "https://", "<script", "<link", "url(//"})
+        EXPECT_EQ(page.find(outside), std::string::npos) << outside;
+    for (const char* there : {"Docking &lt;&quot;small&quot;&gt; &amp; simple", "closing rate", "hold_far_nav",
+                              "data:image/png;base64,bm90IGxvb2tlZCBhdA==", "fault: thruster off +fx", "a &lt; b",
+                              "From the side", "gate failed: corridor"})
+        EXPECT_NE(page.find(there), std::string::npos) << there;
+}
+
+TEST(Page, OfARunThatNeverBeganIsOneToo) {
+    const Scenario s = full_scenario();
+    const std::string page = page_of(s, Messages(s), "/nowhere");
+    EXPECT_EQ(markup_error(page), "");
+    EXPECT_NE(page.find("the emulator was never heard"), std::string::npos);
+}
+
+TEST(Page, Base64AsInRfc4648) {
+    EXPECT_EQ(base64(""), "");
+    EXPECT_EQ(base64("f"), "Zg==");
+    EXPECT_EQ(base64("fo"), "Zm8=");
+    EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+}
+
+TEST(Chart, PutsDataWhereItBelongs) {
+    Chart chart("t", "x", "y", 158 + 14, 100 + 70);  // 100 px wide, 100 px high within its margins
+    chart.range_x(0, 10);
+    chart.range_y(0, 10);
+    chart.line({{0, 0}, {10, 10}}, kBlue);
+    const std::string svg = chart.svg();
+    EXPECT_NE(svg.find("M58.0,130.0 158.0,30.0"), std::string::npos) << svg;
+    EXPECT_EQ(markup_error(svg), "");
+}
+
+TEST(Chart, OfNothingIsEmptyAxes) {
+    EXPECT_EQ(markup_error(Chart("t", "x", "y").svg()), "");
+}
+
+RunResult run_of(std::size_t k, const Scenario& s, const Messages& m) {
+    RunResult r{k, k + 10, "runs/000" + std::to_string(k), to_json(judge(s, m))};
+    r.result["seed"] = r.seed;
+    r.result["trouble"] = "";
+    return r;
+}
+
+std::vector<RunResult> four_runs(const Scenario& s) {
+    std::vector<RunResult> runs;
+    runs.push_back(run_of(1, s, docking(s, chaser_at(s, {0, 0.02, 0}, {-0.07, 0, 0}))));
+    runs.push_back(run_of(2, s, docking(s, chaser_at(s, {0, 0.04, 0}, {-0.09, 0, 0}))));
+    runs.push_back(run_of(3, s, docking(s, chaser_at(s, {0, 0.15, 0}, {-0.08, 0, 0}))));
+    runs.push_back(run_of(4, s, docking(s, chaser_at(s, {}, {-0.07, 0, 0}), DynamicsPhase::captured, 4)));
+    return runs;
+}
+
+TEST(Campaign, CountsAndExplains) {
+    const Scenario s = full_scenario();
+    const nlohmann::json summary = summarise(s, four_runs(s));
+    EXPECT_EQ(summary["succeeded"], 2);
+    EXPECT_EQ(summary["judged"], 4);
+    EXPECT_FALSE(summary["passed"]);
+    EXPECT_EQ(summary["failures"]["contact"][0]["run"], 3);
+    EXPECT_EQ(summary["failures"]["contact"][0]["folder"], "runs/0003");
+    EXPECT_EQ(summary["failures"]["corridor"][0]["run"], 4);
+    EXPECT_NEAR(summary["contact"][0]["mean"].get<double>(), (0.07 + 0.09 + 0.08 + 0.07) / 4, 1e-4);
+    EXPECT_NEAR(summary["contact"][2]["max"].get<double>(), 0.15, 1e-5);
+    EXPECT_NEAR(summary["success_interval_95"][0].get<double>(), 0.0676, 1e-4);  // R: binom.test(2, 4)
+}
+
+TEST(Campaign, PageAndTestReportAreWellFormed) {
+    const Scenario s = full_scenario();
+    std::vector<RunResult> runs = four_runs(s);
+    runs.push_back({5, 15, "runs/0005", nullptr});
+    const nlohmann::json summary = summarise(s, runs);
+    EXPECT_EQ(summary["judged"], 4);
+    EXPECT_EQ(markup_error(campaign_page(s, summary, runs)), "");
+    const std::string xml = campaign_junit("a&b", runs);
+    EXPECT_EQ(markup_error(xml), "");
+    EXPECT_NE(xml.find("tests=\"5\" failures=\"2\" errors=\"0\" skipped=\"1\""), std::string::npos) << xml;
+    EXPECT_EQ(markup_error(campaign_page(s, summarise(s, {}), {})), "");
+}
+
+TEST(Campaign, ARunWithItsResultIsNotRepeated) {
+    const narpa::test::TemporaryFolder folder;
+    const auto leave = [&](const char* result) { std::ofstream(folder / "result.json") << result; };
+    EXPECT_FALSE(is_done(folder / "", "abc", 4));
+    leave(R"({"scenario_hash": "abc", "seed": 4, "trouble": ""})");
+    EXPECT_TRUE(is_done(folder / "", "abc", 4));
+    EXPECT_FALSE(is_done(folder / "", "abd", 4));
+    EXPECT_FALSE(is_done(folder / "", "abc", 5));
+    leave(R"({"scenario_hash": "abc", "seed": 4, "trouble": "interrupted"})");
+    EXPECT_FALSE(is_done(folder / "", "abc", 4));
+    leave(R"({"scenario_hash": "ab)");
+    EXPECT_FALSE(is_done(folder / "", "abc", 4));
+}
+
+TEST(Junit, IsWellFormed) {
+    Scenario s = full_scenario();
+    s.legs[0].name = "<&>";
+    EXPECT_EQ(markup_error(junit(judge(s, docking(s, chaser_at(s, {}, {-0.2, 0, 0}), DynamicsPhase::bounced, 4)),
+                                 "s'\"", 1)),
+              "");
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal

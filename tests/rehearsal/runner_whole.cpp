@@ -1,0 +1,175 @@
+// Whole rehearsals, with the real programs on slcan, FIFO and UDP: what is left behind, that it repeats, and what
+// is said of programs that end too soon.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "rehearsal/runner/campaign.h"
+#include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/rehearsal.h"
+#include "rehearsal/runner/rerun.h"
+#include "tests/rehearsal/judge_support.h"
+#include "tests/rehearsal/markup.h"
+#include "tests/support/temporary_folder.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+using namespace test;
+using narpa::test::TemporaryFolder;
+namespace fs = std::filesystem;
+
+/// The docking that comes with narpa, for a second.
+std::string short_scenario(const TemporaryFolder& folder) {
+    std::ofstream(folder / "short.toml")
+        << "[scenario]\nbased_on = \"" NARPA_BUILD_DIR
+           "/scenes/rehearsal/docking.toml\"\nname = \"short\"\nduration_s = 1.0\n";
+    return folder / "short.toml";
+}
+
+RehearsalOptions options(const TemporaryFolder& folder) {
+    RehearsalOptions o;
+    o.scenario = short_scenario(folder);
+    o.folder = folder / "run";
+    o.programs = NARPA_BUILD_DIR "/bin";
+    o.threads = 1;
+    o.version = "test";
+    return o;
+}
+
+const Console kSilent{[](std::string_view) {}, [](std::string_view) {}};
+
+TEST(Whole, LeavesAllOfItBehindAndRepeatsByteForByte) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    const auto done = run_rehearsal(o, kSilent, stop);
+    ASSERT_TRUE(done) << done.error().text();
+    const Verdict& v = done->verdict;
+    EXPECT_FALSE(v.passed);
+    EXPECT_EQ(gate(v, "duration").reason, "the goal was not reached when 1 s were over");
+    EXPECT_EQ(gate(v, "navigation").state, GateState::passed) << gate(v, "navigation").reason;
+    EXPECT_GT(v.ledger.handed_over, 0u);
+    for (const char* file :
+         {"scenario.toml", "scene.toml", "rehearsal.json", "result.json", "junit.xml", "index.html",
+          "emulator/can.log", "emulator/nav.ledger.csv", "dynamics/truth.csv", "navigation/navigation.csv"})
+        EXPECT_TRUE(fs::exists(o.folder + "/" + file)) << file;
+    EXPECT_FALSE(fs::exists(o.folder + "/nav.fifo"));
+    EXPECT_EQ(markup_error(read_text(o.folder + "/index.html")), "");
+    EXPECT_EQ(markup_error(read_text(o.folder + "/junit.xml")), "");
+
+    // What was judged as it came is what the emulator's log tells; whether its first heartbeat was heard is chance.
+    const auto scenario = read_scenario(o.scenario);
+    const auto logged = judge_log(*scenario, o.folder + "/emulator/can.log");
+    ASSERT_TRUE(logged);
+    nlohmann::json live = to_json(v), log = to_json(*logged);
+    live["bus"].erase("heartbeats"), log["bus"].erase("heartbeats");
+    EXPECT_EQ(live, log);
+
+    o.folder = folder / "again";
+    o.threads = 2;
+    ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
+    for (const char* file : {"/emulator/can.log", "/emulator/nav.ledger.csv", "/navigation/navigation.csv"})
+        EXPECT_FALSE(first_difference(o.folder + file, (folder / "run") + file)) << file;
+}
+
+TEST(Whole, AProgramThatEndsTooSoonIsTheReason) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    o.navigation = "echo ready; echo out of fuel >&2; sleep 0.2; exit 7";
+    const auto done = run_rehearsal(o, kSilent, stop);
+    ASSERT_TRUE(done) << done.error().text();
+    EXPECT_FALSE(done->verdict.passed);
+    EXPECT_EQ(done->verdict.headline, "Flown for 0.0 s, but the navigation ended with status 7: out of fuel")
+        << done->verdict.headline;
+    EXPECT_NE(gate(done->verdict, "complete").reason.find("; the run broke off: "), std::string::npos)
+        << gate(done->verdict, "complete").reason;
+    EXPECT_TRUE(fs::exists(o.folder + "/index.html"));
+}
+
+TEST(Whole, NothingThatMovesIsGivenUp) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    o.dynamics = "sleep 100";
+    o.patience_s = 0.3;
+    const auto done = run_rehearsal(o, kSilent, stop);
+    ASSERT_TRUE(done) << done.error().text();
+    EXPECT_NE(done->verdict.headline.find("but nothing moved for 0.3 s"), std::string::npos)
+        << done->verdict.headline;
+    EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics were never heard"), std::string::npos);
+}
+
+TEST(Whole, WhatTheEmulatorRefusesIsBadInput) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    o.bus = "slcan:notaport";
+    const auto done = run_rehearsal(o, kSilent, stop);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().kind, ErrorKind::bad_input) << done.error().text();
+    o = options(folder);
+    o.video["nose"] = "/dev/video10";
+    EXPECT_NE(run_rehearsal(o, kSilent, stop).error().what.find("does not navigate by this camera"),
+              std::string::npos);
+}
+
+/// A navigation that the user starts, some time after it was asked for.
+TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    o.navigation = "none";
+    std::FILE* own = nullptr;
+    int asked = 0;
+    std::string told;
+    Console console = kSilent;
+    console.say = [&](std::string_view words) {
+        if (words.starts_with("start your own navigation now")) told = words;
+    };
+    const auto value = [&](const std::string& key) {
+        const auto at = told.find("\n  " + key + "=") + key.size() + 4;
+        return told.substr(at, told.find('\n', at) - at);
+    };
+    console.navigation_ready = [&] {
+        if (++asked < 20) return false;
+        own = ::popen((NARPA_BUILD_DIR "/bin/narpa-navigation " + value("SCENARIO") + " --can " + value("BUS") +
+                       " --video " + value("VIDEO") + " --lidar " + value("LIDAR") + " --lockstep")
+                          .c_str(),
+                      "r");
+        std::array<char, 80> line{};
+        return std::fgets(line.data(), line.size(), own) != nullptr && std::string_view(line.data()) == "ready\n";
+    };
+    const auto done = run_rehearsal(o, console, stop);
+    ASSERT_NE(own, nullptr);
+    EXPECT_EQ(::pclose(own), 0);
+    ASSERT_TRUE(done) << done.error().text();
+    EXPECT_EQ(gate(done->verdict, "navigation").state, GateState::passed)
+        << gate(done->verdict, "navigation").reason;
+    EXPECT_EQ(gate(done->verdict, "duration").reason, "the goal was not reached when 1 s were over");
+
+    const auto again = rerun(o.folder, 1, "test", kSilent, stop);
+    ASSERT_FALSE(again);
+    EXPECT_NE(again.error().what.find("a program was started by hand"), std::string::npos) << again.error().text();
+}
+
+TEST(Whole, ManyRunsThatCannotBeAreRefused) {
+    const TemporaryFolder folder;
+    const auto refused = [&](const RehearsalOptions& run, int jobs) {
+        const auto done = run_campaign({run, 2, jobs}, kSilent, StopFlag{false});
+        return done ? std::string() : done.error().what;
+    };
+    RehearsalOptions o = options(folder);
+    o.bus = "vcan0";
+    EXPECT_NE(refused(o, 2).find("cannot share a bus"), std::string::npos);
+    o = options(folder);
+    o.navigation = "none";
+    EXPECT_NE(refused(o, 1).find("expected a command that starts it"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal

@@ -1,0 +1,72 @@
+/// tests/rehearsal/simulated_sensors.h - the sensors of the chaser as the renderer sees what truly is: frames with
+/// the detector's noise, packets of a turn.
+#pragma once
+
+#include <algorithm>
+
+#include "estimator/view/model_view.h"
+#include "protocols/lidar/vlp16.h"
+#include "rehearsal/navigation/scene_model.h"
+#include "renderer/camera/detector.h"
+#include "renderer/lidar/lidar_shot.h"
+#include "tests/rehearsal/navigation_plant.h"
+
+namespace narpa::rehearsal::test {
+
+/// Target's body axes from the chaser's.
+inline Rigid3 chaser_target(const Plant& plant) {
+    const RelativeMotion& m = plant.motion;
+    const Rigid3 T_world_target{m.q_world_target, -(m.q_world_target * plant.scenario.target.centre_of_mass_m)};
+    const Rigid3 T_world_chaser{m.q_world_chaser,
+                                m.position_m - m.q_world_chaser * plant.scenario.chaser.centre_of_mass_m};
+    return inverse(T_world_chaser) * T_world_target;
+}
+
+inline std::vector<std::uint8_t> frame(SceneModel& model, const Plant& plant, std::uint32_t number) {
+    const Camera& camera = model.scene().cameras[model.cameras()[0]];
+    const Rigid3 T_chaser_target = chaser_target(plant);
+    const BodyPoses at = model.place(plant.t_s, plant.motion.q_world_target, inverse(T_chaser_target));
+    FrameSettings settings;
+    settings.seed = 77;
+    settings.frame = number;
+    settings.spp = 4;
+    RadianceImage image(camera.width, camera.height);
+    render_radiance(model.tracer(), at, camera, at.T_world_body[model.chaser()] * camera.T_mount_camera, settings,
+                    image);
+    std::vector<std::uint8_t> bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
+    expose(camera, image, 5, number, bytes);
+    return bytes;
+}
+
+/// Packets of the turn that ends at the plant's time, which it flies to freely from where it was a turn before.
+/// `packet` is the number of the first.
+inline std::vector<std::vector<std::uint8_t>> turn(SceneModel& model, Plant& plant, std::int64_t epoch_unix_ns) {
+    const Lidar& lidar = model.scene().lidars[model.lidars()[0]];
+    const auto from_ns = std::llround(1e9 * plant.t_s), turn_ns = std::llround(1e9 / lidar.rate_hz);
+    std::vector<std::vector<std::uint8_t>> out;
+    std::array<vlp16::Shot, vlp16::kShots> shots;
+    std::array<double, vlp16::kShots> range_m;
+    std::array<float, vlp16::kShots> reflectivity{};
+    const std::int64_t first = (from_ns + vlp16::kPacketPeriodNs - 1) / vlp16::kPacketPeriodNs;
+    for (std::int64_t packet = first; vlp16::packet_start_ns(packet + 1) <= from_ns + turn_ns; ++packet) {
+        vlp16::shots(packet, lidar.rate_hz, shots);
+        for (std::size_t i = 0; i < shots.size(); ++i) {
+            const double t_s = 1e-9 * static_cast<double>(vlp16::packet_start_ns(packet) + shots[i].t_offset_ns);
+            if (t_s > plant.t_s) plant.step({}, {}, t_s - plant.t_s);
+            const BodyPoses& at =
+                model.place(plant.t_s, plant.motion.q_world_target, inverse(chaser_target(plant)));
+            const Rigid3 T = at.T_world_body[model.chaser()] * lidar.T_mount_lidar;
+            range_m[i] = shoot(model.tracer(), at, {T * shots[i].origin_m(), T.q * vlp16::direction(shots[i])},
+                               lidar.range_max_m)
+                             .range_m;
+        }
+        std::vector<std::uint8_t> bytes(vlp16::kDataPacketBytes);
+        vlp16::encode(packet, lidar.rate_hz, epoch_unix_ns, range_m, reflectivity,
+                      std::span<std::uint8_t, vlp16::kDataPacketBytes>(bytes));
+        out.push_back(std::move(bytes));
+    }
+    plant.step({}, {}, 1e-9 * static_cast<double>(from_ns + turn_ns) - plant.t_s);
+    return out;
+}
+
+}  // namespace narpa::rehearsal::test

@@ -13,9 +13,9 @@
 
 #include "base/pose.h"
 #include "base/result.h"
-#include "renderer/scene/scene.h"
 #include "renderer/geometry/body_bounds.h"
 #include "renderer/geometry/lanes.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa {
 
@@ -51,17 +51,27 @@ struct RayBatch {
     void put(std::size_t i, const Ray& ray) { origin.put(i, ray.origin), direction.put(i, ray.direction); }
 };
 
-/// What each ray of a packet meets: the members of Hit, lane by lane. Where the lane's bit in `met` is not set,
-/// `body` is -1 and the rest is undefined.
-struct HitBatch {
-    std::uint32_t met = 0, outside = 0;
+/// Points of surfaces that rays leave: the members of Hit that say where such a ray starts, lane by lane.
+struct SurfacePoints {
+    std::uint32_t outside = 0;  ///< a bit for each lane
     Lanes<int> body;
     Lanes<std::uint32_t> face;
+    Vec3Lanes departure_body;
+
+    void put(std::size_t i, const Hit& hit);
+    /// Copies lane j of another batch.
+    void put(std::size_t i, const SurfacePoints& from, std::size_t j);
+};
+
+/// The nearest surface along each ray of a batch: the members of Hit, lane by lane. Where the lane's bit in `met`
+/// is not set, `body` is -1 and the rest is undefined.
+struct HitBatch : SurfacePoints {
+    std::uint32_t met = 0;
     Lanes<double> range_m;
     Vec3Lanes position, geometric_normal, shading_normal;
     Lanes<float> u, v;
     Lanes<int> material;
-    Vec3Lanes departure_body, beyond_body;
+    Vec3Lanes beyond_body;
 
     [[nodiscard]] Hit operator[](std::size_t i) const;
     void put(std::size_t i, const Hit& hit);
@@ -109,13 +119,22 @@ public:
     /// those that the rays may meet.
     void intersect(const BodyPoses& at, const RayBatch& rays, std::span<const std::uint32_t> bodies,
                    HitBatch& hits) const noexcept;
-    /// Which of the hits of `wanted` cannot see their light, each in a direction of its own without an end. Fastest
-    /// where the directions are nearly the same, as to the Sun.
-    [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, const HitBatch& from, const Vec3Lanes& directions,
+    /// Nearest hits of rays that leave surfaces, each from its point on the side of its geometric normal, in any
+    /// unit direction, without an end. Only lanes whose bit is set in `wanted` are traced, and only those of `hits`
+    /// have defined values. The start is lifted as for `occluded`, and ranges count from there. A direction below
+    /// the horizon of its own surface meets that surface at once. Rays that leave the inner side of a closed mesh,
+    /// a sphere or an ellipsoid meet it again from inside. Rays need not run close together. `hits` may be `from`.
+    void intersect(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                   std::uint32_t wanted, HitBatch& hits) const noexcept;
+    /// Shadow rays without an end: the lanes of `wanted` whose ray meets any surface. Fastest where the directions
+    /// are nearly the same, as to the Sun.
+    [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, const SurfacePoints& from,
+                                         const Vec3Lanes& directions, std::uint32_t wanted) const noexcept;
+    /// Shadow rays with ends: t_max[i] metres from the start.
+    [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, const SurfacePoints& from,
+                                         const Vec3Lanes& directions, const Lanes<double>& t_max,
                                          std::uint32_t wanted) const noexcept;
-    /// The same, each with an end of its own: t_max[i] metres.
-    [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, const HitBatch& from, const Vec3Lanes& directions,
-                                         const Lanes<double>& t_max, std::uint32_t wanted) const noexcept;
+
     /// Which of up to kLanes hits cannot see their light, each in a direction of its own without an end: a bit
     /// each. Only those whose bit is set in `wanted` are asked.
     [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, std::span<const Hit> from,

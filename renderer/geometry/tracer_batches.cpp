@@ -113,20 +113,12 @@ std::uint32_t lanes_before(const Lanes<double>& entry_m, const Lanes<double>& en
     return bits_of(before);
 }
 
-/// What of a hit tells where rays start that leave it.
-struct Origins {
-    const Lanes<int>& body;
-    const Lanes<std::uint32_t>& face;
-    const Vec3Lanes& departure_body;
-    std::uint32_t outside;
-};
-
 }  // namespace
 
 /// Rays that leave surfaces. Each starts in the frame of its own body, which knows no distances but its own.
 class Tracer::Impl::Leaving {
 public:
-    Leaving(const Impl& impl, const BodyPoses& at, const Origins& from, const Vec3Lanes& directions,
+    Leaving(const Impl& impl, const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
             std::uint32_t wanted) noexcept
         : inside_(wanted & ~from.outside) {
         own_.fill(-1);
@@ -248,8 +240,8 @@ void Tracer::intersect(const BodyPoses& at, const RayBatch& rays, std::span<cons
     }
     Impl::Found found;
     if (rays.n == kLanes) {
-        impl_->nearest_hits(at, {embree::Run::together, rays.direction, rays.origin, kNothing},
-                            lanes_below(kLanes), bodies, found);
+        impl_->nearest_hits(at, {embree::Run::together, rays.direction, rays.origin, kNothing}, lanes_below(kLanes),
+                            bodies, found);
     } else {
         RayBatch filled = rays;
         for (std::size_t i = rays.n; i < kLanes; ++i) filled.put(i, rays[0]);
@@ -259,19 +251,30 @@ void Tracer::intersect(const BodyPoses& at, const RayBatch& rays, std::span<cons
     impl_->finish(at, found, hits);
 }
 
-std::uint32_t Tracer::occluded(const BodyPoses& at, const HitBatch& from, const Vec3Lanes& directions,
+void Tracer::intersect(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                       std::uint32_t wanted, HitBatch& hits) const noexcept {
+    Impl::Found found;
+    if (wanted == 0) {
+        hits.met = hits.outside = 0;
+        hits.body.fill(-1);
+        return;
+    }
+    const Impl::Leaving leaving(*impl_, at, from, directions, wanted);
+    impl_->nearest_hits(at, leaving.rays(), wanted, impl_->all_bodies, found);
+    impl_->finish(at, found, hits);
+}
+
+std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                                std::uint32_t wanted) const noexcept {
     if (wanted == 0) return 0;
-    const Impl::Leaving leaving(*impl_, at, {from.body, from.face, from.departure_body, from.outside}, directions,
-                                wanted);
+    const Impl::Leaving leaving(*impl_, at, from, directions, wanted);
     return impl_->hidden(at, leaving.rays(embree::Run::together), kNoEnd, wanted);
 }
 
-std::uint32_t Tracer::occluded(const BodyPoses& at, const HitBatch& from, const Vec3Lanes& directions,
+std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                                const Lanes<double>& t_max, std::uint32_t wanted) const noexcept {
     if (wanted == 0) return 0;
-    const Impl::Leaving leaving(*impl_, at, {from.body, from.face, from.departure_body, from.outside}, directions,
-                                wanted);
+    const Impl::Leaving leaving(*impl_, at, from, directions, wanted);
     return impl_->hidden(at, leaving.rays(), t_max, wanted);
 }
 
@@ -281,19 +284,12 @@ namespace {
 struct SideBySide {
     SideBySide(std::span<const Hit> from, std::span<const Vec3> directions, std::uint32_t wanted) noexcept {
         for_each_lane(wanted, [&](std::size_t i) {
-            body[i] = from[i].body;
-            face[i] = from[i].face;
-            departure_body.put(i, from[i].departure_body);
-            outside |= static_cast<std::uint32_t>(from[i].outside) << i;
+            points.put(i, from[i]);
             direction.put(i, directions[i]);
         });
     }
-    [[nodiscard]] Origins origins() const noexcept { return {body, face, departure_body, outside}; }
-
-    Lanes<int> body;
-    Lanes<std::uint32_t> face;
-    Vec3Lanes departure_body, direction;
-    std::uint32_t outside = 0;
+    SurfacePoints points;
+    Vec3Lanes direction;
 };
 
 }  // namespace
@@ -303,33 +299,42 @@ void Tracer::intersect(const BodyPoses& at, std::span<const Hit> from, std::span
     wanted &= lanes_below(std::min({from.size(), directions.size(), hits.size(), kLanes}));
     if (wanted == 0) return;
     const SideBySide starts(from, directions, wanted);
-    const Impl::Leaving leaving(*impl_, at, starts.origins(), starts.direction, wanted);
-    Impl::Found found;
-    HitBatch packet;
-    impl_->nearest_hits(at, leaving.rays(), wanted, impl_->all_bodies, found);
-    impl_->finish(at, found, packet);
-    for_each_lane(wanted & found.met, [&](std::size_t i) { hits[i] = packet[i]; });
-    for_each_lane(wanted & ~found.met, [&](std::size_t i) { hits[i].body = -1; });
+    HitBatch batch;
+    intersect(at, starts.points, starts.direction, wanted, batch);
+    for_each_lane(wanted & batch.met, [&](std::size_t i) { hits[i] = batch[i]; });
+    for_each_lane(wanted & ~batch.met, [&](std::size_t i) { hits[i].body = -1; });
 }
 
 std::uint32_t Tracer::occluded(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
                                std::uint32_t wanted) const noexcept {
     wanted &= lanes_below(std::min({from.size(), directions.size(), kLanes}));
-    if (wanted == 0) return 0;
     const SideBySide starts(from, directions, wanted);
-    const Impl::Leaving leaving(*impl_, at, starts.origins(), starts.direction, wanted);
+    const Impl::Leaving leaving(*impl_, at, starts.points, starts.direction, wanted);
     return impl_->hidden(at, leaving.rays(), kNoEnd, wanted);
 }
 
 std::uint32_t Tracer::occluded(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
                                std::span<const double> t_max, std::uint32_t wanted) const noexcept {
     wanted &= lanes_below(std::min({from.size(), directions.size(), t_max.size(), kLanes}));
-    if (wanted == 0) return 0;
     const SideBySide starts(from, directions, wanted);
-    const Impl::Leaving leaving(*impl_, at, starts.origins(), starts.direction, wanted);
     Lanes<double> ends{};
     for_each_lane(wanted, [&](std::size_t i) { ends[i] = t_max[i]; });
-    return impl_->hidden(at, leaving.rays(), ends, wanted);
+    return occluded(at, starts.points, starts.direction, ends, wanted);
+}
+
+void SurfacePoints::put(std::size_t i, const Hit& hit) {
+    const std::uint32_t bit = 1u << i;
+    outside = hit.outside ? outside | bit : outside & ~bit;
+    body[i] = hit.body;
+    face[i] = hit.face;
+    departure_body.put(i, hit.departure_body);
+}
+
+void SurfacePoints::put(std::size_t i, const SurfacePoints& from, std::size_t j) {
+    outside = (outside & ~(1u << i)) | (from.outside >> j & 1u) << i;
+    body[i] = from.body[j];
+    face[i] = from.face[j];
+    departure_body.put(i, from.departure_body[j]);
 }
 
 Hit HitBatch::operator[](std::size_t i) const {
@@ -339,18 +344,14 @@ Hit HitBatch::operator[](std::size_t i) const {
 }
 
 void HitBatch::put(std::size_t i, const Hit& hit) {
-    const std::uint32_t bit = 1u << i;
-    met = hit.body < 0 ? met & ~bit : met | bit;
-    outside = hit.outside ? outside | bit : outside & ~bit;
-    body[i] = hit.body;
-    face[i] = hit.face;
+    SurfacePoints::put(i, hit);
+    met = (met & ~(1u << i)) | static_cast<std::uint32_t>(hit.body >= 0) << i;
     range_m[i] = hit.range_m;
     position.put(i, hit.position);
     geometric_normal.put(i, hit.geometric_normal);
     shading_normal.put(i, hit.shading_normal);
     u[i] = hit.u, v[i] = hit.v;
     material[i] = hit.material;
-    departure_body.put(i, hit.departure_body);
     beyond_body.put(i, hit.beyond_body);
 }
 

@@ -158,7 +158,21 @@ TEST(Packets, ThatLeaveSurfacesMeetWhatEachRayMeetsAlone) {
                     tracer->occluded(at, from[i], directions[i], before[i]) == ((dark_before >> i & 1u) != 0) &&
                     tracer->occluded(at, from[i], directions[i], after[i]) == ((dark_after >> i & 1u) != 0);
             }
-            // In place, too.
+            // The same hits and shadows come from batches, also in place.
+            HitBatch batch;
+            Vec3Lanes towards{};
+            for_each_lane(wanted, [&](std::size_t i) {
+                batch.put(i, from[i]);
+                towards.put(i, directions[i]);
+            });
+            EXPECT_EQ(tracer->occluded(at, batch, towards, before, wanted), dark_before);
+            tracer->intersect(at, batch, towards, wanted, batch);
+            for_each_lane(wanted, [&](std::size_t i) {
+                ASSERT_EQ(batch.body[i], next[i].body);
+                if (next[i].body >= 0) {
+                    ASSERT_EQ(batch[i].position, next[i].position);
+                }
+            });
             tracer->intersect(at, from, directions, wanted, from);
             for (std::size_t i = 0; i < kLanes; ++i)
                 if ((wanted >> i & 1u) != 0) {

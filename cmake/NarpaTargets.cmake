@@ -30,11 +30,13 @@ function(narpa_compile_options target)
   endif()
 endfunction()
 
-# narpa_export(NAME) - names a library narpa::NAME, here and in the installed package.
+# narpa_export(NAME) - names a library narpa::NAME, here and in the installed package, where it belongs to the component
+# of its top-level folder. NAME is a folder's path with "_" for "/".
 function(narpa_export name)
   add_library(narpa::${name} ALIAS narpa_${name})
   set_target_properties(narpa_${name} PROPERTIES EXPORT_NAME ${name})
-  install(TARGETS narpa_${name} EXPORT narpaTargets)
+  string(REGEX REPLACE "_.*" "" component ${name})
+  install(TARGETS narpa_${name} EXPORT narpa-${component})
 endfunction()
 
 # narpa_room(FOLDER [SIMD] LINKS ROOMS...) - one library of all sources below FOLDER except main.cpp. LINKS names the
@@ -49,7 +51,7 @@ function(narpa_room folder)
   narpa_export(${name})
   set_target_properties(narpa_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_include_directories(narpa_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
-                                                  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/narpa>)
+                                                  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   foreach(room ${arg_LINKS})
     string(REPLACE "/" "_" linked ${room})
     target_link_libraries(narpa_${name} PUBLIC narpa::${linked})
@@ -62,8 +64,6 @@ function(narpa_room folder)
     # is read, so both sides of a choice may be computed.
     target_compile_options(narpa_${name} PRIVATE -O3 -fno-trapping-math)
   endif()
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/narpa/${folder}
-          FILES_MATCHING PATTERN "*.h")
 endfunction()
 
 # OpenCV 4.6's headers warn in C++20.
@@ -80,9 +80,16 @@ endfunction()
 
 function(narpa_install_package)
   set(dir ${CMAKE_INSTALL_LIBDIR}/cmake/narpa)
-  install(EXPORT narpaTargets NAMESPACE narpa:: DESTINATION ${dir})
+  foreach(component base protocols drivers renderer estimator rehearsal emulator)
+    install(EXPORT narpa-${component} NAMESPACE narpa:: DESTINATION ${dir} FILE narpa-${component}.cmake)
+  endforeach()
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/narpaConfig.cmake.in ${CMAKE_BINARY_DIR}/narpaConfig.cmake
                                 INSTALL_DESTINATION ${dir})
   write_basic_package_version_file(${CMAKE_BINARY_DIR}/narpaConfigVersion.cmake COMPATIBILITY SameMajorVersion)
   install(FILES ${CMAKE_BINARY_DIR}/narpaConfig.cmake ${CMAKE_BINARY_DIR}/narpaConfigVersion.cmake DESTINATION ${dir})
+  include(${PROJECT_SOURCE_DIR}/cmake/PublicHeaders.cmake)
+  list(JOIN NARPA_PUBLIC_HEADERS "$<SEMICOLON>" headers)
+  install(CODE "execute_process(COMMAND \${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR}
+    \"-DDESTINATION=\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_INCLUDEDIR}\" \"-DHEADERS=${headers}\"
+    -P ${PROJECT_SOURCE_DIR}/cmake/InstallHeaders.cmake COMMAND_ERROR_IS_FATAL ANY)")
 endfunction()

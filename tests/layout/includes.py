@@ -1,4 +1,5 @@
-"""Checks that every #include of a room's files points to the room itself or to a room that it links.
+"""Checks that every #include of a room's files points to the room itself or to a room that it links, and that x.cpp
+includes x.h before anything else, so that x.h compiles alone.
 
 Usage: includes.py ROOMS SOURCE_DIR    ROOMS: lines of "folder: linked linked ..."
 """
@@ -40,7 +41,12 @@ for room in links:
     for file in sorted((root / room).rglob("*")):
         if file.suffix not in (".h", ".cpp"):
             continue
-        for number, line in enumerate(file.read_text().splitlines(), 1):
+        lines = file.read_text().splitlines()
+        header = file.with_suffix(".h")
+        first = next((line for line in lines if line.startswith("#include")), "")
+        if file.suffix == ".cpp" and header.exists() and first != f'#include "{header.relative_to(root)}"':
+            wrong.append(f"{file.relative_to(root)}: does not include {header.name} first")
+        for number, line in enumerate(lines, 1):
             include = re.match(r'#include "([^"]+)"', line)
             if include and (target := room_of(include[1])) and target not in allowed:
                 wrong.append(f"{file.relative_to(root)}:{number}: {room} does not link {target}: {include[1]}")

@@ -1,8 +1,8 @@
 // A project of somebody else's: finds the installed package and uses it, from the scene file to a range.
 #include <cstdio>
 
-#include "emulator/world.h"
-#include "renderer/scene/scene_file.h"
+#include <narpa/emulator/world.h>
+#include <narpa/renderer/scene/scene_file.h>
 
 int main(int argc, char** argv) {
     if (argc < 2) return 2;

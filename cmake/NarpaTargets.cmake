@@ -74,7 +74,7 @@ function(narpa_use_opencv target)
 endfunction()
 
 function(narpa_executable name)
-  add_executable(${name} ${ARGN})
+  add_executable(${name} ${ARGN} ${PROJECT_SOURCE_DIR}/apps/program/assimp_assertions.cpp)
   narpa_compile_options(${name})
 endfunction()
 

@@ -3,23 +3,13 @@
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <stdexcept>
+#include <exception>
 
 #include "renderer/scene/file_bytes.h"
 #include "renderer/scene/mesh_material.h"
 #include "renderer/scene/text_cursor.h"
 #include "renderer/scene/triangle_soup.h"
 #include "renderer/scene/triangulate.h"
-
-namespace Assimp {
-
-/// Debian builds Assimp with its assertions on, which abort the program on some damaged files. This definition
-/// stands before the library's own (the linker exports it, as the library refers to it), and makes them exceptions.
-[[noreturn]] void aiAssertViolation(const char* failed_expression, const char* file, int line) {
-    throw std::runtime_error(fmt::format("{}:{}: {} does not hold", file, line, failed_expression));
-}
-
-}  // namespace Assimp
 
 namespace narpa {
 

@@ -11,11 +11,12 @@
 #include <fstream>
 #include <map>
 
+#include "apps/cli.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/video/video_sink.h"
-#include "apps/cli.h"
 #include "emulator/world.h"
 #include "protocols/can/dbc.h"
+#include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/kind_names.h"
 
 namespace narpa::cli {
@@ -114,7 +115,7 @@ nlohmann::json describe(const World& world) {
                            {"detector", c.detector.has_value()},
                            {"lens", c.lens.has_value()}});
     for (const Lidar& l : s.lidars)
-        lidars.push_back({{"name", l.name}, {"model", l.model}, {"rate_hz", l.rate_hz}});
+        lidars.push_back({{"name", l.name}, {"model", l.model->spec().name}, {"rate_hz", l.rate_hz}});
     for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
     nlohmann::json render{{"method", name_of(s.render.method, kMethods)}};
     if (s.render.budget_rays > 0)
@@ -182,7 +183,7 @@ void tell(const World& world) {
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
                         1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
     for (const Lidar& l : s.lidars)
-        say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model, l.rate_hz));
+        say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model->spec().name, l.rate_hz));
 }
 
 Status save_dbc(const Scene& scene, const std::string& path) {

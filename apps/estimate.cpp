@@ -119,7 +119,7 @@ Command add_estimate(CLI::App& app) {
     c->add_option("--camera,--lidar", o->camera, "Name of the camera or LiDAR (default: the first of the scene)");
     c->add_option("--frame", o->one.frame,
                   "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
-    c->add_option("--sweep", o->one.sweep, "FILE.pcap: a VLP-16's data packets, from the first on for one turn");
+    c->add_option("--sweep", o->one.sweep, "FILE.pcap: the LiDAR's data packets, from the first on for one turn");
     c->add_option("--time", o->one.time_s, "Simulation time of the frame or the sweep's first shot, s")
         ->check(CLI::Range(-9e9, 9e9) & finite_number());
     c->add_option("--range-noise", o->one.range_noise_m, "Standard deviation of the sweep's ranges, m")

@@ -12,6 +12,7 @@
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/sweep_points.h"
 #include "estimator/view/measured_image.h"
+#include "protocols/lidar/lidar_model.h"
 
 namespace narpa::cli {
 namespace {
@@ -66,22 +67,24 @@ Result<std::vector<std::uint8_t>> bytes_of(const std::string& path) {
     return bytes;
 }
 
-/// The sweep's points, by their times after its first shot: one turn from the first packet on.
-Result<std::vector<RangePoint>> points_of(const std::string& path, double rate_hz) {
-    auto datagrams = read_datagrams(path, vlp16::kDataPacketBytes);
+/// The returns of one turn from the capture's first packet on; times count from its first shot.
+Result<std::vector<RangePoint>> points_of(const std::string& path, const Lidar& lidar) {
+    const LidarSpec& spec = lidar.model->spec();
+    auto datagrams = read_datagrams(path, spec.data_packet_bytes);
     if (!datagrams) return datagrams.error();
     std::vector<RangePoint> points;
-    std::optional<std::uint32_t> first_us;
-    constexpr std::uint32_t kHour_us = 3'600'000'000U;
+    std::vector<LidarPoint> decoded(spec.shots_per_packet);
+    std::optional<std::int64_t> first_ns;
     for (const auto& bytes : *datagrams) {
-        const auto packet = vlp16::decode(bytes);
-        if (!packet) continue;
-        if (!first_us) first_us = packet->past_hour_us;
-        const std::uint32_t after_us = (packet->past_hour_us + kHour_us - *first_us) % kHour_us;
-        if (after_us >= 1e6 / rate_hz) break;
-        append_points(*packet, std::int64_t{after_us} * 1000, points);
+        const auto time_ns = lidar.model->packet_time(bytes, first_ns.value_or(0));
+        if (!time_ns) continue;
+        if (!first_ns) first_ns = time_ns;
+        const std::int64_t after_ns = *time_ns - *first_ns;
+        if (after_ns < 0 || static_cast<double>(after_ns) >= 1e9 / lidar.rate_hz) break;
+        append_points(std::span(decoded).first(lidar.model->points(bytes, decoded)), after_ns, points);
     }
-    if (!first_us) return Error{"holds no data packet of a VLP-16, expected one at least", path};
+    if (!first_ns)
+        return Error{fmt::format("holds no data packet of a {}, expected at least one", spec.name), path};
     return points;
 }
 
@@ -141,7 +144,7 @@ Outcome estimate_sweep(const OneOptions& o) {
     const Lidar& lidar = scene.lidars[*index];
     auto target = target_of(**world, lidar.mount, lidar.name, o.tracker.target);
     if (!target) return target.error();
-    auto points = points_of(o.sweep, lidar.rate_hz);
+    auto points = points_of(o.sweep, lidar);
     if (!points) return points.error();
     BodyPoses then(scene.bodies.size());
     (*world)->place(t_ns, lidar.mount, then);

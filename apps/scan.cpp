@@ -1,13 +1,13 @@
-// narpa scan - what one LiDAR sees during a turn (or longer), as a point cloud, a table of shots or a capture.
+// narpa scan - what one LiDAR measures during a turn (or longer), as a point cloud, a table of shots or a capture.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <cstdio>
 #include <memory>
 
-#include "drivers/lidar/packet_sink.h"
 #include "apps/cli.h"
 #include "apps/pose_options.h"
+#include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
 #include "renderer/lidar/lidar_shot.h"
 
@@ -25,7 +25,7 @@ struct ScanPoint {
     float reflectivity = 0;
 };
 
-/// One output format: told every packet, then closed.
+/// One output format. Receives every packet, then is closed.
 class Writer {
 public:
     virtual ~Writer() = default;
@@ -60,7 +60,7 @@ private:
     std::string path_;
 };
 
-/// One row a shot, returns or not: the truth behind the packets.
+/// One row per shot, with or without a return: the truth behind the packets.
 class ShotTable final : public Writer {
 public:
     explicit ShotTable(File file) : file_(std::move(file)) {
@@ -68,12 +68,12 @@ public:
     }
     void packet(std::int64_t number, LidarUnit& unit) override {
         for (std::size_t i = 0; i < unit.shots().size(); ++i) {
-            const vlp16::Shot& s = unit.shots()[i];
+            const LidarShot& s = unit.shots()[i];
             const LidarReturn& r = unit.hits()[i];
-            const Vec3 p = s.origin_m() + r.range_m * vlp16::direction(s);
-            file_.print("{},{},{},{},{},{},{},{},{},{},{},{}\n", vlp16::packet_start_ns(number) + s.t_offset_ns,
-                        number, i / vlp16::kShotsPerBlock, s.laser, s.azimuth_rad, s.elevation_rad, r.range_m, p.x,
-                        p.y, p.z, r.reflectivity, r.range_m > 0 ? r.body : -1);
+            const Vec3 p = s.origin_m + r.range_m * s.direction;
+            file_.print("{},{},{},{},{},{},{},{},{},{},{},{}\n", unit.packet_start_ns(number) + s.t_offset_ns,
+                        number, s.block, s.beam, s.azimuth_rad, s.elevation_rad, r.range_m, p.x, p.y, p.z,
+                        r.reflectivity, r.range_m > 0 ? r.body : -1);
         }
     }
     Status close() override { return file_.close(); }
@@ -82,15 +82,15 @@ private:
     File file_;
 };
 
-/// PLY or PCD, ASCII: both say the number of points first, so they are gathered.
+/// PLY or PCD, ASCII. Both start with the number of points, so the points are collected first.
 class PointCloud final : public Writer {
 public:
     PointCloud(File file, bool ply) : file_(std::move(file)), ply_(ply) {}
     void packet(std::int64_t, LidarUnit& unit) override {
         for (std::size_t i = 0; i < unit.shots().size(); ++i) {
-            const vlp16::Shot& s = unit.shots()[i];
+            const LidarShot& s = unit.shots()[i];
             const LidarReturn& r = unit.hits()[i];
-            if (r.range_m > 0) points_.push_back({s.origin_m() + r.range_m * vlp16::direction(s), r.reflectivity});
+            if (r.range_m > 0) points_.push_back({s.origin_m + r.range_m * s.direction, r.reflectivity});
         }
     }
     Status close() override {
@@ -123,9 +123,10 @@ class Capture final : public Writer {
 public:
     explicit Capture(std::unique_ptr<PacketSink> sink) : sink_(std::move(sink)) {}
     void packet(std::int64_t number, LidarUnit& unit) override {
-        const std::int64_t t = LidarUnit::t_sent_ns(number);
+        const std::int64_t t = unit.t_sent_ns(number);
         sink_->send(PacketKind::data, unit.bytes(), t);
-        if (LidarUnit::position_due(number)) sink_->send(PacketKind::position, unit.position(number), t);
+        if (const auto position = unit.position(number); !position.empty())
+            sink_->send(PacketKind::position, position, t);
     }
     Status close() override {
         sink_->flush();
@@ -138,10 +139,11 @@ private:
     std::unique_ptr<PacketSink> sink_;
 };
 
-Result<std::unique_ptr<Writer>> open_writer(const std::string& path, std::int64_t epoch_unix_ns) {
+Result<std::unique_ptr<Writer>> open_writer(const std::string& path, const LidarNetwork& network,
+                                            std::int64_t epoch_unix_ns) {
     const std::string extension = path.substr(std::min(path.rfind('.'), path.size()));
     if (extension == ".pcap") {
-        auto sink = open_packet_sink(path, epoch_unix_ns, true);
+        auto sink = open_packet_sink(path, network, epoch_unix_ns, true);
         if (!sink) return sink.error();
         return std::unique_ptr<Writer>(new Capture(*std::move(sink)));
     }
@@ -166,23 +168,23 @@ Outcome scan(const Options& o) {
     const std::int64_t from_ns = std::llround(o.time_s * 1e9), to_ns = from_ns + std::llround(duration_s * 1e9);
     if (auto loaded = o.pose.load(**world, from_ns, to_ns); !loaded) return loaded.error();
     LidarUnit unit(**world, *index);
-    auto writer = open_writer(o.out, (*world)->scene().epoch_unix_ns);
+    auto writer = open_writer(o.out, unit.lidar().model->spec().network, (*world)->scene().epoch_unix_ns);
     if (!writer) return writer.error();
 
-    std::size_t returns = 0;
-    std::int64_t packets = 0;
-    const std::int64_t first = (from_ns + vlp16::kPacketPeriodNs - 1) / vlp16::kPacketPeriodNs;
-    for (std::int64_t p = first; vlp16::packet_start_ns(p) < to_ns; ++p, ++packets) {
+    std::size_t packets = 0, shots = 0, returns = 0;
+    for (std::int64_t p = unit.first_packet_from(from_ns); unit.packet_start_ns(p) < to_ns; ++p) {
         unit.fire(p);
+        ++packets;
+        shots += unit.shots().size();
         returns += unit.returns();
         (*writer)->packet(p, unit);
     }
     if (auto closed = (*writer)->close(); !closed) return closed.error();
-    say(fmt::format("{}: {} packets, {} shots, {} returns", o.out, packets, packets * vlp16::kShots, returns));
+    say(fmt::format("{}: {} packets, {} shots, {} returns", o.out, packets, shots, returns));
     return nlohmann::json{{"file", o.out},
                           {"lidar", unit.lidar().name},
                           {"packets", packets},
-                          {"shots", packets * vlp16::kShots},
+                          {"shots", shots},
                           {"returns", returns}};
 }
 

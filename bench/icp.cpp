@@ -23,8 +23,14 @@ public:
         : world_(world),
           target_(target),
           settings_(settings),
+          model_(*settings.model),
           random_(settings.seed * 1'000'003 + stream),
-          placement_(world.scene().bodies.size()) {}
+          placement_(world.scene().bodies.size()),
+          shots_(model_.spec().shots_per_packet),
+          range_m_(shots_.size()),
+          reflectivity_(shots_.size()),
+          points_(shots_.size()),
+          bytes_(model_.spec().data_packet_bytes) {}
 
     [[nodiscard]] double even(double low, double high) {
         return std::uniform_real_distribution<double>(low, high)(random_);
@@ -59,20 +65,20 @@ public:
     void fire(const Rigid3& T_lidar_target, const SweepMotion& motion, std::vector<RangePoint>& out) {
         const auto turn_ns = static_cast<std::int64_t>(1e9 / settings_.rotation_hz);
         out.clear();
-        const std::int64_t first = turn_ns / 2 / vlp16::kPacketPeriodNs,
-                           last = 3 * turn_ns / 2 / vlp16::kPacketPeriodNs;
+        const std::int64_t period_ns = model_.packet_period_ns(settings_.rotation_hz);
+        const std::int64_t first = turn_ns / 2 / period_ns, last = 3 * turn_ns / 2 / period_ns;
         Vector6 rate;
         rate << to_eigen(motion.rate_rad_s), to_eigen(motion.velocity_m_s);
         for (std::int64_t packet = first; packet < last; ++packet) {
-            vlp16::shots(packet, settings_.rotation_hz, shots_);
-            const std::int64_t after_ns = vlp16::packet_start_ns(packet) - turn_ns;
+            model_.shots(packet, settings_.rotation_hz, shots_);
+            const std::int64_t after_ns = packet * period_ns - turn_ns;
             for (std::size_t i = 0; i < shots_.size(); ++i) {
                 const double t_s = 1e-9 * static_cast<double>(after_ns + shots_[i].t_offset_ns);
                 placement_.set(target_, displaced(T_lidar_target, t_s * rate));
-                range_m_[i] = range_of({shots_[i].origin_m(), vlp16::direction(shots_[i])});
+                range_m_[i] = range_of({shots_[i].origin_m, shots_[i].direction});
             }
-            vlp16::encode(packet, settings_.rotation_hz, 0, range_m_, reflectivity_, bytes_);
-            append_points(*vlp16::decode(bytes_), after_ns, out);
+            model_.encode(packet, settings_.rotation_hz, 0, range_m_, reflectivity_, bytes_);
+            append_points(std::span(points_).first(model_.points(bytes_, points_)), after_ns, out);
         }
     }
 
@@ -92,12 +98,14 @@ private:
     const World& world_;
     std::size_t target_;
     const IcpBenchSettings& settings_;
+    const LidarModel& model_;
     std::mt19937_64 random_;
     BodyPoses placement_;
-    std::array<vlp16::Shot, vlp16::kShots> shots_{};
-    std::array<double, vlp16::kShots> range_m_{};
-    std::array<float, vlp16::kShots> reflectivity_{};
-    std::array<std::uint8_t, vlp16::kDataPacketBytes> bytes_{};
+    std::vector<LidarShot> shots_;
+    std::vector<double> range_m_;
+    std::vector<float> reflectivity_;
+    std::vector<LidarPoint> points_;
+    std::vector<std::uint8_t> bytes_;
 };
 
 /// What this thread has computed: an alignment keeps to it, and whatever else the machine does is left out.
@@ -116,9 +124,9 @@ double quantile(std::vector<double>& values, double p) {
 Status check(const IcpBenchSettings& s, const std::vector<IcpStarts>& starts) {
     if (!(s.distance_min_m > 0 && s.distance_max_m >= s.distance_min_m && s.range_max_m > s.distance_max_m))
         return Error{"expected 0 < distance_min_m <= distance_max_m < range_max_m"};
-    if (!(s.rotation_hz >= vlp16::kRotationHzMin && s.rotation_hz <= vlp16::kRotationHzMax))
-        return Error{fmt::format("rotation_hz = {}: expected {} to {}", s.rotation_hz, vlp16::kRotationHzMin,
-                                 vlp16::kRotationHzMax)};
+    if (const LidarSpec& m = s.model->spec(); !(s.rotation_hz >= m.rate_hz_min && s.rotation_hz <= m.rate_hz_max))
+        return Error{
+            fmt::format("rotation_hz = {}: expected {} to {}", s.rotation_hz, m.rate_hz_min, m.rate_hz_max)};
     if (!(s.range_noise_m >= 0 && s.cone_deg >= 0 && s.cone_deg <= 180))
         return Error{"expected range_noise_m >= 0 and cone_deg 0 to 180"};
     for (const IcpStarts& at : starts)
@@ -164,7 +172,8 @@ Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target, cons
                                     const std::function<void(int, int)>& tell) {
     if (auto good = check(settings, starts); !good) return good.error();
     IcpSettings icp_settings = settings.icp;
-    icp_settings.noise.range_m = std::hypot(settings.range_noise_m, vlp16::kRangeQuantumM / std::sqrt(12.0));
+    icp_settings.noise.range_m =
+        std::hypot(settings.range_noise_m, settings.model->spec().range_resolution_m / std::sqrt(12.0));
     auto made = CloudIcp::create(world.tracer(), target, icp_settings);
     if (!made) return made.error();
     CloudIcp& icp = *made;

@@ -1,5 +1,5 @@
-/// bench/icp.h - ICP of a VLP-16's sweeps against the model, from many starts: how often it finds the
-/// pose, how far off it is beside its bound, how long it takes.
+/// bench/icp.h - ICP of LiDAR sweeps against the model from many starts: success rate, error beside its bound,
+/// time.
 #pragma once
 
 #include <functional>
@@ -9,6 +9,7 @@
 
 #include "emulator/world.h"
 #include "estimator/cloud/cloud_icp.h"
+#include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
 
@@ -25,9 +26,10 @@ struct IcpBenchSettings {
     double distance_min_m = 10, distance_max_m = 40;  ///< from the target's origin
     double cone_deg = 20;  ///< the LiDAR is seen from the target so far off its x axis at most; 180: anywhere
     double velocity_m_s = 0.1, rate_rad_s = 0.02;  ///< of the target during the sweep, on each axis at most
+    const LidarModel* model = lidar_models().front();
     double rotation_hz = 10;
     double range_max_m = 100;
-    double range_noise_m = 0.02;  ///< before ranges are rounded to 2 mm
+    double range_noise_m = 0.02;  ///< before the model rounds them
     std::uint64_t seed = 1;
     IcpSettings icp{};  ///< but for the noise of its ranges, which is that above
 };

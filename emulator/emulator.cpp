@@ -113,9 +113,10 @@ Status Emulator::open_outputs() {
             if (auto logs = cameras_.back()->log_to(options_.log_folder, wait); !logs) return logs.error();
     }
     for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
-        auto sinks = open_sinks<PacketSink>(
-            options_.lidar, i, scene.lidars, "LiDAR", scene.file,
-            [&](const auto& spec) { return open_packet_sink(spec, scene.epoch_unix_ns, wait); });
+        auto sinks =
+            open_sinks<PacketSink>(options_.lidar, i, scene.lidars, "LiDAR", scene.file, [&](const auto& spec) {
+                return open_packet_sink(spec, scene.lidars[i].model->spec().network, scene.epoch_unix_ns, wait);
+            });
         if (!sinks) return sinks.error();
         if (!sinks->empty()) lidars_.push_back(std::make_unique<LidarFeed>(*world_, i, *std::move(sinks)));
     }

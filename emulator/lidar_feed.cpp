@@ -8,7 +8,7 @@ LidarFeed::LidarFeed(const World& world, std::size_t lidar, std::vector<std::uni
     : unit_(world, lidar), sinks_(std::move(sinks)) {}
 
 void LidarFeed::start_at(std::int64_t t_ns) noexcept {
-    next_ = std::max<std::int64_t>(0, (t_ns + vlp16::kPacketPeriodNs - 1) / vlp16::kPacketPeriodNs);
+    next_ = unit_.first_packet_from(std::max<std::int64_t>(0, t_ns));
 }
 
 void LidarFeed::make_next(const Clock* clock) noexcept {
@@ -17,14 +17,15 @@ void LidarFeed::make_next(const Clock* clock) noexcept {
     unit_.fire(next_);
     stats_.fire.add(monotonic_ns() - wall_start);
 
+    const std::span<const std::uint8_t> position = unit_.position(next_);
     for (const auto& sink : sinks_) {
         sink->send(PacketKind::data, unit_.bytes(), due);
-        if (LidarUnit::position_due(next_)) sink->send(PacketKind::position, unit_.position(next_), due);
+        if (!position.empty()) sink->send(PacketKind::position, position, due);
     }
 
     const std::int64_t now = clock ? clock->now_ns() : due;
     ++stats_.packets;
-    stats_.shots += vlp16::kShots;
+    stats_.shots += unit_.shots().size();
     stats_.returns += unit_.returns();
     stats_.wake_late.add(started - due);
     stats_.hand_over.add(now - due);

@@ -17,9 +17,6 @@ struct LidarStats {
     std::uint64_t skipped = 0;  ///< never fired: the run was more than kMaxLagNs behind
     std::uint64_t shots = 0, returns = 0;
     Histogram wake_late, fire, hand_over;  ///< after it was due; duration; from due to sent
-    [[nodiscard]] double sweeps(double rate_hz) const noexcept {
-        return static_cast<double>(packets) * static_cast<double>(vlp16::kPacketPeriodNs) * 1e-9 * rate_hz;
-    }
 };
 
 class LidarFeed {
@@ -29,14 +26,18 @@ public:
     /// The first packet whose first shot is at or after this time is next.
     void start_at(std::int64_t t_ns) noexcept;
     /// When the next packet is complete and goes out.
-    [[nodiscard]] std::int64_t due_ns() const noexcept { return LidarUnit::t_sent_ns(next_); }
-    /// Fires the next packet for nobody.
+    [[nodiscard]] std::int64_t due_ns() const noexcept { return unit_.t_sent_ns(next_); }
+    /// Fires the next packet and discards it: this triggers one-time allocations.
     void warm_up() noexcept { unit_.fire(next_); }
     /// `clock`: null in lockstep, where no wall time enters.
     void make_next(const Clock* clock) noexcept;
 
     [[nodiscard]] const LidarUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }
+    [[nodiscard]] double sweeps() const noexcept {
+        return static_cast<double>(stats_.packets) * static_cast<double>(unit_.packet_period_ns()) * 1e-9 *
+               unit_.lidar().rate_hz;
+    }
     [[nodiscard]] const std::vector<std::unique_ptr<PacketSink>>& sinks() const noexcept { return sinks_; }
     void finish() noexcept {
         for (const auto& sink : sinks_) sink->flush();

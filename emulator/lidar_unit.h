@@ -1,13 +1,12 @@
 /// emulator/lidar_unit.h - one LiDAR under emulation: packet number -> the bytes that the instrument would send.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "emulator/world.h"
-#include "protocols/lidar/position.h"
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/lidar_model.h"
 #include "renderer/lidar/lidar_shot.h"
 
 namespace narpa {
@@ -18,35 +17,39 @@ public:
     LidarUnit(const World& world, std::size_t index);
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
-    /// The packet is complete, and is sent, when its last sequence is over.
-    [[nodiscard]] static std::int64_t t_sent_ns(std::int64_t packet) noexcept {
-        return vlp16::packet_start_ns(packet + 1);
+    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet) const noexcept { return packet * period_ns_; }
+    [[nodiscard]] std::int64_t packet_period_ns() const noexcept { return period_ns_; }
+    /// The first packet that starts at t_ns >= 0 or later.
+    [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns) const noexcept {
+        return model_.first_packet_from(t_ns, lidar_.rate_hz);
     }
+    /// A packet is sent when it is complete, which is when the next one starts.
+    [[nodiscard]] std::int64_t t_sent_ns(std::int64_t packet) const noexcept { return packet_start_ns(packet + 1); }
 
-    /// Fires the 384 shots of a packet, every body where it is at each shot's own time.
+    /// Fires a packet's shots, every body where it is at each shot's own time.
     void fire(std::int64_t packet) noexcept;
     /// The packet just fired, as it goes out.
-    [[nodiscard]] std::span<const std::uint8_t, vlp16::kDataPacketBytes> bytes() const noexcept { return bytes_; }
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] std::size_t returns() const noexcept { return returns_; }
     /// The truth behind the packet: shots and what they met, ranges unquantised.
-    [[nodiscard]] std::span<const vlp16::Shot, vlp16::kShots> shots() const noexcept { return shots_; }
-    [[nodiscard]] std::span<const LidarReturn, vlp16::kShots> hits() const noexcept { return hits_; }
+    [[nodiscard]] std::span<const LidarShot> shots() const noexcept { return shots_; }
+    [[nodiscard]] std::span<const LidarReturn> hits() const noexcept { return hits_; }
 
-    /// Whether a position packet follows this data packet, and its bytes.
-    [[nodiscard]] static bool position_due(std::int64_t packet) noexcept {
-        return packet % vlp16::kDataPacketsPerPosition == 0;
-    }
-    [[nodiscard]] std::span<const std::uint8_t, vlp16::kPositionPacketBytes> position(std::int64_t packet) noexcept;
+    /// The position packet that follows this data packet; empty where none does.
+    [[nodiscard]] std::span<const std::uint8_t> position(std::int64_t packet) noexcept;
 
 private:
     const World& world_;
     Lidar lidar_;
+    const LidarModel& model_;
+    std::int64_t period_ns_;
     BodyPoses placement_;
     std::size_t returns_ = 0;
-    std::array<vlp16::Shot, vlp16::kShots> shots_{};
-    std::array<LidarReturn, vlp16::kShots> hits_{};
-    std::array<std::uint8_t, vlp16::kDataPacketBytes> bytes_{};
-    std::array<std::uint8_t, vlp16::kPositionPacketBytes> position_{};
+    std::vector<LidarShot> shots_;
+    std::vector<LidarReturn> hits_;
+    std::vector<double> ranges_m_;
+    std::vector<float> reflectivities_;
+    std::vector<std::uint8_t> bytes_, position_;
 };
 
 }  // namespace narpa

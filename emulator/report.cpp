@@ -77,7 +77,7 @@ json of_lidar(const LidarFeed& feed) {
     }
     return {{"name", feed.unit().lidar().name},
             {"packets", s.packets},
-            {"sweeps", s.sweeps(feed.unit().lidar().rate_hz)},
+            {"sweeps", feed.sweeps()},
             {"skipped", s.skipped},
             {"shots", s.shots},
             {"returns", s.returns},

@@ -8,14 +8,10 @@
 
 namespace narpa {
 
-/// UDP ports of the instrument; position packets keep their distance from the data port.
-inline constexpr int kVelodyneDataPort = 2368, kVelodynePositionPort = 8308;
-inline constexpr int kPositionPortOffset = kVelodynePositionPort - kVelodyneDataPort;
-
-/// `address` is HOST:PORT; an IPv6 host stands in brackets.
-Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address);
-Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std::int64_t epoch_unix_ns,
-                                                   bool wait_when_full);
+/// `address` is HOST:PORT; an IPv6 host is in brackets.
+Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network);
+Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork& network,
+                                                   std::int64_t epoch_unix_ns, bool wait_when_full);
 Result<std::unique_ptr<PacketSink>> open_null_packet_sink();
 
 }  // namespace narpa

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
 
@@ -16,7 +17,8 @@ struct PacketCounters {
     std::uint64_t dropped = 0;  ///< socket buffer full, nobody listening, disk full
 };
 
-/// Ports by the maker's convention; `udp:HOST:PORT` moves the data port, position packets keep their distance.
+/// Each kind has its own port (LidarNetwork). `udp:HOST:PORT` sets the data port; position packets keep their
+/// distance.
 enum class PacketKind : std::uint8_t { data, position };
 
 class PacketSink {
@@ -31,9 +33,10 @@ public:
     [[nodiscard]] virtual std::string description() const = 0;
 };
 
-/// SINK: `udp:HOST:PORT` | `FILE.pcap` | `none`. `epoch_unix_ns` is the UTC of simulation time 0, for captures.
+/// SINK: `udp:HOST:PORT` | `FILE.pcap` | `none`. A capture shows the packets as `network` sends them by default;
+/// `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps.
 /// `wait_when_full`: a lockstep run waits for the disk where a real-time run drops.
-Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, std::int64_t epoch_unix_ns,
-                                                     bool wait_when_full);
+Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
+                                                     std::int64_t epoch_unix_ns, bool wait_when_full);
 
 }  // namespace narpa

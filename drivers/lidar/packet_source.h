@@ -31,6 +31,9 @@ protected:
     PacketSourceCounters counters_{};
 };
 
+/// The longest UDP datagram over IPv4: a buffer of this size takes any LiDAR's packets.
+inline constexpr std::size_t kDatagramBytesMax = 65507;
+
 /// SOURCE: `udp:PORT` (of any of this machine's addresses) | `udp:ADDRESS:PORT` (of this one; an IPv6 address
 /// stands in brackets).
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec);

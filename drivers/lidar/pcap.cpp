@@ -42,17 +42,19 @@ std::uint16_t checksum(std::uint32_t sum) noexcept {
     return static_cast<std::uint16_t>(~sum);
 }
 
-// Ethernet, IPv4 and UDP as the instrument sends by default: 192.168.1.201 broadcasts, source port = its port.
-std::size_t put_frame(std::uint8_t* frame, int port, std::span<const std::uint8_t> payload) noexcept {
-    constexpr std::array<std::uint8_t, kEthernetBytes> ethernet{
-        0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,  // to all
-        0x60, 0x76, 0x88, 0,    0,    0,     // Velodyne's prefix
-        0x08, 0x00};                         // IPv4
-    constexpr std::array<std::uint8_t, 8> addresses{192, 168, 1, 201, 255, 255, 255, 255};
+// Ethernet, IPv4 and UDP headers of a broadcast by the instrument; source port = destination port.
+std::size_t put_frame(std::uint8_t* frame, const LidarNetwork& from, int port,
+                      std::span<const std::uint8_t> payload) noexcept {
+    constexpr std::array<std::uint8_t, 6> broadcast{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
+    constexpr std::size_t ipv4 = 0x0800;
+    const auto& a = from.address;
+    const std::array<std::uint8_t, 8> addresses{a[0], a[1], a[2], a[3], 255, 255, 255, 255};
     constexpr std::uint8_t udp_protocol = 17;
     const std::size_t udp_length = kUdpBytes + payload.size();
 
-    std::memcpy(frame, ethernet.data(), ethernet.size());
+    std::memcpy(frame, broadcast.data(), broadcast.size());
+    std::memcpy(frame + broadcast.size(), from.mac.data(), from.mac.size());
+    put_be16(frame + kEthernetBytes - 2, ipv4);
     std::uint8_t* ip = frame + kEthernetBytes;
     std::memset(ip, 0, kIpBytes);
     ip[0] = 0x45;  // version 4, five words
@@ -120,9 +122,10 @@ private:
 
 class PcapSink final : public PacketSink {
 public:
-    PcapSink(const std::string& path, std::int64_t epoch_unix_ns, bool wait_when_full, pcap_t* pcap,
-             pcap_dumper_t* dumper)
+    PcapSink(const std::string& path, const LidarNetwork& network, std::int64_t epoch_unix_ns, bool wait_when_full,
+             pcap_t* pcap, pcap_dumper_t* dumper)
         : description_("capture " + path),
+          network_(network),
           epoch_unix_ns_(epoch_unix_ns),
           writer_(pcap, dumper),
           outbox_(writer_, kRecordSlots, sizeof(Record), wait_when_full) {}
@@ -135,8 +138,8 @@ public:
         Record record;
         const std::int64_t unix_ns = epoch_unix_ns_ + t_ns;
         std::memcpy(record.data(), &unix_ns, kStampBytes);
-        const int port = kind == PacketKind::data ? kVelodyneDataPort : kVelodynePositionPort;
-        const std::size_t size = kStampBytes + put_frame(record.data() + kStampBytes, port, payload);
+        const int port = kind == PacketKind::data ? network_.data_port : network_.position_port;
+        const std::size_t size = kStampBytes + put_frame(record.data() + kStampBytes, network_, port, payload);
         return outbox_.push(std::span(record).first(size));
     }
     void flush() noexcept override { outbox_.flush(); }
@@ -147,6 +150,7 @@ public:
 
 private:
     std::string description_;
+    LidarNetwork network_;
     std::int64_t epoch_unix_ns_;
     PcapWriter writer_;
     Outbox outbox_;
@@ -154,8 +158,8 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std::int64_t epoch_unix_ns,
-                                                   bool wait_when_full) {
+Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork& network,
+                                                   std::int64_t epoch_unix_ns, bool wait_when_full) {
     constexpr int snapshot_bytes = 65535;
     pcap_t* pcap = ::pcap_open_dead_with_tstamp_precision(DLT_EN10MB, snapshot_bytes, PCAP_TSTAMP_PRECISION_NANO);
     if (pcap == nullptr) return Error{"libpcap gave no handle", path, 0, 0, ErrorKind::missing};
@@ -168,7 +172,7 @@ Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std:
         return error;
     }
     return std::unique_ptr<PacketSink>(
-        std::make_unique<PcapSink>(path, epoch_unix_ns, wait_when_full, pcap, dumper));
+        std::make_unique<PcapSink>(path, network, epoch_unix_ns, wait_when_full, pcap, dumper));
 }
 
 }  // namespace narpa
@@ -177,7 +181,8 @@ Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std:
 
 namespace narpa {
 
-Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, std::int64_t, bool) {
+Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork&, std::int64_t,
+                                                   bool) {
     return Error{"this narpa was built without captures",
                  path,
                  0,

@@ -3,10 +3,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
 
 #include "drivers/lidar/backends.h"
@@ -30,13 +32,15 @@ struct Destination {
 
 class UdpSink final : public PacketSink {
 public:
-    UdpSink(int fd, const Destination& data, int port, std::string host)
+    /// `position_port_offset`: 0 where there are no position packets.
+    UdpSink(int fd, const Destination& data, int port, int position_port_offset, const std::string& host)
         : fd_(fd),
           destinations_{data, data},
-          description_("UDP to " + host + ", data port " + std::to_string(port) + ", position port " +
-                       std::to_string(port + kPositionPortOffset)) {
+          description_("UDP to " + host + ", data port " + std::to_string(port)) {
         destinations_[0].set_port(port);
-        destinations_[1].set_port(port + kPositionPortOffset);
+        destinations_[1].set_port(port + position_port_offset);
+        if (position_port_offset != 0)
+            description_ += ", position port " + std::to_string(port + position_port_offset);
     }
     ~UdpSink() override { ::close(fd_); }
     UdpSink(const UdpSink&) = delete;
@@ -66,14 +70,17 @@ private:
     std::atomic<std::uint64_t> sent_{0}, dropped_{0};
 };
 
-Result<int> port_from(std::string_view text, const std::string& address) {
+Result<int> port_from(std::string_view text, const std::string& address, int position_port_offset) {
     int port = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-    constexpr int most = 65535 - kPositionPortOffset;
-    if (error != std::errc{} || end != text.data() + text.size() || port < 1 || port > most)
-        return Error{"udp:" + address + ": expected a data port from 1 to " + std::to_string(most) +
-                     " (position packets go to the port " + std::to_string(kPositionPortOffset) + " above it)"};
-    return port;
+    const int least = std::max(1, 1 - position_port_offset), most = std::min(65535, 65535 - position_port_offset);
+    if (error == std::errc{} && end == text.data() + text.size() && port >= least && port <= most) return port;
+    std::string what =
+        "udp:" + address + ": expected a data port from " + std::to_string(least) + " to " + std::to_string(most);
+    if (position_port_offset != 0)
+        what += " (position packets go to the port " + std::to_string(std::abs(position_port_offset)) +
+                (position_port_offset > 0 ? " above it)" : " below it)");
+    return Error{what};
 }
 
 Result<Destination> resolve(const std::string& host, const std::string& address) {
@@ -90,13 +97,14 @@ Result<Destination> resolve(const std::string& host, const std::string& address)
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address) {
+Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network) {
     const std::size_t colon = address.rfind(':');
     std::string host = address.substr(0, colon);
     if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
     if (colon == address.npos || host.empty())
         return Error{"udp:" + address + ": expected udp:HOST:PORT, as in udp:127.0.0.1:2368"};
-    const Result<int> port = port_from(std::string_view(address).substr(colon + 1), address);
+    const Result<int> port =
+        port_from(std::string_view(address).substr(colon + 1), address, network.position_port_offset());
     if (!port) return port.error();
     const Result<Destination> destination = resolve(host, address);
     if (!destination) return destination.error();
@@ -106,7 +114,8 @@ Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address) {
     if (fd < 0) return Error{"udp:" + address + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
     const int on = 1;  // the instrument itself broadcasts
     ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
-    return std::unique_ptr<PacketSink>(std::make_unique<UdpSink>(fd, *destination, *port, host));
+    return std::unique_ptr<PacketSink>(
+        std::make_unique<UdpSink>(fd, *destination, *port, network.position_port_offset(), host));
 }
 
 }  // namespace narpa

@@ -26,8 +26,8 @@ struct SweepMotion {
 /// a point is off by sqrt((range cos i)^2 + (distance * pointing * sin i)^2): what pointing and the width of the
 /// footprint do to the range grows as tan i.
 struct RangeNoise {
-    double range_m = 0.02;         ///< with rounding: VLP-16 writes multiples of 2 mm, 0.58 mm RMS
-    double pointing_rad = 5.1e-5;  ///< of the beam's direction: VLP-16's azimuths are rounded to 0.01 deg
+    double range_m = 0.02;         ///< including the rounding in the packet: resolution / sqrt(12)
+    double pointing_rad = 5.1e-5;  ///< of the beam's direction: an azimuth rounded to 0.01 deg
 };
 
 }  // namespace narpa

@@ -1,16 +1,17 @@
-/// estimator/cloud/sweep_points.h - a VLP-16's packets as the points that the estimator takes.
+/// estimator/cloud/sweep_points.h - decoded LiDAR returns as measurements for the estimator.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "estimator/cloud/range_points.h"
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
 
-/// Adds a packet's returns, as its reader has them: ranges in steps of 2 mm along beams whose azimuths rest on
-/// hundredths of a degree. `packet_after_ns`: its first shot after the time that the pose is asked for.
-void append_points(const vlp16::DataPacket& packet, std::int64_t packet_after_ns, std::vector<RangePoint>& out);
+/// Appends a packet's returns to `out`. `packet_after_ns`: time of the packet's first shot after the time of the
+/// pose.
+void append_points(std::span<const LidarPoint> packet, std::int64_t packet_after_ns, std::vector<RangePoint>& out);
 
 }  // namespace narpa

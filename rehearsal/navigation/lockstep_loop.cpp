@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <optional>
 
 #include "drivers/can/descriptor.h"
@@ -118,7 +117,7 @@ private:
     const Loop& loop_;
     std::vector<std::optional<Frame>> newest_;
     std::vector<std::uint8_t> buffer_;
-    std::array<std::uint8_t, 2048> packet_{};
+    std::vector<std::uint8_t> packet_ = std::vector<std::uint8_t>(kDatagramBytesMax);
     std::vector<RangePoint> points_;
 };
 

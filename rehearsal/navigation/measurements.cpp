@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "estimator/view/measured_image.h"
-#include "protocols/lidar/vlp16.h"
 
 namespace narpa::rehearsal {
 namespace {

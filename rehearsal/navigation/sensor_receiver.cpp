@@ -1,6 +1,5 @@
 #include "rehearsal/navigation/sensor_receiver.h"
 
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -42,7 +41,7 @@ void SensorReceiver::read_frames(std::size_t i) {
 
 void SensorReceiver::read_packets(std::size_t i) {
     LidarInput& input = inputs_.lidars[i];
-    std::array<std::uint8_t, 2048> packet;
+    std::vector<std::uint8_t> packet(kDatagramBytesMax);
     while (!stop_) {
         const std::size_t n = input.source->receive(packet, kWait_ns);
         if (n == 0) continue;

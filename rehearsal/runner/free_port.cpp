@@ -5,14 +5,23 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <vector>
 
+#include "protocols/lidar/lidar_model.h"
+
 namespace narpa::rehearsal {
 namespace {
 
-constexpr int kLastDataPort = 65535 - 5940;
+/// The last port from which every model's position port can still be reached.
+int last_data_port() {
+    int offset = 0;
+    for (const LidarModel* model : lidar_models())
+        offset = std::max(offset, model->spec().network.position_port_offset());
+    return 65535 - offset;
+}
 
 /// Bound to any free port; -1: none.
 int bind_any(int fd) {
@@ -29,12 +38,13 @@ int bind_any(int fd) {
 
 Result<int> free_lidar_port() {
     constexpr int kTries = 200;
+    const int last = last_data_port();
     std::vector<int> held;  // ports that are too high stay taken while others are tried
     int port = 0;
     for (int k = 0; k < kTries; ++k) {
         held.push_back(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
         port = bind_any(held.back());
-        if (port <= kLastDataPort) break;
+        if (port <= last) break;
     }
     const int reason = errno;
     for (const int fd : held)
@@ -42,9 +52,8 @@ Result<int> free_lidar_port() {
     if (port < 0)
         return Error{fmt::format("no UDP port on the loopback: {}", std::strerror(reason)), "", 0, 0,
                      ErrorKind::missing};
-    if (port > kLastDataPort)
-        return Error{fmt::format("no free UDP port up to {} on the loopback", kLastDataPort), "", 0, 0,
-                     ErrorKind::missing};
+    if (port > last)
+        return Error{fmt::format("no free UDP port up to {} on the loopback", last), "", 0, 0, ErrorKind::missing};
     return port;
 }
 

@@ -5,7 +5,7 @@
 
 namespace narpa::rehearsal {
 
-/// A UDP data port of the loopback that nobody has now; position packets go to the port 5940 above it.
+/// A free UDP data port of the loopback, low enough for the port of the position packets above it.
 [[nodiscard]] Result<int> free_lidar_port();
 
 }  // namespace narpa::rehearsal

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/read_mounting.h"
 #include "renderer/scene/scene_parts.h"
 
@@ -162,18 +163,20 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
 }
 
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene) {
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kModels{{{"VLP-16", "VLP-16"}}};
-    constexpr double kFarthestM = 65535 * 0.002;  // what the VLP-16's packets can say: 16 bits of 2 mm
+    std::vector<std::pair<std::string_view, const LidarModel*>> models;
+    for (const LidarModel* model : lidar_models()) models.emplace_back(model->spec().name, model);
     Lidar lidar;
     lidar.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
     lidar.mount = mounting.mount;
     lidar.T_mount_lidar = mounting.T_mount_thing;
-    table.require("model", "\"VLP-16\"");
-    lidar.model = table.choice<std::string_view>("model", kModels).value_or("VLP-16");
-    lidar.rate_hz = table.number("rate_hz", {.low = 5, .high = 20}).value_or(lidar.rate_hz);
-    lidar.range_max_m =
-        table.number("range_max_m", {.low = 0, .high = kFarthestM, .low_open = true}).value_or(lidar.range_max_m);
+    table.require("model", fmt::format("\"{}\"", models.front().first));
+    lidar.model = table.choice<const LidarModel*>("model", models).value_or(models.front().second);
+    const LidarSpec& spec = lidar.model->spec();
+    lidar.rate_hz =
+        table.number("rate_hz", {.low = spec.rate_hz_min, .high = spec.rate_hz_max}).value_or(spec.rate_hz_default);
+    lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = spec.range_m_max, .low_open = true})
+                            .value_or(spec.range_m_default);
     table.finish();
     return lidar;
 }

@@ -17,6 +17,8 @@
 
 namespace narpa {
 
+class LidarModel;
+
 /// Triangles in the body's own frame, metres. Degenerate and non-finite ones were dropped when it was read.
 struct Mesh {
     std::string name;
@@ -108,10 +110,10 @@ struct Camera {
 struct Lidar {
     std::string name;
     int mount = -1;
-    Rigid3 T_mount_lidar{};    ///< lidar frame: the maker's own (VLP-16: x right, y forward, z up)
-    std::string model;         ///< "VLP-16"
-    double rate_hz = 10;       ///< turns a second: 5..20
-    double range_max_m = 100;  ///< returns beyond are not reported
+    Rigid3 T_mount_lidar{};             ///< lidar frame: the maker's own
+    const LidarModel* model = nullptr;  ///< never null in a scene that was read
+    double rate_hz = 10;                ///< turns a second, within the model's limits
+    double range_max_m = 100;           ///< returns beyond are not reported
 };
 
 struct RenderSettings {

@@ -41,19 +41,21 @@ TEST(SweepPoints, OfTheEmulatedLidarFitTheStation) {
     const SweepMotion motion{1e3 * Vec3{per_ms[3], per_ms[4], per_ms[5]},
                              1e3 * Vec3{per_ms[0], per_ms[1], per_ms[2]}};
 
+    const LidarModel& model = *unit.lidar().model;
     std::vector<RangePoint> points;
-    for (std::int64_t packet = turn_ns / 2 / vlp16::kPacketPeriodNs;
-         packet < 3 * turn_ns / 2 / vlp16::kPacketPeriodNs; ++packet) {
+    std::vector<LidarPoint> decoded(model.spec().shots_per_packet);
+    const std::int64_t period_ns = unit.packet_period_ns();
+    for (std::int64_t packet = turn_ns / 2 / period_ns; packet < 3 * turn_ns / 2 / period_ns; ++packet) {
         unit.fire(packet);
-        const auto data = vlp16::decode(unit.bytes());
-        ASSERT_TRUE(data);
-        append_points(*data, vlp16::packet_start_ns(packet) - turn_ns, points);
+        ASSERT_TRUE(model.packet_time(unit.bytes(), 0));
+        append_points(std::span(decoded).first(model.points(unit.bytes(), decoded)),
+                      unit.packet_start_ns(packet) - turn_ns, points);
     }
     std::erase_if(points, [](const RangePoint& p) { return p.range_m < 10; });  // the chaser's own nose
     ASSERT_GT(points.size(), 500u);
 
     IcpSettings settings;
-    settings.noise.range_m = vlp16::kRangeQuantumM / std::sqrt(12.0);
+    settings.noise.range_m = model.spec().range_resolution_m / std::sqrt(12.0);
     auto icp = CloudIcp::create((*world)->tracer(), kStation, settings);
     ASSERT_TRUE(icp) << icp.error().text();
     Vector6 off;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "drivers/lidar/packet_sink.h"
+#include "protocols/lidar/vlp16.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -53,7 +54,7 @@ Bytes counted_bytes(std::size_t size, int first) {
 }
 
 std::unique_ptr<PacketSink> opened(const std::string& spec) {
-    auto sink = open_packet_sink(spec, 0, false);
+    auto sink = open_packet_sink(spec, vlp16().spec().network, 0, false);
     EXPECT_TRUE(sink) << sink.error().text();
     return sink ? std::move(*sink) : nullptr;
 }
@@ -78,7 +79,7 @@ TEST(UdpSink, DataAndPositionPacketsReachTheirPorts) {
 
 TEST(UdpSink, NobodyListeningIsNoError) {
     for (const std::string host : {"127.0.0.1", "localhost", "[::1]"}) {
-        auto sink = open_packet_sink("udp:" + host + ":24999", 0, false);
+        auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().spec().network, 0, false);
         if (!sink) continue;  // no such address family here
         const Bytes packet = counted_bytes(1206, 0);
         for (int i = 0; i < 500; ++i) (*sink)->send(PacketKind::data, packet, 0);
@@ -119,7 +120,7 @@ TEST(PacketSink, BadSinksSayWhatIsWrong) {
         {"udp:256.1.1.1:2368", "unknown host \"256.1.1.1\""},
     };
     for (const auto& [spec, says] : cases) {
-        const auto sink = open_packet_sink(spec, 0, false);
+        const auto sink = open_packet_sink(spec, vlp16().spec().network, 0, false);
         ASSERT_FALSE(sink) << spec;
         EXPECT_EQ(sink.error().kind, ErrorKind::bad_input) << spec;
         EXPECT_NE(sink.error().text().find(says), std::string::npos) << sink.error().text();

@@ -63,9 +63,8 @@ TEST_P(RealBodies, AreSeenByCameraAndLidar) {
         returns += lidar.returns();
         for (std::size_t i = 0; i < lidar.shots().size(); ++i) {
             if (lidar.hits()[i].range_m <= 0) continue;
-            const Vec3 at =
-                (*world)->scene().lidars[0].T_mount_lidar *
-                (lidar.shots()[i].origin_m() + lidar.hits()[i].range_m * vlp16::direction(lidar.shots()[i]));
+            const Vec3 at = (*world)->scene().lidars[0].T_mount_lidar *
+                            (lidar.shots()[i].origin_m + lidar.hits()[i].range_m * lidar.shots()[i].direction);
             ASSERT_LE(norm(at), reach_m * (1 + 1e-6));
         }
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "protocols/lidar/vlp16.h"
 #include "rehearsal/navigation/state_estimator.h"
 #include "rehearsal/navigation/sweep_buffer.h"
 #include "tests/rehearsal/navigation_plant.h"
@@ -185,21 +186,22 @@ TEST(AttitudeTrack, TurnsEvenlyBetweenReportsAndOnAfterThem) {
 }
 
 std::vector<std::uint8_t> packet(std::int64_t number, std::int64_t epoch_unix_ns) {
-    std::array<double, vlp16::kShots> range_m;
-    std::array<float, vlp16::kShots> reflectivity{};
-    range_m.fill(5);
-    std::vector<std::uint8_t> bytes(vlp16::kDataPacketBytes);
-    vlp16::encode(number, 10, epoch_unix_ns, range_m, reflectivity,
-                  std::span<std::uint8_t, vlp16::kDataPacketBytes>(bytes));
+    const std::vector<double> range_m(vlp16().spec().shots_per_packet, 5);
+    const std::vector<float> reflectivity(range_m.size());
+    std::vector<std::uint8_t> bytes(vlp16().spec().data_packet_bytes);
+    vlp16().encode(number, 10, epoch_unix_ns, range_m, reflectivity, bytes);
     return bytes;
 }
 
 TEST(SweepBuffer, HasTheLastTurnEvenAcrossTheHour) {
     Lidar lidar;
+    lidar.model = &vlp16();
     lidar.rate_hz = 10;
+    const std::int64_t period_ns = vlp16().packet_period_ns(10);
+    const std::size_t shots = vlp16().spec().shots_per_packet;
     const std::int64_t epoch = 1'772'366'399'500'000'000;  // half a second before the hour
     SweepBuffer buffer(lidar, epoch);
-    const std::int64_t t_ns = 1'000'000'000, last = t_ns / vlp16::kPacketPeriodNs - 1;
+    const std::int64_t t_ns = 1'000'000'000, last = t_ns / period_ns - 1;
     EXPECT_FALSE(buffer.complete_to(t_ns));
     for (std::int64_t p = 0; p < last; ++p) ASSERT_TRUE(buffer.take(packet(p, epoch), t_ns));
     EXPECT_FALSE(buffer.complete_to(t_ns)) << "the last one is missing";
@@ -209,16 +211,19 @@ TEST(SweepBuffer, HasTheLastTurnEvenAcrossTheHour) {
     std::vector<RangePoint> points;
     buffer.turn(t_ns, points);
     ASSERT_FALSE(points.empty());
-    EXPECT_EQ(points.size() % vlp16::kShots, 0u);
-    EXPECT_NEAR(static_cast<double>(points.size()) / vlp16::kShots, 0.1e9 / vlp16::kPacketPeriodNs, 2);
+    EXPECT_EQ(points.size() % shots, 0u);
+    EXPECT_NEAR(static_cast<double>(points.size()) / static_cast<double>(shots),
+                0.1e9 / static_cast<double>(period_ns), 2);
     EXPECT_GE(points.front().t_s, -0.1);
     EXPECT_LT(points.back().t_s, 0);
     EXPECT_GT(points.back().t_s, -0.003);
 }
 
 TEST(SweepBuffer, CountsWhatIsNoPacket) {
-    SweepBuffer buffer(Lidar{}, 0);
-    const std::vector<std::uint8_t> noise(vlp16::kDataPacketBytes, 0x5a), empty;
+    Lidar lidar;
+    lidar.model = &vlp16();
+    SweepBuffer buffer(lidar, 0);
+    const std::vector<std::uint8_t> noise(vlp16().spec().data_packet_bytes, 0x5a), empty;
     EXPECT_FALSE(buffer.take(noise, 0));
     EXPECT_FALSE(buffer.take(empty, 0));
     EXPECT_EQ(buffer.bad(), 2u);

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "estimator/view/model_view.h"
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/lidar_model.h"
 #include "rehearsal/navigation/scene_model.h"
 #include "renderer/camera/detector.h"
 #include "renderer/lidar/lidar_shot.h"
@@ -44,25 +44,26 @@ inline std::vector<std::vector<std::uint8_t>> turn(SceneModel& model, Plant& pla
     const Lidar& lidar = model.scene().lidars[model.lidars()[0]];
     const auto from_ns = std::llround(1e9 * plant.t_s), turn_ns = std::llround(1e9 / lidar.rate_hz);
     std::vector<std::vector<std::uint8_t>> out;
-    std::array<vlp16::Shot, vlp16::kShots> shots;
-    std::array<double, vlp16::kShots> range_m;
-    std::array<float, vlp16::kShots> reflectivity{};
-    const std::int64_t first = (from_ns + vlp16::kPacketPeriodNs - 1) / vlp16::kPacketPeriodNs;
-    for (std::int64_t packet = first; vlp16::packet_start_ns(packet + 1) <= from_ns + turn_ns; ++packet) {
-        vlp16::shots(packet, lidar.rate_hz, shots);
+    const LidarModel& lidar_model = *lidar.model;
+    std::vector<LidarShot> shots(lidar_model.spec().shots_per_packet);
+    std::vector<double> range_m(shots.size());
+    std::vector<float> reflectivity(shots.size());
+    const auto start_ns = [&](std::int64_t packet) { return lidar_model.packet_start_ns(packet, lidar.rate_hz); };
+    const std::int64_t first = lidar_model.first_packet_from(from_ns, lidar.rate_hz);
+    for (std::int64_t packet = first; start_ns(packet + 1) <= from_ns + turn_ns; ++packet) {
+        lidar_model.shots(packet, lidar.rate_hz, shots);
         for (std::size_t i = 0; i < shots.size(); ++i) {
-            const double t_s = 1e-9 * static_cast<double>(vlp16::packet_start_ns(packet) + shots[i].t_offset_ns);
+            const double t_s = 1e-9 * static_cast<double>(start_ns(packet) + shots[i].t_offset_ns);
             if (t_s > plant.t_s) plant.step({}, {}, t_s - plant.t_s);
             const BodyPoses& at =
                 model.place(plant.t_s, plant.motion.q_world_target, inverse(chaser_target(plant)));
             const Rigid3 T = at.T_world_body[model.chaser()] * lidar.T_mount_lidar;
-            range_m[i] = shoot(model.tracer(), at, {T * shots[i].origin_m(), T.q * vlp16::direction(shots[i])},
-                               lidar.range_max_m)
-                             .range_m;
+            range_m[i] =
+                shoot(model.tracer(), at, {T * shots[i].origin_m, T.q * shots[i].direction}, lidar.range_max_m)
+                    .range_m;
         }
-        std::vector<std::uint8_t> bytes(vlp16::kDataPacketBytes);
-        vlp16::encode(packet, lidar.rate_hz, epoch_unix_ns, range_m, reflectivity,
-                      std::span<std::uint8_t, vlp16::kDataPacketBytes>(bytes));
+        std::vector<std::uint8_t> bytes(lidar_model.spec().data_packet_bytes);
+        lidar_model.encode(packet, lidar.rate_hz, epoch_unix_ns, range_m, reflectivity, bytes);
         out.push_back(std::move(bytes));
     }
     plant.step({}, {}, 1e-9 * static_cast<double>(from_ns + turn_ns) - plant.t_s);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
 
@@ -126,7 +127,7 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
 
     ASSERT_EQ(s.lidars.size(), 1u);
     EXPECT_EQ(s.lidars[0].mount, 1);
-    EXPECT_EQ(s.lidars[0].model, "VLP-16");
+    EXPECT_EQ(s.lidars[0].model->spec().name, "VLP-16");
     expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 2, 0}, {2.5, 0, 0.5},
                 1e-15);  // y is forward: along +x of the body
     expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 0, 1}, {0.5, 0, 1.5}, 1e-15);  // z is up

@@ -32,7 +32,7 @@ Status CameraFeed::log_to(const std::string& folder, bool wait_when_full) {
     const std::string stem = folder + "/" + unit_.camera().name;
     auto truth = RowLog::create(stem + ".truth.csv", std::string(kTrajectoryHeader) + "\n", wait_when_full);
     if (!truth) return truth.error();
-    auto ledger = RowLog::create(stem + ".ledger.csv", std::string(kLedgerHeader) + "\n", wait_when_full);
+    auto ledger = RowLog::create(stem + ".ledger.csv", ledger_header() + "\n", wait_when_full);
     if (!ledger) return ledger.error();
     truth_log_ = *std::move(truth);
     ledger_log_ = *std::move(ledger);

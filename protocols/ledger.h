@@ -1,8 +1,9 @@
 /// protocols/ledger.h - the time ledger of one camera frame: what it shows, when it was made, what it cost and what
 /// that left in error.
 ///
-/// All times are nanoseconds of the simulation clock. It goes to the log, to CAN (protocols/can) and, when the
-/// scene asks, into the image's last row (protocols/video/embedded_line.h).
+/// All times are nanoseconds of the simulation clock. The ledger goes to the CSV log, to CAN and, when the scene
+/// asks for it, into the image's last row (protocols/video/embedded_line.h). ledger_fields.h has the table of its
+/// fields.
 #pragma once
 
 #include <array>
@@ -35,6 +36,7 @@ inline constexpr std::array<std::string_view, 6> kStepNames{"refined",  "one_sam
 
 struct FrameLedger {
     static constexpr std::size_t kPasses = 8;
+    using Passes = std::array<std::uint32_t, kPasses>;
 
     std::uint32_t frame = 0;        ///< frame number k; exposure mid = k * period
     std::uint8_t camera = 0;        ///< index of the camera in the scene
@@ -44,14 +46,14 @@ struct FrameLedger {
     Delivery delivery = Delivery::frame;
     std::uint8_t step = 0;  ///< index into kStepNames
     BudgetKind budget_kind = BudgetKind::samples;
-    std::uint64_t budget = 0;                     ///< in the units of its kind
-    std::uint64_t samples = 0;                    ///< through the camera
-    std::uint64_t rays = 0;                       ///< of all kinds
-    std::array<std::uint32_t, kPasses> passes{};  ///< camera samples of each pass after the first, then 0
-    float samples_per_pixel = 0;                  ///< mean over the image
-    float expected_error = -1;                    ///< standard error of a pixel, root mean square over the image,
-                                                  ///< as a fraction of full scale; negative: not estimated
-    std::int64_t t_pose_ns = 0;                   ///< time of validity of that command; 0 when there was none
+    std::uint64_t budget = 0;     ///< in the units of its kind
+    std::uint64_t samples = 0;    ///< through the camera
+    std::uint64_t rays = 0;       ///< of all kinds
+    Passes passes{};              ///< camera samples of each pass after the first, then 0
+    float samples_per_pixel = 0;  ///< mean over the image
+    float expected_error = -1;    ///< standard error of a pixel, root mean square over the image,
+                                  ///< as a fraction of full scale; negative: not estimated
+    std::int64_t t_pose_ns = 0;   ///< time of validity of that command; 0 when there was none
     std::int64_t t_exposure_start_ns = 0, t_exposure_mid_ns = 0, t_exposure_end_ns = 0;
     std::int64_t t_render_start_ns = 0, t_render_end_ns = 0;
     std::int64_t t_hand_over_ns = 0;  ///< 0: not handed over, or not yet: the embedded line is written before

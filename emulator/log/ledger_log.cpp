@@ -4,24 +4,17 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <fstream>
+#include <numeric>
+#include <type_traits>
+
+#include "protocols/ledger_fields.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::uint64_t kMostSpp = 65535;
-
-/// "307200;614400": the passes after the first, as a replay needs them.
-std::size_t format_passes(std::span<char> out, const FrameLedger& ledger) noexcept {
-    std::size_t size = 0;
-    for (const std::uint32_t samples : ledger.passes) {
-        if (samples == 0) break;
-        size += fmt::format_to_n(out.data() + size, out.size() - size, "{}{}", size > 0 ? ";" : "", samples).size;
-    }
-    return size;
-}
 
 std::vector<std::string_view> cells_of(std::string_view line, char separator) {
     std::vector<std::string_view> cells;
@@ -33,118 +26,147 @@ std::vector<std::string_view> cells_of(std::string_view line, char separator) {
     }
 }
 
+/// Rows are formatted into a buffer that may be too short: `size` counts on, and what does not fit is left out.
+struct RowBuffer {
+    std::span<char> out;
+    std::size_t size = 0;
+
+    template <class... Args>
+    void add(fmt::format_string<Args...> format, Args&&... args) noexcept {
+        const std::span<char> rest = out.subspan(std::min(size, out.size()));
+        size += fmt::format_to_n(rest.data(), rest.size(), format, std::forward<Args>(args)...).size;
+    }
+};
+
+void format_cell(RowBuffer& row, const LedgerField&, auto value) noexcept {
+    row.add("{}", value);
+}
+void format_cell(RowBuffer& row, const LedgerField&, bool value) noexcept {
+    row.add("{:d}", value);
+}
+template <class Named>
+requires std::is_enum_v<Named>
+void format_cell(RowBuffer& row, const LedgerField& field, Named value) noexcept {
+    row.add("{}", field.signal.choices[static_cast<std::size_t>(value)].name);
+}
+/// "307200;614400"
+void format_cell(RowBuffer& row, const LedgerField&, const FrameLedger::Passes& passes) noexcept {
+    for (std::size_t i = 0; i < passes.size() && passes[i] > 0; ++i) row.add("{}{}", i > 0 ? ";" : "", passes[i]);
+}
+
 template <class... Base>
-bool read_whole(std::string_view text, auto& value, Base... base) {
+bool read_number(std::string_view text, auto& value, Base... base) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);
     return error == std::errc{} && end == text.data() + text.size();
 }
-bool read(std::string_view text, auto& value) {
-    return read_whole(text, value);
+
+// Each reads a cell and returns what was expected where it is bad, else nothing.
+
+template <class Whole>
+std::string read_cell(std::string_view text, const LedgerField& field, Whole& value) {
+    const auto choices = field.signal.choices;
+    const bool good = read_number(text, value);
+    if (!choices.empty())
+        return good && value < choices.size() ? "" : fmt::format("a {}, 0 to {}", field.name, choices.size() - 1);
+    return good ? "" : sizeof(Whole) == 1 ? "a whole number up to 255" : "a whole number";
 }
-bool read(std::string_view text, bool& value) {
+std::string read_cell(std::string_view text, const LedgerField&, std::int64_t& t_ns) {
+    return read_number(text, t_ns) ? "" : "whole nanoseconds";
+}
+std::string read_cell(std::string_view text, const LedgerField&, float& value) {
+    return read_number(text, value) ? "" : "a number";
+}
+std::string read_cell(std::string_view text, const LedgerField&, bool& value) {
     value = text == "1";
-    return value || text == "0";
+    return value || text == "0" ? "" : "0 or 1";
 }
-template <class Named, std::size_t N>
-bool read_name(std::string_view text, const std::array<std::string_view, N>& names, Named& value) {
-    const auto found = std::find(names.begin(), names.end(), text);
-    value = static_cast<Named>(found - names.begin());
-    return found != names.end();
-}
-/// A budget in samples for each pixel is as large as a scene may ask for.
-bool read_budget(std::string_view text, FrameLedger& l) {
-    return read(text, l.budget) &&
-           (l.budget_kind != BudgetKind::samples || (l.budget >= 1 && l.budget <= kMostSpp));
-}
-bool read_passes(std::string_view text, FrameLedger& l) {
-    if (text.empty()) return true;
-    const std::vector<std::string_view> cells = cells_of(text, ';');
-    if (cells.size() > l.passes.size()) return false;
-    std::uint64_t sum = 0;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-        if (!read(cells[i], l.passes[i]) || l.passes[i] == 0) return false;
-        sum += l.passes[i];
+template <class Named>
+requires std::is_enum_v<Named> std::string read_cell(std::string_view text, const LedgerField& field,
+                                                     Named& value) {
+    const auto choices = field.signal.choices;
+    std::string expected;
+    for (std::size_t i = 0; i < choices.size(); ++i) {
+        if (text == choices[i].name) return value = static_cast<Named>(i), "";
+        expected += fmt::format("{}{}", i == 0 ? "" : i + 1 < choices.size() ? ", " : " or ", choices[i].name);
     }
-    return sum <= l.samples;
+    return expected;
+}
+std::string read_cell(std::string_view text, const LedgerField&, FrameLedger::Passes& passes) {
+    constexpr const char* expected =
+        "at most 8 numbers of samples as 65536;131072, together at most as many as the frame's";
+    if (text.empty()) return "";
+    const std::vector<std::string_view> cells = cells_of(text, ';');
+    if (cells.size() > passes.size()) return expected;
+    for (std::size_t i = 0; i < cells.size(); ++i)
+        if (!read_number(cells[i], passes[i]) || passes[i] == 0) return expected;
+    return "";
 }
 
-struct Column {
-    std::string_view expected;
-    bool (*read)(std::string_view text, LoggedFrame& frame);
-};
-constexpr std::string_view kWhole = "a whole number", kTime = "whole nanoseconds", kFlag = "0 or 1";
-
-/// In the order of kLedgerHeader.
-constexpr std::array<Column, 22> kColumns{{
-    {kWhole, [](auto text, auto& f) { return read(text, f.ledger.frame); }},
-    {"a whole number up to 255", [](auto text, auto& f) { return read(text, f.ledger.pose_counter); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_pose_ns); }},
-    {kFlag, [](auto text, auto& f) { return read(text, f.ledger.pose_stale); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_exposure_start_ns); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_exposure_mid_ns); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_exposure_end_ns); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_render_start_ns); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_render_end_ns); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_hand_over_ns); }},
-    {kTime, [](auto text, auto& f) { return read(text, f.ledger.t_deadline_ns); }},
-    {kFlag, [](auto text, auto& f) { return read(text, f.ledger.deadline_met); }},
-    {"frame, nothing, repeated or blank",
-     [](auto text, auto& f) { return read_name(text, kDeliveries, f.ledger.delivery); }},
-    {"a step, 0 to 5",
-     [](auto text, auto& f) { return read(text, f.ledger.step) && f.ledger.step < kStepNames.size(); }},
-    {kWhole, [](auto text, auto& f) { return read(text, f.ledger.samples); }},
-    {"a number", [](auto text, auto& f) { return read(text, f.ledger.samples_per_pixel); }},
-    {kWhole, [](auto text, auto& f) { return read(text, f.ledger.rays); }},
-    {"at most 8 numbers of samples as 65536;131072, together at most as many as the frame's",
-     [](auto text, auto& f) { return read_passes(text, f.ledger); }},
-    {"samples, rays or time",
-     [](auto text, auto& f) { return read_name(text, kBudgetKinds, f.ledger.budget_kind); }},
-    {"a whole number, of samples 1 to 65535", [](auto text, auto& f) { return read_budget(text, f.ledger); }},
-    {"a number", [](auto text, auto& f) { return read(text, f.ledger.expected_error); }},
-    {"8 hexadecimal digits",
-     [](auto text, auto& f) { return text.size() == 8 && read_whole(text, f.image_crc32, 16); }},
-}};
+/// What a column must be beside those before it.
+std::string check_cell(const LedgerField& field, const FrameLedger& l) {
+    if (field.name == "passes" && std::accumulate(l.passes.begin(), l.passes.end(), std::uint64_t{0}) > l.samples)
+        return "numbers of samples, together at most as many as the frame's";
+    if (field.name == "budget" && l.budget_kind == BudgetKind::samples && (l.budget < 1 || l.budget > kMostSpp))
+        return fmt::format("samples for each pixel, 1 to {}", kMostSpp);
+    return "";
+}
 
 }  // namespace
+
+const std::string& ledger_header() {
+    static const std::string header = [] {
+        std::string text;
+        for (const LedgerField& field : kLedgerColumns) text += fmt::format("{},", field.name);
+        return text + "image_crc32";
+    }();
+    return header;
+}
 
 std::uint32_t image_crc32(std::span<const std::uint8_t> bytes) noexcept {
     return static_cast<std::uint32_t>(::crc32_z(0, bytes.data(), bytes.size()));
 }
 
-std::size_t format_ledger_row(std::span<char> out, const FrameLedger& l, std::uint32_t crc32) noexcept {
-    std::array<char, 11 * FrameLedger::kPasses> text;
-    const std::string_view passes(text.data(), format_passes(text, l));
-    const auto end = fmt::format_to_n(
-        out.data(), out.size(), "{},{},{},{:d},{},{},{},{},{},{},{},{:d},{},{},{},{},{},{},{},{},{},{:08x}\n",
-        l.frame, l.pose_counter, l.t_pose_ns, l.pose_stale, l.t_exposure_start_ns, l.t_exposure_mid_ns,
-        l.t_exposure_end_ns, l.t_render_start_ns, l.t_render_end_ns, l.t_hand_over_ns, l.t_deadline_ns,
-        l.deadline_met, kDeliveries[static_cast<std::size_t>(l.delivery)], l.step, l.samples, l.samples_per_pixel,
-        l.rays, passes, kBudgetKinds[static_cast<std::size_t>(l.budget_kind)], l.budget, l.expected_error, crc32);
-    return end.size <= out.size() ? end.size : 0;
+std::size_t format_ledger_row(std::span<char> out, const FrameLedger& ledger, std::uint32_t crc32) noexcept {
+    RowBuffer row{out};
+    for (const LedgerField& field : kLedgerColumns) {
+        visit_field(field, ledger, [&](const auto& value) { format_cell(row, field, value); });
+        row.add(",");
+    }
+    row.add("{:08x}\n", crc32);
+    return row.size <= out.size() ? row.size : 0;
 }
 
 Result<std::vector<LoggedFrame>> read_ledger_log(const std::string& path) {
-    const auto bad = [&](int line, int column, std::string what) {
-        return Error{std::move(what), path, line, column};
+    const auto bad = [&](int line, std::ptrdiff_t column, std::string what) {
+        return Error{std::move(what), path, line, static_cast<int>(column)};
     };
     std::ifstream in(path);
     std::string line;
     if (!in) return bad(0, 0, "cannot be read, expected the ledger log of a camera");
-    if (!std::getline(in, line) || line != kLedgerHeader)
-        return bad(1, 1, fmt::format("expected the header line \"{}\"", kLedgerHeader));
+    if (!std::getline(in, line) || line != ledger_header())
+        return bad(1, 1, fmt::format("expected the header line \"{}\"", ledger_header()));
+    constexpr std::size_t columns = kLedgerColumns.size() + 1;
     std::vector<LoggedFrame> frames;
     for (int number = 2; std::getline(in, line); ++number) {
         const std::vector<std::string_view> cells = cells_of(line, ',');
-        if (cells.size() != kColumns.size())
+        if (cells.size() != columns)
             return bad(number, 1,
-                       fmt::format("{} columns, expected {}: {}", cells.size(), kColumns.size(), kLedgerHeader));
+                       fmt::format("{} columns, expected {}: {}", cells.size(), columns, ledger_header()));
         LoggedFrame frame;
         frame.line = number;
-        for (std::size_t i = 0; i < cells.size(); ++i)
-            if (!kColumns[i].read(cells[i], frame))
-                return bad(number, static_cast<int>(cells[i].data() - line.data()) + 1,
-                           fmt::format("{}: \"{}\", expected {}", cells_of(kLedgerHeader, ',')[i], cells[i],
-                                       kColumns[i].expected));
+        const auto bad_cell = [&](std::string_view name, std::string_view cell, std::string_view expected) {
+            return bad(number, cell.data() - line.data() + 1,
+                       fmt::format("{}: \"{}\", expected {}", name, cell, expected));
+        };
+        for (std::size_t i = 0; i < kLedgerColumns.size(); ++i) {
+            const LedgerField& field = kLedgerColumns[i];
+            std::string expected;
+            visit_field(field, frame.ledger, [&](auto& value) { expected = read_cell(cells[i], field, value); });
+            if (expected.empty()) expected = check_cell(field, frame.ledger);
+            if (!expected.empty()) return bad_cell(field.name, cells[i], expected);
+        }
+        if (cells.back().size() != 8 || !read_number(cells.back(), frame.image_crc32, 16))
+            return bad_cell("image_crc32", cells.back(), "8 hexadecimal digits");
         frames.push_back(frame);
     }
     return frames;

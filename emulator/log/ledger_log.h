@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -13,10 +12,8 @@
 
 namespace narpa {
 
-inline constexpr std::string_view kLedgerHeader =
-    "frame,pose_counter,t_pose_ns,stale,t_exposure_start_ns,t_exposure_mid_ns,t_exposure_end_ns,t_render_start_ns,"
-    "t_render_end_ns,t_hand_over_ns,t_deadline_ns,deadline_met,delivery,step,samples,samples_per_pixel,rays,passes,"
-    "budget_kind,budget,expected_error,image_crc32";
+/// The names of the columns: kLedgerColumns, then image_crc32.
+[[nodiscard]] const std::string& ledger_header();
 
 /// CRC-32 of IEEE 802.3 (zlib's and Python's `crc32`) of a frame's bytes as the device takes them, with their
 /// embedded line.

@@ -14,7 +14,7 @@
 #include "protocols/can/frame.h"
 #include "protocols/can/signal_set.h"
 #include "protocols/estimate.h"
-#include "protocols/ledger.h"
+#include "protocols/ledger_fields.h"
 
 namespace narpa {
 

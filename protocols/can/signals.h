@@ -14,7 +14,6 @@
 #include <string_view>
 
 #include "protocols/estimate.h"
-#include "protocols/ledger.h"
 
 namespace narpa {
 
@@ -114,94 +113,6 @@ inline constexpr std::array<Signal, kPoseSignalCount> kPoseSignals{{
 inline constexpr SetLayout kPoseLayout{
     "Pose", "Commanded pose: on classic CAN the nine frames of one counter take effect together", kPoseFrames,
     kPoseSignals, 456};
-
-// --- Telemetry: one ledger set for each camera, and the heartbeat -----------------------------------------------
-
-enum LedgerSignal : std::size_t {
-    kLedgerFrame,
-    kLedgerCamera,
-    kLedgerPoseCounter,
-    kLedgerExposureMid,
-    kLedgerPoseTime,
-    kLedgerExposureStart,
-    kLedgerExposureEnd,
-    kLedgerRenderStart,
-    kLedgerRenderEnd,
-    kLedgerHandOver,
-    kLedgerDeadline,
-    kLedgerSamplesPerPixel,
-    kLedgerExpectedError,
-    kLedgerPoseStale,
-    kLedgerDeadlineMet,
-    kLedgerPoseKnown,
-    kLedgerStep,
-    kLedgerBudgetKind,
-    kLedgerDelivery,
-    kLedgerPasses,
-    kLedgerSamples,
-    kLedgerRays,
-    kLedgerBudget,
-    kLedgerSignalCount
-};
-
-inline constexpr double kExpectedErrorSteps = 5e6;    ///< of full scale
-inline constexpr double kSamplesPerPixelSteps = 256;  ///< of one sample
-
-inline constexpr auto kLedgerSteps = numbered(kStepNames);
-inline constexpr auto kLedgerBudgetKinds = numbered(kBudgetKinds);
-inline constexpr auto kLedgerDeliveries = numbered(kDeliveries);
-
-inline constexpr std::array<std::string_view, 10> kLedgerFrames{
-    "LedgerFrame",    "LedgerExposureMid", "LedgerPoseTime", "LedgerExposure", "LedgerRender",
-    "LedgerHandOver", "LedgerQuality",     "LedgerSamples",  "LedgerRays",     "LedgerBudget"};
-
-inline constexpr std::array<Signal, kLedgerSignalCount> kLedgerSignals{{
-    {"Frame", "", "Frame number", 1, false, {0, 0, 32}, {0, 0, 32}},
-    {"Camera", "", "Index of the camera in the scene", 1, false, {0, 32, 8}, {0, 32, 8}},
-    {"PoseCounter", "", "Counter of the newest pose command in the frame", 1, false, {0, 40, 8}, {0, 40, 8}},
-    {"ExposureMid",
-     "ns",
-     "Middle of the exposure: simulation clock modulo 2^48 ns",
-     1,
-     false,
-     {1, 0, 48},
-     {0, 48, 48}},
-    {"PoseTime", "ns", "Time of validity of that command, modulo 2^48 ns", 1, false, {2, 0, 48}, {0, 96, 48}},
-    {"ExposureStart", "us", "After ExposureMid", 1, true, {3, 0, 24}, {0, 144, 24}},
-    {"ExposureEnd", "us", "After ExposureMid", 1, true, {3, 24, 24}, {0, 168, 24}},
-    {"RenderStart", "us", "After ExposureMid", 1, true, {4, 0, 24}, {0, 192, 24}},
-    {"RenderEnd", "us", "After ExposureMid", 1, true, {4, 24, 24}, {0, 216, 24}},
-    {"HandOver", "us", "After ExposureMid; not available: not handed over", 1, true, {5, 0, 24}, {0, 240, 24}},
-    {"Deadline", "us", "Of the hand-over, after ExposureMid", 1, true, {5, 24, 24}, {0, 264, 24}},
-    {"SamplesPerPixel", "", "Mean over the image", kSamplesPerPixelSteps, false, {6, 24, 24}, {0, 288, 24}},
-    {"ExpectedError",
-     "",
-     "Standard error of a pixel, RMS over the image, fraction of full scale; not available: not estimated",
-     kExpectedErrorSteps,
-     true,
-     {6, 0, 24},
-     {0, 312, 24}},
-    {"PoseStale", "", "A commanded body had no command or an old one", 1, false, {8, 40, 1}, {0, 336, 1}},
-    {"DeadlineMet", "", "Handed over in time", 1, false, {8, 41, 1}, {0, 337, 1}},
-    {"PoseKnown", "", "PoseCounter and PoseTime hold a command", 1, false, {8, 42, 1}, {0, 338, 1}},
-    {"Step", "", "How far the frame got", 1, false, {7, 40, 3}, {0, 339, 3}, kLedgerSteps},
-    {"BudgetKind", "", "What limited the frame", 1, false, {9, 40, 2}, {0, 342, 2}, kLedgerBudgetKinds},
-    {"Delivery",
-     "",
-     "What was handed over in the frame's place",
-     1,
-     false,
-     {9, 42, 2},
-     {0, 344, 2},
-     kLedgerDeliveries},
-    {"Passes", "", "Passes after the first that count", 1, false, {7, 43, 4}, {0, 346, 4}},
-    {"Samples", "", "Samples through the camera", 1, false, {7, 0, 40}, {0, 352, 40}},
-    {"Rays", "", "Rays of all kinds", 1, false, {8, 0, 40}, {0, 392, 40}},
-    {"Budget", "", "Samples a pixel, rays, or nanoseconds: see BudgetKind", 1, false, {9, 0, 40}, {0, 432, 40}},
-}};
-
-inline constexpr SetLayout kLedgerLayout{"Ledger", "Time ledger of one camera frame", kLedgerFrames, kLedgerSignals,
-                                         472};
 
 // --- Telemetry: the pose that narpa estimates from its own frames -----------------------------------------------
 

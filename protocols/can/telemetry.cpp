@@ -1,81 +1,103 @@
-// What narpa says about itself: heartbeat and frame ledgers (messages.h).
+// Telemetry of narpa: heartbeat and frame ledgers (messages.h).
 #include <algorithm>
 #include <cmath>
 
 #include "protocols/can/messages.h"
+#include "protocols/can/signal_values.h"
 
 namespace narpa {
 namespace {
 
-constexpr int kLedgerTimeBits = 48, kHeartbeatTimeBits = 40, kOffsetBits = 24, kCountBits = 40;
+constexpr int kHeartbeatTimeBits = 40;
 
-std::int64_t low_bits(std::int64_t value, int bits) noexcept {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(value) & ((std::uint64_t{1} << bits) - 1));
-}
-
-/// Rounds to the nearest microsecond, halves upwards; floor division keeps negative times right.
+/// Rounds to the nearest microsecond, halves upwards; exact for negative times.
 std::int64_t to_us(std::int64_t t_ns) noexcept {
     const std::int64_t q = t_ns / 1000, r = t_ns % 1000;
     return q + (r >= 500 ? 1 : r < -500 ? -1 : 0);
 }
 
-std::int64_t offset_us(std::int64_t t_ns, std::int64_t t_mid_ns) noexcept {
-    constexpr std::int64_t limit = raw_max(true, kOffsetBits);
+constexpr std::size_t index_of(std::string_view signal) {
+    return static_cast<std::size_t>(std::ranges::find(kLedgerSignals, signal, &Signal::name) -
+                                    kLedgerSignals.begin());
+}
+constexpr std::size_t kExposureMid = index_of("ExposureMid"), kPoseKnown = index_of("PoseKnown"),
+                      kHandOver = index_of("HandOver");
+
+/// Of a time: after exposure mid.
+bool is_offset(const Signal& s) noexcept {
+    return s.unit == "us";
+}
+
+/// A ledger's value as a signal; `t_mid_ns` is its exposure mid.
+std::int64_t to_raw(const Signal& s, std::int64_t t_mid_ns, std::int64_t t_ns) noexcept {
+    if (!is_offset(s)) return time_steps(t_ns);
+    const std::int64_t limit = raw_max(true, s.fd.length);
     return std::clamp(to_us(t_ns - t_mid_ns), -limit, limit);
 }
-
-/// Not a number is 0.
-std::int64_t steps(float value, double steps_per_unit, std::int64_t limit) noexcept {
-    const double wanted = static_cast<double>(value) * steps_per_unit;
-    if (!(wanted > 0)) return 0;
-    return wanted < static_cast<double>(limit) ? std::llround(wanted) : limit;
+std::int64_t to_raw(const Signal& s, std::int64_t, float value) noexcept {
+    if (!(value >= 0)) return s.is_signed ? kNotAvailable : 0;
+    const double limit = static_cast<double>(raw_max(s.is_signed, s.fd.length));
+    return std::llround(std::min(static_cast<double>(value) * s.steps_per_unit, limit));
 }
-
-std::int64_t saturated(std::uint64_t count) noexcept {
-    constexpr auto limit = static_cast<std::uint64_t>(raw_max(false, kCountBits));
-    return static_cast<std::int64_t>(std::min(count, limit));
+std::int64_t to_raw(const Signal&, std::int64_t, const FrameLedger::Passes& passes) noexcept {
+    return std::ranges::count_if(passes, [](std::uint32_t samples) { return samples > 0; });
+}
+template <class Whole>
+std::int64_t to_raw(const Signal& s, std::int64_t, Whole value) noexcept {
+    const auto limit = static_cast<std::uint64_t>(raw_max(false, s.fd.length));
+    return static_cast<std::int64_t>(std::min(static_cast<std::uint64_t>(value), limit));
 }
 
 RawSignals raw_of(const FrameLedger& l) noexcept {
     RawSignals raw{};
-    raw[kLedgerFrame] = l.frame;
-    raw[kLedgerCamera] = l.camera;
-    raw[kLedgerPoseCounter] = l.pose_counter;
-    raw[kLedgerExposureMid] = low_bits(l.t_exposure_mid_ns, kLedgerTimeBits);
-    raw[kLedgerPoseTime] = low_bits(l.t_pose_ns, kLedgerTimeBits);
-    raw[kLedgerExposureStart] = offset_us(l.t_exposure_start_ns, l.t_exposure_mid_ns);
-    raw[kLedgerExposureEnd] = offset_us(l.t_exposure_end_ns, l.t_exposure_mid_ns);
-    raw[kLedgerRenderStart] = offset_us(l.t_render_start_ns, l.t_exposure_mid_ns);
-    raw[kLedgerRenderEnd] = offset_us(l.t_render_end_ns, l.t_exposure_mid_ns);
-    raw[kLedgerHandOver] = l.t_hand_over_ns == 0 ? kNotAvailable : offset_us(l.t_hand_over_ns, l.t_exposure_mid_ns);
-    raw[kLedgerDeadline] = offset_us(l.t_deadline_ns, l.t_exposure_mid_ns);
-    raw[kLedgerSamplesPerPixel] = steps(l.samples_per_pixel, kSamplesPerPixelSteps, raw_max(false, 24));
-    raw[kLedgerExpectedError] =
-        l.expected_error >= 0 ? steps(l.expected_error, kExpectedErrorSteps, raw_max(true, 24)) : kNotAvailable;
-    raw[kLedgerPoseStale] = l.pose_stale;
-    raw[kLedgerDeadlineMet] = l.deadline_met;
-    raw[kLedgerPoseKnown] = l.t_pose_ns != 0;
-    raw[kLedgerStep] = l.step;
-    raw[kLedgerBudgetKind] = static_cast<std::int64_t>(l.budget_kind);
-    raw[kLedgerDelivery] = static_cast<std::int64_t>(l.delivery);
-    raw[kLedgerPasses] = std::ranges::count_if(l.passes, [](std::uint32_t samples) { return samples > 0; });
-    raw[kLedgerSamples] = saturated(l.samples);
-    raw[kLedgerRays] = saturated(l.rays);
-    raw[kLedgerBudget] = saturated(l.budget);
+    for (std::size_t i = 0; i < kLedgerFields.size(); ++i)
+        visit_field(kLedgerFields[i], l,
+                    [&](const auto& value) { raw[i] = to_raw(kLedgerSignals[i], l.t_exposure_mid_ns, value); });
+    raw[kPoseKnown] = l.t_pose_ns != 0;
+    if (l.t_hand_over_ns == 0) raw[kHandOver] = kNotAvailable;
     return raw;
 }
 
+/// A signal as a ledger's value; `clock` gives the time of a raw value of 48 bits.
+template <class Clock>
+void from_raw(const Signal& s, std::int64_t raw, std::int64_t t_mid_ns, const Clock& clock, std::int64_t& t_ns) {
+    t_ns = raw == kNotAvailable ? 0 : is_offset(s) ? t_mid_ns + 1000 * raw : clock(raw);
+}
+void from_raw(const Signal& s, std::int64_t raw, std::int64_t, const auto&, float& value) noexcept {
+    value = raw == kNotAvailable ? -1.0f : static_cast<float>(static_cast<double>(raw) / s.steps_per_unit);
+}
+void from_raw(const Signal&, std::int64_t, std::int64_t, const auto&, FrameLedger::Passes&) noexcept {}
+template <class Whole>
+void from_raw(const Signal&, std::int64_t raw, std::int64_t, const auto&, Whole& value) noexcept {
+    value = static_cast<Whole>(raw);
+}
+
+FrameLedger ledger_of(const RawSignals& raw, std::int64_t t_reference_ns) noexcept {
+    const auto clock = [&](std::int64_t value) {
+        return unwrap_time(static_cast<std::uint64_t>(value), kTimeBits, t_reference_ns);
+    };
+    const std::int64_t t_mid_ns = clock(raw[kExposureMid]);
+    FrameLedger l;
+    for (std::size_t i = 0; i < kLedgerFields.size(); ++i)
+        visit_field(kLedgerFields[i], l,
+                    [&](auto& value) { from_raw(kLedgerSignals[i], raw[i], t_mid_ns, clock, value); });
+    if (raw[kPoseKnown] == 0) l.t_pose_ns = 0;
+    return l;
+}
+
 DecodeStatus known_choices(const RawSignals& raw) noexcept {
-    const bool known = raw[kLedgerStep] < static_cast<std::int64_t>(kLedgerSteps.size()) &&
-                       raw[kLedgerBudgetKind] < static_cast<std::int64_t>(kLedgerBudgetKinds.size());
-    return known ? DecodeStatus::complete : DecodeStatus::not_a_number;
+    for (std::size_t i = 0; i < kLedgerSignals.size(); ++i) {
+        const auto choices = static_cast<std::int64_t>(kLedgerSignals[i].choices.size());
+        if (choices > 0 && raw[i] >= choices) return DecodeStatus::not_a_number;
+    }
+    return DecodeStatus::complete;
 }
 
 }  // namespace
 
 CanFrame encode(const Heartbeat& heartbeat) noexcept {
     RawSignals raw{};
-    raw[kHeartbeatTime] = low_bits(to_us(heartbeat.t_ns), kHeartbeatTimeBits);
+    raw[kHeartbeatTime] = to_us(heartbeat.t_ns) & raw_max(false, kHeartbeatTimeBits);
     raw[kHeartbeatState] = static_cast<std::int64_t>(heartbeat.state);
     raw[kHeartbeatNoCommand] = heartbeat.no_command;
     raw[kHeartbeatStale] = heartbeat.stale;
@@ -124,38 +146,7 @@ LedgerDecoder::LedgerDecoder(std::uint8_t camera) noexcept
 DecodeStatus LedgerDecoder::accept(const CanFrame& frame, std::int64_t t_reference_ns, FrameLedger& out) noexcept {
     const DecodeStatus status = set_.accept(frame);
     if (status != DecodeStatus::complete) return status;
-    const RawSignals& raw = set_.raw();
-    const auto clock = [&](std::size_t i) {
-        return unwrap_time(static_cast<std::uint64_t>(raw[i]), kLedgerTimeBits, t_reference_ns);
-    };
-    const std::int64_t mid = clock(kLedgerExposureMid);
-    const auto after_mid = [&](std::size_t i) { return raw[i] == kNotAvailable ? 0 : mid + 1000 * raw[i]; };
-    out.frame = static_cast<std::uint32_t>(raw[kLedgerFrame]);
-    out.camera = static_cast<std::uint8_t>(raw[kLedgerCamera]);
-    out.pose_counter = static_cast<std::uint8_t>(raw[kLedgerPoseCounter]);
-    out.pose_stale = raw[kLedgerPoseStale] != 0;
-    out.deadline_met = raw[kLedgerDeadlineMet] != 0;
-    out.delivery = static_cast<Delivery>(raw[kLedgerDelivery]);
-    out.step = static_cast<std::uint8_t>(raw[kLedgerStep]);
-    out.budget_kind = static_cast<BudgetKind>(raw[kLedgerBudgetKind]);
-    out.budget = static_cast<std::uint64_t>(raw[kLedgerBudget]);
-    out.samples = static_cast<std::uint64_t>(raw[kLedgerSamples]);
-    out.rays = static_cast<std::uint64_t>(raw[kLedgerRays]);
-    out.passes = {};
-    out.samples_per_pixel =
-        static_cast<float>(static_cast<double>(raw[kLedgerSamplesPerPixel]) / kSamplesPerPixelSteps);
-    out.expected_error =
-        raw[kLedgerExpectedError] == kNotAvailable
-            ? -1.0f
-            : static_cast<float>(static_cast<double>(raw[kLedgerExpectedError]) / kExpectedErrorSteps);
-    out.t_pose_ns = raw[kLedgerPoseKnown] != 0 ? clock(kLedgerPoseTime) : 0;
-    out.t_exposure_start_ns = after_mid(kLedgerExposureStart);
-    out.t_exposure_mid_ns = mid;
-    out.t_exposure_end_ns = after_mid(kLedgerExposureEnd);
-    out.t_render_start_ns = after_mid(kLedgerRenderStart);
-    out.t_render_end_ns = after_mid(kLedgerRenderEnd);
-    out.t_hand_over_ns = after_mid(kLedgerHandOver);
-    out.t_deadline_ns = after_mid(kLedgerDeadline);
+    out = ledger_of(set_.raw(), t_reference_ns);
     return status;
 }
 

@@ -3,29 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <type_traits>
 
+#include "protocols/ledger_fields.h"
 #include "protocols/little_endian.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic{'N', 'R', 'P', 'A'};
-constexpr std::uint8_t kFlagPoseStale = 1, kFlagDeadlineMet = 2;
-
-// Offsets, each the one before plus its size.
-constexpr std::size_t kVersion = 4, kSize = kVersion + 1, kCamera = kSize + 1, kPoseCounter = kCamera + 1,
-                      kFlags = kPoseCounter + 1, kStep = kFlags + 1, kBudgetKind = kStep + 1,
-                      kFrame = kBudgetKind + 1 + 1, kSamplesPerPixel = kFrame + 4, kError = kSamplesPerPixel + 4,
-                      kSamples = kError + 4, kRays = kSamples + 8, kBudget = kRays + 8, kPasses = kBudget + 8,
-                      kTimes = kPasses + 4 * FrameLedger::kPasses, kCrc = kTimes + 8 * 8;
-static_assert(kCrc + 4 == kEmbeddedLineBytes);
-
-// The eight times in the order of the wire.
-template <class Ledger>
-auto times(Ledger& l) {
-    return std::array{&l.t_pose_ns,         &l.t_exposure_start_ns, &l.t_exposure_mid_ns, &l.t_exposure_end_ns,
-                      &l.t_render_start_ns, &l.t_render_end_ns,     &l.t_hand_over_ns,    &l.t_deadline_ns};
-}
+constexpr std::size_t kVersion = 4, kSize = 5, kCrc = kEmbeddedLineBytes - 4;
 
 // CRC-32 of IEEE 802.3 (reflected 0x04C11DB7, start and final exclusive or all ones), as zlib's crc32.
 std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
@@ -37,33 +24,47 @@ std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
     return ~crc;
 }
 
+/// A field's value at its place in the line; `bit` is of a flag.
+template <class Whole>
+void put(std::uint8_t* at, int, Whole value) {
+    put_le(at, static_cast<std::make_unsigned_t<Whole>>(value));
+}
+void put(std::uint8_t* at, int bit, bool value) {
+    *at = static_cast<std::uint8_t>(*at | value << bit);
+}
+void put(std::uint8_t* at, int, float value) {
+    put_le(at, std::bit_cast<std::uint32_t>(value));
+}
+void put(std::uint8_t* at, int, const FrameLedger::Passes& passes) {
+    for (std::size_t i = 0; i < passes.size(); ++i) put_le(at + 4 * i, passes[i]);
+}
+
+template <class Whole>
+void get(const std::uint8_t* at, int, Whole& value) {
+    value = static_cast<Whole>(get_le<std::make_unsigned_t<Whole>>(at));
+}
+void get(const std::uint8_t* at, int bit, bool& value) {
+    value = (*at >> bit & 1) != 0;
+}
+void get(const std::uint8_t* at, int, float& value) {
+    value = std::bit_cast<float>(get_le<std::uint32_t>(at));
+}
+void get(const std::uint8_t* at, int, FrameLedger::Passes& passes) {
+    for (std::size_t i = 0; i < passes.size(); ++i) passes[i] = get_le<std::uint32_t>(at + 4 * i);
+}
+
 }  // namespace
 
 bool encode_embedded_line(const FrameLedger& ledger, std::span<std::uint8_t> row) noexcept {
     if (row.size() < kEmbeddedLineBytes) return false;
     std::uint8_t* at = row.data();
+    std::ranges::fill(row.first(kEmbeddedLineBytes), std::uint8_t{0});
     std::ranges::copy(kMagic, at);
     at[kVersion] = kEmbeddedLineVersion;
     at[kSize] = kEmbeddedLineBytes;
-    at[kCamera] = ledger.camera;
-    at[kPoseCounter] = ledger.pose_counter;
-    at[kFlags] = static_cast<std::uint8_t>((ledger.pose_stale ? kFlagPoseStale : 0) |
-                                           (ledger.deadline_met ? kFlagDeadlineMet : 0));
-    at[kStep] = ledger.step;
-    at[kBudgetKind] = static_cast<std::uint8_t>(ledger.budget_kind);
-    at[kBudgetKind + 1] = 0;
-    put_le(at + kFrame, ledger.frame);
-    put_le(at + kSamplesPerPixel, std::bit_cast<std::uint32_t>(ledger.samples_per_pixel));
-    put_le(at + kError, std::bit_cast<std::uint32_t>(ledger.expected_error));
-    put_le(at + kSamples, ledger.samples);
-    put_le(at + kRays, ledger.rays);
-    put_le(at + kBudget, ledger.budget);
-    for (std::size_t i = 0; i < ledger.passes.size(); ++i) put_le(at + kPasses + 4 * i, ledger.passes[i]);
-    std::size_t offset = kTimes;
-    for (const std::int64_t* t_ns : times(ledger)) {
-        put_le(at + offset, static_cast<std::uint64_t>(*t_ns));
-        offset += 8;
-    }
+    for (const LedgerField& f : kLedgerFields)
+        if (f.line_offset >= 0)
+            visit_field(f, ledger, [&](const auto& value) { put(at + f.line_offset, f.line_bit, value); });
     put_le(at + kCrc, crc32(row.first(kCrc)));
     return true;
 }
@@ -74,26 +75,11 @@ std::optional<FrameLedger> decode_embedded_line(std::span<const std::uint8_t> ro
     const std::uint8_t* at = row.data();
     if (at[kVersion] != kEmbeddedLineVersion || at[kSize] != kEmbeddedLineBytes) return std::nullopt;
     if (get_le<std::uint32_t>(at + kCrc) != crc32(row.first(kCrc))) return std::nullopt;
-    if (at[kStep] >= kStepNames.size() || at[kBudgetKind] >= kBudgetKinds.size()) return std::nullopt;
     FrameLedger ledger;
-    ledger.camera = at[kCamera];
-    ledger.pose_counter = at[kPoseCounter];
-    ledger.pose_stale = (at[kFlags] & kFlagPoseStale) != 0;
-    ledger.deadline_met = (at[kFlags] & kFlagDeadlineMet) != 0;
-    ledger.step = at[kStep];
-    ledger.budget_kind = static_cast<BudgetKind>(at[kBudgetKind]);
-    ledger.frame = get_le<std::uint32_t>(at + kFrame);
-    ledger.samples_per_pixel = std::bit_cast<float>(get_le<std::uint32_t>(at + kSamplesPerPixel));
-    ledger.expected_error = std::bit_cast<float>(get_le<std::uint32_t>(at + kError));
-    ledger.samples = get_le<std::uint64_t>(at + kSamples);
-    ledger.rays = get_le<std::uint64_t>(at + kRays);
-    ledger.budget = get_le<std::uint64_t>(at + kBudget);
-    for (std::size_t i = 0; i < ledger.passes.size(); ++i)
-        ledger.passes[i] = get_le<std::uint32_t>(at + kPasses + 4 * i);
-    std::size_t offset = kTimes;
-    for (std::int64_t* t_ns : times(ledger)) {
-        *t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(at + offset));
-        offset += 8;
+    for (const LedgerField& f : kLedgerFields) {
+        if (f.line_offset < 0) continue;
+        if (!f.signal.choices.empty() && at[f.line_offset] >= f.signal.choices.size()) return std::nullopt;
+        visit_field(f, ledger, [&](auto& value) { get(at + f.line_offset, f.line_bit, value); });
     }
     return ledger;
 }

@@ -92,8 +92,8 @@ protected:
                          const std::string& value) {
         std::string text = slurp(log + "/nav.ledger.csv");
         std::size_t index = 0;
-        for (std::size_t at = 0; kLedgerHeader.substr(at, column.size()) != column; ++index)
-            at = kLedgerHeader.find(',', at) + 1;
+        for (std::size_t at = 0; ledger_header().substr(at, column.size()) != column; ++index)
+            at = ledger_header().find(',', at) + 1;
         std::size_t at = 0;
         for (std::size_t i = 0; i < row; ++i) at = text.find('\n', at) + 1;
         for (std::size_t i = 0; i < index; ++i) at = text.find(',', at) + 1;
@@ -204,7 +204,7 @@ TEST_F(ReplayTest, ARowOfTheLedgerReadsBackBitForBit) {
     std::array<char, 512> row;
     const std::size_t size = format_ledger_row(row, l, 0x00C0FFEE);
     ASSERT_GT(size, 0U);
-    std::ofstream(folder_ / "l.csv") << kLedgerHeader << "\n" << std::string_view(row.data(), size);
+    std::ofstream(folder_ / "l.csv") << ledger_header() << "\n" << std::string_view(row.data(), size);
     const auto frames = read_ledger_log(folder_ / "l.csv");
     ASSERT_TRUE(frames) << frames.error().text();
     ASSERT_EQ(frames->size(), 1U);

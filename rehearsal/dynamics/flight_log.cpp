@@ -24,10 +24,10 @@ nlohmann::json numbers(const Vec3& v, double scale = 1) {
     return {scale * v.x, scale * v.y, scale * v.z};
 }
 
-nlohmann::json to_json(const PortMotion& p) {
-    return {{"position_m", numbers(p.position_m)},
+nlohmann::json to_json(const PortState& p) {
+    return {{"position_m", numbers(p.position_m())},
             {"velocity_m_s", numbers(p.velocity_m_s)},
-            {"attitude_deg", numbers(p.attitude_rad, 1 / kRadPerDeg)},
+            {"attitude_deg", numbers(p.misalignment_rad(), 1 / kRadPerDeg)},
             {"rate_deg_s", numbers(p.rate_rad_s, 1 / kRadPerDeg)}};
 }
 
@@ -48,11 +48,11 @@ Result<TruthLog> TruthLog::create(const std::string& folder) {
 }
 
 void TruthLog::append(const Simulation& s) {
-    const PortMotion p = s.port();
+    const PortState p = s.port();
     const ActuatorCommand& c = s.command();
     const Loads& fired = s.fired();
-    file_ << fmt::format("{:.9f}", seconds(s.t_ns())) << fields(p.position_m) << fields(p.velocity_m_s)
-          << fields(p.attitude_rad, 1 / kRadPerDeg) << fields(p.rate_rad_s, 1 / kRadPerDeg)
+    file_ << fmt::format("{:.9f}", seconds(s.t_ns())) << fields(p.position_m()) << fields(p.velocity_m_s)
+          << fields(p.misalignment_rad(), 1 / kRadPerDeg) << fields(p.rate_rad_s, 1 / kRadPerDeg)
           << fmt::format(",{},{},{},{}", kDynamicsPhases[static_cast<std::size_t>(s.phase())],
                          kGuidancePhases[static_cast<std::size_t>(c.phase)], c.leg,
                          kAbortReasons[static_cast<std::size_t>(c.abort)])

@@ -11,7 +11,7 @@
 
 namespace narpa::rehearsal {
 
-/// truth.csv: a row at each pose command. Ports as in PortMotion, but degrees; impulses: fired since the row
+/// truth.csv: a row at each pose command. Ports as in PortState, but degrees; impulses: fired since the row
 /// before, chaser's body axes.
 class TruthLog {
 public:

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "protocols/can/messages.h"
 #include "rehearsal/dynamics/random_streams.h"
 
 namespace narpa::rehearsal {
@@ -18,6 +19,14 @@ constexpr double kLeftDistances = 2;  // of the start's distance
 
 double seconds(std::int64_t ns) {
     return static_cast<double>(ns) * 1e-9;
+}
+
+/// A motion in the steps of a pose command; as it is where it does not fit one.
+Motion as_transmitted(const Motion& motion) {
+    CanFrame frame;
+    PoseCommand command{0, 0, motion};
+    if (encode_fd(command, 0, frame)) (void)PoseDecoder(0).accept(frame, 0, command);
+    return command.motion;
 }
 
 Status check(const Vehicle& v, const char* name) {
@@ -75,10 +84,12 @@ void Simulation::place_bodies(std::uint64_t seed) {
     }
 
     const Start& s = scenario_.start;
-    PortMotion port;
-    port.position_m = s.position_m + off(s.position_sigma_m, draws_.position);
+    PortState port;
+    port.T_port_chaser_port.t = s.position_m + off(s.position_sigma_m, draws_.position);
     port.velocity_m_s = s.velocity_m_s + off(s.velocity_sigma_m_s, draws_.velocity);
-    port.attitude_rad = kRadPerDeg * (s.attitude_deg + off(s.attitude_sigma_deg, draws_.attitude));
+    port.T_port_chaser_port.q =
+        T_port_docked().q *
+        exp_rotation(kRadPerDeg * (s.attitude_deg + off(s.attitude_sigma_deg, draws_.attitude)));
     const Vec3 rate_body = kRadPerDeg * (s.rate_deg_s + off(s.rate_sigma_deg_s, draws_.rate));
     port.rate_rad_s = conjugate(scenario_.chaser.T_body_port.q) * rate_body;
     const Motion chaser = chaser_motion(port, scenario_.target, target_motion(state_), scenario_.chaser);
@@ -114,7 +125,7 @@ void Simulation::advance_to(std::int64_t t_ns) {
                 return;
             }
         }
-        if (phase_ == DynamicsPhase::bounced && port(next).position_m.x <= 0 && ports_meet(next)) rebound(next);
+        if (phase_ == DynamicsPhase::bounced && port(next).position_m().x <= 0 && ports_meet(next)) rebound(next);
         fire_for(loads, until_ns - from_ns);
         state_ = next;
         change_target_rate(from_ns, until_ns);
@@ -194,14 +205,14 @@ Motion Simulation::chaser_motion_of(const State& state) const {
             rate};
 }
 
-PortMotion Simulation::port(const State& state) const {
-    return port_motion(scenario_.target, target_motion(state), scenario_.chaser, chaser_motion_of(state));
+PortState Simulation::port(const State& state) const {
+    return port_state(scenario_.target, target_motion(state), scenario_.chaser, chaser_motion_of(state));
 }
 
 // --- Contact --------------------------------------------------------------------------------------------------
 
 bool Simulation::passes_plane(const State& before, const State& then) const {
-    return port(before).position_m.x > 0 && port(then).position_m.x <= 0;
+    return port(before).position_m().x > 0 && port(then).position_m().x <= 0;
 }
 
 /// The first nanosecond at which the chaser's port has reached the plane; before `before_ns`, so that what stands
@@ -210,22 +221,25 @@ Simulation::State Simulation::at_plane(const Loads& loads, std::int64_t dt_ns, s
     std::int64_t not_yet = 0, reached = dt_ns;
     while (reached - not_yet > 1) {
         const std::int64_t middle = not_yet + (reached - not_yet) / 2;
-        (port(after(state_, loads, middle)).position_m.x > 0 ? not_yet : reached) = middle;
+        (port(after(state_, loads, middle)).position_m().x > 0 ? not_yet : reached) = middle;
     }
     return after(state_, loads, std::min(reached, before_ns - 1 - state_.t_ns));
 }
 
 bool Simulation::ports_meet(const State& state) const {
-    const PortMotion p = port(state);
-    return std::hypot(p.position_m.y, p.position_m.z) <= kPortRadiusM && p.velocity_m_s.x < 0;
+    const PortState p = port(state);
+    return p.lateral_m() <= kPortRadiusM && p.closing_m_s() > 0;
 }
 
+/// Whether it captures is decided on the poses in the steps that travel on CAN: the judge, who has no others,
+/// decides alike at the limits.
 void Simulation::touch(const State& met, const Loads& loads) {
     fire_for(loads, met.t_ns - state_.t_ns);
     state_ = met;
-    const PortMotion p = port();
-    const bool captured = within(scenario_.gates.contact.value_or(Gates::Contact{}), p);
-    contact_ = ContactEvent{met.t_ns, p, captured};
+    const PortState on_bus = port_state(scenario_.target, as_transmitted(target_motion(met)), scenario_.chaser,
+                                        as_transmitted(chaser_motion_of(met)));
+    const bool captured = within(scenario_.gates.contact.value_or(CaptureEnvelope{}), on_bus);
+    contact_ = ContactEvent{met.t_ns, port(), captured};
     phase_ = captured ? DynamicsPhase::captured : DynamicsPhase::bounced;
     touching_ = true;
 }
@@ -265,7 +279,7 @@ Truth Simulation::truth() const {
             chaser_motion_of(state_)};
 }
 
-PortMotion Simulation::port() const {
+PortState Simulation::port() const {
     return port(state_);
 }
 
@@ -275,7 +289,7 @@ Ending Simulation::ending() const {
     if (t_ns() >= to_ns(scenario_.duration_s)) return Ending::duration;
     if (command_.phase == GuidancePhase::done) return Ending::navigation_done;
     if (command_.phase == GuidancePhase::retreating &&
-        norm(port().position_m) > kLeftDistances * norm(scenario_.start.position_m))
+        port().range_m() > kLeftDistances * norm(scenario_.start.position_m))
         return Ending::left;
     return Ending::not_yet;
 }

@@ -15,7 +15,6 @@
 #include "base/result.h"
 #include "protocols/closed_loop.h"
 #include "rehearsal/dynamics/orbit_motion.h"
-#include "rehearsal/dynamics/port_motion.h"
 #include "rehearsal/dynamics/rigid_body.h"
 #include "rehearsal/dynamics/thruster_model.h"
 #include "rehearsal/scenario/scenario.h"
@@ -35,7 +34,7 @@ struct StartDraws {
 
 struct ContactEvent {
     std::int64_t t_ns = 0;
-    PortMotion port;  ///< just before
+    PortState port;  ///< just before
     bool captured = false;
 };
 
@@ -61,7 +60,7 @@ public:
     [[nodiscard]] AttitudeReport measure_attitude();
 
     [[nodiscard]] Truth truth() const;
-    [[nodiscard]] PortMotion port() const;
+    [[nodiscard]] PortState port() const;
     [[nodiscard]] DynamicsPhase phase() const noexcept { return phase_; }
     /// The first.
     [[nodiscard]] const std::optional<ContactEvent>& contact() const noexcept { return contact_; }
@@ -89,7 +88,7 @@ private:
     [[nodiscard]] Attitude target_after(const State& from, double dt_s) const;
     [[nodiscard]] Motion target_motion(const State& state) const;
     [[nodiscard]] Motion chaser_motion_of(const State& state) const;
-    [[nodiscard]] PortMotion port(const State& state) const;
+    [[nodiscard]] PortState port(const State& state) const;
     void fire_for(const Loads& loads, std::int64_t dt_ns);
     [[nodiscard]] bool passes_plane(const State& before, const State& then) const;
     [[nodiscard]] State at_plane(const Loads& loads, std::int64_t dt_ns, std::int64_t before_ns) const;

@@ -4,6 +4,14 @@
 #include <cmath>
 
 namespace narpa::rehearsal {
+namespace {
+
+/// Origin of the chaser's port, target's port axes.
+Vec3 port_position_m(const Scenario& scenario, const Rigid3& T_chaser_target) {
+    return (inverse(T_chaser_target * scenario.target.T_body_port) * scenario.chaser.T_body_port).t;
+}
+
+}  // namespace
 
 double JudgedEstimate::largest_in_sigmas() const {
     double largest = 0;
@@ -87,10 +95,10 @@ bool BusRecord::count(DecodeStatus status) {
     return status == DecodeStatus::complete;
 }
 
-std::optional<PortState> BusRecord::truth_at(std::int64_t t_ns) const {
+std::optional<TruthState> BusRecord::truth_at(std::int64_t t_ns) const {
     const auto target = target_.at(t_ns), chaser = chaser_.at(t_ns);
     if (!target || !chaser) return std::nullopt;
-    return port_state(scenario_, t_ns, *target, *chaser);
+    return TruthState{port_state(scenario_.target, *target, scenario_.chaser, *chaser), t_ns};
 }
 
 /// Where both bodies are known by now; times before the target's first command stay without.
@@ -121,8 +129,7 @@ std::size_t BusRecord::judge_waiting() {
         j.rotation_error_rad = rotation_vector(e.T_chaser_target.q * conjugate(truth_pose.q));
         j.sigma_position_m = e.sigma_position_m;
         j.sigma_rotation_rad = e.sigma_rotation_rad;
-        j.port_position_m = T_port_port(scenario_, e.T_chaser_target).t;
-        j.true_port_position_m = T_port_port(scenario_, truth_pose).t;
+        j.port_position_m = port_position_m(scenario_, e.T_chaser_target);
         j.frames = e.frames;
         j.sweeps = e.sweeps;
         estimates.push_back(j);

@@ -16,18 +16,23 @@
 #include "protocols/can/messages.h"
 #include "protocols/closed_loop.h"
 #include "protocols/ledger.h"
-#include "rehearsal/judge/port_state.h"
+#include "rehearsal/docking/port_state.h"
+#include "rehearsal/judge/motion_track.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
+
+/// The true port state at one instant.
+struct TruthState : PortState {
+    std::int64_t t_ns = 0;  ///< simulation clock
+};
 
 /// An estimate beside the truth of the same time. Errors and deviations: the target in the chaser's body axes.
 struct JudgedEstimate {
     std::int64_t t_ns = 0;
     Vec3 position_error_m{}, rotation_error_rad{};
     Vec3 sigma_position_m{}, sigma_rotation_rad{};
-    Vec3 port_position_m{};       ///< of the chaser's port, target's port axes, as estimated
-    Vec3 true_port_position_m{};  ///< the same, as it was
+    Vec3 port_position_m{};  ///< of the chaser's port, target's port axes, as estimated
     std::uint8_t frames = 0, sweeps = 0;
 
     /// Largest |error| / standard deviation of the six.
@@ -55,7 +60,7 @@ public:
     /// `t_reference_ns`: within 39 h of the simulation clock.
     News accept(const CanFrame& frame, std::int64_t t_reference_ns);
 
-    std::vector<PortState> truth;
+    std::vector<TruthState> truth;
     std::vector<JudgedEstimate> estimates;
     std::vector<ActuatorCommand> commands;
     std::vector<DynamicsReport> reports;
@@ -72,7 +77,7 @@ public:
     /// Estimates whose truth has not come.
     [[nodiscard]] std::size_t unjudged() const { return waiting_.size(); }
     /// Both bodies at a time that the commands cover.
-    [[nodiscard]] std::optional<PortState> truth_at(std::int64_t t_ns) const;
+    [[nodiscard]] std::optional<TruthState> truth_at(std::int64_t t_ns) const;
     /// The navigation's command that held at that time: the last one before it.
     [[nodiscard]] const ActuatorCommand* command_before(std::int64_t t_ns) const;
     [[nodiscard]] const DynamicsReport* first_report(DynamicsPhase phase) const;

@@ -22,19 +22,6 @@ double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& p) {
     return allowed - std::hypot(p.y, p.z);
 }
 
-std::vector<ContactCondition> contact_conditions(const Gates::Contact& limits, const PortState& s) {
-    return {
-        {"closing_rate", "closing rate", "m/s", s.closing_m_s(), limits.closing_min_m_s, limits.closing_max_m_s},
-        {"lateral_rate", "lateral rate", "m/s", s.lateral_m_s(), 0, limits.lateral_rate_m_s},
-        {"lateral", "lateral misalignment", "m", s.lateral_m(), 0, limits.lateral_m},
-        {"pitch_yaw", "pitch and yaw", "deg", s.pitch_yaw_rad() * kDeg, 0, limits.pitch_yaw_deg},
-        {"roll", "roll", "deg", s.roll_rad() * kDeg, 0, limits.roll_deg},
-        {"pitch_yaw_rate", "pitch and yaw rate", "deg/s", s.pitch_yaw_rad_s() * kDeg, 0,
-         limits.pitch_yaw_rate_deg_s},
-        {"roll_rate", "roll rate", "deg/s", s.roll_rad_s() * kDeg, 0, limits.roll_rate_deg_s},
-    };
-}
-
 std::string leg_text(const Scenario& scenario, std::size_t leg) {
     if (leg >= scenario.legs.size() || scenario.legs[leg].name.empty()) return fmt::format("leg {}", leg + 1);
     return fmt::format("leg {} \"{}\"", leg + 1, scenario.legs[leg].name);

@@ -31,10 +31,6 @@ struct Watch {
     }
 };
 
-/// Contact conditions of a state, beside the limits.
-[[nodiscard]] std::vector<ContactCondition> contact_conditions(const Gates::Contact& limits,
-                                                               const PortState& state);
-
 /// "at t = 12.300 s in leg 2 \"hold\"".
 [[nodiscard]] std::string when(const Scenario& scenario, const BusRecord& bus, std::int64_t t_ns);
 /// "leg 2 \"hold\"", of an index as the commands carry it.

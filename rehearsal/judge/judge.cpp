@@ -41,7 +41,7 @@ void Judge::see(const DynamicsReport& report) {
     if (report.phase == DynamicsPhase::captured && !t_captured_ns_) t_captured_ns_ = report.t_ns;
 }
 
-void Judge::see(const PortState& state) {
+void Judge::see(const TruthState& state) {
     if (t_contact_ns_ && !contact_judged_ && state.t_ns >= *t_contact_ns_) {
         contact_judged_ = true;
         const GateResult result = contact();
@@ -49,7 +49,7 @@ void Judge::see(const PortState& state) {
     }
     if (t_captured_ns_ && state.t_ns > *t_captured_ns_) return;
     const Gates& gates = scenario_.gates;
-    const double wall_m = gates.corridor ? corridor_clearance_m(*gates.corridor, state.position_m)
+    const double wall_m = gates.corridor ? corridor_clearance_m(*gates.corridor, state.position_m())
                                          : -std::numeric_limits<double>::infinity();
     if (gates.corridor && state.range_m() < gates.corridor->from_m && corridor_.see(state, wall_m))
         tell(corridor());

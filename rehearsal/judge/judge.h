@@ -35,7 +35,7 @@ public:
     [[nodiscard]] std::size_t failures() const { return failures_; }
 
 private:
-    void see(const PortState& state);
+    void see(const TruthState& state);
     void see(const JudgedEstimate& estimate);
     void see(const DynamicsReport& report);
     void tell(const GateResult& result);
@@ -60,7 +60,7 @@ private:
     std::optional<std::int64_t> t_contact_ns_;  ///< captured or bounced, whichever came first
     bool abort_told_ = false, contact_judged_ = false, measured_ = false;
 
-    Watch<PortState> corridor_, keep_out_, distance_;
+    Watch<TruthState> corridor_, keep_out_, distance_;
     Watch<JudgedEstimate> position_, attitude_, sigmas_;  ///< largest errors, and those beyond the gate's sigmas
 };
 

@@ -48,12 +48,13 @@ GateResult Judge::corridor() const {
                              "nearer than {:g} m",
                              c.half_angle_deg, c.radius_m, c.from_m)};
     conclude(gate, corridor_, bus_, "m");
-    gate.reason = first_and_worst(scenario_, bus_, corridor_, [&](const PortState& s) {
-        if (s.position_m.x < 0)
-            return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -s.position_m.x,
+    gate.reason = first_and_worst(scenario_, bus_, corridor_, [&](const TruthState& s) {
+        if (s.position_m().x < 0)
+            return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -s.position_m().x,
                                s.lateral_m());
         return fmt::format("{:.3f} m off the axis {:.2f} m before the port, the corridor allows {:.3f} m",
-                           s.lateral_m(), s.position_m.x, corridor_clearance_m(c, s.position_m) + s.lateral_m());
+                           s.lateral_m(), s.position_m().x,
+                           corridor_clearance_m(c, s.position_m()) + s.lateral_m());
     });
     if (gate.state == GateState::not_judged)
         gate.reason = fmt::format("the chaser never came nearer than {:g} m", c.from_m);
@@ -65,7 +66,7 @@ GateResult Judge::keep_out() const {
         .name = "keep_out",
         .asked = fmt::format("no nearer to the port than {:g} m but in the corridor", *scenario_.gates.keep_out_m)};
     conclude(gate, keep_out_, bus_, "m");
-    gate.reason = first_and_worst(scenario_, bus_, keep_out_, [&](const PortState& s) {
+    gate.reason = first_and_worst(scenario_, bus_, keep_out_, [&](const TruthState& s) {
         return fmt::format("{:.2f} m from the port, {:.2f} m off its axis", s.range_m(), s.lateral_m());
     });
     if (gate.state == GateState::not_judged) gate.reason = "no poses of both bodies were on the bus";
@@ -77,7 +78,7 @@ GateResult Judge::distance() const {
     GateResult gate{.name = "distance", .asked = fmt::format("{:g} to {:g} m between the ports", least, most)};
     conclude(gate, distance_, bus_, "m");
     gate.reason = first_and_worst(scenario_, bus_, distance_,
-                                  [](const PortState& s) { return fmt::format("{:.3f} m apart", s.range_m()); });
+                                  [](const TruthState& s) { return fmt::format("{:.3f} m apart", s.range_m()); });
     if (gate.state == GateState::not_judged) gate.reason = "no poses of both bodies were on the bus";
     return gate;
 }
@@ -138,7 +139,7 @@ std::optional<Contact> Judge::contact_made() const {
     if (!t_contact_ns_) return std::nullopt;
     const auto state = bus_.truth_at(*t_contact_ns_);
     if (!state) return std::nullopt;
-    const Gates::Contact limits = scenario_.gates.contact.value_or(Gates::Contact{});
+    const CaptureEnvelope limits = scenario_.gates.contact.value_or(CaptureEnvelope{});
     return Contact{bus_.seconds(*t_contact_ns_), t_captured_ns_ == t_contact_ns_, *state,
                    contact_conditions(limits, *state)};
 }

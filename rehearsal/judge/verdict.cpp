@@ -35,7 +35,7 @@ json of_contact(const Contact& c) {
                               {"min", k.min},
                               {"max", k.max},
                               {"within", k.within()}});
-    const Vec3 &p = c.state.position_m, &v = c.state.velocity_m_s, &r = c.state.rotation_rad;
+    const Vec3 &p = c.state.position_m(), &v = c.state.velocity_m_s, r = c.state.misalignment_rad();
     return {{"t_s", c.t_s},
             {"captured", c.captured},
             {"position_m", {p.x, p.y, p.z}},

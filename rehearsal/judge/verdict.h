@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rehearsal/judge/port_state.h"
+#include "rehearsal/docking/capture_envelope.h"
 #include "rehearsal/judge/statistics.h"
 
 namespace narpa::rehearsal {
@@ -28,18 +28,11 @@ struct GateResult {
         t_worst_s{};  ///< of the first violation and of the worst (or nearest to one)
 };
 
-/// One of the initial contact conditions.
-struct ContactCondition {
-    std::string name, title, unit;
-    double value = 0, min = 0, max = 0;
-    [[nodiscard]] bool within() const { return value >= min && value <= max; }
-};
-
 struct Contact {
     double t_s = 0;
     bool captured = false;
     PortState state{};
-    std::vector<ContactCondition> conditions;
+    ContactConditions conditions;
 };
 
 /// How the navigation's errors compare with what it told of them.

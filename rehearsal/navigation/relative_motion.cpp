@@ -1,6 +1,18 @@
 #include "rehearsal/navigation/relative_motion.h"
 
 namespace narpa::rehearsal {
+namespace {
+
+Motion target_port(const RelativeMotion& m, const Vehicle& target) {
+    return fixed_to({{m.q_world_target, {}}, {}, m.target_rate_rad_s}, port_from_mass(target));
+}
+
+/// Body axes at the centre of mass.
+Motion chaser_mass(const RelativeMotion& m) {
+    return {{m.q_world_chaser, m.position_m}, m.velocity_m_s, m.chaser_rate_rad_s};
+}
+
+}  // namespace
 
 Rigid3 port_from_mass(const Vehicle& vehicle) {
     return {vehicle.T_body_port.q, vehicle.T_body_port.t - vehicle.centre_of_mass_m};
@@ -32,23 +44,17 @@ RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double 
 }
 
 PortState port_state(const RelativeMotion& m, const Vehicle& target, const Vehicle& chaser) {
-    const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target);
-    const Rigid3 T_world_chaser_port = Rigid3{m.q_world_chaser, m.position_m} * port_from_mass(chaser);
-    const Vec3 arm = m.q_world_chaser * port_from_mass(chaser).t;
-    const Vec3 target_rate = m.q_world_target * m.target_rate_rad_s;
-    const Vec3 velocity = m.velocity_m_s + cross(m.q_world_chaser * m.chaser_rate_rad_s, arm);
-    return {inverse(T_world_port) * T_world_chaser_port,
-            conjugate(T_world_port.q) * (velocity - cross(target_rate, T_world_chaser_port.t))};
+    return port_state(target_port(m, target), fixed_to(chaser_mass(m), port_from_mass(chaser)));
 }
 
 void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle& target, const Vehicle& chaser,
                 RelativeMotion& m) {
-    const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target);
-    const Vec3 arm = m.q_world_chaser * port_from_mass(chaser).t;
-    const Vec3 origin = T_world_port * port_m;
-    m.position_m = origin - arm;
-    m.velocity_m_s = T_world_port.q * port_velocity_m_s + cross(m.q_world_target * m.target_rate_rad_s, origin) -
-                     cross(m.q_world_chaser * m.chaser_rate_rad_s, arm);
+    PortState port = port_state(m, target, chaser);
+    port.T_port_chaser_port.t = port_m;
+    port.velocity_m_s = port_velocity_m_s;
+    const Motion mass = fixed_to(chaser_port_motion(port, target_port(m, target)), inverse(port_from_mass(chaser)));
+    m.position_m = mass.T_world_body.t;
+    m.velocity_m_s = mass.velocity_m_s;
 }
 
 Vec3 nominal_target_rate_rad_s(const Scenario& scenario) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "estimator/filter/motion_model.h"
+#include "rehearsal/docking/port_state.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
@@ -12,12 +13,6 @@ struct RelativeMotion {
     Vec3 position_m{}, velocity_m_s{};  ///< of the chaser's centre of mass, as inertial axes see it
     Quat q_world_target{}, q_world_chaser{};
     Vec3 target_rate_rad_s{}, chaser_rate_rad_s{};  ///< against inertial space, each in its own body axes
-};
-
-/// The chaser's port beside the target's.
-struct PortState {
-    Rigid3 T_port_chaser_port{};  ///< chaser's port axes to target's port axes
-    Vec3 velocity_m_s{};          ///< of the chaser's port origin, as the turning axes of the target's port see it
 };
 
 /// The port's pose about the centre of mass, in body axes.

@@ -6,7 +6,7 @@
 
 #include "rehearsal/judge/statistics.h"
 #include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/chart.h"
+#include "rehearsal/runner/report_charts.h"
 #include "rehearsal/runner/report_page.h"
 
 namespace narpa::rehearsal {
@@ -39,11 +39,17 @@ struct Condition {
     double min = 0, max = 0;
     std::vector<double> values;
 };
+std::vector<json> contacts_of(const std::vector<RunResult>& runs) {
+    std::vector<json> all;
+    for (const RunResult& run : runs)
+        if (run.result.is_object() && run.result["contact"].is_object()) all.push_back(run.result["contact"]);
+    return all;
+}
+
 std::vector<Condition> conditions_over(const std::vector<RunResult>& runs) {
     std::vector<Condition> all;
-    for (const RunResult& run : runs) {
-        if (!run.result.is_object() || !run.result["contact"].is_object()) continue;
-        const json& conditions = run.result["contact"]["conditions"];
+    for (const json& contact : contacts_of(runs)) {
+        const json& conditions = contact["conditions"];
         if (all.empty())
             for (const json& c : conditions)
                 all.push_back({c["name"], c["title"], c["unit"], c["min"], c["max"], {}});
@@ -127,57 +133,6 @@ std::string campaign_junit(const std::string& suite, const std::vector<RunResult
     return out + "  </testsuite>\n";
 }
 
-// --- The page ---------------------------------------------------------------------------------------------------
-
-namespace {
-
-std::string contact_plots(const std::vector<RunResult>& runs) {
-    Points where[2], rates[2], angles[2];  // within, beyond
-    double lateral = 0.1, closing_min = 0.05, closing_max = 0.1, lateral_rate = 0.04, pitch = 4, roll = 4;
-    for (const RunResult& run : runs) {
-        if (!run.result.is_object() || !run.result["contact"].is_object()) continue;
-        const json& c = run.result["contact"];
-        const auto value = [&](std::size_t i) { return c["conditions"][i]["value"].get<double>(); };
-        const auto limit = [&](std::size_t i) { return c["conditions"][i]["max"].get<double>(); };
-        bool within = true;
-        for (const json& k : c["conditions"]) within &= k["within"].get<bool>();
-        const int i = within ? 0 : 1;
-        where[i].emplace_back(c["position_m"][1].get<double>() * 100, c["position_m"][2].get<double>() * 100);
-        rates[i].emplace_back(value(0) * 100, value(1) * 100);
-        angles[i].emplace_back(value(3), value(4));
-        closing_min = c["conditions"][0]["min"], closing_max = limit(0), lateral_rate = limit(1),
-        lateral = limit(2);
-        pitch = limit(3), roll = limit(4);
-    }
-    Chart a("Where the ports met", "y [cm]", "z [cm]", 360, 350),
-        b("Rates", "closing [cm/s]", "lateral [cm/s]", 360, 350),
-        c("Angles", "pitch and yaw [deg]", "roll [deg]", 360, 350);
-    a.equal_scales();
-    a.range_x(-130 * lateral, 130 * lateral);
-    a.range_y(-130 * lateral, 130 * lateral);
-    a.circle(0, 0, lateral * 100, kGreen, "asked");
-    b.range_x(0, closing_max * 140);
-    b.range_y(0, lateral_rate * 140);
-    b.area({{closing_min * 100, 0},
-            {closing_max * 100, 0},
-            {closing_max * 100, lateral_rate * 100},
-            {closing_min * 100, lateral_rate * 100}},
-           kGreen, "asked");
-    c.range_x(0, pitch * 1.3);
-    c.range_y(0, roll * 1.3);
-    c.area({{0, 0}, {pitch, 0}, {pitch, roll}, {0, roll}}, kGreen, "asked");
-    const auto put = [](Chart& chart, const Points(&points)[2]) {
-        chart.dots(points[0], kBlue, 2.4, "within");
-        if (!points[1].empty()) chart.dots(points[1], kVermilion, 2.8, "beyond");
-    };
-    put(a, where);
-    put(b, rates);
-    put(c, angles);
-    return "<div class=\"charts\">" + a.svg() + b.svg() + c.svg() + "</div>\n";
-}
-
-}  // namespace
-
 std::string campaign_page(const Scenario& scenario, const json& s, const std::vector<RunResult>& runs) {
     const auto percent = [](const json& v) { return v.get<double>() * 100; };
     std::string body = fmt::format(
@@ -191,7 +146,7 @@ std::string campaign_page(const Scenario& scenario, const json& s, const std::ve
         body += fmt::format("<p>{} of {} runs have no result yet.</p>\n",
                             s["runs"].get<int>() - s["judged"].get<int>(), s["runs"].get<int>());
     if (!s["contact"].empty()) {
-        body += "<h2>Contact</h2>\n" + contact_plots(runs) +
+        body += "<h2>Contact</h2>\n" + campaign_contact_charts(contacts_of(runs)) +
                 "<table><tr><th>condition</th><th class=\"n\">asked</th><th class=\"n\">mean</th><th "
                 "class=\"n\">sigma</th><th class=\"n\">least</th><th class=\"n\">p99</th><th "
                 "class=\"n\">most</th><th></th>"

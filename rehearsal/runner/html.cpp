@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 
-#include "rehearsal/runner/chart.h"
 #include "rehearsal/runner/report_page.h"
 
 namespace narpa::rehearsal {
@@ -61,40 +60,6 @@ std::string base64(std::string_view bytes) {
         for (std::size_t k = 0; k < 4; ++k) out += k <= n ? kDigits[group >> (18 - 6 * k) & 63] : '=';
     }
     return out;
-}
-
-std::string contact_bars(const std::vector<ContactCondition>& conditions) {
-    std::string out;
-    constexpr double kWidth = 900, kRow = 34, kLeft = 190, kBar = 430;
-    double y = 8;
-    for (const ContactCondition& c : conditions) {
-        // Full scale is a third beyond the limit, or what there is.
-        const double scale = kBar / std::max(c.max * 1.33, c.value * 1.05);
-        const char* colour = c.within() ? kBlue : kVermilion;
-        out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\" style=\"font-size:13px\">{}</text>",
-                           kLeft - 12, y + 15, escape(c.title));
-        out += fmt::format(
-            "<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"18\" fill=\"{}\" fill-opacity=\"0.16\"/>",
-            kLeft + c.min * scale, y + 1, (c.max - c.min) * scale, kGreen);
-        out += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"8\" fill=\"{}\"/>", kLeft, y + 6,
-                           std::max(1.5, c.value * scale), colour);
-        for (const double limit : {c.min, c.max})
-            if (limit > 0)
-                out += fmt::format("<path d=\"M{:.1f},{}v22\" stroke=\"#1d232b\" stroke-width=\"1.5\"/>",
-                                   kLeft + limit * scale, y - 1);
-        const std::string asked =
-            c.min > 0 ? fmt::format("{:g} to {:g}", c.min, c.max) : fmt::format("at most {:g}", c.max);
-        out += fmt::format(
-            "<text x=\"{}\" y=\"{}\" style=\"font-size:13px\"><tspan font-weight=\"650\" "
-            "fill=\"{}\">{:.4g} {}</tspan><tspan dx=\"10\">{} {}</tspan></text>",
-            kLeft + kBar + 16, y + 15, c.within() ? "#1d232b" : kVermilion, c.value, escape(c.unit), asked,
-            c.within() ? "" : "- beyond");
-        y += kRow;
-    }
-    return fmt::format(
-        "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" role=\"img\" aria-label=\"contact conditions\">{2}"
-        "</svg>\n",
-        kWidth, y, out);
 }
 
 }  // namespace narpa::rehearsal

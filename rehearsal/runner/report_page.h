@@ -19,7 +19,5 @@ namespace narpa::rehearsal {
 [[nodiscard]] std::string base64(std::string_view bytes);
 /// "passed", "failed" as a coloured word.
 [[nodiscard]] std::string badge(bool good, std::string_view words);
-/// Each condition as a bar beside its limits.
-[[nodiscard]] std::string contact_bars(const std::vector<ContactCondition>& conditions);
 
 }  // namespace narpa::rehearsal

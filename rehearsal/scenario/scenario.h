@@ -16,6 +16,7 @@
 
 #include "base/pose.h"
 #include "base/result.h"
+#include "rehearsal/docking/capture_envelope.h"
 
 namespace narpa::rehearsal {
 
@@ -117,17 +118,12 @@ struct Fault {
     Vec3 value{};
 };
 
-/// What is asked; a gate that is absent is not judged. Contact: International Docking System Standard, Interface
-/// Definition Document, revision E, table of initial contact conditions.
+/// Requirements; a gate that is absent is not judged.
 struct Gates {
     struct Corridor {
         double half_angle_deg = 10,
                radius_m = 0.5;  ///< a cone about the port's x axis that is this wide at the port
         double from_m = 20;     ///< judged nearer than this
-    };
-    struct Contact {
-        double closing_min_m_s = 0.05, closing_max_m_s = 0.10, lateral_rate_m_s = 0.04, lateral_m = 0.10;
-        double pitch_yaw_deg = 4, roll_deg = 4, pitch_yaw_rate_deg_s = 0.20, roll_rate_deg_s = 0.20;
     };
     struct NavigationError {
         double sigmas = 4;    ///< |error| of each of the six, in standard deviations as told on CAN
@@ -139,8 +135,8 @@ struct Gates {
     std::optional<double> keep_out_m;  ///< sphere about the target's port that only the corridor may enter
     std::optional<std::pair<double, double>> distance_m;  ///< of the ports' origins, all the time
     std::optional<NavigationError> navigation;
-    std::optional<Contact> contact;  ///< asks for contact
-    bool complete = true;            ///< all legs flown, without an abort
+    std::optional<CaptureEnvelope> contact;  ///< asks for contact
+    bool complete = true;                    ///< all legs flown, without an abort
 };
 
 struct Scenario {
@@ -174,10 +170,5 @@ struct Scenario {
 
 /// Errors name file, line, column, what is wrong and what was expected.
 Result<Scenario> read_scenario(const std::string& path);
-
-/// The chaser's port in the target's when docked: half a turn about z.
-[[nodiscard]] inline Rigid3 T_port_docked() {
-    return {{0, 0, 0, 1}, {}};
-}
 
 }  // namespace narpa::rehearsal

@@ -260,7 +260,7 @@ void read_faults(TableReader& root, std::vector<Fault>& faults) {
 void read_contact(TableReader& gates, Gates& out) {
     auto table = gates.table("contact");
     if (!table) return;
-    Gates::Contact c;
+    CaptureEnvelope c;
     const auto limit = [&](const char* key, double& value) {
         value = table->number(key, kNotNegative).value_or(value);
     };

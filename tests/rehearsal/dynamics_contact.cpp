@@ -21,7 +21,7 @@ TEST(Contact, IsAtTheVeryNanosecondAtWhichThePortsPlaneIsReached) {
     ASSERT_TRUE(s.contact());
     EXPECT_EQ(s.contact()->t_ns, s.t_ns());
     EXPECT_EQ(s.phase(), DynamicsPhase::captured);
-    expect_near(s.port().position_m, {}, 1e-9);
+    expect_near(s.port().position_m(), {}, 1e-9);
     expect_near(s.port().velocity_m_s, {-0.07, 0, 0}, 1e-12);  // as it was before they touched
 }
 
@@ -44,14 +44,14 @@ TEST(Contact, WithinTheEnvelopeTheChaserIsHeldAndGoesWithTheTarget) {
     Simulation s = simulate(scenario);
     s.advance_to(ns(100));
     ASSERT_EQ(s.phase(), DynamicsPhase::captured);
-    const PortMotion met = s.contact()->port;
+    const PortState met = s.contact()->port;
     s.apply({0, s.t_ns(), {400, 400, 400}, {400, 0, 0}});
     s.advance_to(s.t_ns() + ns(1.5));
     EXPECT_EQ(s.ending(), Ending::not_yet);
     s.advance_to(s.t_ns() + ns(0.5));
     EXPECT_EQ(s.ending(), Ending::captured);
-    expect_near(s.port().position_m, met.position_m, 1e-12);
-    expect_near(s.port().attitude_rad, met.attitude_rad, 1e-12);
+    expect_near(s.port().position_m(), met.position_m(), 1e-12);
+    expect_near(s.port().misalignment_rad(), met.misalignment_rad(), 1e-12);
     expect_near(s.port().velocity_m_s, {}, 1e-12);
     expect_near(s.port().rate_rad_s, {}, 1e-12);
 }
@@ -68,7 +68,7 @@ TEST(Contact, OutsideOfTheEnvelopeTheyPartAtThreeTenthsOfTheSpeed) {
     s.advance_to(contact_ns + ns(9.5));
     EXPECT_EQ(s.ending(), Ending::not_yet);
     expect_near(s.port().velocity_m_s, {0.06, 0, 0.01}, 1e-12);
-    EXPECT_NEAR(s.port().position_m.x, 0.06 * 9.5, 1e-8);
+    EXPECT_NEAR(s.port().position_m().x, 0.06 * 9.5, 1e-8);
     s.advance_to(contact_ns + ns(10));
     EXPECT_EQ(s.ending(), Ending::bounced);
 }
@@ -81,28 +81,31 @@ TEST(Contact, PushedOnAfterABounceItDoesNotGoThrough) {
     ASSERT_EQ(s.phase(), DynamicsPhase::bounced);
     s.advance_to(s.t_ns() + ns(10));
     EXPECT_EQ(s.ending(), Ending::bounced);
-    EXPECT_GT(s.port().position_m.x, -0.01);
+    EXPECT_GT(s.port().position_m().x, -0.01);
 }
 
 TEST(Contact, EachConditionOfTheEnvelopeCounts) {
-    const Gates::Contact e;
-    PortMotion good;
+    const CaptureEnvelope e;
+    const auto turn = [](PortState& p, const Vec3& misalignment_deg) {
+        p.T_port_chaser_port.q = T_port_docked().q * exp_rotation(kRadPerDeg * misalignment_deg);
+    };
+    PortState good{T_port_docked(), {}, {}};
     good.velocity_m_s.x = -0.07;
     EXPECT_TRUE(within(e, good));
     const auto refused = [&](auto&& change) {
-        PortMotion p = good;
+        PortState p = good;
         change(p);
         return !within(e, p);
     };
-    EXPECT_TRUE(refused([](PortMotion& p) { p.velocity_m_s.x = -0.049; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.velocity_m_s.x = -0.101; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.velocity_m_s.y = 0.03, p.velocity_m_s.z = 0.03; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.position_m.y = 0.08, p.position_m.z = 0.08; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.attitude_rad.x = 4.1 * kRadPerDeg; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.attitude_rad.y = p.attitude_rad.z = 3 * kRadPerDeg; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.rate_rad_s.x = 0.21 * kRadPerDeg; }));
-    EXPECT_TRUE(refused([](PortMotion& p) { p.rate_rad_s.y = p.rate_rad_s.z = 0.15 * kRadPerDeg; }));
-    EXPECT_FALSE(refused([](PortMotion& p) { p.position_m.y = 0.09, p.attitude_rad.x = 3.9 * kRadPerDeg; }));
+    EXPECT_TRUE(refused([&](PortState& p) { p.velocity_m_s.x = -0.049; }));
+    EXPECT_TRUE(refused([&](PortState& p) { p.velocity_m_s.x = -0.101; }));
+    EXPECT_TRUE(refused([&](PortState& p) { p.velocity_m_s.y = 0.03, p.velocity_m_s.z = 0.03; }));
+    EXPECT_TRUE(refused([&](PortState& p) { p.T_port_chaser_port.t = {0, 0.08, 0.08}; }));
+    EXPECT_TRUE(refused([&](PortState& p) { turn(p, {4.1, 0, 0}); }));
+    EXPECT_TRUE(refused([&](PortState& p) { turn(p, {0, 3, 3}); }));
+    EXPECT_TRUE(refused([&](PortState& p) { p.rate_rad_s.x = 0.21 * kRadPerDeg; }));
+    EXPECT_TRUE(refused([&](PortState& p) { p.rate_rad_s.y = p.rate_rad_s.z = 0.15 * kRadPerDeg; }));
+    EXPECT_FALSE(refused([&](PortState& p) { p.T_port_chaser_port.t.y = 0.09, turn(p, {3.9, 0, 0}); }));
 }
 
 TEST(Contact, FarAsideThePortsPassEachOther) {
@@ -112,7 +115,7 @@ TEST(Contact, FarAsideThePortsPassEachOther) {
     s.advance_to(ns(10));
     EXPECT_EQ(s.t_ns(), ns(10));
     EXPECT_EQ(s.phase(), DynamicsPhase::flying);
-    EXPECT_NEAR(s.port().position_m.x, -1.5, 1e-12);
+    EXPECT_NEAR(s.port().position_m().x, -1.5, 1e-12);
 }
 
 TEST(Ending, AtTheScenariosEndOrWhenTheNavigationIsDoneOrHasLeft) {
@@ -151,9 +154,9 @@ TEST(Start, IsWhereTheScenarioSays) {
     scenario.start.attitude_deg = {1, -2, 3};
     scenario.start.rate_deg_s = {0.1, 0.2, -0.3};
     const Simulation s = simulate(scenario);
-    expect_near(s.port().position_m, scenario.start.position_m, 1e-12);
+    expect_near(s.port().position_m(), scenario.start.position_m, 1e-12);
     expect_near(s.port().velocity_m_s, scenario.start.velocity_m_s, 1e-12);
-    expect_near(s.port().attitude_rad / kRadPerDeg, scenario.start.attitude_deg, 1e-10);
+    expect_near(s.port().misalignment_rad() / kRadPerDeg, scenario.start.attitude_deg, 1e-10);
     expect_near(scenario.chaser.T_body_port.q * s.port().rate_rad_s / kRadPerDeg, scenario.start.rate_deg_s, 1e-10);
     // Docked, the ports' x axes are opposite, and their z axes the same.
     scenario.start.attitude_deg = {};
@@ -173,9 +176,9 @@ TEST(Start, IsDispersedAsTheScenarioSays) {
     const int kRuns = 2000;
     Vec3 sum[4], squares[4];
     for (int seed = 1; seed <= kRuns; ++seed) {
-        const PortMotion p = simulate(scenario, seed).port();
-        const Vec3 off[4] = {p.position_m - scenario.start.position_m, p.velocity_m_s, p.attitude_rad / kRadPerDeg,
-                             p.rate_rad_s / kRadPerDeg};
+        const PortState p = simulate(scenario, seed).port();
+        const Vec3 off[4] = {p.position_m() - scenario.start.position_m, p.velocity_m_s,
+                             p.misalignment_rad() / kRadPerDeg, p.rate_rad_s / kRadPerDeg};
         for (int k = 0; k < 4; ++k)
             for (int i = 0; i < 3; ++i) sum[k][i] += off[k][i], squares[k][i] += off[k][i] * off[k][i];
     }
@@ -219,7 +222,7 @@ TEST(Draws, OfOneKindDoNotShiftTheOthers) {
         s->apply(command);
         s->advance_to(ns(1));
     }
-    EXPECT_EQ(a.port().position_m, b.port().position_m);
+    EXPECT_EQ(a.port().position_m(), b.port().position_m());
     EXPECT_NE(simulate(scenario, 6).thrusters().directions()[0], a.thrusters().directions()[0]);
 }
 

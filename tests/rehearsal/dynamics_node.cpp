@@ -50,10 +50,10 @@ public:
     }
 
     /// Where the ports are by the newest pose commands.
-    [[nodiscard]] PortMotion port() const {
+    [[nodiscard]] PortState port() const {
         Motion target, chaser;
         for (const Pose& p : poses) (p.base_id == scenario_.target.can_id ? target : chaser) = p.command.motion;
-        return port_motion(scenario_.target, target, scenario_.chaser, chaser);
+        return port_state(scenario_.target, target, scenario_.chaser, chaser);
     }
 
 private:
@@ -106,12 +106,12 @@ struct Flown {
     std::vector<DynamicsReport> reports;
     std::vector<AttitudeReport> attitudes;
     std::vector<Partner::Pose> poses;
-    PortMotion port_at_end;
+    PortState port_at_end;
 };
 
 /// `steer`: the command for a control period, where the ports are so.
 Flown fly_in_lockstep(const Scenario& scenario, const DynamicsOptions& options, CanBus& hub, const std::string& bus,
-                      const std::function<ActuatorCommand(const PortMotion&)>& steer) {
+                      const std::function<ActuatorCommand(const PortState&)>& steer) {
     Partner partner(hub, scenario);
     partner.on_period = [&](std::int64_t t_ns) {
         ActuatorCommand c = steer(partner.port());
@@ -127,15 +127,15 @@ Flown fly_in_lockstep(const Scenario& scenario, const DynamicsOptions& options, 
     flown.poses = std::move(partner.poses);
     return flown;
 }
-ActuatorCommand rest(const PortMotion&) {
+ActuatorCommand rest(const PortState&) {
     return {};
 }
 
 /// Holds the port at (12, 0, 0): the chaser's body axes are its port's, half a turn from the target's.
-ActuatorCommand hold(const PortMotion& p) {
-    const Vec3 off = p.position_m - Vec3{12, 0, 0};
+ActuatorCommand hold(const PortState& p) {
+    const Vec3 off = p.position_m() - Vec3{12, 0, 0};
     const Vec3 impulse = -10'000.0 * (0.01 * off + 0.25 * p.velocity_m_s);
-    const Vec3 turn = 0.05 * p.attitude_rad + 0.4 * p.rate_rad_s;
+    const Vec3 turn = 0.05 * p.misalignment_rad() + 0.4 * p.rate_rad_s;
     ActuatorCommand c;
     c.impulse_n_s = {-impulse.x, -impulse.y, impulse.z};
     c.angular_impulse_n_m_s = {-15e3 * turn.x, -31e3 * turn.y, -30e3 * turn.z};
@@ -187,9 +187,9 @@ TEST_F(DynamicsOnSlcan, ANavigationThatKnowsTheTruthHoldsItsStation) {
     ASSERT_TRUE(flown.document) << flown.document.error().text();
     EXPECT_EQ((*flown.document)["ending"], "duration");
     EXPECT_EQ((*flown.document)["actuator_commands"]["applied"], 60);
-    expect_near(flown.port_at_end.position_m, {12, 0, 0}, 0.1);
+    expect_near(flown.port_at_end.position_m(), {12, 0, 0}, 0.1);
     expect_near(flown.port_at_end.velocity_m_s, {}, 0.02);
-    EXPECT_LT(norm(flown.port_at_end.attitude_rad) / kRadPerDeg, 0.5);
+    EXPECT_LT(norm(flown.port_at_end.misalignment_rad()) / kRadPerDeg, 0.5);
 }
 
 TEST_F(DynamicsOnSlcan, TheSameSeedGivesTheSameBytes) {
@@ -309,7 +309,7 @@ TEST_F(DynamicsOnSlcan, LogsTheTruth) {
     s.start.velocity_m_s = {-0.5, 0, 0};
     DynamicsOptions o = lockstep();
     o.log_folder = folder / "dynamics";
-    const Flown flown = fly_in_lockstep(s, o, *hub, bus, [](const PortMotion&) {
+    const Flown flown = fly_in_lockstep(s, o, *hub, bus, [](const PortState&) {
         ActuatorCommand c;
         c.impulse_n_s = {0, 100, 0};
         c.leg = 2;

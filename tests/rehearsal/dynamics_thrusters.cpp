@@ -38,7 +38,7 @@ TEST(Thrusters, MoveTheCentreOfMassByImpulseOverMass) {
     expect_near(s.port().velocity_m_s, {-50 / scenario.chaser.mass_kg, 0, 0}, 1e-12);
     // 0.125 s at full force, then coasting: the place tells when it fired.
     const double on_s = 50 / scenario.thrusters.force_n;
-    EXPECT_NEAR(s.port().position_m.x, 60 - 0.005 * (1 - on_s / 2), 1e-12);
+    EXPECT_NEAR(s.port().position_m().x, 60 - 0.005 * (1 - on_s / 2), 1e-12);
     fired(s, command({}, {3, 0, 0}));
     EXPECT_NEAR(s.port().rate_rad_s.x, 0, 1e-15) << "3 N m s is 7.5 ms of 400 N m: not fired";
     fired(s, command({}, {30, 0, 0}));

@@ -17,7 +17,7 @@ Scenario with_all_gates() {
     s.gates.corridor = Gates::Corridor{};
     s.gates.keep_out_m = 5;
     s.gates.navigation = Gates::NavigationError{};
-    s.gates.contact = Gates::Contact{};
+    s.gates.contact = CaptureEnvelope{};
     return s;
 }
 
@@ -103,10 +103,10 @@ TEST(JudgeBus, ATurningTargetTurnsThePortAxes) {
     const Vec3 world_rate = target.T_world_body.q * rate;
     const Motion chaser{T, target.velocity_m_s + cross(world_rate, T.t - target.T_world_body.t),
                         conjugate(T.q) * world_rate};
-    const PortState state = port_state(s, 0, target, chaser);
-    EXPECT_NEAR(
-        norm(state.position_m) + norm(state.velocity_m_s) + norm(state.rotation_rad) + norm(state.rate_rad_s), 0,
-        1e-12);
+    const PortState state = port_state(s.target, target, s.chaser, chaser);
+    EXPECT_NEAR(norm(state.position_m()) + norm(state.velocity_m_s) + norm(state.misalignment_rad()) +
+                    norm(state.rate_rad_s),
+                0, 1e-12);
 }
 
 TEST(JudgeBus, LatencyIsFromTheCommandToTheHandOver) {

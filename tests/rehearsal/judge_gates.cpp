@@ -23,7 +23,7 @@ TEST(Judge, AGoodDockingPassesEveryGate) {
     s.gates.corridor = Gates::Corridor{10, 0.5, 20};
     s.gates.keep_out_m = 8;
     s.gates.navigation = Gates::NavigationError{};
-    s.gates.contact = Gates::Contact{};
+    s.gates.contact = CaptureEnvelope{};
     const Verdict v = judge(s, docking(s, good_contact(s)));
     for (const GateResult& g : v.gates) EXPECT_EQ(g.state, State::passed) << g.name << ": " << g.reason;
     EXPECT_EQ(v.gates.size(), 6u);
@@ -36,7 +36,7 @@ TEST(Judge, AGoodDockingPassesEveryGate) {
 
 TEST(Judge, ContactConditionsAreThoseOfTheTruthAtThatInstant) {
     Scenario s = small_scenario();
-    s.gates.contact = Gates::Contact{};
+    s.gates.contact = CaptureEnvelope{};
     const Verdict v = judge(s, docking(s, good_contact(s)));
     ASSERT_TRUE(v.contact);
     const auto value = [&](std::size_t i) { return v.contact->conditions[i].value; };
@@ -52,7 +52,7 @@ TEST(Judge, ContactConditionsAreThoseOfTheTruthAtThatInstant) {
 
 TEST(Judge, EachContactConditionFailsByItself) {
     Scenario s = small_scenario();
-    s.gates.contact = Gates::Contact{};
+    s.gates.contact = CaptureEnvelope{};
     const Vec3 v_good{-0.07, 0, 0};
     const std::vector<std::pair<std::string, Motion>> bad{
         {"closing rate 0.12", chaser_at(s, {}, {-0.12, 0, 0})},
@@ -76,13 +76,13 @@ TEST(Judge, EachContactConditionFailsByItself) {
 }
 
 TEST(Judge, AtALimitIsWithin) {
-    const PortState s{0, {0, 0.10, 0}, {-0.05, 0, 0.04}, {}, {}};
-    for (const ContactCondition& c : contact_conditions(Gates::Contact{}, s)) EXPECT_TRUE(c.within()) << c.name;
+    const PortState s{{T_port_docked().q, {0, 0.10, 0}}, {-0.05, 0, 0.04}, {}};
+    for (const ContactCondition& c : contact_conditions(CaptureEnvelope{}, s)) EXPECT_TRUE(c.within()) << c.name;
 }
 
 TEST(Judge, WhatBouncesHasNotDocked) {
     Scenario s = small_scenario();
-    s.gates.contact = Gates::Contact{};
+    s.gates.contact = CaptureEnvelope{};
     const Verdict v = judge(s, docking(s, chaser_at(s, {}, {-0.3, 0, 0}), DynamicsPhase::bounced));
     EXPECT_EQ(gate(v, "contact").state, State::failed);
     EXPECT_NE(gate(v, "contact").reason.find("bounced off: closing rate 0.3"), std::string::npos);

@@ -58,8 +58,8 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
         flight.errors.push_back(error_between(e.T_chaser_target, T_chaser_target).cwiseQuotient(deviations));
         if (flight.last().phase == GuidancePhase::docked) break;
         if (flight.last().phase == GuidancePhase::retreating) {
-            flight.farthest_m = std::max(flight.farthest_m, norm(simulation->port().position_m));
-            flight.axial_m.push_back(simulation->port().position_m.x);
+            flight.farthest_m = std::max(flight.farthest_m, norm(simulation->port().position_m()));
+            flight.axial_m.push_back(simulation->port().position_m().x);
         }
         simulation->apply(flight.last());
     }
@@ -74,7 +74,7 @@ TEST(NavigationLoop, DocksInsideTheEnvelope) {
         ASSERT_TRUE(flight.contact) << seed;
         EXPECT_TRUE(flight.contact->captured) << seed;
         EXPECT_TRUE(within(*s.gates.contact, flight.contact->port)) << seed;
-        const Vec3& p = flight.contact->port.position_m;
+        const Vec3& p = flight.contact->port.position_m();
         EXPECT_LT(std::hypot(p.y, p.z), 0.05) << seed;
         EXPECT_EQ(flight.last().phase, GuidancePhase::docked);
         EXPECT_EQ(norm(flight.last().impulse_n_s) + norm(flight.last().angular_impulse_n_m_s), 0);

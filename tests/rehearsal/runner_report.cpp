@@ -21,7 +21,7 @@ Scenario full_scenario() {
     s.gates.corridor = Gates::Corridor{};
     s.gates.keep_out_m = 5;
     s.gates.navigation = Gates::NavigationError{};
-    s.gates.contact = Gates::Contact{};
+    s.gates.contact = CaptureEnvelope{};
     s.faults.push_back({Fault::Kind::thruster_off, 3, 5, "+fx", {}});
     return s;
 }

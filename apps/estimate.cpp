@@ -69,7 +69,7 @@ Outcome estimate_log(const Options& o, const TrackerOptions& tracker_options) {
     const EstimateSummary summary = summarise(*tracked);
     const nlohmann::json told = to_json(summary);
     say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target,
-                    kEstimateMethods[static_cast<std::size_t>(tracker_options.method)], estimates_in_words(told)));
+                    kEstimateMethods[static_cast<std::size_t>(tracker_options.method)], in_words(summary)));
     if (!o.csv.empty())
         if (auto written = write_rows(o.csv, *tracked); !written) return written.error();
     if (!o.picture.empty()) {

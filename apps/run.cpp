@@ -69,25 +69,20 @@ Outcome run(const Options& options) {
 
     stop_on_signals();
     if (CanNode* can = (*emulator)->can()) say("commands: " + can->bus().description());
-    for (const auto& feed : (*emulator)->cameras())
-        for (const auto& sink : feed->sinks())
-            say(fmt::format("camera {} -> {}", feed->unit().camera().name, sink->description()));
-    for (const auto& feed : (*emulator)->lidars())
-        for (const auto& sink : feed->sinks())
-            say(fmt::format("lidar {} -> {}", feed->unit().lidar().name, sink->description()));
-
-    if (const EstimateFeed* estimates = (*emulator)->estimates())
-        say(fmt::format("pose of {} from camera {}", estimates->target(), estimates->camera().name));
+    for (const auto& sensor : (*emulator)->sensors())
+        for (const std::string& output : sensor->outputs())
+            say(fmt::format("{} {} -> {}", sensor->kind(), sensor->name(), output));
+    if (const OnlineEstimator* estimator = (*emulator)->estimator())
+        say(fmt::format("pose of {} from camera {}", estimator->target(), estimator->camera().name));
 
     StopFlag done{false};
     std::thread progress([&] { show_progress(**emulator, done); });
     const Status status = (*emulator)->run(stop_flag());
     done = true;
     progress.join();
-    const nlohmann::json summary = report(**emulator);
-    say(in_words(summary));
+    say(in_words(**emulator));
     if (!status) return status.error();
-    return summary;
+    return report(**emulator);
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ std::string frames_in_words(const CameraStats& s) {
     return out;
 }
 
-CameraRun of(const CameraFeed& feed, const RenderSettings& render) {
+CameraRun of(const CameraSensor& feed, const RenderSettings& render) {
     const CameraUnit& unit = feed.unit();
     const std::int64_t period = unit.camera().period_ns;
     return {unit.camera().name, period, render.budget_ns > 0 ? render.budget_ns : period - unit.exposure_ns() / 2,
@@ -148,8 +148,10 @@ Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunO
     if (auto done = (*emulator)->run(stop); !done) return done.error();
 
     LoopRun run{name, load, {}, {}, (*emulator)->page_faults(), (*emulator)->notices()};
-    for (const auto& feed : (*emulator)->cameras()) run.cameras.push_back(of(*feed, scene.render));
-    for (const auto& feed : (*emulator)->lidars()) run.lidars.push_back({feed->unit().lidar().name, feed->stats()});
+    for (const CameraSensor* camera : (*emulator)->sensors_of<CameraSensor>())
+        run.cameras.push_back(of(*camera, scene.render));
+    for (const LidarSensor* lidar : (*emulator)->sensors_of<LidarSensor>())
+        run.lidars.push_back({std::string(lidar->name()), lidar->stats()});
     return run;
 }
 
@@ -196,8 +198,7 @@ std::string in_words(const std::vector<LoopRun>& runs) {
                             c.name, s.frames, s.deadline_missed, s.skipped, c.incomplete(), ms(s.wake_late),
                             ms(s.render), ms(s.hand_over), ms(s.late), 100 * c.allowance_used(0.5));
             out += fmt::format("{:>7} {:>8} {}\n", "", "", frames_in_words(s));
-            out +=
-                fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_in_words(lateness(s.late)));
+            out += fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_in_words(s.late));
         }
         for (const LidarRun& l : run.lidars)
             out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24}\n", run.name, l.name,

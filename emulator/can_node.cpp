@@ -107,6 +107,17 @@ std::int64_t CanNode::first_ns() const noexcept {
     return t;
 }
 
+std::vector<std::pair<std::string_view, std::uint64_t>> CommandCounters::rejected() const {
+    std::vector<std::pair<std::string_view, std::uint64_t>> causes{{"past", past}, {"overrun", overrun}};
+    for (std::size_t i = 0; i < kDecodeStatusCount; ++i) {
+        const auto status = static_cast<DecodeStatus>(i);
+        const bool good =
+            status == DecodeStatus::not_mine || status == DecodeStatus::partial || status == DecodeStatus::complete;
+        if (!good) causes.emplace_back(name(status), by_status[i]);
+    }
+    return causes;
+}
+
 CommandCounters CanNode::counters() const noexcept {
     CommandCounters c = counters_;
     for (const Listener& l : listeners_)

@@ -23,6 +23,9 @@ struct CommandCounters {
     std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, as PoseDecoder counts them
     std::uint64_t foreign = 0;                                  ///< frames of other identifiers
     std::uint64_t missed = 0;                                   ///< commands lost by the gaps in their counters
+
+    /// Frames and commands rejected, by cause.
+    [[nodiscard]] std::vector<std::pair<std::string_view, std::uint64_t>> rejected() const;
 };
 
 class CanNode {
@@ -32,6 +35,7 @@ public:
     CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded);
 
     [[nodiscard]] CanBus& bus() noexcept { return bus_; }
+    [[nodiscard]] const CanBus& bus() const noexcept { return bus_; }
 
     /// Waits until `receive` may have something to read or the time is over; may wake early.
     void wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept;

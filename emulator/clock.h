@@ -1,10 +1,11 @@
-/// emulator/clock.h - the simulation clock of a real-time run: nanoseconds of CLOCK_MONOTONIC since the start.
+/// emulator/clock.h - the simulation clock of a run, in integer nanoseconds: real time or lockstep.
 #pragma once
 
 #include <algorithm>
-#include <cerrno>
+#include <atomic>
 #include <cstdint>
 #include <ctime>
+#include <limits>
 
 #include "base/stop.h"
 
@@ -16,22 +17,40 @@ namespace narpa {
     return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
 }
 
+/// What a sensor may read of the clock. One clock per run; any thread may read it.
 class Clock {
 public:
-    /// Time 0 is this far ahead: what starts late for lack of warning starts in time.
-    explicit Clock(std::int64_t lead_ns) : start_ns_(monotonic_ns() + lead_ns) {}
+    static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 
-    [[nodiscard]] std::int64_t now_ns() const noexcept { return monotonic_ns() - start_ns_; }
-    [[nodiscard]] std::int64_t to_monotonic(std::int64_t t_ns) const noexcept { return t_ns + start_ns_; }
-    [[nodiscard]] std::int64_t from_monotonic(std::int64_t t_ns) const noexcept { return t_ns - start_ns_; }
+    virtual ~Clock() = default;
+    [[nodiscard]] virtual std::int64_t now_ns() const noexcept = 0;
+    /// Simulation time `t_ns` on CLOCK_MONOTONIC.
+    [[nodiscard]] virtual std::int64_t to_monotonic(std::int64_t t_ns) const noexcept = 0;
 
-    /// Sleeps to the absolute time `t_ns`, looking at the flag ten times a second; false when stopped instead.
+    /// The run ends here; kNever: when it is stopped.
+    [[nodiscard]] std::int64_t end_ns() const noexcept { return end_ns_.load(std::memory_order_relaxed); }
+    void end_at(std::int64_t t_ns) noexcept { end_ns_.store(t_ns, std::memory_order_relaxed); }
+
+private:
+    std::atomic<std::int64_t> end_ns_{kNever};
+};
+
+/// CLOCK_MONOTONIC since `start`.
+class RealTimeClock final : public Clock {
+public:
+    /// Time 0 is `lead_ns` from now. Before other threads read the clock.
+    void start(std::int64_t lead_ns) noexcept { start_ns_ = monotonic_ns() + lead_ns; }
+
+    [[nodiscard]] std::int64_t now_ns() const noexcept override { return monotonic_ns() - start_ns_; }
+    [[nodiscard]] std::int64_t to_monotonic(std::int64_t t_ns) const noexcept override { return t_ns + start_ns_; }
+
+    /// Sleeps until the absolute time `t_ns`, checking the flag ten times a second. False: stopped.
     [[nodiscard]] bool wait_until(std::int64_t t_ns, const StopFlag& stop) const noexcept {
         constexpr std::int64_t kSlice = 100'000'000;
         while (!stop.load(std::memory_order_relaxed)) {
             const std::int64_t now = now_ns();
             if (now >= t_ns) return true;
-            const std::int64_t until = start_ns_ + std::min(t_ns, now + kSlice);
+            const std::int64_t until = to_monotonic(std::min(t_ns, now + kSlice));
             const timespec ts{until / 1'000'000'000, until % 1'000'000'000};
             ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &ts, nullptr);
         }
@@ -39,7 +58,20 @@ public:
     }
 
 private:
-    std::int64_t start_ns_;
+    std::int64_t start_ns_ = 0;
+};
+
+/// Stands still while a sensor works: everything takes no time, so no wall time enters any result.
+class LockstepClock final : public Clock {
+public:
+    void set(std::int64_t t_ns) noexcept { now_ns_ = t_ns; }
+
+    [[nodiscard]] std::int64_t now_ns() const noexcept override { return now_ns_; }
+    /// Now, whatever the time: nothing in lockstep waits for it.
+    [[nodiscard]] std::int64_t to_monotonic(std::int64_t) const noexcept override { return monotonic_ns(); }
+
+private:
+    std::int64_t now_ns_ = 0;
 };
 
 }  // namespace narpa

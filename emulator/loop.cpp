@@ -1,16 +1,15 @@
-// emulator/loop.cpp - the loops. In real time every sensor has a thread that waits for its absolute deadline,
-// renders and publishes, and one thread serves the CAN bus. In lockstep one thread does it all, and the clock is
-// the bus: it stands still until every commanded body has a command for the time to come.
+// emulator/loop.cpp - the two loops over the table of sensors. In real time each sensor has a thread that waits for
+// the absolute due time of its next item, and one thread serves the CAN bus. In lockstep one thread does
+// everything: the simulation clock advances only when every commanded body has a command for the time to come.
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <condition_variable>
-#include <limits>
-#include <mutex>
+#include <barrier>
 #include <thread>
 
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
+#include "emulator/telemetry.h"
 #include "emulator/threads.h"
 #include "estimator/features/feature_matcher.h"
 
@@ -19,39 +18,28 @@ namespace {
 
 constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;
 constexpr std::int64_t kStartLeadNs = 50'000'000;
-constexpr std::int64_t kBusWaitNs = 2'000'000;  // how long a ledger may wait for the bus thread
-constexpr int kFramesPerTurn = 4096;            // bounds a turn of the bus thread on a saturated bus
-constexpr int kBusPriority = 60, kLidarPriority = 55, kCameraPriority = 50, kTracingPriority = 49;
+constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
+constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
+constexpr int kFramesPerTurn = 4096;                     // bounds one turn of the CAN thread on a saturated bus
+constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
+
+/// Calls f on the threads on which the sensor works.
+void execute(const Sensor& sensor, TracingThreads& threads, const auto& f) {
+    sensor.thread().in_arena ? threads.arena.execute(f) : f();
+}
+
+struct StartClock {
+    RealTimeClock& clock;
+    void operator()() const noexcept { clock.start(kStartLeadNs); }
+};
 
 }  // namespace
 
-/// Where the threads of a run wait for each other, so that the clock starts when all are ready.
-class StartLine {
-public:
-    explicit StartLine(std::size_t runners) : missing_(runners) {}
-
-    /// Says so, and waits for the start.
-    void ready() {
-        std::unique_lock lock(mutex_);
-        --missing_;
-        changed_.notify_all();
-        changed_.wait(lock, [&] { return started_; });
-    }
-    void wait_until_all_are_ready() {
-        std::unique_lock lock(mutex_);
-        changed_.wait(lock, [&] { return missing_ == 0; });
-    }
-    void go() {
-        const std::lock_guard lock(mutex_);
-        started_ = true;
-        changed_.notify_all();
-    }
-
-private:
-    std::mutex mutex_;
-    std::condition_variable changed_;
-    std::size_t missing_;
-    bool started_ = false;
+/// What the threads of a real-time run share. The clock starts when all of them are at the barrier.
+struct Emulator::RealTimeRun {
+    explicit RealTimeRun(std::size_t threads) : start(static_cast<std::ptrdiff_t>(threads), StartClock{clock}) {}
+    RealTimeClock clock;
+    std::barrier<StartClock> start;
 };
 
 // --- Real time ------------------------------------------------------------
@@ -59,180 +47,114 @@ private:
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
-    StartLine start(cameras_.size() + lidars_.size() + (can_ ? 1 : 0));
-    StopFlag sensors_done{false}, estimates_done{false};
-    std::thread bus;
-    if (can_) bus = std::thread([&] { run_bus(start, estimates_done); });
-    std::thread estimator;
-    if (estimates_) estimator = std::thread([&] { run_estimator(sensors_done); });
+    RealTimeRun run(1 + sensors_.size() + (can_ ? 1 : 0));
+    run.clock.end_at(end_ns_);
+    StopFlag sensors_done{false}, estimator_done{false};
+    std::thread bus, estimator;
+    if (can_) bus = std::thread([&] { run_bus(run, estimator_done); });
+    if (estimator_) estimator = std::thread([&] { run_estimator(sensors_done); });
     std::vector<std::thread> sensors;
-    for (const auto& feed : lidars_) sensors.emplace_back([&, f = feed.get()] { run_lidar(*f, start, stop); });
-    for (const auto& feed : cameras_) sensors.emplace_back([&, f = feed.get()] { run_camera(*f, start, stop); });
-    start.wait_until_all_are_ready();
-    clock_ = std::make_unique<Clock>(kStartLeadNs);
-    start.go();
-    (void)clock_->wait_until(0, stop);
+    for (const auto& sensor : sensors_) sensors.emplace_back([&, s = sensor.get()] { run_sensor(*s, run, stop); });
+    run.start.arrive_and_wait();
+    (void)run.clock.wait_until(0, stop);
     const PageFaults before = narpa::page_faults();
     for (std::thread& t : sensors) t.join();
     const PageFaults after = narpa::page_faults();
     page_faults_ = {after.minor - before.minor, after.major - before.major};
     sensors_done = true;
-    if (estimator.joinable()) estimates_->wake(), estimator.join();
-    estimates_done = true;
+    if (estimator.joinable()) estimator_->wake(), estimator.join();
+    estimator_done = true;
     if (bus.joinable()) bus.join();
+    t_ns_ = std::min(run.clock.now_ns(), run.clock.end_ns());
 }
 
-// A sensor's first frames and packets pay for everything that is only needed once, and show how long the next will
-// take: so they are made before the clock runs, by the thread and at the priority that makes the next.
-
-void Emulator::run_camera(CameraFeed& feed, StartLine& start, const StopFlag& stop) {
-    name_thread("narpa-camera");
+void Emulator::become_real_time(const char* name, int priority) {
+    name_thread(name);
     touch_stack();
-    if (!take_fifo_priority(kCameraPriority)) no_priority_ = true;
-    if (&feed == cameras_.front().get()) threads_->gather();
-    threads_->arena.execute([&] { feed.warm_up(); });
-    start.ready();
-    while (feed.next_mid_ns() < end_ns_ && clock_->wait_until(feed.due_ns(), stop)) {
-        threads_->arena.execute([&] { feed.make_next(clock_.get(), end_ns_); });
-        t_ns_.store(clock_->now_ns(), std::memory_order_relaxed);
+    if (!take_fifo_priority(priority)) no_priority_ = true;
+}
+
+void Emulator::run_sensor(Sensor& sensor, RealTimeRun& run, const StopFlag& stop) {
+    const SensorThread thread = sensor.thread();
+    become_real_time(thread.name, thread.priority);
+    // The first sensor that needs the tracing threads waits until all of them are there.
+    const auto traces = [](const auto& s) { return s->thread().in_arena; };
+    if (&sensor == std::ranges::find_if(sensors_, traces)->get()) threads_->gather();
+    execute(sensor, *threads_, [&] { sensor.warm_up(); });
+    run.start.arrive_and_wait();
+    while (sensor.last_pose_ns() < run.clock.end_ns() && run.clock.wait_until(sensor.due_ns(), stop)) {
+        execute(sensor, *threads_, [&] { sensor.make_next(run.clock); });
+        t_ns_.store(run.clock.now_ns(), std::memory_order_relaxed);
     }
 }
 
-void Emulator::run_lidar(LidarFeed& feed, StartLine& start, const StopFlag& stop) {
-    name_thread("narpa-lidar");
-    touch_stack();
-    if (!take_fifo_priority(kLidarPriority)) no_priority_ = true;
-    feed.warm_up();
-    start.ready();
-    while (feed.due_ns() <= end_ns_ && clock_->wait_until(feed.due_ns(), stop)) feed.make_next(clock_.get());
-}
-
-void Emulator::run_bus(StartLine& start, const StopFlag& stop) {
-    name_thread("narpa-can");
-    touch_stack();
-    if (!take_fifo_priority(kBusPriority)) no_priority_ = true;
-    start.ready();
+void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
+    become_real_time("narpa-can", kBusPriority);
+    RealTimeClock& clock = run.clock;
+    run.start.arrive_and_wait();
     std::int64_t next_heartbeat = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-        can_->wait(clock_->now_ns(), kBusWaitNs);
-        const std::int64_t now = clock_->now_ns();
+        can_->wait(clock.now_ns(), kBusWaitNs);
+        const std::int64_t now = clock.now_ns();
         t_ns_.store(now, std::memory_order_relaxed);
         bool moved = false;
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
         }
-        send_ledgers(now);
-        send_estimates(now);
-        // Nothing more will be commanded. Said once: a camera that is always behind would never get to an end that
-        // moves on with the time.
-        if (end_ns_ == std::numeric_limits<std::int64_t>::max() && can_->ended()) end_ns_ = now;
+        telemetry_->send(now);
+        // A recorded bus has ended: so does the run. Set once, because an overloaded camera never reaches an end
+        // that advances with the time.
+        if (clock.end_ns() == Clock::kNever && can_->ended()) clock.end_at(now);
         if (now >= next_heartbeat) {
-            send_heartbeat(now, RunState::running);
+            telemetry_->send_heartbeat(now, RunState::running);
             next_heartbeat += kHeartbeatPeriodNs;
         }
     }
-    send_ledgers(clock_->now_ns());
-    send_estimates(clock_->now_ns());
-    send_heartbeat(clock_->now_ns(), RunState::stopping);
+    telemetry_->send(clock.now_ns());
+    telemetry_->send_heartbeat(clock.now_ns(), RunState::stopping);
 }
 
-/// Without priority, on one thread: it takes what the sensors leave.
+/// Without real-time priority, on one thread: it uses the time that the sensors leave.
 void Emulator::run_estimator(const StopFlag& stop) {
     name_thread("narpa-estimate");
-    const OnePictureThread pictures;  // workers with the sensors' priority would help, and hold the sensors up
+    const OnePictureThread pictures;  // workers with the sensors' priority would delay the sensors
     tbb::task_arena alone(1);
-    alone.execute([&] { estimates_->run(stop); });
+    alone.execute([&] { estimator_->run(stop); });
 }
 
 // --- Lockstep ------------------------------------------------------------
 
 void Emulator::run_lockstep(const StopFlag& stop) {
-    bool started = false;
-    bool moved = false;
-    send_heartbeat(0, RunState::starting);
+    LockstepClock clock;
+    clock.end_at(end_ns_);
+    bool started = false, moved = false;
+    telemetry_->send_heartbeat(0, RunState::starting);
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
         if (!can_->receive(t_ns(), moved)) {
             if (can_->bus().ended()) break;
-            can_->bus().wait(100'000'000);
+            can_->bus().wait(kLockstepWaitNs);
             continue;
         }
         if (!moved || !can_->commanded()) continue;
-        if (!started) {
-            for (const auto& feed : cameras_) feed->start_at(can_->first_ns());
-            for (const auto& feed : lidars_) feed->start_at(can_->first_ns());
-            started = true;
-        }
-        advance_to(std::min(can_->granted_ns(), end_ns_.load()), stop);
-        send_heartbeat(t_ns(), RunState::lockstep);
+        if (!std::exchange(started, true))
+            for (const auto& sensor : sensors_) sensor->start_at(can_->first_ns());
+        advance_to(std::min(can_->granted_ns(), end_ns_), clock, stop);
+        telemetry_->send_heartbeat(t_ns(), RunState::lockstep);
     }
-    send_heartbeat(t_ns(), RunState::stopping);
+    telemetry_->send_heartbeat(t_ns(), RunState::stopping);
 }
 
-/// Makes every frame and packet that falls due up to t, in the order of time.
-void Emulator::advance_to(std::int64_t t_ns, const StopFlag& stop) {
+/// Makes every item whose poses are commanded by `t_ns`, in the order of time.
+void Emulator::advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFlag& stop) {
+    const auto last_pose = [](const auto& sensor) { return sensor->last_pose_ns(); };
     while (!stop.load(std::memory_order_relaxed)) {
-        const auto earlier_frame = [](const auto& a, const auto& b) { return a->next_mid_ns() < b->next_mid_ns(); };
-        const auto earlier_packet = [](const auto& a, const auto& b) { return a->due_ns() < b->due_ns(); };
-        const auto camera = std::min_element(cameras_.begin(), cameras_.end(), earlier_frame);
-        const auto lidar = std::min_element(lidars_.begin(), lidars_.end(), earlier_packet);
-        constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
-        const std::int64_t t_camera = camera == cameras_.end() ? kNever : (*camera)->next_mid_ns();
-        const std::int64_t t_lidar = lidar == lidars_.end() ? kNever : (*lidar)->due_ns();
-        // The run ends before the frame at `end` and after the packet that is complete by then.
-        if (std::min(t_camera, t_lidar) > t_ns || (t_camera >= end_ns_ && t_lidar > end_ns_)) break;
-        if (t_lidar <= t_camera) {
-            (*lidar)->make_next(nullptr);
-        } else if (t_camera < end_ns_) {
-            threads_->arena.execute([&] { (*camera)->make_next(nullptr, end_ns_); });
-            send_ledgers(t_camera);
-            send_estimates(t_camera);
-        } else {
-            break;
-        }
+        Sensor& next = **std::ranges::min_element(sensors_, {}, last_pose);
+        const std::int64_t t_pose = next.last_pose_ns();
+        if (t_pose > t_ns || t_pose >= clock.end_ns()) break;
+        clock.set(next.due_ns());
+        execute(next, *threads_, [&] { next.make_next(clock); });
+        telemetry_->send(t_pose);
     }
     t_ns_.store(std::max(this->t_ns(), t_ns), std::memory_order_relaxed);
-}
-
-// --- Telemetry ------------------------------------------------------------
-
-void Emulator::send_ledgers(std::int64_t t_ns) noexcept {
-    FrameLedger ledger;
-    for (const auto& feed : cameras_) {
-        while (feed->ledgers().pop(ledger)) {
-            faults_.stale |= ledger.pose_stale;
-            faults_.deadline_missed |= !ledger.deadline_met;
-            can_->send(ledger, t_ns);
-        }
-    }
-}
-
-void Emulator::send_estimates(std::int64_t t_ns) noexcept {
-    EstimateReport report;
-    while (estimates_ && estimates_->reports().pop(report)) can_->send(report, t_ns);
-}
-
-/// Faults are those since the last heartbeat.
-void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
-    Heartbeat heartbeat = faults_;
-    heartbeat.t_ns = t_ns;
-    heartbeat.state = state;
-    heartbeat.no_command = !can_->commanded();
-    const std::uint64_t drops = output_drops();
-    heartbeat.output_dropped = drops != drops_told_;
-    drops_told_ = drops;
-    faults_ = {};
-    can_->send(heartbeat, t_ns);
-}
-
-std::uint64_t Emulator::output_drops() const noexcept {
-    std::uint64_t n = 0;
-    for (const auto& feed : cameras_)
-        for (const auto& sink : feed->sinks()) {
-            const VideoCounters c = sink->counters();
-            n += c.ring_full + c.no_reader + c.failed;
-        }
-    for (const auto& feed : lidars_)
-        for (const auto& sink : feed->sinks()) n += sink->counters().dropped;
-    return n;
 }
 
 }  // namespace narpa

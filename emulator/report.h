@@ -3,18 +3,28 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "emulator/emulator.h"
+#include "emulator/log/histogram.h"
 
 namespace narpa {
 
-/// Frames, sweeps, commands received and lost, latency percentiles, deadlines missed, drops by cause.
-[[nodiscard]] nlohmann::json report(Emulator& emulator);
-/// How many frames were handed over how long before or after their deadline: percentiles, and counts by bins.
+/// Frames, sweeps, commands received and lost, latency percentiles, deadlines missed, drops by cause. Each sensor's
+/// part is in the list of its kind ("cameras").
+[[nodiscard]] nlohmann::json report(const Emulator& emulator);
+/// The same as text.
+[[nodiscard]] std::string in_words(const Emulator& emulator);
+
+/// How many frames were handed over how long after their deadline (negative: before).
+struct LatenessBin {
+    double from_ms, to_ms;  ///< infinite at either end
+    std::uint64_t frames;
+};
+[[nodiscard]] std::vector<LatenessBin> lateness_bins(const SignedHistogram& late);
+/// Percentiles and bins.
 [[nodiscard]] nlohmann::json lateness(const SignedHistogram& late);
-/// "598 1 to 3 ms early, 2 0.3 to 1 ms late": the bins that hold any.
-[[nodiscard]] std::string lateness_in_words(const nlohmann::json& lateness);
-/// The same, in words; made from the JSON so that the two cannot disagree.
-[[nodiscard]] std::string in_words(const nlohmann::json& report);
+/// "598 1 to 3 ms early, 2 0.3 to 1 ms late": the bins that are not empty.
+[[nodiscard]] std::string lateness_in_words(const SignedHistogram& late);
 
 }  // namespace narpa

@@ -10,8 +10,8 @@
 #include "base/result.h"
 #include "emulator/pose_track.h"
 #include "emulator/trajectory.h"
-#include "renderer/scene/scene.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa {
 

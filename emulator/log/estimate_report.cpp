@@ -179,21 +179,18 @@ nlohmann::json to_json(const EstimateSummary& s) {
             {"ms_most", s.ms_most}};
 }
 
-std::string estimates_in_words(const nlohmann::json& s) {
-    const auto value = [&](const char* key) { return s[key].get<double>(); };
-    std::string out = fmt::format("{:.0f} of {:.0f} frames gave a pose that the track took\n", value("measured"),
-                                  value("frames"));
-    if (value("measured") == 0) return out;
+std::string in_words(const EstimateSummary& s) {
+    std::string out = fmt::format("{} of {} frames gave a pose that the filter accepted\n", s.measured, s.frames);
+    if (s.measured == 0) return out;
     out += fmt::format(
-        "    a frame alone: RMS {:.4f} deg, {:.3g} m ({:.3g} % of the range); {:.1f} and {:.1f} bounds\n",
-        value("rotation_rms_rad") / kDegree, value("position_rms_m"), 100 * value("position_rms_of_range"),
-        value("rotation_of_bound"), value("position_of_bound"));
-    out += fmt::format("    filtered: RMS {:.4f} deg, {:.3g} m\n", value("filtered_rotation_rms_rad") / kDegree,
-                       value("filtered_position_rms_m"));
-    out += fmt::format("    NEES {:.2f} (95 % band {:.2f} to {:.2f}), NIS {:.2f}; 6 where covariances are right\n",
-                       value("nees_mean"), s["nees_95"][0].get<double>(), s["nees_95"][1].get<double>(),
-                       value("nis_mean"));
-    return out + fmt::format("    {:.0f} ms a frame (median; most {:.0f})\n", value("ms_median"), value("ms_most"));
+        "    single frame: RMS {:.4f} deg, {:.3g} m ({:.3g} % of the range); {:.1f} and {:.1f} times the bound\n",
+        s.rotation_rms_rad / kDegree, s.position_rms_m, 100 * s.position_rms_of_range, s.rotation_of_bound,
+        s.position_of_bound);
+    out += fmt::format("    filtered: RMS {:.4f} deg, {:.3g} m\n", s.filtered_rotation_rms_rad / kDegree,
+                       s.filtered_position_rms_m);
+    out += fmt::format("    NEES {:.2f} (95 % band {:.2f} to {:.2f}), NIS {:.2f}; expected 6\n", s.nees_mean,
+                       s.nees_low, s.nees_high, s.nis_mean);
+    return out + fmt::format("    {:.0f} ms per frame (median; max {:.0f})\n", s.ms_median, s.ms_most);
 }
 
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames) {

@@ -31,8 +31,7 @@ struct EstimateSummary {
 };
 [[nodiscard]] EstimateSummary summarise(std::span<const TrackedFrame> frames);
 [[nodiscard]] nlohmann::json to_json(const EstimateSummary& summary);
-/// The same in a few lines for people; made from the JSON so that the two cannot disagree.
-[[nodiscard]] std::string estimates_in_words(const nlohmann::json& summary);
+[[nodiscard]] std::string in_words(const EstimateSummary& summary);
 
 /// Errors of every frame over time, in rotation and in position, within three standard deviations and above the
 /// bound, as a PNG.

@@ -199,7 +199,8 @@ TEST_F(Budgets, TheReportCountsFramesByStep) {
         const nlohmann::json& camera = told["cameras"][0];
         for (const std::string_view name : kStepNames)
             EXPECT_EQ(camera["steps"][std::string(name)], name == step ? 4 : 0) << name;
-        EXPECT_NE(in_words(told).find(std::string("steps: 4 ") + step), std::string::npos) << in_words(told);
+        EXPECT_NE(in_words(*emulator).find(std::string("steps: 4 ") + step), std::string::npos)
+            << in_words(*emulator);
         for (const Row& row : read_rows(folder_ / "log/nav.ledger.csv"))
             EXPECT_EQ(kStepNames[whole(row, "step")], step);
     }
@@ -211,13 +212,13 @@ TEST(Report, TellsHowManyFramesWereHowLate) {
     for (int i = 0; i < 2; ++i) late.add(500'000);
     late.add(-45'000'000);
     const nlohmann::json told = lateness(late);
-    EXPECT_EQ(lateness_in_words(told), "1 over 30 ms early, 7 1 to 3 ms early, 2 0.3 to 1 ms late");
+    EXPECT_EQ(lateness_in_words(late), "1 over 30 ms early, 7 1 to 3 ms early, 2 0.3 to 1 ms late");
     std::uint64_t frames = 0;
     for (const nlohmann::json& bin : told["bins"]) frames += bin["frames"].get<std::uint64_t>();
     EXPECT_EQ(frames, late.count());
     EXPECT_NEAR(told["p50"].get<double>(), -2, 0.07);
     EXPECT_EQ(told["max"], 0.5);
-    EXPECT_EQ(lateness_in_words(lateness({})), "none");
+    EXPECT_EQ(lateness_in_words({}), "none");
 }
 
 /// In real time: how far each frame gets is up to the machine, what is said of it must fit together.
@@ -231,7 +232,7 @@ TEST_P(BudgetOfTime, IsADeadlineThatEachWholeFrameMeetsOrIsCountedToMiss) {
     const std::string method = std::string("method = \"") + GetParam() + "\"\nbudget_ms = 30";
     const auto emulator = run(scene_with(method, "late_policy = \"drop\"\ndetector = {exposure_s = 0.01}"), o);
     ASSERT_TRUE(emulator);
-    const CameraStats& c = emulator->cameras().front()->stats();
+    const CameraStats& c = camera_of(*emulator).stats();
     EXPECT_EQ(c.frames + c.skipped, 10U);
     EXPECT_EQ(c.late.count(), c.frames);
     EXPECT_EQ(c.steps.back(), 0U);

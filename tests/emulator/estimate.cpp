@@ -78,10 +78,10 @@ TEST_F(EstimateTest, EveryFrameOfALockstepRunIsLookedAt) {
     const std::string log = folder_ / "log";
     const auto emulator = fly(6, log);
     ASSERT_NE(emulator, nullptr);
-    ASSERT_NE(emulator->estimates(), nullptr);
-    const auto& frames = emulator->estimates()->frames();
-    ASSERT_EQ(frames.size(), emulator->cameras().front()->stats().frames);
-    EXPECT_EQ(emulator->estimates()->passed_over(), 0u);
+    ASSERT_NE(emulator->estimator(), nullptr);
+    const auto& frames = emulator->estimator()->frames();
+    ASSERT_EQ(frames.size(), camera_of(*emulator).stats().frames);
+    EXPECT_EQ(emulator->estimator()->skipped(), 0u);
     for (const TrackedFrame& f : frames) {
         ASSERT_EQ(f.state, EstimateState::measured) << f.why;
         EXPECT_LT(error_between(*f.measured, f.truth).head<3>().norm(), 5e-3);
@@ -128,7 +128,7 @@ TEST_F(EstimateTest, GoesOutOnCan) {
     }
     stop = true;
     loop.join();
-    const auto& frames = (*emulator)->estimates()->frames();
+    const auto& frames = (*emulator)->estimator()->frames();
     ASSERT_GE(reports.size(), 3u);
     ASSERT_GE(frames.size(), reports.size());
     for (std::size_t i = 0; i < reports.size(); ++i) {

@@ -2,7 +2,7 @@
 // then lateness is no matter of how fast the machine is.
 #include <algorithm>
 
-#include "emulator/camera_feed.h"
+#include "emulator/camera_sensor.h"
 #include "protocols/video/embedded_line.h"
 #include "tests/emulator/loop_support.h"
 
@@ -41,14 +41,17 @@ protected:
         ASSERT_TRUE(world) << world.error().text();
         std::vector<std::unique_ptr<VideoSink>> sinks;
         sinks.push_back(std::make_unique<Keeper>(sent_));
-        CameraFeed feed(**world, 0, std::move(sinks));
+        CameraSensor feed(**world, 0, std::move(sinks));
         feed.keep_ledgers();
         ASSERT_TRUE(feed.log_to(folder_ / "", true));
-        const Clock before(kHourNs), behind(-kHourNs);
+        RealTimeClock before, behind;
+        before.start(kHourNs);
+        behind.start(-kHourNs);
         for (std::uint32_t frame = 0; frame < 5; ++frame) {
             const bool is_late = std::ranges::find(late, frame) != late.end();
-            // To the clock that is behind, all frames up to its end are missed: this is the last one.
-            feed.make_next(is_late ? &behind : &before, feed.next_mid_ns() + 1);
+            RealTimeClock& clock = is_late ? behind : before;
+            clock.end_at(feed.last_pose_ns() + 1);  // the last frame: an hour behind, all others would be skipped
+            feed.make_next(clock);
         }
         ASSERT_TRUE(feed.finish());
         stats_ = feed.stats();

@@ -30,8 +30,8 @@ protected:
         const Status status = (*emulator)->run(stop);
         EXPECT_TRUE(status) << status.error().text();
         if (counters) *counters = (*emulator)->can()->counters();
-        frames_ = (*emulator)->cameras().front()->stats().frames;
-        packets_ = (*emulator)->lidars().front()->stats().packets;
+        frames_ = camera_of(**emulator).stats().frames;
+        packets_ = lidar_of(**emulator).stats().packets;
         emulator->reset();
         return {slurp(out + ".y4m"), slurp(out + ".pcap"), slurp(out + "/nav.truth.csv"),
                 slurp(out + "/nav.ledger.csv")};
@@ -123,7 +123,7 @@ TEST_F(Lockstep, EndsBeforeTheFrameAtItsDuration) {
     ASSERT_TRUE(emulator);
     StopFlag stop{false};
     ASSERT_TRUE((*emulator)->run(stop));
-    EXPECT_EQ((*emulator)->cameras().front()->stats().frames, 10U);
+    EXPECT_EQ(camera_of(**emulator).stats().frames, 10U);
     EXPECT_EQ((*emulator)->t_ns(), 1'000'000'000);
 }
 

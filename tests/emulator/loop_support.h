@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "drivers/can/can_bus.h"
+#include "emulator/camera_sensor.h"
 #include "emulator/emulator.h"
+#include "emulator/lidar_sensor.h"
 #include "protocols/can/messages.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/support/temporary_folder.h"
@@ -60,6 +62,14 @@ inline std::vector<std::map<std::string, std::string>> read_rows(const std::stri
         for (std::size_t i = 0; i < std::min(names.size(), values.size()); ++i) row[names[i]] = values[i];
     }
     return rows;
+}
+
+/// The first camera and the first LiDAR of a run.
+inline const CameraSensor& camera_of(const Emulator& emulator) {
+    return *emulator.sensors_of<CameraSensor>().front();
+}
+inline const LidarSensor& lidar_of(const Emulator& emulator) {
+    return *emulator.sensors_of<LidarSensor>().front();
 }
 
 class LoopTest : public ::testing::Test {

@@ -32,14 +32,14 @@ TEST_F(RealTime, MakesOrCountsEveryFrameAndPacketOfItsDuration) {
     const auto emulator = start(small_scene(), o);
     ASSERT_TRUE(emulator);
     ASSERT_TRUE(emulator->run(stop_));
-    const CameraStats& c = emulator->cameras().front()->stats();
-    const LidarStats& l = emulator->lidars().front()->stats();
+    const CameraStats& c = camera_of(*emulator).stats();
+    const LidarStats& l = lidar_of(*emulator).stats();
     EXPECT_EQ(c.frames + c.skipped, 10U);
     EXPECT_GE(c.frames, 1U);
     EXPECT_EQ(l.packets + l.skipped, 1'000'000'000U / 1'327'104);
     EXPECT_GT(l.returns, 0U);
     EXPECT_EQ(emulator->can()->counters().taken, 10U);
-    EXPECT_EQ(emulator->cameras().front()->sinks().front()->counters().written, c.handed_over);
+    EXPECT_EQ(camera_of(*emulator).sinks().front()->counters().written, c.handed_over);
 }
 
 /// By samples, by a budget in time, and by paths within one.
@@ -71,8 +71,8 @@ TEST_P(OnceItRuns, TheLoopAllocatesNothing) {
     }
     loop.join();
     EXPECT_EQ(calls, 0U);
-    const CameraStats& c = emulator->cameras().front()->stats();
-    const LidarStats& l = emulator->lidars().front()->stats();
+    const CameraStats& c = camera_of(*emulator).stats();
+    const LidarStats& l = lidar_of(*emulator).stats();
     EXPECT_EQ(c.frames + c.skipped, 80U);
     EXPECT_GE(c.frames, 1U);
     EXPECT_EQ(l.packets + l.skipped, 1'600'000'000U / 1'327'104);
@@ -87,7 +87,7 @@ TEST_P(OnceItRuns, TheLoopTouchesNoNewPage) {
     const auto emulator = start(busy_scene(), o);
     ASSERT_TRUE(emulator);
     ASSERT_TRUE(emulator->run(stop_));
-    const CameraStats& c = emulator->cameras().front()->stats();
+    const CameraStats& c = camera_of(*emulator).stats();
     EXPECT_EQ(c.frames + c.skipped, 50U);
     EXPECT_EQ(emulator->page_faults().major, 0);
     const auto refused = [](const std::string& note) { return note.find("not locked") != std::string::npos; };
@@ -128,7 +128,7 @@ TEST_F(RealTime, ARunOnALogEndsAfterItsLastFrame) {
     const auto emulator = start(small_scene(), o);
     ASSERT_TRUE(emulator);
     ASSERT_TRUE(emulator->run(stop_));
-    const CameraStats& c = emulator->cameras().front()->stats();
+    const CameraStats& c = camera_of(*emulator).stats();
     EXPECT_GE(c.frames + c.skipped, 5U);
     EXPECT_EQ(emulator->can()->counters().foreign, 2U);
 }
@@ -169,8 +169,8 @@ TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
     ASSERT_TRUE(emulator);
     ASSERT_TRUE(emulator->run(stop_));
     ::close(reader);
-    const CameraStats& c = emulator->cameras().front()->stats();
-    const VideoCounters sent = emulator->cameras().front()->sinks().front()->counters();
+    const CameraStats& c = camera_of(*emulator).stats();
+    const VideoCounters sent = camera_of(*emulator).sinks().front()->counters();
     EXPECT_EQ(c.frames + c.skipped, 25U);
     EXPECT_GT(c.handed_over, sent.written);  // the loop went on without the reader
     EXPECT_EQ(sent.written + sent.ring_full + sent.no_reader + sent.failed, c.handed_over);
@@ -196,12 +196,12 @@ TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
     stop_ = true;
     loop.join();
     const std::string video = slurp(folder_ / "a.y4m");
-    const std::uint64_t frames = emulator->cameras().front()->stats().handed_over;
+    const std::uint64_t frames = camera_of(*emulator).stats().handed_over;
     EXPECT_GE(frames, 1U);
     EXPECT_EQ((video.size() - video.find('\n') - 1) % (64 * 48 + 6), 0U);
     EXPECT_EQ((video.size() - video.find('\n') - 1) / (64 * 48 + 6), frames);
     // Nobody commands: every frame says so.
-    EXPECT_EQ(emulator->cameras().front()->stats().stale, emulator->cameras().front()->stats().frames);
+    EXPECT_EQ(camera_of(*emulator).stats().stale, camera_of(*emulator).stats().frames);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-/// emulator/estimate_feed.h - poses estimated beside the run from the frames of one camera, on a thread of its own
-/// at its own pace: what comes while it is busy is passed over. In lockstep every frame is looked at, in its turn.
+/// emulator/online_estimator.h - estimates poses during the run from the frames of one camera. In real time it has
+/// a thread of its own and skips the frames that arrive while it is busy; in lockstep it processes every frame at
+/// once.
 #pragma once
 
 #include <atomic>
@@ -17,27 +18,27 @@
 
 namespace narpa {
 
-class EstimateFeed {
+class OnlineEstimator {
 public:
-    EstimateFeed(std::unique_ptr<FrameTracker> tracker, const World& world, std::size_t camera);
+    OnlineEstimator(std::unique_ptr<FrameTracker> tracker, const World& world, std::size_t camera, bool lockstep);
 
-    /// CAMERA.estimate.csv and CAMERA.estimate.png in this folder.
-    Status log_to(const std::string& folder, bool wait_when_full);
+    /// Writes CAMERA.estimate.csv and CAMERA.estimate.png to this folder.
+    Status log_to(const std::string& folder);
+    /// Keeps reports for the CAN thread.
     void keep_reports() noexcept { keeps_reports_ = true; }
 
-    /// From the camera's thread: copies the frame where the estimator waits for one, and never waits itself.
-    void offer(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at) noexcept;
-    /// The estimator's thread: looks at what is offered, until `stop` is set and `wake` was called.
+    /// From the camera's thread. In real time: copies the frame if the estimator is idle; never waits. In lockstep:
+    /// processes the frame before it returns.
+    void take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
+    /// The estimator's thread: processes frames until `stop` is set and `wake` was called.
     void run(const StopFlag& stop);
     void wake() noexcept;
-    /// Looks at a frame at once: in lockstep.
-    void look(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
 
-    /// For the CAN thread: kept only where there is one.
     SpscRing<EstimateReport, 64>& reports() noexcept { return reports_; }
-    /// After the run; of more than kMostKept frames the first.
+    /// After the run; the first kMostKept frames.
     [[nodiscard]] const std::vector<TrackedFrame>& frames() const noexcept { return frames_; }
-    [[nodiscard]] std::uint64_t passed_over() const noexcept { return passed_over_; }
+    /// Frames that arrived while the estimator was busy.
+    [[nodiscard]] std::uint64_t skipped() const noexcept { return skipped_; }
     [[nodiscard]] const FrameTracker& tracker() const noexcept { return *tracker_; }
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
@@ -47,16 +48,18 @@ public:
 
 private:
     enum Slot : int { empty, full };
+    void process(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
 
     std::unique_ptr<FrameTracker> tracker_;
     Camera camera_;
     std::uint8_t index_;
     std::string target_, title_;
+    bool lockstep_;
     std::atomic<int> slot_{empty};
     FrameLedger ledger_;
     std::vector<std::uint8_t> bytes_;
     BodyPoses at_;
-    std::uint64_t passed_over_ = 0;  ///< the camera's thread only, until the run is over
+    std::uint64_t skipped_ = 0;  ///< the camera's thread only, until the end of the run
     bool keeps_reports_ = false;
     SpscRing<EstimateReport, 64> reports_;
     std::vector<TrackedFrame> frames_;

@@ -1,4 +1,4 @@
-#include "emulator/camera_feed.h"
+#include "emulator/camera_sensor.h"
 
 #include <fmt/format.h>
 
@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "emulator/can_node.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/trajectory.h"
 
@@ -20,14 +21,14 @@ void fill_black(PixelFormat format, std::span<std::uint8_t> bytes) noexcept {
 
 }  // namespace
 
-CameraFeed::CameraFeed(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
+CameraSensor::CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
     : world_(world), unit_(world, camera), sinks_(std::move(sinks)) {
     const LatePolicy late = unit_.camera().late;
     if (late == LatePolicy::repeat || late == LatePolicy::blank) spare_.resize(unit_.bytes().size());
     fill_black(unit_.camera().format, spare_);
 }
 
-Status CameraFeed::log_to(const std::string& folder, bool wait_when_full) {
+Status CameraSensor::log_to(const std::string& folder, bool wait_when_full) {
     folder_ = folder;
     const std::string stem = folder + "/" + unit_.camera().name;
     auto truth = RowLog::create(stem + ".truth.csv", std::string(kTrajectoryHeader) + "\n", wait_when_full);
@@ -40,35 +41,34 @@ Status CameraFeed::log_to(const std::string& folder, bool wait_when_full) {
     return Ok{};
 }
 
-void CameraFeed::start_at(std::int64_t t_ns) noexcept {
+void CameraSensor::start_at(std::int64_t t_ns) noexcept {
     const std::int64_t period = unit_.camera().period_ns;
     next_ = static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period - 1) / period));
 }
 
-void CameraFeed::warm_up() {
-    for (int i = 0; i < 2; ++i) unit_.warm_up();  // the faster one counts
-    const FrameLedger ledger = unit_.expose(next_, next_mid_ns(), monotonic_ns() + world_.scene().render.budget_ns);
+void CameraSensor::warm_up() {
+    for (int i = 0; i < 2; ++i) unit_.warm_up();
+    const FrameLedger ledger =
+        unit_.expose(next_, last_pose_ns(), monotonic_ns() + world_.scene().render.budget_ns);
     unit_.embed(ledger);
     unit_.handed_over(monotonic_ns());
 }
 
-std::int64_t CameraFeed::deadline_ns(std::uint32_t frame) const noexcept {
+std::int64_t CameraSensor::deadline_ns(std::uint32_t frame) const noexcept {
     const std::int64_t budget = world_.scene().render.budget_ns;
     return budget > 0 ? unit_.t_mid_ns(frame) + unit_.exposure_ns() / 2 + budget : unit_.t_mid_ns(frame + 1);
 }
 
-void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
-    const std::uint32_t frame = next_;
-    const std::int64_t due = due_ns(), deadline = deadline_ns(frame);
-    const std::int64_t started = clock ? clock->now_ns() : due;
+void CameraSensor::make_next(const Clock& clock) {
+    const std::int64_t deadline = deadline_ns(next_), started = clock.now_ns();
     const std::int64_t wall_start = monotonic_ns();
 
-    FrameLedger ledger = unit_.expose(frame, unit_.t_mid_ns(frame), clock ? clock->to_monotonic(deadline) : 0);
+    FrameLedger ledger = unit_.expose(next_, last_pose_ns(), clock.to_monotonic(deadline));
     ledger.t_render_start_ns = started;
-    ledger.t_render_end_ns = clock ? clock->now_ns() : due;
+    ledger.t_render_end_ns = clock.now_ns();
     ledger.t_deadline_ns = deadline;
     stats_.render.add(monotonic_ns() - wall_start);
-    stats_.wake_late.add(started - due);
+    stats_.wake_late.add(started - due_ns());
     stats_.radiance.add(unit_.durations().radiance_ns);
     stats_.sensor.add(unit_.durations().sensor_ns);
 
@@ -77,18 +77,18 @@ void CameraFeed::make_next(const Clock* clock, std::int64_t end_ns) {
     stats_.send.add(monotonic_ns() - wall_ready);
     account(ledger);
     log(ledger);
-    if (watcher_) show(ledger, clock != nullptr);
+    if (estimator_ && ledger.delivery == Delivery::frame)
+        estimator_->take(ledger, unit_.bytes(), unit_.placement());
     ++next_;
-    if (clock) let_go_of_missed(*clock, end_ns);
+    skip_missed(clock);
 }
 
-void CameraFeed::hand_over(FrameLedger& ledger, const Clock* clock) noexcept {
-    const std::int64_t ready = clock ? clock->now_ns() : ledger.t_render_end_ns;
-    ledger.deadline_met = ready <= ledger.t_deadline_ns;
+void CameraSensor::hand_over(FrameLedger& ledger, const Clock& clock) noexcept {
+    ledger.deadline_met = clock.now_ns() <= ledger.t_deadline_ns;
     unit_.embed(ledger);
     ledger.delivery = deliver(ledger.deadline_met);
-    const std::int64_t out = clock ? clock->now_ns() : ready;
-    if (clock) unit_.handed_over(clock->to_monotonic(out));
+    const std::int64_t out = clock.now_ns();
+    unit_.handed_over(clock.to_monotonic(out));
     if (ledger.delivery != Delivery::nothing) ledger.t_hand_over_ns = out;
     ledger.deadline_met = out <= ledger.t_deadline_ns;
     stats_.late.add(out - ledger.t_deadline_ns);
@@ -97,7 +97,7 @@ void CameraFeed::hand_over(FrameLedger& ledger, const Clock* clock) noexcept {
         std::copy(unit_.bytes().begin(), unit_.bytes().end(), spare_.begin());
 }
 
-Delivery CameraFeed::deliver(bool in_time) noexcept {
+Delivery CameraSensor::deliver(bool in_time) noexcept {
     const LatePolicy late = unit_.camera().late;
     if (in_time || late == LatePolicy::late) {
         send(unit_.bytes());
@@ -108,12 +108,12 @@ Delivery CameraFeed::deliver(bool in_time) noexcept {
     return late == LatePolicy::repeat ? Delivery::repeated : Delivery::blank;
 }
 
-void CameraFeed::send(std::span<const std::uint8_t> bytes) noexcept {
+void CameraSensor::send(std::span<const std::uint8_t> bytes) noexcept {
     for (const auto& sink : sinks_) sink->send(bytes);
     ++stats_.handed_over;
 }
 
-void CameraFeed::account(const FrameLedger& ledger) noexcept {
+void CameraSensor::account(const FrameLedger& ledger) noexcept {
     ++stats_.frames;
     stats_.deadline_missed += !ledger.deadline_met;
     stats_.stale += ledger.pose_stale;
@@ -126,21 +126,29 @@ void CameraFeed::account(const FrameLedger& ledger) noexcept {
     if (keeps_ledgers_) stats_.ledgers_lost += !ledgers_.push(ledger);
 }
 
-void CameraFeed::show(const FrameLedger& ledger, bool real_time) {
-    if (ledger.delivery != Delivery::frame) return;  // the device never had it
-    if (real_time)
-        watcher_->offer(ledger, unit_.bytes(), unit_.placement());
-    else
-        watcher_->look(ledger, unit_.bytes(), unit_.placement());
-}
-
-/// A frame whose successor is already due is not made any more: the stream stays in step with the clock.
-void CameraFeed::let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept {
-    for (; next_mid_ns() < end_ns && due_ns() + unit_.camera().period_ns <= clock.now_ns(); ++next_)
+void CameraSensor::skip_missed(const Clock& clock) noexcept {
+    for (; last_pose_ns() < clock.end_ns() && due_ns() + unit_.camera().period_ns <= clock.now_ns(); ++next_)
         ++stats_.skipped;
 }
 
-void CameraFeed::log(const FrameLedger& l) noexcept {
+void CameraSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept {
+    for (FrameLedger ledger; ledgers_.pop(ledger);) {
+        faults.stale |= ledger.pose_stale;
+        faults.deadline_missed |= !ledger.deadline_met;
+        can.send(ledger, t_ns);
+    }
+}
+
+std::uint64_t CameraSensor::drops() const noexcept {
+    std::uint64_t n = 0;
+    for (const auto& sink : sinks_) {
+        const VideoCounters c = sink->counters();
+        n += c.ring_full + c.no_reader + c.failed;
+    }
+    return n;
+}
+
+void CameraSensor::log(const FrameLedger& l) noexcept {
     if (!truth_log_) return;
     std::array<char, RowLog::kMaxLine> row;
     for (std::size_t i = 0; i < world_.scene().bodies.size(); ++i) {
@@ -152,7 +160,7 @@ void CameraFeed::log(const FrameLedger& l) noexcept {
     sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
 }
 
-Status CameraFeed::finish() {
+Status CameraSensor::finish() {
     for (const auto& sink : sinks_) sink->flush();
     if (!sheet_) return Ok{};
     Status truth = truth_log_->close(), ledger = ledger_log_->close();

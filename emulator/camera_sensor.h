@@ -1,4 +1,4 @@
-/// emulator/camera_feed.h - a camera on its way out: unit -> sinks, log, ledger, with everything counted.
+/// emulator/camera_sensor.h - a camera in the loop: frames from its unit to sinks, logs, ledgers and estimator.
 #pragma once
 
 #include <array>
@@ -9,11 +9,11 @@
 
 #include "drivers/video/video_sink.h"
 #include "emulator/camera_unit.h"
-#include "emulator/clock.h"
-#include "emulator/estimate_feed.h"
 #include "emulator/log/contact_sheet.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/row_log.h"
+#include "emulator/online_estimator.h"
+#include "emulator/sensor.h"
 #include "emulator/spsc_ring.h"
 
 namespace narpa {
@@ -33,48 +33,52 @@ struct CameraStats {
     Histogram error_1e9, samples_1e3;  ///< expected error, 1e-9 of full scale; samples per pixel, 1e-3
 };
 
-class CameraFeed {
+class CameraSensor final : public Sensor {
 public:
-    CameraFeed(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks);
+    CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks);
 
-    /// Truth (trajectory CSV), ledger (CSV) and contact sheet in this folder.
+    /// Writes truth (trajectory CSV), ledger (CSV) and contact sheet to this folder.
     Status log_to(const std::string& folder, bool wait_when_full);
+    /// Keeps each frame's ledger for send_telemetry.
+    void keep_ledgers() noexcept { keeps_ledgers_ = true; }
+    /// Gives each frame that is handed over to the estimator too, which must outlive the run.
+    void show_to(OnlineEstimator& estimator) noexcept { estimator_ = &estimator; }
 
-    /// The first frame at or after this time is next.
-    void start_at(std::int64_t t_ns) noexcept;
-    [[nodiscard]] std::int64_t next_mid_ns() const noexcept { return unit_.t_mid_ns(next_); }
-    /// When the next frame can be made: its exposure is over.
-    [[nodiscard]] std::int64_t due_ns() const noexcept { return next_mid_ns() + unit_.exposure_ns() / 2; }
-
-    /// Makes three frames for nobody: two that take all that frames of this scene can take pay for what is needed
-    /// once, and the faster of them shows how fast the renderer is; the third shows what the next need on their way
-    /// out.
-    void warm_up();
-    /// Exposes the next frame and hands it to every sink. `clock`: null in lockstep, where no wall time enters.
-    /// `end_ns`: frames from there on are not part of the run, so they cannot be skipped.
-    void make_next(const Clock* clock, std::int64_t end_ns);
+    [[nodiscard]] std::string_view kind() const noexcept override { return "camera"; }
+    [[nodiscard]] std::string_view name() const noexcept override { return unit_.camera().name; }
+    [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-camera", 50, true}; }
+    [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
+    void start_at(std::int64_t t_ns) noexcept override;
+    /// The middle of the next exposure.
+    [[nodiscard]] std::int64_t last_pose_ns() const noexcept override { return unit_.t_mid_ns(next_); }
+    /// The end of the next exposure.
+    [[nodiscard]] std::int64_t due_ns() const noexcept override { return last_pose_ns() + unit_.exposure_ns() / 2; }
+    /// Two frames of maximum work, the faster of which calibrates the renderer; then one as in the run, which
+    /// measures the time from radiance to hand-over.
+    void warm_up() override;
+    void make_next(const Clock& clock) override;
+    void send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept override;
+    [[nodiscard]] std::uint64_t drops() const noexcept override;
+    Status finish() override;
+    [[nodiscard]] nlohmann::json report() const override;
+    [[nodiscard]] std::string in_words() const override;
 
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }
     [[nodiscard]] const std::vector<std::unique_ptr<VideoSink>>& sinks() const noexcept { return sinks_; }
-    /// Ledgers for the CAN thread: kept only where there is one.
-    void keep_ledgers() noexcept { keeps_ledgers_ = true; }
     SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
-    /// Who looks at the frames as they go out; outlives the run.
-    void show_to(EstimateFeed& watcher) noexcept { watcher_ = &watcher; }
-    /// Flushes sinks and logs and writes the contact sheet.
-    Status finish();
 
 private:
-    void hand_over(FrameLedger& ledger, const Clock* clock) noexcept;
-    /// For the hand-over: the end of the time budget, or the middle of the next exposure.
+    /// Hands the frame just rendered over as the late policy says, and completes its ledger.
+    void hand_over(FrameLedger& ledger, const Clock& clock) noexcept;
+    /// Of the hand-over: the end of the time budget, or the middle of the next exposure.
     [[nodiscard]] std::int64_t deadline_ns(std::uint32_t frame) const noexcept;
     [[nodiscard]] Delivery deliver(bool in_time) noexcept;
     void send(std::span<const std::uint8_t> bytes) noexcept;
     void account(const FrameLedger& ledger) noexcept;
-    void let_go_of_missed(const Clock& clock, std::int64_t end_ns) noexcept;
+    /// Skips the frames whose successors are due already: the stream keeps step with the clock.
+    void skip_missed(const Clock& clock) noexcept;
     void log(const FrameLedger& ledger) noexcept;
-    void show(const FrameLedger& ledger, bool real_time);
 
     const World& world_;
     CameraUnit unit_;
@@ -83,7 +87,7 @@ private:
     std::vector<std::uint8_t> spare_;  ///< `repeat`: the last frame in time; `blank`: black; else empty
     SpscRing<FrameLedger, 64> ledgers_;
     bool keeps_ledgers_ = false;
-    EstimateFeed* watcher_ = nullptr;
+    OnlineEstimator* estimator_ = nullptr;
     CameraStats stats_;
 
     std::string folder_;

@@ -1,0 +1,59 @@
+/// emulator/lidar_sensor.h - a LiDAR in the loop: packets from its unit to sinks at the instrument's own rate.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "drivers/lidar/packet_sink.h"
+#include "emulator/lidar_unit.h"
+#include "emulator/log/histogram.h"
+#include "emulator/sensor.h"
+
+namespace narpa {
+
+struct LidarStats {
+    std::uint64_t packets = 0;
+    std::uint64_t skipped = 0;  ///< never fired: the sensor was more than kMaxLagNs behind
+    std::uint64_t shots = 0, returns = 0;
+    Histogram wake_late, fire, hand_over;  ///< after it was due; duration; from due to sent
+};
+
+class LidarSensor final : public Sensor {
+public:
+    LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks);
+
+    [[nodiscard]] std::string_view kind() const noexcept override { return "lidar"; }
+    [[nodiscard]] std::string_view name() const noexcept override { return unit_.lidar().name; }
+    [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-lidar", 55, false}; }
+    [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
+    void start_at(std::int64_t t_ns) noexcept override;
+    /// All shots of the packet come before it is complete.
+    [[nodiscard]] std::int64_t last_pose_ns() const noexcept override { return due_ns() - 1; }
+    /// When the packet is complete and goes out.
+    [[nodiscard]] std::int64_t due_ns() const noexcept override { return unit_.t_sent_ns(next_); }
+    void warm_up() override { unit_.fire(next_); }
+    void make_next(const Clock& clock) override;
+    [[nodiscard]] std::uint64_t drops() const noexcept override;
+    Status finish() override;
+    [[nodiscard]] nlohmann::json report() const override;
+    [[nodiscard]] std::string in_words() const override;
+
+    [[nodiscard]] const LidarUnit& unit() const noexcept { return unit_; }
+    [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }
+    [[nodiscard]] double sweeps() const noexcept {
+        return static_cast<double>(stats_.packets) * static_cast<double>(unit_.packet_period_ns()) * 1e-9 *
+               unit_.lidar().rate_hz;
+    }
+    [[nodiscard]] const std::vector<std::unique_ptr<PacketSink>>& sinks() const noexcept { return sinks_; }
+
+    static constexpr std::int64_t kMaxLagNs = 100'000'000;
+
+private:
+    LidarUnit unit_;
+    std::vector<std::unique_ptr<PacketSink>> sinks_;
+    std::int64_t next_ = 0;
+    LidarStats stats_;
+};
+
+}  // namespace narpa

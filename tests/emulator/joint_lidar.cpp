@@ -129,11 +129,11 @@ TEST_F(JointLidar, PacketsOfALockstepRunDecodeToTheGeometry) {
         GTEST_SKIP() << "built without libpcap";
     ASSERT_TRUE(emulator) << emulator.error().text();
     ASSERT_TRUE((*emulator)->run(StopFlag{false}));
-    const LidarFeed& feed = *(*emulator)->lidars()[0];
-    EXPECT_EQ(feed.stats().packets, 4U);  // a turn of 0.5 s each
-    EXPECT_EQ(feed.stats().returns, 4U * Fan8::kShots);
-    EXPECT_DOUBLE_EQ(feed.sweeps(), 4);
-    EXPECT_EQ(feed.sinks()[0]->counters().sent, 4U) << "no position packets";
+    const LidarSensor& lidar = lidar_of(**emulator);
+    EXPECT_EQ(lidar.stats().packets, 4U);  // a turn of 0.5 s each
+    EXPECT_EQ(lidar.stats().returns, 4U * Fan8::kShots);
+    EXPECT_DOUBLE_EQ(lidar.sweeps(), 4);
+    EXPECT_EQ(lidar.sinks()[0]->counters().sent, 4U) << "no position packets";
 
     // As navigation reads them: the turn that ends at 1.5 s, from the third packet.
     const auto datagrams = read_datagrams(folder_ / "fan.pcap", fan8().spec().data_packet_bytes);

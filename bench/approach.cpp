@@ -39,12 +39,12 @@ public:
         if (method == EstimateMethod::features) {
             FeatureSettings settings;
             settings.seed = o.seed;
-            points_.emplace(world.tracer(), camera, target, at, settings);
+            points_.emplace(world.render_scene(), camera, target, at, settings);
         } else {
             dense_.seed = o.seed;
             dense_.method = world.scene().render.method;
             dense_.max_depth = world.scene().render.max_depth;
-            pixels_.emplace(world.tracer(), camera, target);
+            pixels_.emplace(world.render_scene(), camera, target);
         }
     }
 

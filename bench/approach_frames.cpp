@@ -22,7 +22,7 @@ ApproachFrames::ApproachFrames(const World& world, const Camera& camera, std::si
       camera_(camera),
       at_(at_time_0(world)),
       sensor_(sensor_model(camera)),
-      view_(world.tracer(), camera_, target, at_),
+      view_(world.render_scene(), camera_, target, at_),
       bytes_(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})),
       made_{{}, at_, {}, {}} {}
 

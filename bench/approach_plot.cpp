@@ -205,8 +205,8 @@ Status picture_of_frames(const std::string& path, const World& world, std::size_
     cv::Mat sheet(2 * height + kCurve + 5 * kGap + 40, kFrames * (kWidth + kGap) + kGap, CV_8UC3,
                   cv::Scalar(255, 255, 255));
     ApproachFrames frames(world, camera, target, o);
-    FeatureAlignment alignment(world.tracer(), camera, target, BodyPoses(world.scene().bodies.size()));
-    ModelView view(world.tracer(), camera, target, BodyPoses(world.scene().bodies.size()));
+    FeatureAlignment alignment(world.render_scene(), camera, target, BodyPoses(world.scene().bodies.size()));
+    ModelView view(world.render_scene(), camera, target, BodyPoses(world.scene().bodies.size()));
     std::mt19937_64 random(o.seed);
     for (int k = 0; k < kFrames; ++k) {
         const int left = kGap + k * (kWidth + kGap);

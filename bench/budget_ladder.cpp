@@ -97,7 +97,7 @@ PictureMean reference_of(View& v, FrameSettings settings, int spp,
     PictureMean mean(v.image.pixels.size());
     settings.spp = std::max(2, spp / kReferencePictures);
     ++settings.seed;  // shares no random numbers with what is measured
-    CameraRenderer renderer(v.world.tracer(), v.camera);
+    CameraRenderer renderer(v.world.render_scene(), v.camera);
     for (std::uint32_t k = 0; k < kReferencePictures; ++k) {
         tell(fmt::format("reference {}/{}", k, kReferencePictures));
         settings.frame = k;
@@ -142,7 +142,7 @@ Ladder climb(const World& world, std::size_t camera_index, const LadderSettings&
     const auto add = [&](Rung rung, const FrameSettings& settings) {
         climbers.emplace_back(std::move(rung), settings, reference);
         if (!climbers.back().rung.loop)
-            climbers.back().renderer = std::make_unique<CameraRenderer>(world.tracer(), camera);
+            climbers.back().renderer = std::make_unique<CameraRenderer>(world.render_scene(), camera);
     };
     const auto named = [](std::string name, bool is_loop, bool adaptive) {
         Rung rung;

@@ -21,7 +21,7 @@ public:
         : camera_(world.scene().cameras[index]),
           threads_(threads),
           at(world.scene().bodies.size()),
-          renderer_(world.tracer(), camera_),
+          renderer_(world.render_scene(), camera_),
           image_(camera_.width, camera_.height),
           bytes_(frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns})),
           handed_(bytes_.size()) {

@@ -51,7 +51,7 @@ struct Station {
         f.method = r.method, f.max_depth = r.max_depth;
         f.seed = r.seed, f.frame = number;
         RadianceImage radiance(camera.width, camera.height);
-        render_radiance(world.tracer(), at, camera, T_world_camera, f, radiance);
+        render_radiance(world.render_scene(), at, camera, T_world_camera, f, radiance);
         std::vector<std::uint8_t> bytes(
             frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
         expose(camera, radiance, r.seed, number, bytes);

@@ -28,7 +28,7 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
       full_scale_(full_scale_radiance(camera_)),
       placement_(world.scene().bodies.size()),
       motions_(world.scene().bodies.size()),
-      renderer_(world.tracer(), camera_),
+      renderer_(world.render_scene(), camera_),
       radiance_(camera_.width, camera_.height),
       bytes_(frame_bytes(format())) {}
 

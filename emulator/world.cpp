@@ -27,9 +27,9 @@ Result<std::unique_ptr<World>> World::create(Scene scene) {
         if (auto good = check_camera(c, scene.file); !good) return good.error();
     std::unique_ptr<World> world(new World);
     world->scene_ = std::move(scene);
-    auto tracer = Tracer::create(world->scene_);
-    if (!tracer) return tracer.error();
-    world->tracer_.emplace(*std::move(tracer));
+    auto render_scene = RenderScene::create(world->scene_);
+    if (!render_scene) return render_scene.error();
+    world->render_scene_.emplace(*std::move(render_scene));
 
     const std::vector<Body>& bodies = world->scene_.bodies;
     world->tracks_.resize(bodies.size());

@@ -10,7 +10,7 @@
 #include "base/result.h"
 #include "emulator/pose_track.h"
 #include "emulator/trajectory.h"
-#include "renderer/geometry/tracer.h"
+#include "renderer/light/render_scene.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -28,7 +28,8 @@ public:
     static Result<std::unique_ptr<World>> create(Scene scene);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
-    [[nodiscard]] const Tracer& tracer() const noexcept { return *tracer_; }
+    [[nodiscard]] const RenderScene& render_scene() const noexcept { return *render_scene_; }
+    [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_->tracer(); }
     /// The track of body i; null when the scene gives it no can_id.
     [[nodiscard]] PoseTrack* track(std::size_t body) noexcept { return tracks_[body].get(); }
     [[nodiscard]] bool has_commanded_bodies() const noexcept { return commanded_ > 0; }
@@ -56,7 +57,7 @@ private:
     [[nodiscard]] TrackedPose pose(std::size_t body, std::int64_t t_ns) const noexcept;
 
     Scene scene_;
-    std::optional<Tracer> tracer_;
+    std::optional<RenderScene> render_scene_;
     std::vector<std::unique_ptr<PoseTrack>> tracks_;
     std::vector<std::size_t> moving_;
     std::size_t commanded_ = 0;

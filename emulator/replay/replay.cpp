@@ -59,7 +59,7 @@ struct Replay::Impl {
           camera(world->scene().cameras[camera_index]),
           index(static_cast<std::uint8_t>(camera_index)),
           full_scale(full_scale_radiance(camera)),
-          renderer(world->tracer(), camera),
+          renderer(world->render_scene(), camera),
           picture(camera.width, camera.height),
           reference(camera.width, camera.height),
           bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})) {}

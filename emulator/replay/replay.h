@@ -23,7 +23,7 @@ struct ReferenceComparison {
 /// A logged run of one camera, open to be looked at again.
 ///
 /// A frame follows from the scene, the bodies' poses, its number, the seed, its step and the sizes of its passes
-/// (renderer/film/frame_budget.h): the log has them all, so that frames made against the clock repeat as well.
+/// (renderer/integrator/frame_budget.h): the log has them all, so that frames made against the clock repeat as well.
 class Replay {
 public:
     /// `camera` empty: the first of the scene. `scene_file` empty: the one that the run had.

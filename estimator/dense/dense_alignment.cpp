@@ -55,8 +55,8 @@ std::string_view name(DenseStatus status) noexcept {
 }
 
 struct DenseAlignment::Impl {
-    Impl(const Tracer& the_tracer, const Camera& the_camera, std::size_t the_target)
-        : tracer(the_tracer), camera(the_camera), target(the_target), sensor(sensor_model(the_camera)) {
+    Impl(const RenderScene& the_render_scene, const Camera& the_camera, std::size_t the_target)
+        : render_scene(the_render_scene), camera(the_camera), target(the_target), sensor(sensor_model(the_camera)) {
         if (camera.embedded_line) {  // the last row holds no light
             --camera.height;
             camera.embedded_line = false;
@@ -65,12 +65,12 @@ struct DenseAlignment::Impl {
 
     LevelView& view_of(int factor, const Camera& level_camera, const Window& window, const BodyPoses& at) {
         auto& kept = levels[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
-        if (!kept || kept->window() != window) kept.emplace(tracer, level_camera, window, target, at);
+        if (!kept || kept->window() != window) kept.emplace(render_scene, level_camera, window, target, at);
         kept->place_bodies(at);
         return *kept;
     }
 
-    const Tracer& tracer;
+    const RenderScene& render_scene;
     Camera camera;
     const std::size_t target;
     const SensorModel sensor;
@@ -111,8 +111,8 @@ Status check_input(const Camera& camera, const MeasuredImage& frame, std::span<c
 
 }  // namespace
 
-DenseAlignment::DenseAlignment(const Tracer& tracer, const Camera& camera, std::size_t target)
-    : impl_(std::make_unique<Impl>(tracer, camera, target)) {}
+DenseAlignment::DenseAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target)
+    : impl_(std::make_unique<Impl>(render_scene, camera, target)) {}
 DenseAlignment::~DenseAlignment() = default;
 
 Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const BodyPoses& at,
@@ -120,13 +120,14 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
                                             std::span<const float> frame_variance) {
     Impl& i = *impl_;
     if (const Status good = check(options); !good) return good.error();
-    if (const Status good =
-            check_input(i.camera, frame, frame_variance, i.tracer.scene().bodies.size(), at, T_camera_body_guess);
+    if (const Status good = check_input(i.camera, frame, frame_variance, i.render_scene.scene().bodies.size(), at,
+                                        T_camera_body_guess);
         !good)
         return good.error();
     DenseEstimate e;
     e.T_camera_body = T_camera_body_guess;
-    const std::optional<Window> about = window_about(i.tracer, i.camera, i.target, T_camera_body_guess);
+    const std::optional<Window> about =
+        window_about(i.render_scene.tracer(), i.camera, i.target, T_camera_body_guess);
     if (!about) {
         e.status = DenseStatus::left_the_picture;
         return e;
@@ -135,7 +136,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
     while (factor > options.finest && extent_px(*about) / factor < kLeastExtent_px) factor /= 2;
     for (bool first = true; factor >= options.finest; factor /= 2, first = false) {
         const Camera camera = coarser_camera(i.camera, factor);
-        std::optional<Window> window = window_about(i.tracer, camera, i.target, e.T_camera_body);
+        std::optional<Window> window = window_about(i.render_scene.tracer(), camera, i.target, e.T_camera_body);
         if (!window) {
             e.status = DenseStatus::left_the_picture;
             return e;
@@ -144,7 +145,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
         LevelView& view = i.view_of(factor, camera, *window, at);
         view.measure(coarser_image(frame, factor), coarser_variance(frame_variance, i.camera, factor));
-        Descent descent(camera, i.sensor, i.tracer, i.target, factor, view, options, e);
+        Descent descent(camera, i.sensor, i.render_scene, i.target, factor, view, options, e);
         e.status = descent.run(first);
         if (factor != options.finest || e.status != DenseStatus::converged) continue;
         descent.polish();
@@ -161,18 +162,18 @@ Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camer
         i.camera.width, i.camera.height,
         std::vector<float>(static_cast<std::size_t>(i.camera.width) * static_cast<std::size_t>(i.camera.height))};
     if (const Status good =
-            check_input(i.camera, none, frame_variance, i.tracer.scene().bodies.size(), at, T_camera_body);
+            check_input(i.camera, none, frame_variance, i.render_scene.scene().bodies.size(), at, T_camera_body);
         !good)
         return good.error();
     const int factor = options.finest;
     const Camera camera = coarser_camera(i.camera, factor);
-    const std::optional<Window> window = window_about(i.tracer, camera, i.target, T_camera_body);
+    const std::optional<Window> window = window_about(i.render_scene.tracer(), camera, i.target, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
     LevelView& view = i.view_of(factor, camera, *window, at);
     view.measure(coarser_image(none, factor), coarser_variance(frame_variance, i.camera, factor));
     DenseEstimate e;
     e.T_camera_body = T_camera_body;
-    Descent descent(camera, i.sensor, i.tracer, i.target, factor, view, options, e);
+    Descent descent(camera, i.sensor, i.render_scene, i.target, factor, view, options, e);
     return descent.bound();
 }
 

@@ -70,8 +70,8 @@ struct DenseEstimate {
 
 class DenseAlignment {
 public:
-    /// `tracer` outlives it; `target`: index of the body whose pose is looked for.
-    DenseAlignment(const Tracer& tracer, const Camera& camera, std::size_t target);
+    /// `render_scene` outlives it; `target`: index of the body whose pose is looked for.
+    DenseAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target);
     ~DenseAlignment();
 
     /// `at`: where every body is at the time of the frame; the target's attitude there tells how the light falls on

@@ -94,11 +94,12 @@ bool is_pose(const Rigid3& T) {
     return finite && std::abs(norm(T.q) - 1) < 1e-3;
 }
 
-Descent::Descent(const Camera& camera, const SensorModel& sensor, const Tracer& tracer, std::size_t target,
-                 int factor, LevelView& view, const DenseOptions& options, DenseEstimate& estimate)
+Descent::Descent(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene,
+                 std::size_t target, int factor, LevelView& view, const DenseOptions& options,
+                 DenseEstimate& estimate)
     : camera_(camera),
       sensor_(sensor),
-      tracer_(tracer),
+      render_scene_(render_scene),
       target_(target),
       factor_(factor),
       view_(view),
@@ -241,7 +242,7 @@ void Descent::lengthen(const Step& step) {
 /// Takes the step if it is no worse.
 bool Descent::try_step(const Step& step) {
     const Rigid3 there = displaced(e_.T_camera_body, step.pose);
-    if (!is_pose(there) || !window_about(tracer_, camera_, target_, there)) return false;
+    if (!is_pose(there) || !window_about(render_scene_.tracer(), camera_, target_, there)) return false;
     const Eigen::Vector2d e = equations_.exposure_step(step.pose);
     const Exposure exposure{std::max(e_.exposure.gain + e[0], kLeastGain), e_.exposure.offset_dn + e[1]};
     render(there);

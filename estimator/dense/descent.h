@@ -12,8 +12,8 @@ namespace narpa {
 class Descent {
 public:
     /// All outlive it. `camera`: of the level, each of whose pixels is `factor` x `factor` of the sensor's.
-    Descent(const Camera& camera, const SensorModel& sensor, const Tracer& tracer, std::size_t target, int factor,
-            LevelView& view, const DenseOptions& options, DenseEstimate& estimate);
+    Descent(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene, std::size_t target,
+            int factor, LevelView& view, const DenseOptions& options, DenseEstimate& estimate);
 
     /// Moves the estimate to where this level's images agree; `first`: sideways by whole pixels before that, as a
     /// guess may be off by more than a derivative reaches.
@@ -45,7 +45,7 @@ private:
 
     const Camera& camera_;
     const SensorModel& sensor_;
-    const Tracer& tracer_;
+    const RenderScene& render_scene_;
     const std::size_t target_;
     const int factor_;
     LevelView& view_;

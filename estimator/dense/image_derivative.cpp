@@ -169,21 +169,21 @@ Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, cons
 
 }  // namespace
 
-ImageDerivative::ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target,
+ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                  const BodyPoses& at)
-    : tracer_(tracer), camera_(camera), target_(target), at_(at) {
-    const auto& materials = tracer.scene().materials;
-    view_dependent_ = tracer.scene().sun && std::any_of(materials.begin(), materials.end(), depends_on_view);
+    : render_scene_(render_scene), camera_(camera), target_(target), at_(at) {
+    const auto& materials = render_scene.scene().materials;
+    view_dependent_ = render_scene.scene().sun && std::any_of(materials.begin(), materials.end(), depends_on_view);
     derivative_.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
 }
 
 std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_target, const SensorModel& sensor,
                                                      const FrameSettings& settings, int fineness) {
     const Rigid3 T_world_camera = place_camera(T_camera_target, camera_, target_, at_);
-    const FineGrid coarse(tracer_, at_, camera_, T_world_camera, settings, std::min(fineness, kAnywhere));
+    const FineGrid coarse(render_scene_, at_, camera_, T_world_camera, settings, std::min(fineness, kAnywhere));
     const FrameSettings plain = settings;
-    const Frame frame = make_frame(tracer_, at_, camera_, T_world_camera, plain);
-    const FineGrid fine(tracer_, at_, camera_, T_world_camera, settings, fineness);
+    const Frame frame = make_frame(render_scene_, at_, camera_, T_world_camera, plain);
+    const FineGrid fine(render_scene_, at_, camera_, T_world_camera, settings, fineness);
     const Vec3& t = T_camera_target.t;
     const double eventful_dn = kEventful * std::sqrt(sensor.variance_dn2(sensor.black_dn));
     const auto pixel = [&](PixelPatch& patch, int x, int y) -> Row {

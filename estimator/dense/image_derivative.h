@@ -37,8 +37,8 @@ using PixelDerivative = Eigen::Matrix<float, 6, 1>;
 
 class ImageDerivative {
 public:
-    /// `camera` is that of the image. `tracer` outlives it.
-    ImageDerivative(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at);
+    /// `camera` is that of the image. `render_scene` outlives it.
+    ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at);
 
     /// As ModelView has it.
     void place_bodies(const BodyPoses& at) { at_ = at; }
@@ -50,7 +50,7 @@ public:
                                         const FrameSettings& settings, int fineness);
 
 private:
-    const Tracer& tracer_;
+    const RenderScene& render_scene_;
     const Camera camera_;
     const std::size_t target_;
     BodyPoses at_;

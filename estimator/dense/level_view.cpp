@@ -67,11 +67,11 @@ Camera window_camera(const Camera& camera, const Window& window) {
     return c;
 }
 
-LevelView::LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
-                     const BodyPoses& at)
+LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window,
+                     std::size_t target, const BodyPoses& at)
     : window_(window),
-      view_(tracer, window_camera(camera, window), target, at),
-      derivative_(tracer, window_camera(camera, window), target, at) {
+      view_(render_scene, window_camera(camera, window), target, at),
+      derivative_(render_scene, window_camera(camera, window), target, at) {
     const std::size_t n = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
     measured_.resize(n);
     signal_.resize(n);

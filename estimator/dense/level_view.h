@@ -29,7 +29,7 @@ struct Window {
 /// Signal and derivative in a window of the camera.
 class LevelView {
 public:
-    LevelView(const Tracer& tracer, const Camera& camera, const Window& window, std::size_t target,
+    LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window, std::size_t target,
               const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }

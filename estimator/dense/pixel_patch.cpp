@@ -28,13 +28,13 @@ double signal_of(const SensorModel& sensor, const Rgb& L) {
     return k[0] * static_cast<double>(L.x) + k[1] * static_cast<double>(L.y) + k[2] * static_cast<double>(L.z);
 }
 
-FineGrid::FineGrid(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-                   const FrameSettings& settings, int fineness)
+FineGrid::FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
+                   const Rigid3& T_world_camera, const FrameSettings& settings, int fineness)
     : fineness_(fineness),
       camera_(finer_camera(camera, fineness)),
       T_world_camera_(T_world_camera),
       settings_(one_ray(settings)),
-      frame_(make_frame(tracer, at, camera_, T_world_camera_, settings_)) {}
+      frame_(make_frame(render_scene, at, camera_, T_world_camera_, settings_)) {}
 
 void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, int y) {
     const int s = grid.fineness();

@@ -15,8 +15,8 @@ namespace narpa {
 class FineGrid {
 public:
     /// All but `camera` outlive it.
-    FineGrid(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-             const FrameSettings& settings, int fineness);
+    FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
+             const Rigid3& T_world_camera, const FrameSettings& settings, int fineness);
     FineGrid(const FineGrid&) = delete;
     FineGrid& operator=(const FineGrid&) = delete;
 

@@ -157,9 +157,9 @@ struct FeatureAlignment::Points {
     }
 };
 
-FeatureAlignment::FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target,
+FeatureAlignment::FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                    const BodyPoses& at, const FeatureSettings& settings)
-    : view_(tracer, camera, target, at),
+    : view_(render_scene, camera, target, at),
       sensor_(sensor_model(camera)),
       settings_(settings),
       matcher_(settings.kind, settings.features) {}

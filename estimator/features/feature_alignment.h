@@ -62,8 +62,8 @@ struct FeatureEstimate {
 /// Keeps what it renders with from frame to frame.
 class FeatureAlignment {
 public:
-    /// `tracer` outlives it. `target`: index of the body. `at`: as of ModelView.
-    FeatureAlignment(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at,
+    /// `render_scene` outlives it. `target`: index of the body. `at`: as of ModelView.
+    FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at,
                      const FeatureSettings& settings = {});
 
     /// `at`: where the bodies are when the frame is exposed. Points that the view shows where the frame does not

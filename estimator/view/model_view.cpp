@@ -11,12 +11,12 @@ Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::si
     return T_world_camera;
 }
 
-ModelView::ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at)
-    : tracer_(tracer),
+ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at)
+    : render_scene_(render_scene),
       camera_(camera),
       target_(target),
       at_(at),
-      renderer_(tracer_, camera_),
+      renderer_(render_scene_, camera_),
       radiance_(camera.width, camera.height) {}
 
 void ModelView::place(const Rigid3& T_camera_target) {
@@ -31,7 +31,7 @@ void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
 Hit ModelView::look_through(double u_px, double v_px) const noexcept {
     const Vec3 direction{(u_px - camera_.cx) / camera_.fx, (v_px - camera_.cy) / camera_.fy, 1};
     const Ray ray{T_world_camera_.t, T_world_camera_.q * normalized(direction)};
-    return tracer_.intersect(at_, ray, std::numeric_limits<double>::infinity());
+    return render_scene_.tracer().intersect(at_, ray, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace narpa

@@ -17,9 +17,9 @@ namespace narpa {
 
 class ModelView {
 public:
-    /// `tracer` outlives it. `target`: index of the body whose pose is looked for. `at`: where every body is at the
-    /// time of the frame; the target's attitude there tells how the light falls on it.
-    ModelView(const Tracer& tracer, const Camera& camera, std::size_t target, const BodyPoses& at);
+    /// `render_scene` outlives it. `target`: index of the body whose pose is looked for. `at`: where every body is
+    /// at the time of the frame; the target's attitude there tells how the light falls on it.
+    ModelView(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at);
 
     /// Where every body is from now on: at another frame's time.
     void place_bodies(const BodyPoses& at) { at_ = at; }
@@ -29,7 +29,7 @@ public:
     void render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs);
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
-    [[nodiscard]] const Tracer& tracer() const noexcept { return tracer_; }
+    [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_.tracer(); }
     [[nodiscard]] std::size_t target() const noexcept { return target_; }
     /// Of the last render: linear radiance; first hits through the pixels' middles in world coordinates; and where
     /// the bodies and the camera were.
@@ -46,7 +46,7 @@ public:
     [[nodiscard]] Hit look_through(double u_px, double v_px) const noexcept;
 
 private:
-    const Tracer& tracer_;
+    const RenderScene& render_scene_;
     Camera camera_;
     std::size_t target_;
     BodyPoses at_;

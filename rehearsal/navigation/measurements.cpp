@@ -40,7 +40,7 @@ constexpr double kNear_m = 0.3;
 CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, std::uint64_t seed)
     : model_(model),
       camera_(model.scene().cameras[camera]),
-      alignment_(model.tracer(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
+      alignment_(model.render_scene(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
                  feature_settings(seed)) {}
 
 MeasurementResult CameraPoseEstimator::look(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,

@@ -54,9 +54,9 @@ Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario)
     auto lidars = on_chaser(m->scene_.lidars, scenario.navigation.lidars, *chaser, scenario.scene);
     if (!lidars) return lidars.error();
     m->cameras_ = *std::move(cameras), m->lidars_ = *std::move(lidars);
-    auto tracer = Tracer::create(m->scene_);
-    if (!tracer) return tracer.error();
-    m->tracer_.emplace(*std::move(tracer));
+    auto render_scene = RenderScene::create(m->scene_);
+    if (!render_scene) return render_scene.error();
+    m->render_scene_.emplace(*std::move(render_scene));
     m->at_ = BodyPoses(m->scene_.bodies.size());
     for (std::size_t i = 0; i < m->scene_.bodies.size(); ++i)
         m->at_.set(i, m->scene_.bodies[i].initial.T_world_body);

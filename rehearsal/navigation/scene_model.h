@@ -7,7 +7,7 @@
 
 #include "base/result.h"
 #include "rehearsal/scenario/scenario.h"
-#include "renderer/geometry/tracer.h"
+#include "renderer/light/render_scene.h"
 
 namespace narpa::rehearsal {
 
@@ -18,7 +18,8 @@ public:
     static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
-    [[nodiscard]] const Tracer& tracer() const noexcept { return *tracer_; }
+    [[nodiscard]] const RenderScene& render_scene() const noexcept { return *render_scene_; }
+    [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_->tracer(); }
     [[nodiscard]] std::size_t target() const noexcept { return target_; }
     [[nodiscard]] std::size_t chaser() const noexcept { return chaser_; }
     /// Of the scene, those that the scenario navigates by, in its order.
@@ -34,7 +35,7 @@ private:
     SceneModel() : at_(0) {}
 
     Scene scene_;
-    std::optional<Tracer> tracer_;
+    std::optional<RenderScene> render_scene_;
     Orbit orbit_;
     Vec3 target_centre_of_mass_m_{};
     std::size_t target_ = 0, chaser_ = 0;

@@ -34,7 +34,7 @@ constexpr double kRest = 0.05;
 
 class BudgetFrame {
 public:
-    BudgetFrame(FramePasses& passes, PassCosts& costs, const Tracer& tracer, const Camera& camera,
+    BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
                 const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
                 RadianceImage& out, std::vector<float>* variance)
         : passes_(passes),
@@ -45,9 +45,9 @@ public:
           middle_settings_(with_spp(settings, kMiddleBeam)),
           direct_settings_(by_direct_light(middle_settings_)),
           sample_settings_(with_spp(settings, kBeamSamples)),
-          middle_(make_frame(tracer, at, camera, T_world_camera, middle_settings_)),
-          direct_(make_frame(tracer, at, camera, T_world_camera, direct_settings_)),
-          sample_(make_frame(tracer, at, camera, T_world_camera, sample_settings_)),
+          middle_(make_frame(render_scene, at, camera, T_world_camera, middle_settings_)),
+          direct_(make_frame(render_scene, at, camera, T_world_camera, direct_settings_)),
+          sample_(make_frame(render_scene, at, camera, T_world_camera, sample_settings_)),
           has_indirect_(settings.method == RenderSettings::Method::path),
           out_(out),
           variance_(variance) {}
@@ -338,10 +338,10 @@ std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {
     return static_cast<std::uint64_t>(static_cast<double>(std::max<std::int64_t>(wall_ns, 0)) / ns_[index(what)]);
 }
 
-FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const Tracer& tracer, const Camera& camera,
-                                  const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
-                                  RadianceImage& out, std::vector<float>* variance) {
-    return BudgetFrame(passes, costs, tracer, camera, at, T_world_camera, settings, out, variance).make();
+FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene,
+                                  const Camera& camera, const BodyPoses& at, const Rigid3& T_world_camera,
+                                  const FrameSettings& settings, RadianceImage& out, std::vector<float>* variance) {
+    return BudgetFrame(passes, costs, render_scene, camera, at, T_world_camera, settings, out, variance).make();
 }
 
 }  // namespace narpa

@@ -6,8 +6,8 @@
 
 #include "renderer/film/budgeted_frame.h"
 #include "renderer/film/camera_batch.h"
-#include "renderer/integrator/first_hit.h"
 #include "renderer/geometry/flush_denormals.h"
+#include "renderer/film/first_hit.h"
 
 namespace narpa {
 namespace {
@@ -40,8 +40,8 @@ void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
 }  // namespace
 
 struct CameraRenderer::Impl {
-    Impl(const Tracer& the_tracer, const Camera& the_camera)
-        : tracer(the_tracer), camera(the_camera), passes(the_tracer, the_camera) {}
+    Impl(const RenderScene& the_render_scene, const Camera& the_camera)
+        : render_scene(the_render_scene), camera(the_camera), passes(the_render_scene.tracer(), the_camera) {}
 
     FrameAccount render_uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
         passes.begin(f, f.lens);
@@ -54,14 +54,14 @@ struct CameraRenderer::Impl {
         return account;
     }
 
-    const Tracer& tracer;
+    const RenderScene& render_scene;
     const Camera& camera;
     FramePasses passes;
     PassCosts costs;
 };
 
-CameraRenderer::CameraRenderer(const Tracer& tracer, const Camera& camera)
-    : impl_(std::make_unique<Impl>(tracer, camera)) {}
+CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera)
+    : impl_(std::make_unique<Impl>(render_scene, camera)) {}
 CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const Rigid3& T_world_camera,
@@ -70,20 +70,21 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const Rigid3& T_world_c
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     if (!uniform && aovs == nullptr)
-        return render_within_budget(i.passes, i.costs, i.tracer, i.camera, at, T_world_camera, settings, out,
+        return render_within_budget(i.passes, i.costs, i.render_scene, i.camera, at, T_world_camera, settings, out,
                                     nullptr);
-    const Frame frame = make_frame(i.tracer, at, i.camera, T_world_camera, settings);
+    const Frame frame = make_frame(i.render_scene, at, i.camera, T_world_camera, settings);
     if (aovs != nullptr) {
         resize(*aovs, out.pixels.size());
         store_first_hits(frame, out.width, out.height, *aovs);
     }
     if (uniform) return i.render_uniform(frame, out, variance);
-    return render_within_budget(i.passes, i.costs, i.tracer, i.camera, at, T_world_camera, settings, out, variance);
+    return render_within_budget(i.passes, i.costs, i.render_scene, i.camera, at, T_world_camera, settings, out,
+                                variance);
 }
 
-void render_radiance(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-                     const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
-    CameraRenderer(tracer, camera).render(at, T_world_camera, settings, out, aovs);
+void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
+                     const Rigid3& T_world_camera, const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
+    CameraRenderer(render_scene, camera).render(at, T_world_camera, settings, out, aovs);
 }
 
 }  // namespace narpa

@@ -1,27 +1,15 @@
 /// renderer/film/camera_image.h - a camera's linear radiance image, and the exact outputs beside it.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "renderer/film/frame_budget.h"
 #include "renderer/image/radiance_image.h"
-#include "renderer/geometry/tracer.h"
+#include "renderer/integrator/frame_settings.h"
+#include "renderer/light/render_scene.h"
 
 namespace narpa {
-
-struct FrameSettings {
-    int spp = 1;             ///< 1: the ray through each pixel's centre
-    std::uint64_t seed = 0;  ///< scene seed; samples depend on (seed, frame, pixel, sample) and nothing else
-    std::uint32_t frame = 0;
-    RenderSettings::Method method = RenderSettings::Method::direct;
-    int max_depth = 8;                                ///< of method path
-    std::atomic<std::size_t>* pixels_done = nullptr;  ///< counted up while the frame is made; null: nobody looks
-    FrameBudget budget{};                             ///< kind samples: spp
-    bool times = false;                               ///< tell where the time goes
-};
 
 /// The light that reaches the camera.
 ///
@@ -40,8 +28,9 @@ struct FrameSettings {
 /// Runs on the calling thread's TBB arena. Same bytes whatever the number of threads. Takes its memory anew with
 /// each call: for many frames there is CameraRenderer. `aovs` may be null; they show a pinhole's view, tiny bodies
 /// among the rest.
-void render_radiance(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-                     const FrameSettings& settings, RadianceImage& out, Aovs* aovs = nullptr);
+void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
+                     const Rigid3& T_world_camera, const FrameSettings& settings, RadianceImage& out,
+                     Aovs* aovs = nullptr);
 
 /// The same, for a camera's frames one after another: keeps memory and measures from frame to frame, and knows
 /// budgets. What a frame looks like depends on neither. Allocates nothing after the first frame of a kind. Tiles
@@ -49,7 +38,7 @@ void render_radiance(const Tracer& tracer, const BodyPoses& at, const Camera& ca
 class CameraRenderer {
 public:
     /// Both outlive it.
-    CameraRenderer(const Tracer& tracer, const Camera& camera);
+    CameraRenderer(const RenderScene& render_scene, const Camera& camera);
     ~CameraRenderer();
 
     FrameAccount render(const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,

@@ -40,7 +40,7 @@ bool in_a_sixteenth(int tx, int ty) {
 class EmittersInView {
 public:
     EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
-        lamps_ = !f.quick && f.tracer.lights().any_with_extent();
+        lamps_ = !f.quick && f.render_scene.lights().any_with_extent();
         if (f.quick || f.path.direct || !f.sun || f.sun->is_point()) return;
         // Bounds, all of them generous: of half the disc, of half a tile and of the way from point to point of a
         // lens.

@@ -14,6 +14,7 @@
 #include "renderer/film/g_buffer.h"
 #include "renderer/film/sample_plan.h"
 #include "renderer/film/tile_culling.h"
+#include "renderer/image/radiance_image.h"
 
 namespace narpa {
 

@@ -1,6 +1,7 @@
 /// renderer/film/subpixel_light.h - the light of tiny bodies, put into their pixels.
 #pragma once
 
+#include "renderer/image/radiance_image.h"
 #include "renderer/integrator/frame_light.h"
 
 namespace narpa {

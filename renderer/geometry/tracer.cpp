@@ -17,16 +17,6 @@ struct Candidate {
     double entry_m;
 };
 
-Status check_light(const Scene& s, const Light& l) {
-    if (l.mount >= static_cast<int>(s.bodies.size()))
-        return Error{"light \"" + l.name + "\" rides on body " + std::to_string(l.mount) + " of " +
-                     std::to_string(s.bodies.size())};
-    const bool rectangle = l.kind == Light::Kind::rectangle, disc = l.kind == Light::Kind::disc;
-    if ((rectangle && !(l.width_m > 0 && l.height_m > 0)) || (disc && !(l.radius_m > 0)))
-        return Error{"light \"" + l.name + "\": the size of a lamp is a positive length in metres"};
-    return Ok{};
-}
-
 Status check_textures(const Scene& s, const Material& m) {
     for (const int texture : {m.texture, m.emission_texture, m.normal_texture, m.height_texture})
         if (texture >= static_cast<int>(s.textures.size()))
@@ -71,9 +61,6 @@ Status Tracer::Impl::build(const Scene& s, int threads) {
         textured.push_back(m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 ||
                            m.height_texture >= 0);
     }
-    for (const Light& l : s.lights)
-        if (const Status good = check_light(s, l); !good) return good.error();
-    lights.emplace(s);
     return Ok{};
 }
 
@@ -192,10 +179,6 @@ bool Tracer::Impl::exact_hides(const BodyPoses& at, std::size_t body, const Hit&
                                                     to_body(T.q, direction))
                        : shape.exact.first_crossing(start_turned + (at.T_world_body[own].t - T.t), direction);
     return crossing.range < t_max;
-}
-
-const Lights& Tracer::lights() const noexcept {
-    return *impl_->lights;
 }
 
 const BodyBounds& Tracer::bounds(std::size_t body) const noexcept {

@@ -19,8 +19,6 @@
 
 namespace narpa {
 
-class Lights;
-
 struct Ray {
     Vec3 origin{};
     Vec3 direction{};  ///< unit
@@ -153,9 +151,6 @@ public:
                                          std::uint32_t wanted) const noexcept;
 
     [[nodiscard]] TextureFrame texture_frame(const BodyPoses& at, const Hit& hit) const noexcept;
-
-    /// Emitters of the scene, made ready once.
-    [[nodiscard]] const Lights& lights() const noexcept;
 
     /// An ellipsoid that holds the body.
     [[nodiscard]] const BodyBounds& bounds(std::size_t body) const noexcept;

@@ -3,11 +3,9 @@
 
 #include <bit>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include "renderer/geometry/ellipsoid.h"
-#include "renderer/light/lights.h"
 #include "renderer/geometry/mesh_scene.h"
 #include "renderer/geometry/tracer.h"
 
@@ -53,7 +51,6 @@ struct Tracer::Impl {
     std::vector<BodyBounds> bounds;  ///< one for each body
     std::vector<std::uint32_t> all_bodies;
     std::vector<std::uint8_t> textured;  ///< per material: does it look at texture coordinates?
-    std::optional<Lights> lights;
 
     Status build(const Scene& s, int threads);
     [[nodiscard]] Result<Shape> shape_for(const Body& body) const;

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "base/each_isa.h"
-#include "renderer/light/small_body_sampling.h"
-#include "renderer/light/lights.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/light/lights.h"
+#include "renderer/light/small_body_sampling.h"
 
 namespace narpa {
 namespace {
@@ -248,7 +248,7 @@ void first_light(const Frame& f, Packet& p, RgbLanes& radiance) {
     if (!f.sun_first) return;
     if (p.hits.met != 0) light_first_surfaces(f, p, radiance);
     for_each_lane(lanes_below(p.rays.n) & ~p.hits.met,
-                  [&](std::size_t i) { radiance.put(i, sky_along(f.tracer, p.rays.direction[i])); });
+                  [&](std::size_t i) { radiance.put(i, sky_along(f.render_scene, p.rays.direction[i])); });
 }
 
 /// A sample of a pixel.
@@ -281,8 +281,8 @@ void light_together(const Frame& f, std::span<Packet> packets, std::span<const S
                           light[packet].first[lane] != Rgb{}};
         }
     const std::uint64_t rays =
-        shared_path_radiance(f.tracer, f.at, f.path, std::span(first).first(n), f.settings.seed, f.settings.frame,
-                             std::span(radiance).first(n), std::span(variance).first(n));
+        shared_path_radiance(f.render_scene, f.at, f.path, std::span(first).first(n), f.settings.seed,
+                             f.settings.frame, std::span(radiance).first(n), std::span(variance).first(n));
     packets.front().rays_traced += rays;
     packets.front().path_rays += rays;
     for (std::size_t i = 0; i < n; ++i) {
@@ -293,23 +293,25 @@ void light_together(const Frame& f, std::span<Packet> packets, std::span<const S
 
 }  // namespace
 
-Frame make_frame(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-                 const FrameSettings& settings) {
-    const Scene& scene = tracer.scene();
+Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
+                 const Rigid3& T_world_camera, const FrameSettings& settings) {
+    const Tracer& tracer = render_scene.tracer();
+    const Scene& scene = render_scene.scene();
     const bool direct = settings.method == RenderSettings::Method::direct;
     // One sample passes the lens at its centre, as through a pinhole.
     const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
     const bool guided = !direct && SmallBodySampling::may_help(tracer, at);
-    const bool sun_first = !direct && sun_alone_lights_first_surfaces(tracer) && !guided;
-    return {tracer,
+    const bool sun_first = !direct && sun_alone_lights_first_surfaces(render_scene) && !guided;
+    return {render_scene,
+            tracer,
             at,
             camera,
             T_world_camera,
             settings,
             lens,
             scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
-            direct && !tracer.lights().beyond_the_sun(),
+            direct && !render_scene.lights().beyond_the_sun(),
             sun_first,
             {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, guided,
              sun_first && settings.spp > 1 ? 1 : kSomeSetOut},
@@ -326,11 +328,11 @@ void light_along(const Frame& f, Packet& p, RgbLanes& radiance) {
     Lanes<Hit> hits;
     Lanes<Rgb> light;
     for (std::size_t i = 0; i < p.rays.n; ++i) rays[i] = p.rays[i], hits[i] = p.hits[i];
-    p.rays_traced +=
-        path_radiance(f.tracer, f.at, f.path, std::span(rays).first(p.rays.n), std::span(hits).first(p.rays.n),
-                      {f.settings.seed, f.settings.frame, std::span(p.number).first(p.rays.n),
-                       std::span(p.sample).first(p.rays.n)},
-                      std::span(light).first(p.rays.n));
+    p.rays_traced += path_radiance(f.render_scene, f.at, f.path, std::span(rays).first(p.rays.n),
+                                   std::span(hits).first(p.rays.n),
+                                   {f.settings.seed, f.settings.frame, std::span(p.number).first(p.rays.n),
+                                    std::span(p.sample).first(p.rays.n)},
+                                   std::span(light).first(p.rays.n));
     for (std::size_t i = 0; i < p.rays.n; ++i) radiance.put(i, light[i]);
     clock.ends(Phase::indirect);
 }

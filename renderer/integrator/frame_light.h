@@ -1,4 +1,5 @@
-/// renderer/integrator/frame_light.h - what stays the same over a frame, and the light that comes back along its rays.
+/// renderer/integrator/frame_light.h - what stays the same over a frame, and the light that comes back along its
+/// rays.
 #pragma once
 
 #include <array>
@@ -7,15 +8,15 @@
 #include <optional>
 #include <span>
 
-#include "renderer/film/camera_image.h"
-#include "renderer/film/frame_budget.h"
+#include "renderer/integrator/frame_settings.h"
 #include "renderer/integrator/path.h"
-#include "renderer/light/sun_disc.h"
 #include "renderer/integrator/subpixel_bodies.h"
+#include "renderer/light/sun_disc.h"
 
 namespace narpa {
 
 struct Frame {
+    const RenderScene& render_scene;
     const Tracer& tracer;
     const BodyPoses& at;
     const Camera& camera;
@@ -33,7 +34,7 @@ struct Frame {
 };
 
 /// The arguments outlive the frame.
-[[nodiscard]] Frame make_frame(const Tracer& tracer, const BodyPoses& at, const Camera& camera,
+[[nodiscard]] Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
                                const Rigid3& T_world_camera, const FrameSettings& settings);
 
 /// Rays that are traced together, and what they meet first.

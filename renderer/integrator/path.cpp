@@ -7,11 +7,11 @@
 #include <variant>
 
 #include "base/each_isa.h"
-#include "renderer/light/lights.h"
-#include "renderer/integrator/path_vertex.h"
-#include "renderer/integrator/path_state.h"
-#include "renderer/integrator/path_reuse.h"
 #include "renderer/integrator/batch_sampler.h"
+#include "renderer/integrator/path_reuse.h"
+#include "renderer/integrator/path_state.h"
+#include "renderer/integrator/path_vertex.h"
+#include "renderer/light/lights.h"
 
 namespace narpa {
 namespace {
@@ -38,10 +38,11 @@ NARPA_EACH_ISA void next_points(const PathNumbers& from, std::size_t n, const La
 /// follows from its own ray and its own random numbers alone, but where paths share what they find.
 class Stream {
 public:
-    Stream(const Tracer& tracer, const BodyPoses& at, const PathSettings& settings, const PathNumbers& numbers)
-        : tracer_(tracer),
-          scene_(tracer.scene()),
-          lights_(tracer.lights()),
+    Stream(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
+           const PathNumbers& numbers)
+        : tracer_(render_scene.tracer()),
+          scene_(render_scene.scene()),
+          lights_(render_scene.lights()),
           at_(at),
           settings_(settings),
           numbers_(numbers),
@@ -524,13 +525,13 @@ private:
 
 }  // namespace
 
-std::uint64_t path_radiance(const Tracer& tracer, const BodyPoses& at, const PathSettings& settings,
+std::uint64_t path_radiance(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
                             std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
                             std::span<Rgb> radiance) noexcept {
     std::uint64_t traced = 0;
     for (std::size_t k = 0; k < rays.size(); k += kStream) {
         const std::size_t n = std::min(kStream, rays.size() - k);
-        Stream stream(tracer, at, settings,
+        Stream stream(render_scene, at, settings,
                       {numbers.seed, numbers.frame, numbers.pixel.subspan(k, n), numbers.sample.subspan(k, n)});
         stream.run(rays.subspan(k, n), first.subspan(k, n), radiance.subspan(k, n));
         traced += stream.rays_traced();
@@ -538,26 +539,27 @@ std::uint64_t path_radiance(const Tracer& tracer, const BodyPoses& at, const Pat
     return traced;
 }
 
-Rgb sky_along(const Tracer& tracer, const Vec3& direction) noexcept {
-    const Rgb& ambient = tracer.scene().ambient;
-    const std::optional<SunDisc>& sun = tracer.lights().sun();
+Rgb sky_along(const RenderScene& render_scene, const Vec3& direction) noexcept {
+    const Rgb& ambient = render_scene.scene().ambient;
+    const std::optional<SunDisc>& sun = render_scene.lights().sun();
     if (!sun || sun->is_point() || sun->pdf(direction) == 0) return ambient;
     return ambient + Rgb{sun->radiance(), sun->radiance(), sun->radiance()};
 }
 
-bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept {
-    const Lights& lights = tracer.lights();
+bool sun_alone_lights_first_surfaces(const RenderScene& render_scene) noexcept {
+    const Lights& lights = render_scene.lights();
     if (lights.any(Lights::Group::all) || lights.any_with_extent() || !lights.sun()) return false;
-    return lights.sun()->is_point() || tracer.scene().sun->angular_diameter_rad < kNarrowSun_rad;
+    return lights.sun()->is_point() || render_scene.scene().sun->angular_diameter_rad < kNarrowSun_rad;
 }
 
-std::uint64_t shared_path_radiance(const Tracer& tracer, const BodyPoses& at, const PathSettings& settings,
-                                   std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
-                                   std::span<Rgb> radiance, std::span<float> variance) noexcept {
+std::uint64_t shared_path_radiance(const RenderScene& render_scene, const BodyPoses& at,
+                                   const PathSettings& settings, std::span<const FirstSurface> first,
+                                   std::uint64_t seed, std::uint32_t frame, std::span<Rgb> radiance,
+                                   std::span<float> variance) noexcept {
     if (first.empty()) return 0;
     std::array<std::uint32_t, kSharing> pixel, sample;
     for (std::size_t i = 0; i < first.size(); ++i) pixel[i] = first[i].pixel, sample[i] = first[i].sample;
-    Stream stream(tracer, at, settings,
+    Stream stream(render_scene, at, settings,
                   {seed, frame, std::span(pixel).first(first.size()), std::span(sample).first(first.size())});
     stream.run_shared(first, radiance, variance);
     return stream.rays_traced();

@@ -13,7 +13,7 @@
 #include <cstdint>
 #include <span>
 
-#include "renderer/geometry/tracer.h"
+#include "renderer/light/render_scene.h"
 
 namespace narpa {
 
@@ -42,7 +42,7 @@ struct PathNumbers {
 /// Radiance, W m^-2 sr^-1, that comes back along rays whose first hits are known. Any number of them: from a few
 /// dozen up, packets stay full while paths end. Same values whatever the other rays are. Thread-safe, allocates
 /// nothing; takes 200 kB of stack. Returns the number of rays that it traced.
-std::uint64_t path_radiance(const Tracer& tracer, const BodyPoses& at, const PathSettings& settings,
+std::uint64_t path_radiance(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
                             std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
                             std::span<Rgb> radiance) noexcept;
 
@@ -70,16 +70,17 @@ inline constexpr std::size_t kSharing = 64;
 /// A lobe this sharp finds the narrow Sun better than the Sun's points find the lobe.
 inline constexpr float kSharpLobe = 1000;
 /// May the Sun's light on first surfaces be taken as above?
-[[nodiscard]] bool sun_alone_lights_first_surfaces(const Tracer& tracer) noexcept;
+[[nodiscard]] bool sun_alone_lights_first_surfaces(const RenderScene& render_scene) noexcept;
 /// What a ray brings that meets nothing and that nobody else speaks for: the sky, and the Sun's disc in it.
-[[nodiscard]] Rgb sky_along(const Tracer& tracer, const Vec3& direction) noexcept;
+[[nodiscard]] Rgb sky_along(const RenderScene& render_scene, const Vec3& direction) noexcept;
 
 /// The same of up to kSharing rays, but what one path finds lights the first surfaces of all (shared_bounces.h), so
 /// that the result of each ray depends on the others. No two should be the same pixel's: what they find by the same
 /// path is not independent. `radiance`: out, but for the light that lit surfaces have. `variance`: out, of the mean
 /// band of what is shared, roughly.
-std::uint64_t shared_path_radiance(const Tracer& tracer, const BodyPoses& at, const PathSettings& settings,
-                                   std::span<const FirstSurface> first, std::uint64_t seed, std::uint32_t frame,
-                                   std::span<Rgb> radiance, std::span<float> variance) noexcept;
+std::uint64_t shared_path_radiance(const RenderScene& render_scene, const BodyPoses& at,
+                                   const PathSettings& settings, std::span<const FirstSurface> first,
+                                   std::uint64_t seed, std::uint32_t frame, std::span<Rgb> radiance,
+                                   std::span<float> variance) noexcept;
 
 }  // namespace narpa

@@ -66,7 +66,7 @@ TEST(BenchReference, EmbreesCallsSeeTheSamePixelsAsTheTracer) {
     const RawCost cost = raw->trace(c, v.T_world_camera, normalized(world->scene().sun->direction));
     RadianceImage image(96, 96);
     Aovs aovs;
-    render_radiance(world->tracer(), v.at, c, v.T_world_camera, {}, image, &aovs);
+    render_radiance(world->render_scene(), v.at, c, v.T_world_camera, {}, image, &aovs);
     std::uint64_t seen = 0, lit = 0;
     for (std::size_t i = 0; i < image.pixels.size(); ++i) {
         seen += aovs.body[i] >= 0;
@@ -92,7 +92,7 @@ void expect_same_image(const World& world, int spp, double precision) {
     RadianceImage image(c.width, c.height);
     PictureMean narpas(image.pixels.size());
     for (settings.frame = 0; settings.frame < 16; ++settings.frame) {
-        render_radiance(world.tracer(), v.at, c, v.T_world_camera, settings, image);
+        render_radiance(world.render_scene(), v.at, c, v.T_world_camera, settings, image);
         narpas.add(image.pixels);
     }
     ErrorAgainst loops(narpas);

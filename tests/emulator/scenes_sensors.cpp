@@ -5,9 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "renderer/scene/scene_file.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/lidar/lidar_shot.h"
+#include "renderer/scene/scene_file.h"
 
 namespace narpa {
 namespace {
@@ -21,12 +21,12 @@ protected:
         Result<Scene> read = read_scene(path.string());
         ASSERT_TRUE(read.has_value()) << read.error().text();
         scene = new Scene(std::move(*read));
-        Result<Tracer> built = Tracer::create(*scene);
+        Result<RenderScene> built = RenderScene::create(*scene);
         ASSERT_TRUE(built.has_value()) << built.error().text();
-        tracer = new Tracer(std::move(*built));
+        render_scene = new RenderScene(std::move(*built));
     }
     static void TearDownTestSuite() {
-        delete tracer;
+        delete render_scene;
         delete scene;
     }
     /// The chaser on the port's axis, facing it.
@@ -37,7 +37,7 @@ protected:
         return at;
     }
     static inline Scene* scene = nullptr;
-    static inline Tracer* tracer = nullptr;
+    static inline RenderScene* render_scene = nullptr;
 };
 
 /// A quarter of the camera's resolution, the same view.
@@ -45,13 +45,13 @@ struct View {
     int station_pixels = 0, chaser_pixels = 0;
     double sunlit_high = 0, shadow_low = 0;  ///< 95th and 5th percentile of the station's radiance
 };
-View look(const Tracer& tracer, const BodyPoses& at, Camera camera) {
+View look(const RenderScene& render_scene, const BodyPoses& at, Camera camera) {
     camera.width /= 4, camera.height /= 4, camera.fx /= 4, camera.fy /= 4;
     camera.cx = 0.5 * (camera.width - 1), camera.cy = 0.5 * (camera.height - 1);
     RadianceImage image(camera.width, camera.height);
     Aovs aovs;
     const Rigid3 T_world_camera = at.T_world_body[static_cast<std::size_t>(camera.mount)] * camera.T_mount_camera;
-    render_radiance(tracer, at, camera, T_world_camera, {}, image, &aovs);
+    render_radiance(render_scene, at, camera, T_world_camera, {}, image, &aovs);
     View view;
     std::vector<float> radiance;
     for (std::size_t i = 0; i < aovs.body.size(); ++i) {
@@ -70,7 +70,7 @@ View look(const Tracer& tracer, const BodyPoses& at, Camera camera) {
 TEST_F(DockingSensors, StationGrowsInTheCameraLitAndShadowedAndTheChaserStaysOutOfIt) {
     int before = 0;
     for (const double x_m : {60.0, 35.0, 10.0, 3.0, 0.5, 0.0}) {
-        const View view = look(*tracer, at_distance(x_m), scene->cameras[0]);
+        const View view = look(*render_scene, at_distance(x_m), scene->cameras[0]);
         EXPECT_EQ(view.chaser_pixels, 0) << "at " << x_m << " m";
         EXPECT_GE(view.station_pixels, before) << "at " << x_m << " m";
         if (x_m >= 3) {
@@ -92,7 +92,7 @@ TEST_F(DockingSensors, LidarSeesTheStationAheadAndTheChaserOnlyBehind) {
             for (int azimuth = -90; azimuth < 90; ++azimuth) {
                 const double e = elevation * kDegree, a = azimuth * kDegree;
                 const Ray beam{T.t, T.q * Vec3{std::cos(e) * std::sin(a), std::cos(e) * std::cos(a), std::sin(e)}};
-                const LidarReturn seen = shoot(*tracer, at, beam, lidar.range_max_m);
+                const LidarReturn seen = shoot(render_scene->tracer(), at, beam, lidar.range_max_m);
                 on_station += seen.body == 0;
                 if (std::abs(azimuth) <= 60) {
                     EXPECT_NE(seen.body, 1) << azimuth << " deg, " << elevation << " deg";

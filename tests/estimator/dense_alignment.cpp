@@ -9,8 +9,8 @@
 #include <limits>
 #include <optional>
 
-#include "renderer/scene/scene_file.h"
 #include "renderer/camera/detector.h"
+#include "renderer/scene/scene_file.h"
 
 namespace narpa {
 namespace {
@@ -26,15 +26,15 @@ protected:
         scene = std::move(*read);
         camera = coarser_camera(scene.cameras[0], 4);
         camera.format = PixelFormat::y16;
-        auto made = Tracer::create(scene);
+        auto made = RenderScene::create(scene);
         ASSERT_TRUE(made);
-        tracer.emplace(std::move(*made));
+        render_scene.emplace(std::move(*made));
         for (std::size_t b = 0; b < at.T_world_body.size(); ++b) at.set(b, scene.bodies[b].initial.T_world_body);
         at.T_world_body[1].t = {25, 1.2, -0.8};
         truth = inverse(at.T_world_body[1] * camera.T_mount_camera) * at.T_world_body[0];
     }
     MeasuredImage frame_at(const Rigid3& pose, bool noise) {
-        ModelView view(*tracer, camera, 0, at);
+        ModelView view(*render_scene, camera, 0, at);
         FrameSettings s;
         s.seed = 99;
         s.budget.kind = FrameBudget::Kind::rays;
@@ -52,7 +52,7 @@ protected:
 
     Scene scene;
     Camera camera;
-    std::optional<Tracer> tracer;
+    std::optional<RenderScene> render_scene;
     BodyPoses at{2};
     Rigid3 truth;
 };
@@ -66,7 +66,7 @@ Vector6 off_by(double degrees, double part, double range_m) {
 
 TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     const MeasuredImage frame = frame_at(truth, false);
-    DenseAlignment dense(*tracer, camera, 0);
+    DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
     o.fineness = 4;
     o.rays_per_pixel = 24;
@@ -80,7 +80,7 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
 
 TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
     const MeasuredImage frame = frame_at(truth, true);
-    DenseAlignment dense(*tracer, camera, 0);
+    DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
     o.fineness = 3;
     o.rays_per_pixel = 6;
@@ -101,7 +101,7 @@ TEST_F(DockingFrame, IsTheSameOnAnyNumberOfThreads) {
     const auto pose_on = [&](int threads) {
         tbb::task_arena arena(threads);
         return arena.execute([&] {
-            const auto e = DenseAlignment(*tracer, camera, 0)
+            const auto e = DenseAlignment(*render_scene, camera, 0)
                                .align(frame, at, displaced(truth, off_by(1, 0.01, norm(truth.t))), o);
             EXPECT_TRUE(e);
             return e ? *e : DenseEstimate{};
@@ -114,7 +114,7 @@ TEST_F(DockingFrame, IsTheSameOnAnyNumberOfThreads) {
 
 TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
     const MeasuredImage frame = frame_at(truth, false);
-    DenseAlignment dense(*tracer, camera, 0);
+    DenseAlignment dense(*render_scene, camera, 0);
     const auto says = [&](const MeasuredImage& f, const Rigid3& guess, const DenseOptions& o,
                           std::span<const float> variance, const char* words) {
         const auto e = dense.align(f, at, guess, o, variance);
@@ -138,7 +138,7 @@ TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
 
 TEST_F(DockingFrame, SaysThatTheTargetIsNotInThePicture) {
     const MeasuredImage frame = frame_at(truth, false);
-    DenseAlignment dense(*tracer, camera, 0);
+    DenseAlignment dense(*render_scene, camera, 0);
     for (const Vec3& place : {Vec3{500, 0, 60}, Vec3{0, 0, -60}}) {
         const auto e = dense.align(frame, at, {truth.q, place}, {});
         ASSERT_TRUE(e);

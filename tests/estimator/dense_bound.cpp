@@ -128,8 +128,8 @@ TEST(DenseBound, ErrorsAreThoseThatNoiseMakes) {
     m.exponent = 12;
     scene.materials.push_back(m);
     scene.bodies.push_back({"ball", Ellipsoid{{1, 1.4, 0.8}, 0}, {}, {}});
-    const auto tracer = Tracer::create(scene);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(scene);
+    ASSERT_TRUE(render_scene);
     Camera camera;
     camera.width = camera.height = 112;
     camera.fx = camera.fy = 300;
@@ -143,14 +143,14 @@ TEST(DenseBound, ErrorsAreThoseThatNoiseMakes) {
                                .bits = 12};
     const BodyPoses at(1);
     const Rigid3 truth{normalized(Quat{0.9, 0.2, -0.3, 0.1}), {0.1, -0.05, 10}};
-    ModelView view(*tracer, camera, 0, at);
+    ModelView view(*render_scene, camera, 0, at);
     FrameSettings fine;
     fine.seed = 99;
     fine.budget.kind = FrameBudget::Kind::rays;
     fine.budget.rays = 3'000'000;
     view.render(truth, fine, false);
 
-    DenseAlignment dense(*tracer, camera, 0);
+    DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
     o.rays_per_pixel = 100;
     const auto bound = dense.bound(at, truth, o);

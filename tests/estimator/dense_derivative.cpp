@@ -45,12 +45,12 @@ struct Renders {
 
 /// Of each column: RMS over the pixels of (integral of the derivative - difference of the images), over the RMS of
 /// the difference.
-std::array<double, 6> relative_errors(const Tracer& tracer, const Camera& camera, std::size_t target,
+std::array<double, 6> relative_errors(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                       const Rigid3& pose, const Renders& r) {
-    const BodyPoses at = placement_of(tracer.scene());
+    const BodyPoses at = placement_of(render_scene.scene());
     const SensorModel sensor = unit_sensor();
-    ImageDerivative derivative(tracer, camera, target, at);
-    ModelView view(tracer, camera, target, at);
+    ImageDerivative derivative(render_scene, camera, target, at);
+    ModelView view(render_scene, camera, target, at);
     FrameSettings many;
     many.budget.kind = FrameBudget::Kind::rays;
     many.budget.rays = static_cast<std::uint64_t>(r.rays_per_pixel * camera.width * camera.height);
@@ -95,11 +95,11 @@ const Rigid3 kTenMetresAhead{normalized(Quat{0.9, 0.2, -0.3, 0.1}), {0.1, -0.05,
 
 void expect_right(const Material& material, double tolerance) {
     const Scene scene = ellipsoid_of(material);
-    const auto tracer = Tracer::create(scene);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(scene);
+    ASSERT_TRUE(render_scene);
     Renders r;
     r.half_rad = 1.6e-2, r.half_m = r.half_ahead_m = 3.2e-2;  // half a pixel
-    const auto errors = relative_errors(*tracer, pinhole(48, 150), 0, kTenMetresAhead, r);
+    const auto errors = relative_errors(*render_scene, pinhole(48, 150), 0, kTenMetresAhead, r);
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], tolerance) << "column " << k;
 }
 
@@ -131,8 +131,8 @@ TEST(ImageDerivative, OfRoughMetal) {
 TEST(ImageDerivative, OfTheDockingScene) {
     const auto scene = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
     ASSERT_TRUE(scene) << scene.error().text();
-    const auto tracer = Tracer::create(*scene);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(*scene);
+    ASSERT_TRUE(render_scene);
     const Rigid3 T_world_camera{scene->bodies[1].initial.T_world_body.q * scene->cameras[0].T_mount_camera.q,
                                 {10, 0.4, -0.3}};
     Renders r;
@@ -141,7 +141,7 @@ TEST(ImageDerivative, OfTheDockingScene) {
     r.rays_per_pixel = 200;
     Camera camera = pinhole(40, 400);
     camera.cx = 10, camera.cy = 5;
-    const auto errors = relative_errors(*tracer, camera, 0, inverse(T_world_camera), r);
+    const auto errors = relative_errors(*render_scene, camera, 0, inverse(T_world_camera), r);
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.17) << "column " << k;
 }
 

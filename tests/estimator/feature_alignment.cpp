@@ -6,8 +6,8 @@
 #include <random>
 
 #include "estimator/features/flow_noise.h"
-#include "renderer/scene/scene_file.h"
 #include "renderer/camera/detector.h"
+#include "renderer/scene/scene_file.h"
 
 namespace narpa {
 namespace {
@@ -22,9 +22,9 @@ protected:
         auto read = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
         ASSERT_TRUE(read) << read.error().text();
         scene_ = *std::move(read);
-        auto made = Tracer::create(scene_);
+        auto made = RenderScene::create(scene_);
         ASSERT_TRUE(made);
-        tracer_.emplace(*std::move(made));
+        render_scene_.emplace(*std::move(made));
         camera_ = coarser_camera(scene_.cameras[0], 2);
     }
 
@@ -35,7 +35,7 @@ protected:
         at_.set(kChaser, {scene_.bodies[kChaser].initial.T_world_body.q, {x_m, 0.03 * x_m, -0.02 * x_m}});
         const Rigid3 T_world_camera = at_.T_world_body[kChaser] * camera_.T_mount_camera;
         truth_ = inverse(T_world_camera) * at_.T_world_body[kStation];
-        ModelView view(*tracer_, camera_, kStation, at_);
+        ModelView view(*render_scene_, camera_, kStation, at_);
         FrameSettings settings;
         settings.spp = spp;
         settings.seed = 77;
@@ -57,14 +57,14 @@ protected:
     }
 
     Scene scene_;
-    std::optional<Tracer> tracer_;
+    std::optional<RenderScene> render_scene_;
     Camera camera_;
     BodyPoses at_{2};
     Rigid3 truth_{};
 };
 
 TEST_F(FeatureAlignmentTest, FindsThePoseFromFiveDegreesAndFivePerCentOff) {
-    FeatureAlignment alignment(*tracer_, camera_, kStation, BodyPoses(2));
+    FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2));
     std::mt19937_64 random(3);
     double nees = 0;
     int frames = 0;
@@ -90,8 +90,8 @@ TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
     const MeasuredImage frame = frame_at(20, 1);
     std::mt19937_64 random(4);
     const Rigid3 guess = off_by(3, random);
-    FeatureAlignment one(*tracer_, camera_, kStation, BodyPoses(2)),
-        other(*tracer_, camera_, kStation, BodyPoses(2));
+    FeatureAlignment one(*render_scene_, camera_, kStation, BodyPoses(2)),
+        other(*render_scene_, camera_, kStation, BodyPoses(2));
     (void)other.align(frame_at(10, 2), at_, guess);  // what it saw before does not matter
     const MeasuredImage again = frame_at(20, 1);
     EXPECT_EQ(frame.dn, again.dn);
@@ -99,7 +99,7 @@ TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
 }
 
 TEST_F(FeatureAlignmentTest, SaysThatThereIsNothingToMatch) {
-    FeatureAlignment alignment(*tracer_, camera_, kStation, BodyPoses(2));
+    FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2));
     MeasuredImage dark = frame_at(20, 1);
     std::fill(dark.dn.begin(), dark.dn.end(), 64.f);
     EXPECT_EQ(alignment.align(dark, at_, truth_).status, FeatureStatus::few_matches);
@@ -117,7 +117,7 @@ TEST_F(FeatureAlignmentTest, EachKindOfFeatureLeadsThere) {
         FeatureSettings settings;
         settings.kind = kind;
         settings.renders_max = 4;
-        FeatureAlignment alignment(*tracer_, camera_, kStation, BodyPoses(2), settings);
+        FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2), settings);
         const FeatureEstimate e = alignment.align(frame, at_, guess);
         ASSERT_TRUE(e.ok()) << name(kind) << ": " << name(e.status);
         EXPECT_LT(error_between(e.T_camera_target, truth_).head<3>().norm(), 0.5 * kDegree) << name(kind);

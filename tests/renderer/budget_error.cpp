@@ -14,7 +14,7 @@ struct Errors {
     double measured = 0, predicted = 0;
 };
 Errors errors_of(const BudgetView& v, const std::vector<double>& truth, const FrameSettings& settings, int frames) {
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     Errors e;
     FrameSettings s = settings;
     for (int k = 0; k < frames; ++k) {
@@ -121,7 +121,7 @@ TEST(BudgetError, FallsAsTheBudgetGrows) {
                                                                      : std::vector<double>{0.1, 0.6, 8, 16, 32};
         double before = 1e9;
         for (const double rays : budgets) {
-            CameraRenderer renderer(v.tracer, v.camera);
+            CameraRenderer renderer(v.render_scene, v.camera);
             double squared = 0;
             for (std::uint32_t k = 0; k < 2; ++k)
                 squared +=
@@ -168,7 +168,7 @@ TEST(BudgetError, FramesOfPathsHaveTheMeanOfTheReference) {
     // Four times as many samples as eighty frames': what is not known of the mean grows by 12 %.
     const std::vector<double> truth = truth_of(v, 512, Method::path);
     const double mean = std::accumulate(truth.begin(), truth.end(), 0.0) / static_cast<double>(truth.size());
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     for (const double rays : {14.0, 20.0}) {
         Bias bias;
         for (std::uint32_t k = 0; k < 80; ++k) {
@@ -184,7 +184,7 @@ TEST(BudgetError, FramesOfPathsHaveTheMeanOfTheReference) {
 TEST(BudgetError, FramesThatTheClockEndsHaveTheMeanOfTheReference) {
     const BudgetView v = slatted_court();
     const std::vector<double> truth = truth_of(v, 512, Method::path);
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     Bias bias;
     for (std::uint32_t k = 0; k < 100; ++k) {
         FrameSettings s = rays_a_pixel(v, 0, k, Method::path);

@@ -67,7 +67,7 @@ TEST(BudgetFrame, RaysGiveTheSameBytesTwentyTimesOnAnyThreadsUnderAnyLoad) {
 
 TEST(BudgetFrame, FramesBeforeItLeaveNoTrace) {
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer kept(v.tracer, v.camera);
+    CameraRenderer kept(v.render_scene, v.camera);
     std::uint32_t frame = 0;
     for (const double rays : {30.0, 0.03, 4.0, 0.3, 1.2, 60.0, 2.0})
         for (const Method method : {Method::path, Method::direct}) {
@@ -78,7 +78,7 @@ TEST(BudgetFrame, FramesBeforeItLeaveNoTrace) {
 
 TEST(BudgetFrame, NeverMoreRaysThanTheBudget) {
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     for (const Method method : {Method::direct, Method::path})
         for (double rays = 0.01; rays < 100; rays *= 1.37) {
             const FrameSettings s = rays_a_pixel(v, rays, 1, method);
@@ -111,7 +111,7 @@ std::vector<double> ladder_of(const BudgetView& v, Method method, std::uint32_t 
 
 TEST(BudgetFrame, IsMadeAnewFromItsAccount) {
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     for (const Method method : {Method::direct, Method::path})
         for (const double rays : ladder_of(v, method, 9)) {
             const FrameSettings s = rays_a_pixel(v, rays, 9, method);
@@ -126,7 +126,7 @@ TEST(BudgetFrame, IsMadeAnewFromItsAccount) {
 
 TEST(BudgetFrame, StepsGoDownOneByOneAndEachShowsAWholeImage) {
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     using Step = FrameStep;
     for (const Method method : {Method::direct, Method::path}) {
         std::vector<Step> seen{Step::nothing};
@@ -153,7 +153,7 @@ TEST(BudgetFrame, WhatABodyHasLeftShowsTheBackground) {
     // The same renderer and image, and the body elsewhere: whatever it has covered is black again, at every step.
     BudgetView v = craft_over_a_globe();
     v.T_world_camera = looking({30, 0, 0}, {0, 0, 0});
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     RadianceImage image(v.camera.width, v.camera.height);
     for (const Method method : {Method::direct, Method::path})
         for (const double rays : {0.1, 0.4, 2.0, 4.0, 16.0}) {
@@ -189,7 +189,7 @@ TEST(BudgetFrame, CoarsePixelsShowTheDirectLightOfTheOneThatStandsForThem) {
 
 TEST(BudgetFrame, ADeadlineThatIsPastLeavesTimeForAWholeCoarseImage) {
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     for (const Method method : {Method::direct, Method::path}) {
         const Shown coarse = at_step(v, FrameStep::coarse_4, method, 1);
         for (const std::int64_t late_ns : {std::int64_t{0}, std::int64_t{1'000'000}, now_ns()}) {
@@ -205,7 +205,7 @@ TEST(BudgetFrame, ADeadlineThatIsPastLeavesTimeForAWholeCoarseImage) {
 
 TEST(BudgetFrame, WhatTheClockCutsOffLeavesNoTrace) {
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     int frame = 0, cut = 0;
     for (const Method method : {Method::direct, Method::path})
         for (int run = 0; run < 25; ++run) {
@@ -223,7 +223,7 @@ TEST(BudgetFrame, WhatTheClockCutsOffLeavesNoTrace) {
 TEST(BudgetFrame, AllocatesNothingAfterTheFirstFrame) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer has the heap";
     const BudgetView v = craft_over_a_globe();
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     RadianceImage image(v.camera.width, v.camera.height);
     const auto frames = [&](std::uint32_t n) {
         for (std::uint32_t i = 0; i < n; ++i)

@@ -22,12 +22,12 @@ class BudgetView {
 public:
     BudgetView(Scene of, int width, int height, double focal_px, const Rigid3& pose)
         : scene(std::make_unique<Scene>(std::move(of))),
-          tracer(*Tracer::create(*scene, 1)),
+          render_scene(*RenderScene::create(*scene, 1)),
           camera(test::camera(width, height, focal_px)),
           at(placed(*scene)),
           T_world_camera(pose) {}
     std::unique_ptr<Scene> scene;  // the tracer keeps its address
-    Tracer tracer;
+    RenderScene render_scene;
     Camera camera;
     BodyPoses at;
     Rigid3 T_world_camera;
@@ -94,7 +94,7 @@ inline Shown render(CameraRenderer& renderer, const BudgetView& v, const FrameSe
     return shown;
 }
 inline Shown render(const BudgetView& v, const FrameSettings& s) {
-    CameraRenderer renderer(v.tracer, v.camera);
+    CameraRenderer renderer(v.render_scene, v.camera);
     return render(renderer, v, s);
 }
 

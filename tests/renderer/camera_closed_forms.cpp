@@ -16,10 +16,10 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kSolar = 1361;
 
 RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, const FrameSettings& settings) {
-    const auto tracer = Tracer::create(s, 1);
-    EXPECT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    EXPECT_TRUE(render_scene);
     RadianceImage image(c.width, c.height);
-    render_radiance(*tracer, placed(s), c, T, settings, image);
+    render_radiance(*render_scene, placed(s), c, T, settings, image);
     return image;
 }
 

@@ -3,9 +3,9 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "renderer/camera/camera_ray.h"
 #include "renderer/camera/detector.h"
 #include "renderer/film/camera_image.h"
-#include "renderer/camera/camera_ray.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/shapes.h"
 
@@ -35,8 +35,8 @@ const Rigid3 kView = looking({12, 7, 9}, {0, 0, -1});
 
 TEST(CameraFrame, AovsAgreeWithTheTracer) {
     const Scene s = craft_over_a_globe();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     const Camera c = camera(60, 45, 60);
     RadianceImage image(c.width, c.height);
@@ -44,13 +44,13 @@ TEST(CameraFrame, AovsAgreeWithTheTracer) {
     for (const int spp : {1, 4}) {
         FrameSettings settings;
         settings.spp = spp;
-        render_radiance(*tracer, at, c, kView, settings, image, &aovs);
+        render_radiance(*render_scene, at, c, kView, settings, image, &aovs);
         std::array<int, 4> seen{};
         for (int y = 0; y < c.height; ++y)
             for (int x = 0; x < c.width; ++x) {
                 const std::size_t i = static_cast<std::size_t>(y * c.width + x);
                 const Ray ray = camera_ray(c, kView, x, y);
-                const Hit hit = tracer->intersect(at, ray, kInfinity);
+                const Hit hit = render_scene->tracer().intersect(at, ray, kInfinity);
                 ++seen[static_cast<std::size_t>(hit.body + 1)];
                 ASSERT_EQ(aovs.body[i], hit.body);
                 if (hit.body < 0) {
@@ -93,11 +93,11 @@ TEST(CameraFrame, AlbedoHasTheTextureAndTheColourOfMirrorsAndGlass) {
     const Rigid3 T = looking({0, 0, 5}, {0, 0, 0}, {0, 1, 0});
     const auto albedo = [&](std::uint16_t material) {
         s.meshes[0].face_material.assign(2, material);
-        const auto tracer = Tracer::create(s, 1);
-        EXPECT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(s, 1);
+        EXPECT_TRUE(render_scene);
         RadianceImage image(c.width, c.height);
         Aovs aovs;
-        render_radiance(*tracer, placed(s), c, T, {}, image, &aovs);
+        render_radiance(*render_scene, placed(s), c, T, {}, image, &aovs);
         return std::pair{aovs.albedo[4 * 9 + 1], aovs.albedo[4 * 9 + 7]};
     };
     const auto [left, right] = albedo(0);
@@ -110,27 +110,27 @@ TEST(CameraFrame, AlbedoHasTheTextureAndTheColourOfMirrorsAndGlass) {
 
 TEST(CameraFrame, CountsThePixelsThatAreDone) {
     const Scene s = craft_over_a_globe();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const Camera c = camera(37, 21, 30);
     RadianceImage image(c.width, c.height);
     std::atomic<std::size_t> done{0};
     FrameSettings settings;
     settings.pixels_done = &done;
-    render_radiance(*tracer, placed(s), c, kView, settings, image);
+    render_radiance(*render_scene, placed(s), c, kView, settings, image);
     EXPECT_EQ(done, 37u * 21);
 }
 
 TEST(CameraFrame, VarianceIsThatOfTheMean) {
     const Scene s = craft_over_a_globe();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const Camera c = camera(24, 18, 24);
     RadianceImage image(c.width, c.height);
     Aovs aovs;
     FrameSettings settings;
     settings.spp = 64;
-    render_radiance(*tracer, placed(s), c, kView, settings, image, &aovs);
+    render_radiance(*render_scene, placed(s), c, kView, settings, image, &aovs);
     // An edge pixel varies, a pixel of the background does not; nothing is negative.
     EXPECT_GT(*std::max_element(aovs.variance.begin(), aovs.variance.end()), 1.0f);
     EXPECT_EQ(*std::min_element(aovs.variance.begin(), aovs.variance.end()), 0.0f);
@@ -145,8 +145,8 @@ struct Bytes {
     std::vector<std::uint8_t> frame;
     friend bool operator==(const Bytes&, const Bytes&) = default;
 };
-Bytes frame_on(int threads, const Scene& s, const Tracer& tracer, std::uint64_t seed, std::uint32_t frame,
-               RenderSettings::Method method = RenderSettings::Method::direct) {
+Bytes frame_on(int threads, const Scene& s, const RenderScene& render_scene, std::uint64_t seed,
+               std::uint32_t frame, RenderSettings::Method method = RenderSettings::Method::direct) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
     Bytes bytes;
@@ -162,7 +162,7 @@ Bytes frame_on(int threads, const Scene& s, const Tracer& tracer, std::uint64_t 
         settings.frame = frame;
         settings.method = method;
         RadianceImage image(c.width, c.height);
-        render_radiance(tracer, placed(s), c, kView, settings, image);
+        render_radiance(render_scene, placed(s), c, kView, settings, image);
         bytes.frame.resize(3 * image.pixels.size());
         expose(c, image, seed, frame, bytes.frame);
         bytes.radiance = image.pixels;
@@ -172,22 +172,22 @@ Bytes frame_on(int threads, const Scene& s, const Tracer& tracer, std::uint64_t 
 
 TEST(CameraFrame, SameBytesOnOneTwoAndSevenThreads) {
     const Scene s = craft_over_a_globe();
-    const auto tracer = Tracer::create(s, 2);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 2);
+    ASSERT_TRUE(render_scene);
     for (const auto method : {RenderSettings::Method::direct, RenderSettings::Method::path}) {
-        const Bytes one = frame_on(1, s, *tracer, 5, 6, method);
-        EXPECT_EQ(one, frame_on(2, s, *tracer, 5, 6, method));
-        EXPECT_EQ(one, frame_on(7, s, *tracer, 5, 6, method));
+        const Bytes one = frame_on(1, s, *render_scene, 5, 6, method);
+        EXPECT_EQ(one, frame_on(2, s, *render_scene, 5, 6, method));
+        EXPECT_EQ(one, frame_on(7, s, *render_scene, 5, 6, method));
     }
 }
 
 TEST(CameraFrame, SeedAndFrameNumberChangeTheSamples) {
     const Scene s = craft_over_a_globe();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
-    const Bytes a = frame_on(1, s, *tracer, 5, 6), b = frame_on(1, s, *tracer, 5, 7),
-                c = frame_on(1, s, *tracer, 6, 6);
-    EXPECT_EQ(a, frame_on(1, s, *tracer, 5, 6));
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
+    const Bytes a = frame_on(1, s, *render_scene, 5, 6), b = frame_on(1, s, *render_scene, 5, 7),
+                c = frame_on(1, s, *render_scene, 6, 6);
+    EXPECT_EQ(a, frame_on(1, s, *render_scene, 5, 6));
     EXPECT_NE(a.radiance, b.radiance);
     EXPECT_NE(a.radiance, c.radiance);
     EXPECT_NE(b.radiance, c.radiance);
@@ -196,8 +196,8 @@ TEST(CameraFrame, SeedAndFrameNumberChangeTheSamples) {
 TEST(CameraFrame, AllocatesNothingAfterTheFirstFrame) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer has the heap";
     const Scene s = craft_over_a_globe();
-    const auto tracer = Tracer::create(s, 2);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 2);
+    ASSERT_TRUE(render_scene);
     BodyPoses at = placed(s);
     Camera c = camera(160, 120, 160);
     c.detector = Detector{};
@@ -208,7 +208,7 @@ TEST(CameraFrame, AllocatesNothingAfterTheFirstFrame) {
     std::vector<std::uint8_t> bytes(2 * image.pixels.size());
     FrameSettings settings;
     tbb::task_arena arena(2);
-    CameraRenderer renderer(*tracer, c);
+    CameraRenderer renderer(*render_scene, c);
     const auto frames = [&](int n) {
         arena.execute([&] {
             for (int i = 0; i < n; ++i) {

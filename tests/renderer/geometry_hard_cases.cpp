@@ -20,6 +20,9 @@ constexpr int kFewer = 1;
 Result<Tracer> tracer_of(const Scene& s) {
     return Tracer::create(s, 1);
 }
+Result<RenderScene> render_scene_of(const Scene& s) {
+    return RenderScene::create(s, 1);
+}
 
 Scene bumpy_body_in_the_sun() {
     Scene s;
@@ -31,8 +34,8 @@ Scene bumpy_body_in_the_sun() {
 
 TEST(TraceFar, CommonOffsetChangesNoRangeAndNoPixel) {
     const Scene s = bumpy_body_in_the_sun();
-    const auto tracer = tracer_of(s);
-    ASSERT_TRUE(tracer) << tracer.error().text();
+    const auto render_scene = render_scene_of(s);
+    ASSERT_TRUE(render_scene) << render_scene.error().text();
     Camera c = camera(160, 120, 1400);
     c.detector = Detector{};
     c.format = PixelFormat::y16;
@@ -41,13 +44,13 @@ TEST(TraceFar, CommonOffsetChangesNoRangeAndNoPixel) {
     RadianceImage near(c.width, c.height), far(c.width, c.height);
     Aovs near_aovs, far_aovs;
     std::vector<std::uint8_t> near_bytes(2 * near.pixels.size()), far_bytes(near_bytes.size());
-    render_radiance(*tracer, placed(s), c, T, {}, near, &near_aovs);
+    render_radiance(*render_scene, placed(s), c, T, {}, near, &near_aovs);
     expose(c, near, 0, 0, near_bytes);
 
     for (const Vec3 offset : {Vec3{1e7, 0, 0}, Vec3{-3.844e8, 0, 0}, Vec3{0, 3.844e8, -1e7}}) {
         Rigid3 moved = T;
         moved.t += offset;
-        render_radiance(*tracer, placed(s, offset), c, moved, {}, far, &far_aovs);
+        render_radiance(*render_scene, placed(s, offset), c, moved, {}, far, &far_aovs);
         expose(c, far, 0, 0, far_bytes);
         double worst = 0;
         int seen = 0;
@@ -65,16 +68,16 @@ TEST(TraceFar, CommonOffsetChangesNoRangeAndNoPixel) {
 
 TEST(TraceFar, OffsetThatIsExactInDoubleChangesNoBitOfTheRadiance) {
     Scene s = bumpy_body_in_the_sun();
-    const auto tracer = tracer_of(s);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = render_scene_of(s);
+    ASSERT_TRUE(render_scene);
     const Camera c = camera(96, 96, 900);
     const Rigid3 T = looking({44, 22, 9}, {0.25, -0.5, 1.0});
     RadianceImage near(c.width, c.height), far(c.width, c.height);
     FrameSettings settings;
     settings.spp = 2;
-    render_radiance(*tracer, placed(s), c, T, settings, near);
+    render_radiance(*render_scene, placed(s), c, T, settings, near);
     const Vec3 offset{0x1p28, -0x1p27, 0x1p20};
-    render_radiance(*tracer, placed(s, offset), c, {T.q, T.t + offset}, settings, far);
+    render_radiance(*render_scene, placed(s, offset), c, {T.q, T.t + offset}, settings, far);
     EXPECT_EQ(near.pixels, far.pixels);
 }
 
@@ -149,7 +152,7 @@ TEST(TraceFar, MeshModelledFarFromItsOwnOriginKeepsItsPrecision) {
 TEST(TraceFar, AnEarthBehindChangesNoNearRange) {
     Scene alone = bumpy_body_in_the_sun(), with_earth = bumpy_body_in_the_sun();
     add_sphere(with_earth, 6378137, {0, 0, -6778137});
-    const auto a = tracer_of(alone), b = tracer_of(with_earth);
+    const auto a = render_scene_of(alone), b = render_scene_of(with_earth);
     ASSERT_TRUE(a && b);
     const Camera c = camera(80, 60, 80);
     const Rigid3 T = looking({6, 3, 8}, {0, 0, 0});
@@ -416,18 +419,18 @@ TEST(TraceWatertight, PixelsThatMeetAGridsVerticesAreNotLost) {
 
 TEST(TracePose, SignOfTheQuaternionChangesNothing) {
     Scene s = bumpy_body_in_the_sun();
-    const auto tracer = tracer_of(s);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = render_scene_of(s);
+    ASSERT_TRUE(render_scene);
     const Camera c = camera(64, 64, 800);
     Rigid3 T = looking({44, 22, 9}, {0.25, -0.5, 1.0});
     BodyPoses at = placed(s);
     RadianceImage plus(c.width, c.height), minus(c.width, c.height);
-    render_radiance(*tracer, at, c, T, {}, plus);
+    render_radiance(*render_scene, at, c, T, {}, plus);
     T.q = -T.q;
     Rigid3 body = at.T_world_body[0];
     body.q = -body.q;
     at.set(0, body);
-    render_radiance(*tracer, at, c, T, {}, minus);
+    render_radiance(*render_scene, at, c, T, {}, minus);
     EXPECT_EQ(plus.pixels, minus.pixels);
 }
 
@@ -486,13 +489,13 @@ TEST(TraceErrors, BadLightsAreToldByName) {
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, box(1, 1, 1));
     s.lights.push_back({.name = "beacon", .mount = 7});
-    const auto on_nobody = tracer_of(s);
+    const auto on_nobody = render_scene_of(s);
     ASSERT_FALSE(on_nobody);
     EXPECT_NE(on_nobody.error().what.find("beacon"), std::string::npos);
     s.lights[0] = {.name = "panel", .kind = Light::Kind::rectangle, .width_m = 0};
-    EXPECT_FALSE(tracer_of(s));
+    EXPECT_FALSE(render_scene_of(s));
     s.lights[0].width_m = 1;
-    EXPECT_TRUE(tracer_of(s));
+    EXPECT_TRUE(render_scene_of(s));
 }
 
 TEST(TraceErrors, BadMeshesAreToldByName) {

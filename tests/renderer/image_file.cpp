@@ -49,11 +49,11 @@ struct Shot {
         s.materials.push_back(m);
         add_sphere(s, 1, far);
         add_sun(s, {1, 0.2, 0.1});
-        const auto tracer = Tracer::create(s, 1);
-        EXPECT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(s, 1);
+        EXPECT_TRUE(render_scene);
         FrameSettings settings;
         settings.spp = 2;
-        render_radiance(*tracer, placed(s), c, looking(far + Vec3{4, 1, 1}, far), settings, image, &aovs);
+        render_radiance(*render_scene, placed(s), c, looking(far + Vec3{4, 1, 1}, far), settings, image, &aovs);
         bytes.resize(frame_bytes({12, 8, format, 0}));
         expose(c, image, 0, 0, bytes);
     }

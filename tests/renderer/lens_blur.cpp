@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "renderer/film/camera_image.h"
 #include "renderer/camera/lens.h"
+#include "renderer/film/camera_image.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -83,12 +83,12 @@ TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
 }
 
 RadianceImage render(const Scene& s, const Camera& c, int spp, const Rigid3& T = {}) {
-    const auto tracer = Tracer::create(s, 1);
-    EXPECT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    EXPECT_TRUE(render_scene);
     RadianceImage image(c.width, c.height);
     FrameSettings settings;
     settings.spp = spp;
-    render_radiance(*tracer, placed(s), c, T, settings, image);
+    render_radiance(*render_scene, placed(s), c, T, settings, image);
     return image;
 }
 

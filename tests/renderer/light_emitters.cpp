@@ -153,13 +153,13 @@ TEST(DiscLight, IsTheFormFactorOfParallelDiscs) {
     const double form_factor = 0.5 * (X - std::sqrt(X * X - 4 * (R2 / R1) * (R2 / R1)));
     double sum = 0, error2 = 0;
     const int points = 256;  // even in area, along a spiral
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     for (int k = 0; k < points; ++k) {
         const double r = disc_radius * std::sqrt((k + 0.5) / points), phi = k * kPi * (3 - std::sqrt(5.0));
         const Vec3 p{r * std::cos(phi), r * std::sin(phi), 0};
-        const Estimate e = light_along(*tracer, placed(s), ray_to(p + Vec3{0.01, 0, 0.05}, p), kDirectLight, 16,
-                                       static_cast<std::uint64_t>(k));
+        const Estimate e = light_along(*render_scene, placed(s), ray_to(p + Vec3{0.01, 0, 0.05}, p), kDirectLight,
+                                       16, static_cast<std::uint64_t>(k));
         sum += e.mean.x / 2;
         error2 += e.error * e.error / 4;
     }

@@ -6,12 +6,12 @@
 #include <numbers>
 #include <random>
 
+#include "renderer/camera/lens.h"
+#include "renderer/film/camera_batch.h"
+#include "renderer/integrator/batch_sampler.h"
+#include "renderer/integrator/shading.h"
 #include "renderer/material/bsdf.h"
 #include "renderer/material/fast_math.h"
-#include "renderer/film/camera_batch.h"
-#include "renderer/camera/lens.h"
-#include "renderer/integrator/shading.h"
-#include "renderer/integrator/batch_sampler.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -120,14 +120,17 @@ Scene motley() {
 
 struct Stage {
     Scene scene = motley();
-    Tracer tracer;
+    RenderScene render_scene;
     BodyPoses at;
     Camera view;
     Rigid3 T;
     FrameSettings settings;
 
     explicit Stage(Camera c)
-        : tracer(*Tracer::create(scene, 1)), at(placed(scene)), view(c), T(looking({0.3, 0.2, 6}, {}, {0, 1, 0})) {
+        : render_scene(*RenderScene::create(scene, 1)),
+          at(placed(scene)),
+          view(c),
+          T(looking({0.3, 0.2, 6}, {}, {0, 1, 0})) {
         settings.spp = 16;
         settings.seed = 11;
         settings.frame = 3;
@@ -140,13 +143,13 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
     lens.lens = Lens{0.05, 6};
     for (const Camera& c : {pinhole, lens}) {
         const Stage stage(c);
-        const Frame f = make_frame(stage.tracer, stage.at, stage.view, stage.T, stage.settings);
+        const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
         auto p = std::make_unique<Packet>();
         for (int round = 0; round < 200; ++round) {
             CameraSamples s = some_samples(1 + random() % kLanes, c, 40, random);
             s.middle = round % 4 == 0;
             RgbLanes radiance;
-            trace_samples(f, s, stage.tracer.all_bodies(), *p, radiance);
+            trace_samples(f, s, stage.render_scene.tracer().all_bodies(), *p, radiance);
             ASSERT_EQ(p->rays.n, s.n);
             for (std::size_t i = 0; i < s.n; ++i) {
                 const PixelSampler sampler(stage.settings.seed, stage.settings.frame, s.number[i]);
@@ -175,12 +178,12 @@ TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
     c.lens = Lens{0.05, 6};
     Stage stage(c);
     stage.settings.spp = 1;
-    const Frame f = make_frame(stage.tracer, stage.at, stage.view, stage.T, stage.settings);
+    const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     auto p = std::make_unique<Packet>();
     CameraSamples s = some_samples(kLanes, c, 1, random);
     s.middle = true;
     RgbLanes radiance;
-    trace_samples(f, s, stage.tracer.all_bodies(), *p, radiance);
+    trace_samples(f, s, stage.render_scene.tracer().all_bodies(), *p, radiance);
     for (std::size_t i = 0; i < s.n; ++i) {
         const Ray ray = camera_ray(c, stage.T, s.x[i], s.y[i]);
         ASSERT_EQ(p->rays[i].origin, ray.origin);
@@ -192,7 +195,7 @@ TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
 TEST(PacketLight, IsThatOfOneRayAtATime) {
     std::mt19937_64 random(5);
     const Stage stage(camera(64, 64, 100));
-    const Frame f = make_frame(stage.tracer, stage.at, stage.view, stage.T, stage.settings);
+    const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     ASSERT_TRUE(f.quick);
     auto p = std::make_unique<Packet>();
     int lit = 0, shaded = 0, background = 0;
@@ -200,7 +203,7 @@ TEST(PacketLight, IsThatOfOneRayAtATime) {
         const CameraSamples s = some_samples(1 + random() % kLanes, stage.view, 16, random);
         RgbLanes radiance;
         const std::uint64_t rays_before = p->rays_traced;
-        trace_samples(f, s, stage.tracer.all_bodies(), *p, radiance);
+        trace_samples(f, s, stage.render_scene.tracer().all_bodies(), *p, radiance);
         std::uint64_t rays = s.n;
         for (std::size_t i = 0; i < s.n; ++i) {
             const Hit hit = p->hits[i];
@@ -211,14 +214,14 @@ TEST(PacketLight, IsThatOfOneRayAtATime) {
             } else {
                 const Vec3 d = p->rays.direction[i];
                 const Surface surface =
-                    surface_at(stage.tracer, stage.at, hit, d, hit.range_m * f.path.pixel_angle_rad);
+                    surface_at(stage.render_scene.tracer(), stage.at, hit, d, hit.range_m * f.path.pixel_angle_rad);
                 expected = surface.emission + stage.scene.ambient * ambient_reflectance(surface);
                 const double cosine = dot(surface.normal, p->to_sun[i]);
                 const Rgb reflected = bsdf(surface, surface.normal, p->to_sun[i], -d);
                 if (cosine > 0 && reflected != Rgb{}) {
                     ++rays;
-                    is_lit = !stage.tracer.occluded(stage.at, hit, p->to_sun[i],
-                                                    std::numeric_limits<double>::infinity());
+                    is_lit = !stage.render_scene.tracer().occluded(stage.at, hit, p->to_sun[i],
+                                                                   std::numeric_limits<double>::infinity());
                     if (is_lit)
                         expected = expected + reflected * static_cast<float>(f.sun->irradiance() * cosine /
                                                                              dot(p->to_sun[i], f.sun->centre()));
@@ -241,13 +244,14 @@ TEST(PacketLight, IsThatOfOneRayAtATime) {
 TEST(PacketLight, TimesOfThePhasesAddUpWhereSomebodyLooks) {
     std::mt19937_64 random(6);
     const Stage stage(camera(64, 64, 100));
-    const Frame f = make_frame(stage.tracer, stage.at, stage.view, stage.T, stage.settings);
+    const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     auto p = std::make_unique<Packet>();
     PhaseTimes times{};
     p->times = &times;
     RgbLanes radiance;
     for (int round = 0; round < 300; ++round)
-        trace_samples(f, some_samples(kLanes, stage.view, 16, random), stage.tracer.all_bodies(), *p, radiance);
+        trace_samples(f, some_samples(kLanes, stage.view, 16, random), stage.render_scene.tracer().all_bodies(), *p,
+                      radiance);
     for (const Phase phase : {Phase::aim, Phase::rays, Phase::shading, Phase::shadow_rays})
         EXPECT_GT(times[static_cast<std::size_t>(phase)], 0);
     EXPECT_EQ(times[static_cast<std::size_t>(Phase::indirect)], 0);

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "renderer/material/texture_lookup.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/material/texture_lookup.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -36,14 +36,14 @@ INSTANTIATE_TEST_SUITE_P(Shapes, ClosedRoom,
 
 /// Radiance at many places of a body about the origin in an even sky, seen from `eye`.
 void expect_sky_colour(const Scene& s, const Vec3& eye, double tolerance) {
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     PathSettings settings;
     settings.max_depth = 40;
     for (int i = 0; i < 24; ++i) {
         const double phi = 2.4 * i, r = 0.99 * std::sqrt((i + 0.5) / 24);
         const Vec3 target{0, r * std::cos(phi), r * std::sin(phi)};
-        const Estimate e = light_along(*tracer, placed(s), ray_to(eye, target), settings, 16);
+        const Estimate e = light_along(*render_scene, placed(s), ray_to(eye, target), settings, 16);
         EXPECT_NEAR(e.mean.x, 2, 2 * tolerance) << i;
         EXPECT_NEAR(e.mean.y, 3, 3 * tolerance) << i;
     }
@@ -143,11 +143,11 @@ TEST(Furnace, NoMaterialSendsBackMoreThanItGets) {
         s.materials[0].metallic = 1;
         s.ambient = {1, 1, 1};
         add_mesh(s, bumpy(3, 1, 0.3));
-        const auto tracer = Tracer::create(s, 1);
-        ASSERT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(s, 1);
+        ASSERT_TRUE(render_scene);
         for (const Vec3& target : {Vec3{0, 0, 0}, Vec3{0, 0.5, 0.3}, Vec3{0, -0.3, 0.8}, Vec3{0, 0.2, -0.9}}) {
             const Estimate e =
-                light_along(*tracer, placed(s), ray_to({4, 0.1, 0.2}, target), {.max_depth = 40}, 256);
+                light_along(*render_scene, placed(s), ray_to({4, 0.1, 0.2}, target), {.max_depth = 40}, 256);
             EXPECT_LT(e.mean.x, 1 + kSigmas * e.error + 1e-4) << static_cast<int>(kind);
             EXPECT_GT(e.mean.x, 0.05) << static_cast<int>(kind);
         }

@@ -122,13 +122,13 @@ TEST(RussianRoulette, KeepsTheMeanOfEveryBand) {
 
 /// The way of light through the sphere without reflection: point and direction where it leaves. The path's own
 /// pieces: the tracer's hits, the material's directions, the other side of each surface.
-Ray through_sphere(const Tracer& tracer, const BodyPoses& at, const Ray& in) {
-    Hit hit = tracer.intersect(at, in, kInfinity);
+Ray through_sphere(const RenderScene& render_scene, const BodyPoses& at, const Ray& in) {
+    Hit hit = render_scene.tracer().intersect(at, in, kInfinity);
     Vec3 d = in.direction;
     for (int surface = 0; surface < 2; ++surface) {
         EXPECT_EQ(hit.body, 0);
         Surface s;
-        s.material = &tracer.scene().materials[0];
+        s.material = &render_scene.scene().materials[0];
         s.normal = hit.shading_normal;
         s.outside = hit.outside;
         EXPECT_EQ(hit.outside, surface == 0);
@@ -137,7 +137,7 @@ Ray through_sphere(const Tracer& tracer, const BodyPoses& at, const Ray& in) {
         d = through.l;
         const Hit from = other_side(hit);
         if (surface == 1) return {hit.position, d};
-        tracer.intersect(at, std::span(&from, 1), std::span(&d, 1), 1u, std::span(&hit, 1));
+        render_scene.tracer().intersect(at, std::span(&from, 1), std::span(&d, 1), 1u, std::span(&hit, 1));
     }
     return {};
 }
@@ -149,11 +149,11 @@ TEST(GlassSphere, TurnsRaysAsSnellSaysAndFocusesParaxialOnes) {
             s.materials.push_back(glass(static_cast<float>(n)));
             const double ior = static_cast<double>(static_cast<float>(n));
             add_sphere(s, radius, {});
-            const auto tracer = Tracer::create(s, 1);
-            ASSERT_TRUE(tracer);
+            const auto render_scene = RenderScene::create(s, 1);
+            ASSERT_TRUE(render_scene);
             for (const double b : {0.1, 0.3, 0.6, 0.9}) {  // impact parameter over radius
                 const Ray in{{-3 * radius, b * radius, 0}, {1, 0, 0}};
-                const Ray out = through_sphere(*tracer, placed(s), in);
+                const Ray out = through_sphere(*render_scene, placed(s), in);
                 // Turned by twice the difference of the angles of incidence and refraction, both the same at the
                 // far side.
                 const double turned = 2 * (std::asin(b) - std::asin(b / ior));
@@ -162,7 +162,7 @@ TEST(GlassSphere, TurnsRaysAsSnellSaysAndFocusesParaxialOnes) {
             }
             // Effective focal length n r / (2 (n - 1)) from the centre; the aberration goes as the height squared.
             const double b = 1e-3;
-            const Ray out = through_sphere(*tracer, placed(s), {{-3 * radius, b * radius, 0}, {1, 0, 0}});
+            const Ray out = through_sphere(*render_scene, placed(s), {{-3 * radius, b * radius, 0}, {1, 0, 0}});
             const double crossing = out.origin.x - out.origin.y * out.direction.x / out.direction.y;
             EXPECT_NEAR(crossing / (ior * radius / (2 * (ior - 1))), 1, 5e-6) << n;
         }

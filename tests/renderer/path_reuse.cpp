@@ -31,36 +31,38 @@ struct View {
     std::array<RayBatch, kPixels / kLanes> ray_packets;
     std::array<HitBatch, kPixels / kLanes> hit_packets;
 
-    View(const Tracer& tracer, const BodyPoses& at, const Vec3& eye, const Vec3& target, double width_m) {
+    View(const RenderScene& render_scene, const BodyPoses& at, const Vec3& eye, const Vec3& target,
+         double width_m) {
         const Vec3 ahead = normalized(target - eye), across = normalized(cross(ahead, {0, 0, 1})),
                    down = cross(ahead, across);
         for (std::size_t i = 0; i < kPixels; ++i) {
             const double x = (static_cast<double>(i % kSide) + 0.5) / kSide - 0.5,
                          y = (static_cast<double>(i / kSide) + 0.5) / kSide - 0.5;
             rays[i] = ray_to(eye, target + width_m * (x * across + y * down));
-            first[i] = tracer.intersect(at, rays[i], kInfinity);
+            first[i] = render_scene.tracer().intersect(at, rays[i], kInfinity);
             number[i] = static_cast<std::uint32_t>(i);
             ray_packets[i / kLanes].n = kLanes;
             ray_packets[i / kLanes].put(i % kLanes, rays[i]);
         }
         for (std::size_t k = 0; k < ray_packets.size(); ++k)
-            tracer.intersect(at, ray_packets[k], tracer.all_bodies(), hit_packets[k]);
+            render_scene.tracer().intersect(at, ray_packets[k], render_scene.tracer().all_bodies(), hit_packets[k]);
     }
 };
 
-using Trace = std::uint64_t (*)(const Tracer&, const BodyPoses&, const View&, const PathSettings&,
+using Trace = std::uint64_t (*)(const RenderScene&, const BodyPoses&, const View&, const PathSettings&,
                                 std::uint64_t seed, std::uint32_t sample, std::array<Rgb, kPixels>& light);
 
-std::uint64_t each_for_itself(const Tracer& tracer, const BodyPoses& at, const View& view,
+std::uint64_t each_for_itself(const RenderScene& render_scene, const BodyPoses& at, const View& view,
                               const PathSettings& settings, std::uint64_t seed, std::uint32_t sample,
                               std::array<Rgb, kPixels>& light) {
     std::array<std::uint32_t, kPixels> samples;
     samples.fill(sample);
-    return path_radiance(tracer, at, settings, view.rays, view.first, {seed, 0, view.number, samples}, light);
+    return path_radiance(render_scene, at, settings, view.rays, view.first, {seed, 0, view.number, samples}, light);
 }
 
-std::uint64_t together(const Tracer& tracer, const BodyPoses& at, const View& view, const PathSettings& settings,
-                       std::uint64_t seed, std::uint32_t sample, std::array<Rgb, kPixels>& light) {
+std::uint64_t together(const RenderScene& render_scene, const BodyPoses& at, const View& view,
+                       const PathSettings& settings, std::uint64_t seed, std::uint32_t sample,
+                       std::array<Rgb, kPixels>& light) {
     static_assert(kPixels == kSharing);
     const FirstSurfaces nothing_known{};
     std::array<FirstSurface, kSharing> first;
@@ -72,17 +74,17 @@ std::uint64_t together(const Tracer& tracer, const BodyPoses& at, const View& vi
                     view.number[i],
                     sample};
     std::array<float, kSharing> variance;
-    return shared_path_radiance(tracer, at, settings, first, seed, 0, light, variance);
+    return shared_path_radiance(render_scene, at, settings, first, seed, 0, light, variance);
 }
 
-Picture picture(const Tracer& tracer, const BodyPoses& at, const View& view, const PathSettings& settings,
-                std::uint32_t samples, Trace trace) {
+Picture picture(const RenderScene& render_scene, const BodyPoses& at, const View& view,
+                const PathSettings& settings, std::uint32_t samples, Trace trace) {
     Picture p;
     std::array<std::array<double, kPictures>, kPixels> means{};
     for (int k = 0; k < kPictures; ++k)
         for (std::uint32_t s = 0; s < samples; ++s) {
             std::array<Rgb, kPixels> light;
-            trace(tracer, at, view, settings, static_cast<std::uint64_t>(k + 1), s, light);
+            trace(render_scene, at, view, settings, static_cast<std::uint64_t>(k + 1), s, light);
             for (std::size_t i = 0; i < kPixels; ++i)
                 means[i][static_cast<std::size_t>(k)] += static_cast<double>(light[i].x) / samples;
         }
@@ -124,14 +126,14 @@ class Sharing : public testing::TestWithParam<Case> {};
 TEST_P(Sharing, ChangesNoMeanAndTakesTheNoiseOfWhatFewFind) {
     Scene s = dish_and_block();
     GetParam().add(s);
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
-    const View view(*tracer, at, {3, -4, 4}, {0.2, 0.3, -0.5}, 1);
+    const View view(*render_scene, at, {3, -4, 4}, {0.2, 0.3, -0.5}, 1);
     PathSettings settings;
     settings.max_depth = 5;
-    const Picture alone = picture(*tracer, at, view, settings, 32, each_for_itself);
-    const Picture shared = picture(*tracer, at, view, settings, 32, together);
+    const Picture alone = picture(*render_scene, at, view, settings, 32, each_for_itself);
+    const Picture shared = picture(*render_scene, at, view, settings, 32, together);
     double sum_alone = 0, sum_shared = 0, square = 0;
     for (std::size_t i = 0; i < kPixels; ++i) {
         // Student's t with some 15 degrees of freedom, 64 times.
@@ -174,8 +176,8 @@ INSTANTIATE_TEST_SUITE_P(
 
 /// Of camera frames, in the first band.
 Picture frames(const Scene& s, int spp) {
-    const auto tracer = Tracer::create(s, 1);
-    EXPECT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    EXPECT_TRUE(render_scene);
     const Camera c = camera(static_cast<int>(kSide), static_cast<int>(kSide), 40);
     const Rigid3 T_world_camera = looking({3, -4, 4}, {0.2, 0.3, -0.5});
     FrameSettings settings;
@@ -187,7 +189,7 @@ Picture frames(const Scene& s, int spp) {
     for (int k = 0; k < kPictures; ++k) {
         settings.frame = static_cast<std::uint32_t>(k);
         RadianceImage image(c.width, c.height);
-        render_radiance(*tracer, placed(s), c, T_world_camera, settings, image);
+        render_radiance(*render_scene, placed(s), c, T_world_camera, settings, image);
         for (std::size_t i = 0; i < kPixels; ++i) {
             const auto light = static_cast<double>(image.pixels[i].x);
             p.mean[i] += light / kPictures;
@@ -219,13 +221,13 @@ TEST(SharedPaths, TakeTheSunsLightOnFirstSurfacesAsDirectLightDoes) {
 TEST(SharedPaths, AllocatesNothing) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "this build's heap is the sanitizer's own";
     const Scene s = dish_and_block();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
-    const View view(*tracer, at, {3, -4, 4}, {0.2, 0.3, -0.5}, 1);
-    picture(*tracer, at, view, {}, 1, together);
+    const View view(*render_scene, at, {3, -4, 4}, {0.2, 0.3, -0.5}, 1);
+    picture(*render_scene, at, view, {}, 1, together);
     const AllocationCounter counter;
-    picture(*tracer, at, view, {}, 2, together);
+    picture(*render_scene, at, view, {}, 2, together);
     EXPECT_EQ(counter.on_this_thread(), 0U);
 }
 

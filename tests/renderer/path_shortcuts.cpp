@@ -22,7 +22,7 @@ TEST(PathShortcuts, TheLastRayIsLeftOutOnlyWhereItWouldFindNothing) {
     for (const double diameter : {0.0, 0.0093}) {
         Scene dark = facing_plates(diameter), glimmering = dark;
         glimmering.ambient = {1e-20f, 1e-20f, 1e-20f};  // to be looked for, but too faint to count
-        const auto in_the_dark = Tracer::create(dark, 1), all_the_way = Tracer::create(glimmering, 1);
+        const auto in_the_dark = RenderScene::create(dark, 1), all_the_way = RenderScene::create(glimmering, 1);
         ASSERT_TRUE(in_the_dark && all_the_way);
         const BodyPoses at = placed(dark);
         std::uint64_t few = 0, many = 0;
@@ -31,11 +31,11 @@ TEST(PathShortcuts, TheLastRayIsLeftOutOnlyWhereItWouldFindNothing) {
             const PathSettings settings{.max_depth = depth};
             for (std::uint32_t pixel = 0; pixel < 64; ++pixel) {
                 const Ray ray = ray_to({-1, -3, 2}, {0.02 * pixel - 0.6, 0.1, 0});
-                const Hit first = in_the_dark->intersect(at, ray, kInfinity);
+                const Hit first = in_the_dark->tracer().intersect(at, ray, kInfinity);
                 const std::uint32_t sample = 5;
                 Rgb less, more;
-                const auto trace = [&](const Tracer& tracer, Rgb& out) {
-                    return path_radiance(tracer, at, settings, std::span(&ray, 1), std::span(&first, 1),
+                const auto trace = [&](const RenderScene& render_scene, Rgb& out) {
+                    return path_radiance(render_scene, at, settings, std::span(&ray, 1), std::span(&first, 1),
                                          {1, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&out, 1));
                 };
                 few += trace(*in_the_dark, less);
@@ -56,14 +56,14 @@ TEST(PathShortcuts, GuidingRaysFromAMeshToASmallBodyChangesNoMean) {
     add_mesh(s, plate(4, 4));
     add_sphere(s, 0.2, {0.9, 0, 0.7});
     add_sun(s, {-1, 0, -0.1});
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
-    EXPECT_TRUE(SmallBodySampling::may_help(*tracer, at));
+    EXPECT_TRUE(SmallBodySampling::may_help(render_scene->tracer(), at));
     const Ray ray = ray_to({-1, 0.1, 2}, {-1.1, 0, 0});
     const PathSettings guided{.max_depth = 2}, left_to_chance{.max_depth = 2, .guided = false};
-    const Estimate with = light_along(*tracer, at, ray, guided, 1024, 3);
-    const Estimate without = light_along(*tracer, at, ray, left_to_chance, 8192, 4);
+    const Estimate with = light_along(*render_scene, at, ray, guided, 1024, 3);
+    const Estimate without = light_along(*render_scene, at, ray, left_to_chance, 8192, 4);
     ASSERT_GT(with.mean.x, 0);
     EXPECT_LT(with.error, 0.01 * with.mean.x);
     EXPECT_NEAR(with.mean.x, without.mean.x, kSigmas * std::hypot(with.error, without.error));
@@ -74,12 +74,12 @@ TEST(PathShortcuts, NobodyIsGuidedWhereNoBodyLooksSmall) {
     s.materials = {lambert(0.9f)};
     add_mesh(s, plate(4, 4));
     add_mesh(s, plate(4, 4), {{}, {0, 0, 1}});
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     BodyPoses at = placed(s);
-    EXPECT_FALSE(SmallBodySampling::may_help(*tracer, at));
+    EXPECT_FALSE(SmallBodySampling::may_help(render_scene->tracer(), at));
     at.set(1, {{}, {0, 0, 100}});
-    EXPECT_TRUE(SmallBodySampling::may_help(*tracer, at));
+    EXPECT_TRUE(SmallBodySampling::may_help(render_scene->tracer(), at));
 }
 
 }  // namespace

@@ -2,9 +2,9 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "renderer/material/bsdf.h"
-#include "renderer/light/lights.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/light/lights.h"
+#include "renderer/material/bsdf.h"
 #include "tests/renderer/path_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -58,12 +58,12 @@ TEST(SunDisc, CastsThePenumbraOfAnEdge) {
     s.meshes[1].face_material.assign(s.meshes[1].faces.size(), 1);
     add_sun(s, {0, 0, 1});
     const double half = 0.5 * s.sun->angular_diameter_rad;
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     for (const double part : {-1.05, -0.8, -0.3, 0.0, 0.4, 0.9, 1.05}) {
         const double d = part * 10 * std::tan(half), cut = std::clamp(part, -1.0, 1.0);
         const double visible = 1 - (std::acos(cut) - cut * std::sqrt(1 - cut * cut)) / kPi;
-        const Estimate e = light_along(*tracer, placed(s), ray_to({d, 0.3, 1}, {d, 0, 0}), {}, 256);
+        const Estimate e = light_along(*render_scene, placed(s), ray_to({d, 0.3, 1}, {d, 0, 0}), {}, 256);
         // 4096 stratified points of the disc: the edge cuts about sqrt(4096) of their cells.
         EXPECT_NEAR(e.mean.x / (kSolar / kPi), visible, 5e-3) << part;
     }
@@ -78,17 +78,17 @@ TEST(SunDisc, GlossySurfacesHaveNoFireflies) {
             s.materials.push_back(phong(0.2f, 0.8f, n));
             add_mesh(s, plate(2, 2));
             add_sun(s, {0, 0, 1});
-            const auto tracer = Tracer::create(s, 1);
-            ASSERT_TRUE(tracer);
+            const auto render_scene = RenderScene::create(s, 1);
+            ASSERT_TRUE(render_scene);
             const Vec3 eye{std::sin(off), 0, std::cos(off)};
             const BodyPoses at = placed(s);
             const Ray ray{eye, -eye};
-            const Hit first = tracer->intersect(at, ray, kInfinity);
+            const Hit first = render_scene->tracer().intersect(at, ray, kInfinity);
             double sum = 0, squares = 0;
             const int samples = 4096;
             for (int k = 0; k < samples; ++k) {
                 const Rgb radiance =
-                    light_along(*tracer, at, ray, first, kDirectLight, 7, static_cast<std::uint32_t>(k), 0);
+                    light_along(*render_scene, at, ray, first, kDirectLight, 7, static_cast<std::uint32_t>(k), 0);
                 sum += static_cast<double>(radiance.x);
                 squares += std::pow(static_cast<double>(radiance.x), 2);
             }
@@ -126,8 +126,8 @@ TEST(PlanetShine, OnTheMoonsNightSideIsTheIntegralOverThePlanet) {
         add_sphere(s, moon_radius, moon, 1);
         add_sun(s, {1, 0, 0});
         s.sun->angular_diameter_rad = 0.0061;
-        const auto tracer = Tracer::create(s, 1);
-        ASSERT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(s, 1);
+        ASSERT_TRUE(render_scene);
         for (const Vec3& up : {normalized(Vec3{-1, -0.8, 0.3}), normalized(Vec3{-0.1, -1, 0.4})}) {
             const Vec3 p = moon + moon_radius * up;
             const Vec3 to_planet = normalized(-p);
@@ -151,7 +151,7 @@ TEST(PlanetShine, OnTheMoonsNightSideIsTheIntegralOverThePlanet) {
             ASSERT_GT(expected, 0);
             PathSettings settings;
             settings.max_depth = 2;
-            const Estimate e = light_along(*tracer, placed(s), ray_to(p + 1e4 * up, p), settings, 2048);
+            const Estimate e = light_along(*render_scene, placed(s), ray_to(p + 1e4 * up, p), settings, 2048);
             EXPECT_NEAR(e.mean.x / expected, 1, 0.01) << distance;
             EXPECT_LT(e.error / expected, 0.004) << distance;
         }
@@ -185,8 +185,8 @@ Scene workshop() {
 
 constexpr int kSide = 12;
 /// An image of the workshop, its pixels `together` at a time.
-std::vector<Rgb> picture(const Tracer& tracer, const BodyPoses& at, const Vec3& offset, std::size_t together,
-                         const PathSettings& settings = {}) {
+std::vector<Rgb> picture(const RenderScene& render_scene, const BodyPoses& at, const Vec3& offset,
+                         std::size_t together, const PathSettings& settings = {}) {
     std::vector<Rgb> pixels(kSide * kSide);
     tbb::parallel_for(std::size_t{0}, (pixels.size() + together - 1) / together, [&](std::size_t block) {
         const std::size_t from = block * together, n = std::min(together, pixels.size() - from);
@@ -200,12 +200,12 @@ std::vector<Rgb> picture(const Tracer& tracer, const BodyPoses& at, const Vec3& 
                          y = static_cast<double>(pixel / kSide) / kSide - 0.5;
             rays[i] = ray_to({3, -3, 3}, {3 * (x + y), 3 * (x - y), 0.5});
             rays[i].origin += offset;
-            first[i] = tracer.intersect(at, rays[i], kInfinity);
+            first[i] = render_scene.tracer().intersect(at, rays[i], kInfinity);
             number[i] = static_cast<std::uint32_t>(pixel);
         }
         for (std::uint32_t s = 0; s < 8; ++s) {
             sample.assign(n, s);
-            path_radiance(tracer, at, settings, rays, first, {3, 0, number, sample}, radiance);
+            path_radiance(render_scene, at, settings, rays, first, {3, 0, number, sample}, radiance);
             for (std::size_t i = 0; i < n; ++i) pixels[from + i] += radiance[i];
         }
     });
@@ -214,10 +214,10 @@ std::vector<Rgb> picture(const Tracer& tracer, const BodyPoses& at, const Vec3& 
 
 TEST(PathRadiance, OfARayDoesNotDependOnItsNeighboursNorOnThreads) {
     const Scene s = workshop();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
-    const std::vector<Rgb> expected = picture(*tracer, at, {}, kLanes);
+    const std::vector<Rgb> expected = picture(*render_scene, at, {}, kLanes);
     double lit = 0;
     for (const Rgb& p : expected) {
         EXPECT_TRUE(is_finite(p));
@@ -226,22 +226,22 @@ TEST(PathRadiance, OfARayDoesNotDependOnItsNeighboursNorOnThreads) {
     EXPECT_GT(lit, 100);
     // Within a packet, within what travels together, and beyond.
     for (const std::size_t together : {1UL, 3UL, 8UL, 40UL, 128UL, 144UL})
-        EXPECT_EQ(picture(*tracer, at, {}, together), expected) << together;
+        EXPECT_EQ(picture(*render_scene, at, {}, together), expected) << together;
     for (const int threads : {1, 2, 7}) {
         tbb::task_arena arena(threads);
-        arena.execute([&] { EXPECT_EQ(picture(*tracer, at, {}, kLanes), expected) << threads; });
+        arena.execute([&] { EXPECT_EQ(picture(*render_scene, at, {}, kLanes), expected) << threads; });
     }
 }
 
 TEST(PathRadiance, AllocatesNothing) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "this build's heap is the sanitizer's own";
     const Scene s = workshop();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     const Ray ray = ray_to({3, -3, 3}, {0.5, -0.75, 0.5});
-    const Hit first = tracer->intersect(at, ray, kInfinity);
-    const auto trace = [&](std::uint32_t sample) { light_along(*tracer, at, ray, first, {}, 1, 0, sample); };
+    const Hit first = render_scene->tracer().intersect(at, ray, kInfinity);
+    const auto trace = [&](std::uint32_t sample) { light_along(*render_scene, at, ray, first, {}, 1, 0, sample); };
     trace(0);
     const AllocationCounter counter;
     for (std::uint32_t k = 1; k < 64; ++k) trace(k);
@@ -250,24 +250,24 @@ TEST(PathRadiance, AllocatesNothing) {
 
 TEST(PathRadiance, IsTheSameFarFromTheOrigin) {
     const Scene s = workshop();
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     for (const bool direct : {false, true}) {
         const PathSettings settings{.direct = direct};
-        const std::vector<Rgb> expected = picture(*tracer, placed(s), {}, kLanes, settings);
+        const std::vector<Rgb> expected = picture(*render_scene, placed(s), {}, kLanes, settings);
         // All positions of the workshop are multiples of 1/8 m: added to these offsets they stay exact, and so does
         // all else, for only their differences count.
         for (const double far : {1e7, 3.844e8}) {
             const Vec3 offset{far, -0.5 * far, 0.25 * far};
-            const std::vector<Rgb> moved = picture(*tracer, placed(s, offset), offset, kLanes, settings);
+            const std::vector<Rgb> moved = picture(*render_scene, placed(s, offset), offset, kLanes, settings);
             EXPECT_EQ(moved, expected) << far;
         }
     }
 }
 
 /// Paths in their plainest form: only the BSDF says where they go on, and light is found by chance.
-Vec3 plain_path(const Tracer& tracer, const BodyPoses& at, Ray ray, int depth, std::mt19937_64& random) {
-    const Scene& scene = tracer.scene();
+Vec3 plain_path(const RenderScene& render_scene, const BodyPoses& at, Ray ray, int depth, std::mt19937_64& random) {
+    const Scene& scene = render_scene.scene();
     const SunDisc sun(*scene.sun);
     std::uniform_real_distribution<double> number;
     Vec3 radiance{}, throughput{1, 1, 1};
@@ -275,12 +275,12 @@ Vec3 plain_path(const Tracer& tracer, const BodyPoses& at, Ray ray, int depth, s
         return Vec3{a.x * static_cast<double>(b.x), a.y * static_cast<double>(b.y), a.z * static_cast<double>(b.z)};
     };
     for (int met = 0;; ++met) {
-        const Hit hit = tracer.intersect(at, ray, kInfinity);
+        const Hit hit = render_scene.tracer().intersect(at, ray, kInfinity);
         if (hit.body < 0) {
             const float disc = sun.pdf(ray.direction) > 0 ? sun.radiance() : 0;
             return radiance + product(throughput, scene.ambient + Rgb{disc, disc, disc});
         }
-        const Surface s = surface_at(tracer, at, hit, ray.direction, 0);
+        const Surface s = surface_at(render_scene.tracer(), at, hit, ray.direction, 0);
         radiance += product(throughput, s.emission);
         if (met == depth) return radiance;
         const BsdfSample next =
@@ -305,8 +305,8 @@ TEST(PathRadiance, IsThatOfPathsWhichFindAllLightByChance) {
     egg.shape = Ellipsoid{{0.25, 0.5, 0.375}, 4};
     egg.initial.T_world_body = {normalized(Quat{0.9, 0.1, 0.3, 0.2}), {1, 1.5, 1}};
     s.bodies.push_back(egg);
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     PathSettings settings;
     settings.max_depth = 4;
@@ -315,12 +315,12 @@ TEST(PathRadiance, IsThatOfPathsWhichFindAllLightByChance) {
                                     {1, -0.3, 0},      {-0.5, -1.5, 0},   {-1.5, -1, 0.75}, {0.25, -0.75, 0.25}};
     for (const Vec3& target : targets) {
         const Ray ray = ray_to({3, -3, 3}, target);
-        const Estimate e = light_along(*tracer, at, ray, settings, 512);
+        const Estimate e = light_along(*render_scene, at, ray, settings, 512);
         const int samples = 20000;
         Vec3 sum{};
         double squares = 0;
         for (int k = 0; k < samples; ++k) {
-            const Vec3 sample = plain_path(*tracer, at, ray, settings.max_depth, random);
+            const Vec3 sample = plain_path(*render_scene, at, ray, settings.max_depth, random);
             sum += sample;
             squares += sample.x * sample.x;
         }

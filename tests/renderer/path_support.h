@@ -26,11 +26,11 @@ inline const Lanes<std::uint32_t> kOwnPixels = [] {
 }();
 
 /// Radiance along one ray by one sample.
-inline Rgb light_along(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const Hit& first,
+inline Rgb light_along(const RenderScene& render_scene, const BodyPoses& at, const Ray& ray, const Hit& first,
                        const PathSettings& settings, std::uint64_t seed, std::uint32_t pixel,
                        std::uint32_t sample) {
     Rgb radiance;
-    path_radiance(tracer, at, settings, std::span(&ray, 1), std::span(&first, 1),
+    path_radiance(render_scene, at, settings, std::span(&ray, 1), std::span(&first, 1),
                   {seed, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&radiance, 1));
     return radiance;
 }
@@ -49,17 +49,17 @@ struct Estimate {
 };
 
 /// Mean of kLanes independent pixels' means of `samples` each; their scatter tells the error.
-inline Estimate light_along(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const PathSettings& settings,
-                            std::uint32_t samples, std::uint64_t seed = 1) {
+inline Estimate light_along(const RenderScene& render_scene, const BodyPoses& at, const Ray& ray,
+                            const PathSettings& settings, std::uint32_t samples, std::uint64_t seed = 1) {
     std::array<Ray, kLanes> rays;
     rays.fill(ray);
     std::array<Hit, kLanes> first;
-    first.fill(tracer.intersect(at, ray, kInfinity));
+    first.fill(render_scene.tracer().intersect(at, ray, kInfinity));
     std::array<Vec3, kLanes> sum{};
     for (std::uint32_t s = 0; s < samples; ++s) {
         std::array<Rgb, kLanes> radiance;
         const Lanes<std::uint32_t> sample = the_same(s);
-        path_radiance(tracer, at, settings, rays, first, {seed, 0, kOwnPixels, sample}, radiance);
+        path_radiance(render_scene, at, settings, rays, first, {seed, 0, kOwnPixels, sample}, radiance);
         for (std::size_t i = 0; i < kLanes; ++i) sum[i] += vec_cast<double>(radiance[i]);
     }
     Estimate e;
@@ -71,9 +71,9 @@ inline Estimate light_along(const Tracer& tracer, const BodyPoses& at, const Ray
 }
 inline Estimate light_along(const Scene& scene, const Ray& ray, const PathSettings& settings, std::uint32_t samples,
                             std::uint64_t seed = 1) {
-    const auto tracer = Tracer::create(scene, 1);
-    EXPECT_TRUE(tracer);
-    return light_along(*tracer, placed(scene), ray, settings, samples, seed);
+    const auto render_scene = RenderScene::create(scene, 1);
+    EXPECT_TRUE(render_scene);
+    return light_along(*render_scene, placed(scene), ray, settings, samples, seed);
 }
 
 inline Material shining(float albedo, const Rgb& emission) {

@@ -113,12 +113,12 @@ struct Shot {
     RadianceImage image;
     Aovs aovs;
 };
-Shot shoot_frame(const Tracer& tracer, const Camera& c, const Rigid3& T, int spp, std::uint32_t frame) {
+Shot shoot_frame(const RenderScene& render_scene, const Camera& c, const Rigid3& T, int spp, std::uint32_t frame) {
     Shot shot{RadianceImage(c.width, c.height), {}};
     FrameSettings settings;
     settings.spp = spp;
     settings.frame = frame;
-    render_radiance(tracer, placed(tracer.scene()), c, T, settings, shot.image, &shot.aovs);
+    render_radiance(render_scene, placed(render_scene.scene()), c, T, settings, shot.image, &shot.aovs);
     return shot;
 }
 double mean_of(const Rgb& p) {
@@ -133,15 +133,15 @@ TEST(Interval, OfASmoothPictureHoldsTheTruth) {
     add_mesh(s, icosphere(4, 1, true));
     add_sun(s, {0.4, 0.5, 1});
     s.ambient = {20, 20, 20};
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const Camera c = camera(32, 32, 40);
     const Rigid3 T = looking({2.5, 1, 1.5}, {0, 0, 0});
-    const Shot truth = shoot_frame(*tracer, c, T, 1024, 1000);
+    const Shot truth = shoot_frame(*render_scene, c, T, 1024, 1000);
     for (const int spp : {4, 16}) {
         int held = 0, varied = 0;
         for (std::uint32_t frame = 0; frame < 2; ++frame) {
-            const Shot shot = shoot_frame(*tracer, c, T, spp, frame);
+            const Shot shot = shoot_frame(*render_scene, c, T, spp, frame);
             for (std::size_t i = 0; i < shot.image.pixels.size(); ++i) {
                 const double variance = static_cast<double>(shot.aovs.variance[i]);
                 if (variance == 0) {
@@ -165,8 +165,8 @@ TEST(Interval, OfASphereOnAFewThousandthsOfAPixelHoldsTheTruth) {
     s.materials.push_back(lambert(0.5f));
     add_sphere(s, 5, {0, 0, 0});
     add_sun(s, {1, 0, 0});
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const double truth = 1361 * 0.5 * 2 / 3 * std::pow(5 * f / distance, 2);
     std::mt19937_64 random(23);
     std::uniform_real_distribution<double> within(-0.4, 0.4);
@@ -175,7 +175,7 @@ TEST(Interval, OfASphereOnAFewThousandthsOfAPixelHoldsTheTruth) {
         for (std::uint32_t frame = 0; frame < 20; ++frame) {
             Camera c = camera(9, 9, f);
             c.cx = 4 + within(random), c.cy = 4 + within(random);
-            const Shot shot = shoot_frame(*tracer, c, looking({distance, 0, 0}, {}), spp, frame);
+            const Shot shot = shoot_frame(*render_scene, c, looking({distance, 0, 0}, {}), spp, frame);
             const double half = interval_95(static_cast<double>(shot.aovs.variance[4 * 9 + 4]), spp, 16);
             held += std::abs(mean_of(shot.image.pixels[4 * 9 + 4]) - truth) <= half;
             EXPECT_LT(half, 0.1 * truth);

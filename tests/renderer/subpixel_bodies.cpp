@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "renderer/geometry/body_bounds.h"
-#include "renderer/film/camera_image.h"
 #include "renderer/camera/camera_ray.h"
+#include "renderer/film/camera_image.h"
+#include "renderer/geometry/body_bounds.h"
 #include "renderer/integrator/subpixel_bodies.h"
 #include "tests/renderer/camera_support.h"
 #include "tests/support/allocation_counter.h"
@@ -22,9 +22,10 @@ using namespace test;
 constexpr double kPi = std::numbers::pi;
 constexpr double kFocal = 1319.4792168823421;  // 30 degrees across the diagonal of 500 x 500
 
-RadianceImage render(const Tracer& tracer, const Camera& c, const Rigid3& T, FrameSettings settings = {}) {
+RadianceImage render(const RenderScene& render_scene, const Camera& c, const Rigid3& T,
+                     FrameSettings settings = {}) {
     RadianceImage image(c.width, c.height);
-    render_radiance(tracer, placed(tracer.scene()), c, T, settings, image);
+    render_radiance(render_scene, placed(render_scene.scene()), c, T, settings, image);
     return image;
 }
 
@@ -56,8 +57,8 @@ struct Far {
         add_sun(scene, {std::cos(phase), std::sin(phase), 0});
         scene.sun->angular_diameter_rad = sun_diameter;
     }
-    [[nodiscard]] Tracer tracer() const {
-        auto t = Tracer::create(scene, 1);
+    [[nodiscard]] RenderScene render_scene() const {
+        auto t = RenderScene::create(scene, 1);
         EXPECT_TRUE(t);
         return std::move(*t);
     }
@@ -77,7 +78,7 @@ Moments moments(const std::vector<double>& v) {
 
 /// Flux with the body at several places in its pixel, on edges and corners too.
 std::vector<double> fluxes(const Far& far, FrameSettings settings) {
-    const Tracer tracer = far.tracer();
+    const RenderScene render_scene = far.render_scene();
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> shift(-0.5, 0.5);
     std::vector<double> out;
@@ -87,7 +88,7 @@ std::vector<double> fluxes(const Far& far, FrameSettings settings) {
         c.cx = 10 + (special ? 0.5 * (k & 1) : shift(random));
         c.cy = 10 + (special ? 0.25 * (k & 2) : shift(random));
         settings.frame = k;
-        out.push_back(irradiance(render(tracer, c, far.view(), settings), c));
+        out.push_back(irradiance(render(render_scene, c, far.view(), settings), c));
     }
     return out;
 }
@@ -165,12 +166,12 @@ TEST(TinyBody, SunOfTheRightSizeAndPathsGiveTheSameLight) {
 TEST(TinyBody, LightStaysTheSameWhileItMovesOverPixelsAndBlocks) {
     Far far(1.5e4, 1.0, 0.5);  // 0.9 px wide
     add_mesh(far.scene, bumpy(3, 5, 0.3));
-    const Tracer tracer = far.tracer();
+    const RenderScene render_scene = far.render_scene();
     std::vector<double> seen;
     for (int k = 0; k < 64; ++k) {
         Camera c = far.c;
         c.cx = 8.5 + 0.11 * k, c.cy = 9.3 + 0.05 * k;  // seven pixels along, over corners of pixels and of blocks
-        seen.push_back(irradiance(render(tracer, c, far.view()), c));
+        seen.push_back(irradiance(render(render_scene, c, far.view()), c));
     }
     const Moments m = moments(seen);
     EXPECT_GT(m.mean, 0);
@@ -194,7 +195,7 @@ TEST(TinyBody, OneThatTurnsKeepsItsLightToOnePercent) {
             const Vec3 v = conjugate(q) * Vec3{1, 0, 0};
             const double area =
                 std::abs(v.x) * size.y * size.z + std::abs(v.y) * size.x * size.z + std::abs(v.z) * size.x * size.y;
-            ratio.push_back(irradiance(render(far.tracer(), far.c, far.view()), far.c) / (area / 1e10));
+            ratio.push_back(irradiance(render(far.render_scene(), far.c, far.view()), far.c) / (area / 1e10));
         }
         const Moments m = moments(ratio);
         EXPECT_NEAR(m.mean, 1, 5e-3) << size.x << " x " << size.y << " x " << size.z;
@@ -216,7 +217,7 @@ TEST(TinyBody, EllipsoidIsSampledOverItsOwnOutline) {
         far.scene.bodies[0].initial.T_world_body.q = q;
         const Vec3 v = conjugate(q) * Vec3{1, 0, 0};
         const double area = kPi * norm(Vec3{v.x * a.y * a.z, v.y * a.z * a.x, v.z * a.x * a.y});
-        EXPECT_NEAR(irradiance(render(far.tracer(), far.c, far.view()), far.c) / (area / 1e10), 1, 1e-3);
+        EXPECT_NEAR(irradiance(render(far.render_scene(), far.c, far.view()), far.c) / (area / 1e10), 1, 1e-3);
     }
 }
 
@@ -233,7 +234,7 @@ TEST(TinyBody, CrossingTheLimitOfSizeChangesTheLightByLessThanOnePercent) {
                 else
                     add_sphere(far.scene, 5, {});
                 // Where a body is sampled with the rest, 4096 samples a pixel find its light to 0.2 %.
-                const auto image = render(far.tracer(), far.c, far.view(), {.spp = side == 0 ? 1 : 4096});
+                const auto image = render(far.render_scene(), far.c, far.view(), {.spp = side == 0 ? 1 : 4096});
                 scaled[static_cast<std::size_t>(side)] = irradiance(image, far.c) * distance * distance;
             }
             EXPECT_NEAR(scaled[1] / scaled[0], 1, 1e-2) << "phase " << phase << (mesh ? " mesh" : " sphere");
@@ -251,10 +252,10 @@ struct Shining {
     }
     /// Mean radiance of the picture times its pixels.
     [[nodiscard]] double sum(int spp = 1) const {
-        const auto tracer = Tracer::create(s, 1);
-        EXPECT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(s, 1);
+        EXPECT_TRUE(render_scene);
         double total = 0;
-        for (const Rgb& p : render(*tracer, c, {}, {.spp = spp}).pixels) total += static_cast<double>(p.x);
+        for (const Rgb& p : render(*render_scene, c, {}, {.spp = spp}).pixels) total += static_cast<double>(p.x);
         return total;
     }
 };
@@ -317,10 +318,10 @@ TEST(TinyBody, OffTheAxisAndOverTheEdgeOfTheImage) {
     for (const double x : {-466.0, 300.0}) {
         w.s.bodies.clear();
         add_sphere(w.s, kWide, {x, 0, 1000}, 1);
-        const auto tracer = Tracer::create(w.s, 1);
-        ASSERT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(w.s, 1);
+        ASSERT_TRUE(render_scene);
         const double d2 = x * x + 1e6, solid_angle = 2 * kPi * (1 - std::sqrt(1 - kWide * kWide / d2));
-        EXPECT_NEAR(irradiance(render(*tracer, w.c, {}), w.c) / solid_angle, 1, 5e-3) << x;
+        EXPECT_NEAR(irradiance(render(*render_scene, w.c, {}), w.c) / solid_angle, 1, 5e-3) << x;
     }
     w.c = camera(16, 16, 1000);
     w.s.bodies.clear();
@@ -374,8 +375,8 @@ Scene swarm_over_a_globe() {
 
 TEST(TinyBody, SameBytesOnOneTwoAndSevenThreadsWithAndWithoutALens) {
     const Scene s = swarm_over_a_globe();
-    const auto tracer = Tracer::create(s, 2);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 2);
+    ASSERT_TRUE(render_scene);
     for (const bool lens : {false, true})
         for (const auto method : {RenderSettings::Method::direct, RenderSettings::Method::path}) {
             std::vector<std::vector<Rgb>> pictures;
@@ -385,7 +386,7 @@ TEST(TinyBody, SameBytesOnOneTwoAndSevenThreadsWithAndWithoutALens) {
                 tbb::task_arena(threads).execute([&] {
                     Camera c = camera(45, 38, 2000);
                     if (lens) c.lens = Lens{0.05, 50};
-                    pictures.push_back(render(*tracer, c, {}, {.spp = 2, .method = method}).pixels);
+                    pictures.push_back(render(*render_scene, c, {}, {.spp = 2, .method = method}).pixels);
                 });
             }
             EXPECT_EQ(pictures[0], pictures[1]);
@@ -396,14 +397,14 @@ TEST(TinyBody, SameBytesOnOneTwoAndSevenThreadsWithAndWithoutALens) {
 TEST(TinyBody, FramesWithThemAllocateNothing) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer has the heap";
     const Scene s = swarm_over_a_globe();
-    const auto tracer = Tracer::create(s, 2);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 2);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     const Camera c = camera(48, 48, 2000);
     RadianceImage image(c.width, c.height);
     Aovs aovs;
     tbb::task_arena arena(2);
-    CameraRenderer renderer(*tracer, c);
+    CameraRenderer renderer(*render_scene, c);
     const auto frames = [&](std::uint32_t n) {
         arena.execute([&] {
             for (std::uint32_t i = 0; i < n; ++i) renderer.render(at, {}, {.spp = 2, .frame = i}, image, &aovs);

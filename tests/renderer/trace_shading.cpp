@@ -3,15 +3,15 @@
 
 #include <numbers>
 
-#include "renderer/material/bsdf.h"
-#include "renderer/material/texture_lookup.h"
-#include "renderer/film/camera_image.h"
 #include "renderer/camera/camera_ray.h"
+#include "renderer/film/camera_image.h"
 #include "renderer/integrator/sampler.h"
 #include "renderer/integrator/shading.h"
-#include "renderer/light/sun_disc.h"
-#include "tests/support/shapes.h"
 #include "renderer/lidar/lidar_shot.h"
+#include "renderer/light/sun_disc.h"
+#include "renderer/material/bsdf.h"
+#include "renderer/material/texture_lookup.h"
+#include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
@@ -21,12 +21,12 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kSolar = 1361;
 
 RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, int spp = 1) {
-    const auto tracer = Tracer::create(s, 1);
-    EXPECT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    EXPECT_TRUE(render_scene);
     RadianceImage image(c.width, c.height);
     FrameSettings settings;
     settings.spp = spp;
-    render_radiance(*tracer, placed(s), c, T, settings, image);
+    render_radiance(*render_scene, placed(s), c, T, settings, image);
     return image;
 }
 
@@ -101,14 +101,14 @@ TEST(Sun, SetSunLightsNothingAndABodyCastsAShadow) {
     add_mesh(s, plate(20, 20));
     add_sphere(s, 1, {0, 0, 3});
     add_sun(s, {0, 0, 1});
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     const auto lit = [&](double x) {
         const Ray ray{{x, 5, 5}, normalized(Vec3{0, -5, -5})};
-        const Hit hit = tracer->intersect(at, ray, kInfinity);
+        const Hit hit = render_scene->tracer().intersect(at, ray, kInfinity);
         EXPECT_EQ(hit.body, 0);
-        return !tracer->occluded(at, hit, {0, 0, 1}, kInfinity);
+        return !render_scene->tracer().occluded(at, hit, {0, 0, 1}, kInfinity);
     };
     EXPECT_FALSE(lit(0));
     EXPECT_FALSE(lit(0.999));
@@ -233,8 +233,8 @@ TEST(ShadowTerminator, SmoothSpheresHaveNoFalseShadows) {
         add_mesh(s, icosphere(level, 1, true));
         const double phase = 135 * kPi / 180;
         add_sun(s, {std::cos(phase), std::sin(phase), 0});
-        const auto tracer = Tracer::create(s, 1);
-        ASSERT_TRUE(tracer);
+        const auto render_scene = RenderScene::create(s, 1);
+        ASSERT_TRUE(render_scene);
         const BodyPoses at = placed(s);
         const Camera c = camera(300, 300, 2900);
         const Rigid3 T = looking({20, 0, 0}, {});
@@ -242,12 +242,12 @@ TEST(ShadowTerminator, SmoothSpheresHaveNoFalseShadows) {
         double flux = 0, unshadowed = 0;
         for (int y = 0; y < c.height; ++y)
             for (int x = 0; x < c.width; ++x) {
-                const Hit hit = tracer->intersect(at, camera_ray(c, T, x, y), kInfinity);
+                const Hit hit = render_scene->tracer().intersect(at, camera_ray(c, T, x, y), kInfinity);
                 if (hit.body < 0) continue;
                 const double cosine = dot(hit.shading_normal, s.sun->direction);
                 if (cosine <= 0) continue;
                 ++lit;
-                const bool blocked = tracer->occluded(at, hit, s.sun->direction, kInfinity);
+                const bool blocked = render_scene->tracer().occluded(at, hit, s.sun->direction, kInfinity);
                 dark += blocked;
                 unshadowed += cosine;
                 flux += blocked ? 0 : cosine;
@@ -264,13 +264,13 @@ TEST(ShadingNormal, StaysOnTheSideOfTheFaceWhateverTheFileSays) {
     Mesh m = icosphere(2, 1, true);
     for (Vec3f& n : m.normals) n = -n;  // a file with its normals inside out
     add_mesh(s, m);
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     std::mt19937_64 random(9);
     for (int i = 0; i < 2000; ++i) {
         const Vec3 eye = 4.0 * random_direction(random);
         const Ray ray{eye, normalized(0.9 * random_direction(random) - eye)};
-        const Hit hit = tracer->intersect(placed(s), ray, kInfinity);
+        const Hit hit = render_scene->tracer().intersect(placed(s), ray, kInfinity);
         if (hit.body < 0) continue;
         EXPECT_LT(dot(hit.geometric_normal, ray.direction), 0);
         EXPECT_GT(dot(hit.geometric_normal, hit.shading_normal), 0);
@@ -330,17 +330,17 @@ TEST(Lidar, PlateReturnsItsRangeBodyAndReflectance) {
     s.materials.push_back(lambert(0.6f));
     add_sphere(s, 1, {0, 100, 0});
     add_mesh(s, plate(10, 10));
-    const auto tracer = Tracer::create(s, 1);
-    ASSERT_TRUE(tracer);
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     const double tilt = 0.7;
     const Ray beam{20.0 * Vec3{std::sin(tilt), 0, std::cos(tilt)}, {-std::sin(tilt), 0, -std::cos(tilt)}};
-    const LidarReturn hit = shoot(*tracer, at, beam, 100);
+    const LidarReturn hit = shoot(render_scene->tracer(), at, beam, 100);
     EXPECT_NEAR(hit.range_m, 20, 1e-9);
     EXPECT_EQ(hit.body, 1);
     EXPECT_NEAR(hit.reflectivity, 0.6 * std::cos(tilt), 1e-6);
-    EXPECT_EQ(shoot(*tracer, at, beam, 19.99).range_m, 0);
-    EXPECT_EQ(shoot(*tracer, at, {beam.origin, -beam.direction}, 100).body, -1);
+    EXPECT_EQ(shoot(render_scene->tracer(), at, beam, 19.99).range_m, 0);
+    EXPECT_EQ(shoot(render_scene->tracer(), at, {beam.origin, -beam.direction}, 100).body, -1);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// renderer/film/frame_budget.h - what a frame may cost, and what became of it.
+/// renderer/integrator/frame_budget.h - what a frame may cost, and what became of it.
 ///
 /// A frame is made in passes. The first gives each pixel its middle; where even that may not fit, it goes from
 /// coarse to fine, so that there is a whole frame from its first fraction on. What the middles show of the geometry

@@ -1,4 +1,4 @@
-#include "renderer/integrator/first_hit.h"
+#include "renderer/film/first_hit.h"
 
 #include <limits>
 

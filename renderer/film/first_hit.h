@@ -1,6 +1,7 @@
-/// renderer/integrator/first_hit.h - fills the outputs beside the radiance from the ray through a pixel's centre.
+/// renderer/film/first_hit.h - fills the outputs beside the radiance from the ray through a pixel's centre.
 #pragma once
 
+#include "renderer/image/radiance_image.h"
 #include "renderer/integrator/frame_light.h"
 
 namespace narpa {

@@ -1,0 +1,26 @@
+#include "renderer/light/render_scene.h"
+
+namespace narpa {
+namespace {
+
+Status check_light(const Scene& s, const Light& l) {
+    if (l.mount >= static_cast<int>(s.bodies.size()))
+        return Error{"light \"" + l.name + "\" rides on body " + std::to_string(l.mount) + " of " +
+                     std::to_string(s.bodies.size())};
+    const bool rectangle = l.kind == Light::Kind::rectangle, disc = l.kind == Light::Kind::disc;
+    if ((rectangle && !(l.width_m > 0 && l.height_m > 0)) || (disc && !(l.radius_m > 0)))
+        return Error{"light \"" + l.name + "\": the size of a lamp is a positive length in metres"};
+    return Ok{};
+}
+
+}  // namespace
+
+Result<RenderScene> RenderScene::create(const Scene& scene, int threads) {
+    auto tracer = Tracer::create(scene, threads);
+    if (!tracer) return tracer.error();
+    for (const Light& l : scene.lights)
+        if (const Status good = check_light(scene, l); !good) return good.error();
+    return RenderScene(scene, *std::move(tracer));
+}
+
+}  // namespace narpa

@@ -187,7 +187,7 @@ void tell(const World& world) {
 }
 
 Status save_dbc(const Scene& scene, const std::string& path) {
-    std::vector<DbcBody> bodies;
+    std::vector<CanBody> bodies;
     for (const Body& b : scene.bodies)
         if (b.can_id) bodies.push_back({b.name, *b.can_id});
     std::ofstream out(path, std::ios::binary);

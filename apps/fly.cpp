@@ -6,9 +6,9 @@
 #include <limits>
 #include <map>
 
+#include "apps/cli.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/can/remote_clock.h"
-#include "apps/cli.h"
 #include "emulator/clock.h"
 #include "emulator/trajectory.h"
 #include "protocols/can/messages.h"
@@ -24,7 +24,6 @@ struct Options {
     bool lockstep = false, classic = false;
 };
 
-constexpr std::uint32_t kDefaultId = 0x100;
 constexpr std::int64_t kMs = 1'000'000;
 
 /// One body's commands on the wire.
@@ -40,7 +39,7 @@ Result<std::map<std::string, Commander>> commanders(const Options& o, const std:
     if (o.ids.empty()) {
         if (all.size() > 1)
             return Error{fmt::format("{} bodies, expected --id BODY=ID for each", all.size()), o.trajectory};
-        all.begin()->second.base_id = kDefaultId;
+        all.begin()->second.base_id = kDefaultBodyBaseId;
         return all;
     }
     for (const std::string& text : o.ids) {
@@ -116,19 +115,12 @@ private:
     Status send(const TrajectoryRow& row, std::int64_t t_ns) {
         Commander& c = who_.at(row.body);
         const PoseCommand command{c.counter++, t_ns, row.motion};
-        PoseFrames classic;
-        CanFrame fd;
-        const EncodeStatus encoded =
-            fd_ ? encode_fd(command, c.base_id, fd) : encode_classic(command, c.base_id, classic);
-        if (!encoded)
+        FrameSet frames;
+        if (const EncodeStatus encoded = encode(command, c.base_id, fd_, frames); !encoded)
             return Error{fmt::format("row at {} s of \"{}\": {}", static_cast<double>(row.t_ns) * 1e-9, row.body,
                                      encoded.text()),
                          options_.trajectory};
-        if (fd_) {
-            frames_dropped += !bus_.send(fd);
-        } else {
-            for (const CanFrame& f : classic) frames_dropped += !bus_.send(f);
-        }
+        for (const CanFrame& f : frames) frames_dropped += !bus_.send(f);
         c.newest_ns = t_ns;
         ++commands;
         return Ok{};

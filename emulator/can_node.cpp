@@ -59,19 +59,11 @@ bool CanNode::take(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
 }
 
 void CanNode::send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept {
-    if (bus_.carries_fd()) {
-        put(encode_fd(ledger), t_now_ns);
-    } else {
-        for (const CanFrame& frame : encode_classic(ledger)) put(frame, t_now_ns);
-    }
+    for (const CanFrame& frame : encode(ledger, bus_.carries_fd())) put(frame, t_now_ns);
 }
 
 void CanNode::send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept {
-    if (bus_.carries_fd()) {
-        put(encode_fd(estimate), t_now_ns);
-    } else {
-        for (const CanFrame& frame : encode_classic(estimate)) put(frame, t_now_ns);
-    }
+    for (const CanFrame& frame : encode(estimate, bus_.carries_fd())) put(frame, t_now_ns);
 }
 
 void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {

@@ -16,7 +16,6 @@
 namespace narpa {
 namespace {
 
-constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;
 constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "protocols/can/closed_loop.h"
+#include "protocols/can/closed_loop_signals.h"
 #include "protocols/can/messages.h"
 
 namespace narpa {
@@ -88,11 +88,11 @@ void write_set(Sections& out, const SetLayout& layout, const std::string& prefix
 
 }  // namespace
 
-std::string write_dbc(std::span<const DbcBody> bodies, int cameras) {
+std::string write_dbc(std::span<const CanBody> bodies, int cameras) {
     Sections out;
     const Route command{"Commander", "narpa"}, telemetry{"narpa", "Commander"},
         navigation{"Navigation", "Commander"}, dynamics{"Commander", "Navigation"};
-    for (const DbcBody& body : bodies) write_set(out, kPoseLayout, symbol(body.name) + "_", body.base_id, command);
+    for (const CanBody& body : bodies) write_set(out, kPoseLayout, symbol(body.name) + "_", body.base_id, command);
     for (int i = 0; i < cameras; ++i)
         write_set(out, kLedgerLayout, "Camera" + std::to_string(i) + "_",
                   ledger_base_id(static_cast<std::uint8_t>(i)), telemetry);

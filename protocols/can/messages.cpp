@@ -53,16 +53,6 @@ DecodeStatus pose_verdict(const RawSignals& raw) noexcept {
 
 }  // namespace
 
-Status check_body_base_id(std::int64_t can_id) {
-    if (can_id >= 0 && can_id <= kMaxBodyBaseId && can_id % kBaseIdStep == 0) return Ok{};
-    std::array<char, 160> text{};
-    std::snprintf(text.data(), text.size(),
-                  "can_id %s0x%llX cannot be a body's: expected a multiple of 16 from 0x000 to 0x%03X",
-                  can_id < 0 ? "-" : "", static_cast<unsigned long long>(can_id < 0 ? -can_id : can_id),
-                  kMaxBodyBaseId);
-    return Error{.what = text.data()};
-}
-
 std::string EncodeStatus::text() const {
     std::array<char, 160> text{};
     const char* space = unit.empty() ? "" : " ";
@@ -72,12 +62,10 @@ std::string EncodeStatus::text() const {
     return text.data();
 }
 
-EncodeStatus encode_classic(const PoseCommand& command, std::uint32_t base_id, PoseFrames& out) noexcept {
+EncodeStatus encode_classic(const PoseCommand& command, std::uint32_t base_id, FrameSet& out) noexcept {
     RawSignals raw{};
     const EncodeStatus status = quantise(command, &Signal::classic, raw);
-    if (!status) return status;
-    for (std::size_t i = 0; i < out.size(); ++i)
-        out[i] = encode_classic(kPoseLayout, raw, command.counter, base_id, i);
+    if (status) out = encode_classic(kPoseLayout, raw, command.counter, base_id);
     return status;
 }
 
@@ -85,6 +73,14 @@ EncodeStatus encode_fd(const PoseCommand& command, std::uint32_t base_id, CanFra
     RawSignals raw{};
     const EncodeStatus status = quantise(command, &Signal::fd, raw);
     if (status) out = encode_fd(kPoseLayout, raw, command.counter, base_id);
+    return status;
+}
+
+EncodeStatus encode(const PoseCommand& command, std::uint32_t base_id, bool fd, FrameSet& out) noexcept {
+    if (!fd) return encode_classic(command, base_id, out);
+    CanFrame frame;
+    const EncodeStatus status = encode_fd(command, base_id, frame);
+    if (status) out = FrameSet(frame);
     return status;
 }
 

@@ -62,16 +62,20 @@ std::string_view name(DecodeStatus status) noexcept {
     return names[static_cast<std::size_t>(status)];
 }
 
-CanFrame encode_classic(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter, std::uint32_t base_id,
-                        std::size_t index) noexcept {
-    CanFrame frame;
-    frame.id = base_id + static_cast<std::uint32_t>(index);
-    frame.size = kClassicBytes;
-    for (std::size_t i = 0; i < layout.signals.size(); ++i)
-        if (layout.signals[i].classic.frame == index) put_signal(frame.data, layout.signals[i].classic, raw[i]);
-    frame.data[kClassicCounterByte] = counter;
-    frame.data[kClassicCrcByte] = classic_crc(frame);
-    return frame;
+FrameSet encode_classic(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
+                        std::uint32_t base_id) noexcept {
+    FrameSet set;
+    for (std::size_t index = 0; index < layout.frames.size(); ++index) {
+        CanFrame frame;
+        frame.id = base_id + static_cast<std::uint32_t>(index);
+        frame.size = kClassicBytes;
+        for (std::size_t i = 0; i < layout.signals.size(); ++i)
+            if (layout.signals[i].classic.frame == index) put_signal(frame.data, layout.signals[i].classic, raw[i]);
+        frame.data[kClassicCounterByte] = counter;
+        frame.data[kClassicCrcByte] = classic_crc(frame);
+        set.push(frame);
+    }
+    return set;
 }
 
 CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,

@@ -37,10 +37,29 @@ inline constexpr std::int64_t kNotAvailable = std::numeric_limits<std::int64_t>:
 /// Raw values in the order of the layout's signals.
 using RawSignals = std::array<std::int64_t, kMaxSignals>;
 
-/// Frame `index` of the classic form. Raw values are within the signal's range for classic CAN (or "not
-/// available").
-[[nodiscard]] CanFrame encode_classic(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
-                                      std::uint32_t base_id, std::size_t index) noexcept;
+/// The frames of one message.
+class FrameSet {
+public:
+    FrameSet() = default;
+    explicit FrameSet(const CanFrame& frame) noexcept { push(frame); }
+    void push(const CanFrame& frame) noexcept { frames_[size_++] = frame; }
+
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] auto begin() const noexcept { return frames_.begin(); }
+    [[nodiscard]] auto end() const noexcept { return frames_.begin() + static_cast<std::ptrdiff_t>(size_); }
+    [[nodiscard]] auto begin() noexcept { return frames_.begin(); }
+    [[nodiscard]] auto end() noexcept { return frames_.begin() + static_cast<std::ptrdiff_t>(size_); }
+    [[nodiscard]] const CanFrame& operator[](std::size_t i) const noexcept { return frames_[i]; }
+    [[nodiscard]] CanFrame& operator[](std::size_t i) noexcept { return frames_[i]; }
+
+private:
+    std::array<CanFrame, 10> frames_{};
+    std::size_t size_ = 0;
+};
+
+/// The classic form. Raw values are within the signal's range for classic CAN (or "not available").
+[[nodiscard]] FrameSet encode_classic(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
+                                      std::uint32_t base_id) noexcept;
 /// The one frame of the FD form.
 [[nodiscard]] CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
                                  std::uint32_t base_id) noexcept;

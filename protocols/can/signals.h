@@ -13,6 +13,7 @@
 #include <span>
 #include <string_view>
 
+#include "protocols/can/identifiers.h"
 #include "protocols/estimate.h"
 
 namespace narpa {
@@ -67,8 +68,6 @@ struct SetLayout {
     std::uint16_t fd_counter_bit = 0;  ///< where the counter lies in the FD frame; 0: no FD form
 };
 
-inline constexpr std::uint32_t kFdOffset = 15;    ///< identifier of the FD form: base + 15
-inline constexpr std::uint32_t kBaseIdStep = 16;  ///< base identifiers are multiples of this
 inline constexpr std::size_t kClassicBytes = 8, kFdBytes = 64;
 inline constexpr int kClassicPayloadBits = 48;
 inline constexpr int kClassicCounterByte = 6, kClassicCrcByte = 7, kFdCrcByte = 62;

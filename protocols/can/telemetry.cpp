@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocols/can/messages.h"
-#include "protocols/can/signal_values.h"
+#include "protocols/can/message_codec.h"
 
 namespace narpa {
 namespace {
@@ -73,9 +72,7 @@ void from_raw(const Signal&, std::int64_t raw, std::int64_t, const auto&, Whole&
 }
 
 FrameLedger ledger_of(const RawSignals& raw, std::int64_t t_reference_ns) noexcept {
-    const auto clock = [&](std::int64_t value) {
-        return unwrap_time(static_cast<std::uint64_t>(value), kTimeBits, t_reference_ns);
-    };
+    const auto clock = [&](std::int64_t value) { return time_of(value, t_reference_ns); };
     const std::int64_t t_mid_ns = clock(raw[kExposureMid]);
     FrameLedger l;
     for (std::size_t i = 0; i < kLedgerFields.size(); ++i)
@@ -83,14 +80,6 @@ FrameLedger ledger_of(const RawSignals& raw, std::int64_t t_reference_ns) noexce
                     [&](auto& value) { from_raw(kLedgerSignals[i], raw[i], t_mid_ns, clock, value); });
     if (raw[kPoseKnown] == 0) l.t_pose_ns = 0;
     return l;
-}
-
-DecodeStatus known_choices(const RawSignals& raw) noexcept {
-    for (std::size_t i = 0; i < kLedgerSignals.size(); ++i) {
-        const auto choices = static_cast<std::int64_t>(kLedgerSignals[i].choices.size());
-        if (choices > 0 && raw[i] >= choices) return DecodeStatus::not_a_number;
-    }
-    return DecodeStatus::complete;
 }
 
 }  // namespace
@@ -103,15 +92,13 @@ CanFrame encode(const Heartbeat& heartbeat) noexcept {
     raw[kHeartbeatStale] = heartbeat.stale;
     raw[kHeartbeatDeadlineMissed] = heartbeat.deadline_missed;
     raw[kHeartbeatOutputDropped] = heartbeat.output_dropped;
-    return encode_classic(kHeartbeatLayout, raw, heartbeat.counter, kHeartbeatId, 0);
+    return encode_classic(kHeartbeatLayout, raw, heartbeat.counter, kHeartbeatId)[0];
 }
 
 DecodeStatus decode(const CanFrame& frame, std::int64_t t_reference_ns, Heartbeat& out) noexcept {
-    constexpr auto known_state = [](const RawSignals& raw) noexcept {
-        return raw[kHeartbeatState] < static_cast<std::int64_t>(kRunStates.size()) ? DecodeStatus::complete
-                                                                                   : DecodeStatus::not_a_number;
-    };
-    SetDecoder set(kHeartbeatLayout, kHeartbeatId, known_state);
+    SetDecoder set(kHeartbeatLayout, kHeartbeatId, [](const RawSignals& raw) noexcept {
+        return has_known_choices(raw, kHeartbeatSignals) ? DecodeStatus::complete : DecodeStatus::not_a_number;
+    });
     const DecodeStatus status = set.accept(frame);
     if (status != DecodeStatus::complete) return status;
     const RawSignals& raw = set.raw();
@@ -126,28 +113,20 @@ DecodeStatus decode(const CanFrame& frame, std::int64_t t_reference_ns, Heartbea
     return status;
 }
 
-LedgerFrames encode_classic(const FrameLedger& ledger) noexcept {
-    const RawSignals raw = raw_of(ledger);
-    LedgerFrames out;
-    for (std::size_t i = 0; i < out.size(); ++i)
-        out[i] = encode_classic(kLedgerLayout, raw, static_cast<std::uint8_t>(ledger.frame),
-                                ledger_base_id(ledger.camera), i);
-    return out;
-}
-
-CanFrame encode_fd(const FrameLedger& ledger) noexcept {
-    return encode_fd(kLedgerLayout, raw_of(ledger), static_cast<std::uint8_t>(ledger.frame),
-                     ledger_base_id(ledger.camera));
-}
-
-LedgerDecoder::LedgerDecoder(std::uint8_t camera) noexcept
-    : set_(kLedgerLayout, ledger_base_id(camera), known_choices) {}
-
-DecodeStatus LedgerDecoder::accept(const CanFrame& frame, std::int64_t t_reference_ns, FrameLedger& out) noexcept {
-    const DecodeStatus status = set_.accept(frame);
-    if (status != DecodeStatus::complete) return status;
-    out = ledger_of(set_.raw(), t_reference_ns);
-    return status;
-}
+template <>
+struct Codec<FrameLedger> {
+    static constexpr const SetLayout& layout = kLedgerLayout;
+    static std::uint32_t base_id(std::uint8_t camera) noexcept { return ledger_base_id(camera); }
+    static std::uint8_t camera(const FrameLedger& l) noexcept { return l.camera; }
+    static std::uint8_t counter(const FrameLedger& l) noexcept { return static_cast<std::uint8_t>(l.frame); }
+    static RawSignals raw_of(const FrameLedger& l) noexcept { return narpa::raw_of(l); }
+    static DecodeStatus check(const RawSignals& raw) noexcept {
+        return has_known_choices(raw, kLedgerSignals) ? DecodeStatus::complete : DecodeStatus::not_a_number;
+    }
+    static void read(const RawSignals& raw, std::uint8_t, std::int64_t t_reference_ns, FrameLedger& out) noexcept {
+        out = ledger_of(raw, t_reference_ns);
+    }
+};
+NARPA_CAN_MESSAGE(FrameLedger);
 
 }  // namespace narpa

@@ -9,7 +9,7 @@
 
 #include "drivers/can/descriptor.h"
 #include "drivers/can/remote_clock.h"
-#include "protocols/can/closed_loop.h"
+#include "protocols/can/messages.h"
 #include "rehearsal/dynamics/flight_log.h"
 #include "rehearsal/dynamics/simulation.h"
 
@@ -190,12 +190,12 @@ private:
         AttitudeReport attitude = simulation_.measure_attitude();
         attitude.t_ns = clock_time_ns();
         attitude.counter = attitude_counter_++;
-        if (auto sent = send_message(attitude); !sent) return sent;
+        if (auto sent = send(encode(attitude, fd_)); !sent) return sent;
         return send_poses();
     }
 
     Status send_report(DynamicsPhase phase) {
-        return send_message(DynamicsReport{report_counter_++, clock_time_ns(), t_start_ns_, phase});
+        return send(encode(DynamicsReport{report_counter_++, clock_time_ns(), t_start_ns_, phase}, fd_));
     }
 
     /// The chaser last: with its command the emulator may go on to this time.
@@ -211,25 +211,15 @@ private:
 
     Status send_pose(Body& body, const Motion& motion) {
         const PoseCommand command{body.counter++, clock_time_ns(), motion};
-        PoseFrames classic;
-        CanFrame fd;
-        const EncodeStatus encoded =
-            fd_ ? encode_fd(command, body.base_id, fd) : encode_classic(command, body.base_id, classic);
-        if (!encoded)
+        FrameSet frames;
+        if (const EncodeStatus encoded = encode(command, body.base_id, fd_, frames); !encoded)
             return failed(fmt::format("pose of \"{}\" at {:.3f} s: {}", body.name, now_s(), encoded.text()));
         ++poses_;
-        return fd_ ? send({&fd, 1}) : send(classic);
-    }
-
-    template <class Message>
-    Status send_message(const Message& message) {
-        if (!fd_) return send(encode_classic(message));
-        const CanFrame frame = encode_fd(message);
-        return send({&frame, 1});
+        return send(frames);
     }
 
     /// In real time what does not go is dropped, and the bus counts it; in lockstep it must go.
-    Status send(std::span<const CanFrame> frames) {
+    Status send(const FrameSet& frames) {
         const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.patience_s * 1e9);
         for (const CanFrame& frame : frames)
             while (!bus_.send(frame) && options_.lockstep && !stop_) {

@@ -63,11 +63,9 @@ BusRecord::News BusRecord::accept(const CanFrame& frame, std::int64_t t_referenc
         heartbeats.output_dropped += beat.output_dropped;
         heartbeats.lockstep |= beat.state == RunState::lockstep;
         news.heartbeat = true;
-    } else if (frame.id >= kTelemetryBaseId && frame.id < kHeartbeatId - 1) {
+    } else if (const auto camera = ledger_camera(frame.id)) {
         FrameLedger ledger;
-        if (count(ledger_decoders_[(frame.id - kTelemetryBaseId) / kBaseIdStep].accept(frame, t_reference_ns,
-                                                                                       ledger)))
-            ledgers.push_back(ledger);
+        if (take(ledger_decoders_[*camera], frame, t_reference_ns, ledger)) ledgers.push_back(ledger);
     }
     news.estimates = judge_waiting();
     return news;

@@ -12,7 +12,6 @@
 #include <optional>
 #include <vector>
 
-#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 #include "protocols/closed_loop.h"
 #include "protocols/ledger.h"

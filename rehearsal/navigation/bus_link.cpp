@@ -31,20 +31,13 @@ std::vector<FrameNotice> BusLink::take_notices() {
 }
 
 template <class Message>
-bool BusLink::send_as_the_bus_can(const Message& message) {
-    if (bus_->carries_fd()) return bus_->send(encode_fd(message));
+bool BusLink::send(const Message& message) {
     bool all = true;
-    for (const CanFrame& frame : encode_classic(message)) all = bus_->send(frame) && all;
+    for (const CanFrame& frame : encode(message, bus_->carries_fd())) all = bus_->send(frame) && all;
     return all;
 }
-
-bool BusLink::send(const NavigationEstimate& estimate) {
-    return send_as_the_bus_can(estimate);
-}
-
-bool BusLink::send(const ActuatorCommand& command) {
-    return send_as_the_bus_can(command);
-}
+template bool BusLink::send(const NavigationEstimate&);
+template bool BusLink::send(const ActuatorCommand&);
 
 std::uint64_t BusLink::bad_messages() const noexcept {
     std::uint64_t n = 0;

@@ -10,7 +10,6 @@
 
 #include "drivers/can/can_bus.h"
 #include "drivers/can/remote_clock.h"
-#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 
 namespace narpa::rehearsal {
@@ -37,8 +36,8 @@ public:
     [[nodiscard]] std::vector<FrameNotice> take_notices();
 
     /// False: the bus did not take all of it.
-    bool send(const NavigationEstimate& estimate);
-    bool send(const ActuatorCommand& command);
+    template <class Message>
+    bool send(const Message& message);
 
     /// Messages that could not be read.
     [[nodiscard]] std::uint64_t bad_messages() const noexcept;
@@ -46,9 +45,6 @@ public:
     [[nodiscard]] std::string description() const { return bus_->description(); }
 
 private:
-    template <class Message>
-    bool send_as_the_bus_can(const Message& message);
-
     std::unique_ptr<CanBus> bus_;
     RemoteClock clock_;
     MessageDecoder<DynamicsReport> dynamics_decoder_;

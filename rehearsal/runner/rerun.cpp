@@ -9,7 +9,6 @@
 #include <fstream>
 
 #include "protocols/can/candump.h"
-#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/runner/child_process.h"
 
@@ -84,23 +83,9 @@ std::string describe_message(const Scenario& s, const std::string& line) {
     CandumpLine parsed;
     if (line.empty()) return "nothing more";
     if (parse_candump(line, parsed) != nullptr) return line;
-    struct Kind {
-        std::uint32_t base;
-        std::string name;
-    };
-    std::vector<Kind> kinds{
-        {s.target.can_id, "pose of " + s.target.body}, {s.chaser.can_id, "pose of " + s.chaser.body},
-        {kEstimateBaseId, "emulator's estimate"},      {kActuatorBaseId, "thruster command"},
-        {kNavigationBaseId, "navigation estimate"},    {kAttitudeBaseId, "attitude report"},
-        {kDynamicsBaseId, "dynamics report"}};
-    if (s.attractor) kinds.push_back({s.attractor->second, "pose of " + s.attractor->first});
-    const std::uint32_t id = parsed.frame.id;
-    std::string what = "frame";
-    if (id == kHeartbeatId) what = "heartbeat";
-    if (id >= kTelemetryBaseId && id < kHeartbeatId - 1)
-        what = fmt::format("ledger of camera {}, part {}", (id - kTelemetryBaseId) / kBaseIdStep, id % kBaseIdStep);
-    for (const Kind& k : kinds)
-        if (id / kBaseIdStep == k.base / kBaseIdStep) what = fmt::format("{}, part {}", k.name, id % kBaseIdStep);
+    std::vector<CanBody> bodies{{s.target.body, s.target.can_id}, {s.chaser.body, s.chaser.can_id}};
+    if (s.attractor) bodies.push_back({s.attractor->first, s.attractor->second});
+    const std::string what = message_name(parsed.frame.id, bodies);
     return fmt::format("t = {:.6f} s: {} ({})", static_cast<double>(parsed.t_ns) * 1e-9, what,
                        line.substr(line.rfind(' ') + 1));
 }

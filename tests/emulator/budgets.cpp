@@ -126,7 +126,7 @@ std::vector<FrameLedger> fly(CanBus& hub, const std::vector<PoseCommand>& comman
     const auto bus = open_or_fail("slcan:" + std::to_string(hub_port(hub)), CanRole::client);
     if (!bus) return {};
     for (const PoseCommand& command : commands) {
-        PoseFrames encoded;
+        FrameSet encoded;
         EXPECT_TRUE(encode_classic(command, 0x100, encoded));
         for (const CanFrame& frame : encoded) EXPECT_TRUE(bus->send(frame));
     }

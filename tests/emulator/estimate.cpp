@@ -112,7 +112,7 @@ TEST_F(EstimateTest, GoesOutOnCan) {
     const auto bus = open_or_fail("slcan:" + std::to_string(hub_port((*emulator)->can()->bus())), CanRole::client);
     ASSERT_NE(bus, nullptr);
     for (const PoseCommand& command : approach_commands(4)) {
-        PoseFrames encoded;
+        FrameSet encoded;
         ASSERT_TRUE(encode_classic(command, 0x100, encoded));
         for (const CanFrame& frame : encoded) EXPECT_TRUE(bus->send(frame));
     }

@@ -1,6 +1,5 @@
 // What dynamics and navigation say to each other on CAN: both forms carry the same, and nothing else is let
 // through.
-#include "protocols/can/closed_loop.h"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "protocols/can/closed_loop_signals.h"
 #include "protocols/can/crc.h"
 #include "protocols/can/messages.h"
 

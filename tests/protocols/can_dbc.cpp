@@ -25,7 +25,7 @@ std::string shipped_text() {
 }
 
 TEST(CanDbc, ShippedFileIsTheGeneratedOne) {
-    const std::array<DbcBody, 1> bodies{{{"chaser", kBase}}};
+    const std::array<CanBody, 1> bodies{{{"chaser", kBase}}};
     const std::string generated = write_dbc(bodies);
     if (generated == shipped_text()) return;
     const std::string path = NARPA_BUILD_DIR "/narpa.dbc";
@@ -34,7 +34,7 @@ TEST(CanDbc, ShippedFileIsTheGeneratedOne) {
 }
 
 TEST(CanDbc, NamesBecomeSymbols) {
-    const std::array<DbcBody, 2> bodies{{{"7 of 9", 0x20}, {"port-side", 0x30}}};
+    const std::array<CanBody, 2> bodies{{{"7 of 9", 0x20}, {"port-side", 0x30}}};
     const std::string text = write_dbc(bodies, 2);
     EXPECT_NE(text.find("BO_ 32 _7_of_9_Time: 8 Commander\n"), std::string::npos);
     EXPECT_NE(text.find("BO_ 63 port_side_Pose: 64 Commander\n"), std::string::npos);
@@ -89,7 +89,7 @@ TEST(CanDbc, CanmatrixEncodesWhatWeDecode) {
     std::string text;
     PoseDecoder decoder(kBase);
     for (const PoseCommand& sent : commands) {
-        PoseFrames frames;
+        FrameSet frames;
         PoseCommand expected, out;
         ASSERT_TRUE(encode_classic(sent, kBase, frames));
         ASSERT_EQ(decode_all(frames, kBase, sent.t_valid_ns, expected), PoseStatus::complete);

@@ -135,7 +135,7 @@ TEST(CanHostile, PoseFrames) {
     std::vector<CanFrame> good;
     for (int i = 0; i < 4; ++i) {
         const PoseCommand c = random_command(rng, 1e4);
-        PoseFrames frames;
+        FrameSet frames;
         ASSERT_TRUE(encode_classic(c, 0x100, frames));
         good.insert(good.end(), frames.begin(), frames.end());
         ASSERT_TRUE(encode_fd(c, 0x100, good.emplace_back()));

@@ -23,8 +23,8 @@ PoseCommand command_at(std::int64_t t_valid_ns, std::uint8_t counter) {
     return c;
 }
 
-PoseFrames classic(const PoseCommand& c, std::uint32_t base_id = kBase) {
-    PoseFrames frames;
+FrameSet classic(const PoseCommand& c, std::uint32_t base_id = kBase) {
+    FrameSet frames;
     const EncodeStatus status = encode_classic(c, base_id, frames);
     EXPECT_TRUE(status) << status.text();
     return frames;
@@ -54,7 +54,7 @@ TEST(CanPose, ClassicLayoutIsTheDocumentedOne) {
     c.motion.T_world_body = {{1, 0, 0, 0}, {1, -1e-6, 0}};
     c.motion.velocity_m_s = {2e-5, 0, 0};
     c.motion.rate_rad_s = {-2e-5, 0, 0};
-    const PoseFrames frames = classic(c);
+    const FrameSet frames = classic(c);
     using Bytes = std::array<std::uint8_t, 7>;
     const auto head = [&](std::size_t i) {
         Bytes b{};
@@ -121,7 +121,7 @@ TEST(CanPose, DecodedPoseEncodesToTheSameFrames) {
         PoseCommand c = random_command(rng, 1e5);
         PoseCommand decoded;
         ASSERT_EQ(decode_all(classic(c), kBase, c.t_valid_ns, decoded), PoseStatus::complete);
-        const PoseFrames first = classic(c), again = classic(decoded);
+        const FrameSet first = classic(c), again = classic(decoded);
         for (const std::size_t f : {0, 1, 2, 3, 6, 7, 8}) ASSERT_EQ(first[f].data, again[f].data) << f;
         // The attitude was normalised in between, which may move its last bit.
         ASSERT_LE(angle_between(c.motion.T_world_body.q, decoded.motion.T_world_body.q), 5e-7);
@@ -176,7 +176,7 @@ TEST(CanPose, TakesEffectInAnyOrder) {
     PoseCommand in_order;
     ASSERT_EQ(decode_all(classic(sent), kBase, 0, in_order), PoseStatus::complete);
     for (int i = 0; i < 500; ++i) {
-        PoseFrames frames = classic(sent);
+        FrameSet frames = classic(sent);
         std::shuffle(frames.begin(), frames.end(), rng);
         PoseDecoder decoder(kBase);
         PoseCommand out;
@@ -185,7 +185,7 @@ TEST(CanPose, TakesEffectInAnyOrder) {
             ASSERT_EQ(decoder.accept(frames[k], 0, out), PoseStatus::partial);
             ASSERT_EQ(out.counter, 99);  // untouched until it is whole
         }
-        ASSERT_EQ(decoder.accept(frames.back(), 0, out), PoseStatus::complete);
+        ASSERT_EQ(decoder.accept(frames[frames.size() - 1], 0, out), PoseStatus::complete);
         ASSERT_TRUE(same(out, in_order));
     }
 }
@@ -193,7 +193,7 @@ TEST(CanPose, TakesEffectInAnyOrder) {
 TEST(CanPose, NewCounterDropsThePartialSet) {
     PoseDecoder decoder(kBase);
     PoseCommand out;
-    const PoseFrames first = classic(command_at(1'000'000, 10)), second = classic(command_at(2'000'000, 11));
+    const FrameSet first = classic(command_at(1'000'000, 10)), second = classic(command_at(2'000'000, 11));
     for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(decoder.accept(first[i], 0, out), PoseStatus::partial);
     for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(decoder.accept(second[i], 0, out), PoseStatus::partial);
     EXPECT_EQ(decoder.count(PoseStatus::incomplete_set), 1u);
@@ -209,7 +209,7 @@ TEST(CanPose, NewCounterDropsThePartialSet) {
 TEST(CanPose, OtherContentUnderTheSameCounterIsAnotherSet) {
     PoseDecoder decoder(kBase);
     PoseCommand out;
-    const PoseFrames first = classic(command_at(1'000'000, 10)), second = classic(command_at(2'000'000, 10));
+    const FrameSet first = classic(command_at(1'000'000, 10)), second = classic(command_at(2'000'000, 10));
     EXPECT_EQ(decoder.accept(first[0], 0, out), PoseStatus::partial);
     EXPECT_EQ(decoder.accept(first[1], 0, out), PoseStatus::partial);
     EXPECT_EQ(decoder.accept(second[0], 0, out), PoseStatus::partial);
@@ -244,7 +244,7 @@ TEST(CanPose, RestartedSenderMayUseTheLastCounterAgain) {
 TEST(CanPose, DuplicatesAreNamed) {
     PoseDecoder decoder(kBase);
     PoseCommand out;
-    const PoseFrames frames = classic(command_at(1, 1));
+    const FrameSet frames = classic(command_at(1, 1));
     EXPECT_EQ(decoder.accept(frames[3], 0, out), PoseStatus::partial);
     EXPECT_EQ(decoder.accept(frames[3], 0, out), PoseStatus::duplicate);
     for (const CanFrame& f : frames) (void)decoder.accept(f, 0, out);
@@ -340,7 +340,7 @@ TEST(CanPose, RejectsEveryFlippedBit) {
 
 TEST(CanPose, RejectsNotAvailable) {
     PoseCommand out;
-    PoseFrames frames = classic(command_at(1, 1));
+    FrameSet frames = classic(command_at(1, 1));
     std::fill_n(frames[2].data.begin(), 6, std::uint8_t{0});
     frames[2].data[5] = 0x80;  // position y = -2^47
     mend_crc(frames[2]);
@@ -360,7 +360,7 @@ TEST(CanPose, RejectsNotAvailable) {
 
 TEST(CanPose, RejectsWhatIsNoRotation) {
     PoseCommand out;
-    PoseFrames frames = classic(command_at(1, 1));
+    FrameSet frames = classic(command_at(1, 1));
     std::fill_n(frames[4].data.begin(), 6, std::uint8_t{0});
     mend_crc(frames[4]);
     EXPECT_EQ(decode_all(frames, kBase, 0, out), PoseStatus::not_unit);
@@ -378,7 +378,7 @@ TEST(CanPose, RejectsWhatIsNoRotation) {
 }
 
 TEST(CanPose, EncodeSaysWhatDoesNotFit) {
-    PoseFrames frames{};
+    FrameSet frames;
     CanFrame frame;
     PoseCommand c = command_at(1, 1);
     c.motion.velocity_m_s.y = 12'000;
@@ -465,7 +465,7 @@ TEST(CanPose, WorkedExampleOfTheReadme) {
     ASSERT_EQ(frames.size(), 10u);
     PoseCommand sent{7, 1'250'000'000, {}};
     sent.motion = {{{0.6, 0, 0.8, 0}, {1, -2, 10.5}}, {0, 0, -0.1}, {0, 0.01, 0}};
-    const PoseFrames expected = classic(sent);
+    const FrameSet expected = classic(sent);
     for (std::size_t i = 0; i < expected.size(); ++i) {
         EXPECT_EQ(frames[i].id, expected[i].id);
         EXPECT_EQ(frames[i].data, expected[i].data);

@@ -9,7 +9,6 @@
 #include <thread>
 
 #include "drivers/can/buses.h"
-#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
 #include "tests/rehearsal/dynamics_support.h"
@@ -45,8 +44,7 @@ public:
     }
     void beat(std::int64_t t_ns, RunState state) { bus_.send(encode(Heartbeat{t_ns, state})); }
     void command(const ActuatorCommand& c) {
-        if (bus_.carries_fd()) return void(bus_.send(encode_fd(c)));
-        for (const CanFrame& f : encode_classic(c)) bus_.send(f);
+        for (const CanFrame& f : encode(c, bus_.carries_fd())) bus_.send(f);
     }
 
     /// Where the ports are by the newest pose commands.

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/judge/judge.h"
 
@@ -98,12 +97,9 @@ public:
     }
 
 private:
-    template <std::size_t N>
-    void put(const std::array<CanFrame, N>& set) {
-        frames.insert(frames.end(), set.begin(), set.end());
-    }
+    void put(const FrameSet& set) { frames.insert(frames.end(), set.begin(), set.end()); }
     void pose(std::uint32_t id, double t_s, const Motion& motion) {
-        PoseFrames set;
+        FrameSet set;
         if (encode_classic(PoseCommand{counter_++, ns(t_s), motion}, id, set)) put(set);
     }
 

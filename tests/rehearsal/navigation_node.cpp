@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "drivers/video/video_sink.h"
-#include "protocols/can/closed_loop.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
 #include "tests/rehearsal/simulated_sensors.h"

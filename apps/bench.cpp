@@ -5,15 +5,10 @@
 
 namespace narpa::cli {
 
-Command add_bench(CLI::App& app) {
-    CLI::App* bench = app.add_subcommand("bench", "Measure speed against error");
-    bench->require_subcommand(1);
+Command add_bench(Parser app) {
+    const Parser bench = app.subcommand("bench", "Measure speed against error");
     auto chosen = std::make_shared<Command>();
-    for (const auto& add : {add_bench_render, add_bench_loop, add_bench_estimate}) {
-        const Command command = add(*bench);
-        CLI::App* subcommand = bench->get_subcommands([](const CLI::App*) { return true; }).back();
-        subcommand->final_callback([chosen, command] { *chosen = command; });
-    }
+    bench.choice<Command>({add_bench_render, add_bench_loop, add_bench_estimate}, *chosen);
     return [chosen] { return (*chosen)(); };
 }
 

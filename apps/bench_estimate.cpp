@@ -1,20 +1,29 @@
 // narpa bench estimate - each estimator: error against its bound, failures, time.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 
+#include "apps/bench.h"
+#include "apps/bench_scene.h"
 #include "bench/approach.h"
 #include "bench/estimate_plots.h"
 #include "bench/pnp.h"
 #include "bench/stereo.h"
-#include "apps/bench.h"
-#include "apps/bench_scene.h"
 
 namespace narpa::cli {
 namespace {
+
+/// CLI::Range lets NaN through.
+CLI::Validator finite_number() {
+    return {[](std::string& text) {
+                return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+            },
+            ""};
+}
 
 struct Options {
     std::vector<std::string> only;

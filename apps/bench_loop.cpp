@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "bench/loop.h"
 #include "apps/bench.h"
 #include "apps/bench_scene.h"
 #include "apps/budget_options.h"
+#include "bench/loop.h"
 #include "emulator/realtime.h"
 
 namespace narpa::cli {
@@ -102,33 +102,30 @@ Outcome bench(Options o) {
 
 }  // namespace
 
-Command add_bench_loop(CLI::App& bench_command) {
+Command add_bench_loop(Parser bench_command) {
     auto o = std::make_shared<Options>();
     o->run.duration_s = 10;
-    CLI::App* c = bench_command.add_subcommand(
+    const Parser c = bench_command.subcommand(
         "loop",
         "The real-time loop, alone and beside processes that keep processors busy: jitter, latency, deadlines");
-    c->add_option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that narpa brings along)");
-    c->add_option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
-        ->check(CLI::Range(0.1, 86400.0))
-        ->capture_default_str();
-    CLI::Option* load = c->add_option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)")
-                            ->delimiter(',')
-                            ->allow_extra_args(false);
-    CLI::Option* busy = c->add_option("--busy", o->busy, "So many processes that keep processors busy (default: 1)")
-                            ->check(CLI::Range(1, kCpusMax))
-                            ->excludes(load);
-    c->add_flag("--idle-only", o->idle_only, "No run beside load")->excludes(load)->excludes(busy);
-    o->budget.add_to(*c);
-    c->add_option("--cpus", o->cpus,
-                  "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one");
-    c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
-        ->check(CLI::Range(0, 1024));
-    c->add_option("--late-max", o->late_max_percent, "Percent of the frames that may be handed over late")
-        ->check(CLI::Range(0.0, 100.0))
-        ->capture_default_str();
-    c->add_option("-o,--output", o->plot, "FILE.png: how many frames exceed which time");
-    c->footer(
+    c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that narpa brings along)");
+    c.option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
+        .range(0.1, 86400.0)
+        .shows_default();
+    const Option load =
+        c.option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)").comma_separated();
+    const Option busy = c.option("--busy", o->busy, "So many processes that keep processors busy (default: 1)")
+                            .range(1, kCpusMax)
+                            .excludes(load);
+    c.flag("--idle-only", o->idle_only, "No run beside load").excludes(load).excludes(busy);
+    o->budget.add_to(c);
+    c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one");
+    c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
+    c.option("--late-max", o->late_max_percent, "Percent of the frames that may be handed over late")
+        .range(0.0, 100.0)
+        .shows_default();
+    c.option("-o,--output", o->plot, "FILE.png: how many frames exceed which time");
+    c.footer(
         "Exit status 1 where a frame is not whole, more frames are late than --late-max, none fell due, or the "
         "bench was interrupted.");
     return [o] { return bench(*o); };

@@ -1,5 +1,6 @@
 // narpa bench render - how fast the error of a picture falls: RMSE, bias and time at several numbers of samples.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -7,12 +8,12 @@
 #include <cstdio>
 #include <memory>
 
-#include "bench/convergence.h"
-#include "bench/convergence_plot.h"
-#include "emulator/camera_unit.h"
 #include "apps/bench.h"
 #include "apps/bench_ladder.h"
 #include "apps/bench_scene.h"
+#include "bench/convergence.h"
+#include "bench/convergence_plot.h"
+#include "emulator/camera_unit.h"
 #include "emulator/clock.h"
 #include "emulator/threads.h"
 

@@ -4,17 +4,16 @@
 
 namespace narpa::cli {
 
-void BudgetOptions::add_to(CLI::App& app) {
-    CLI::Option* samples =
-        app.add_option("--spp", spp, "Samples per pixel instead of the scene's")->check(CLI::Range(1, 65535));
-    CLI::Option* time =
-        app.add_option("--budget-ms", budget_ms, "A frame as good as it gets in so many milliseconds, instead")
-            ->check(CLI::Range(0.001, 1e6));
-    CLI::Option* rays =
-        app.add_option("--budget-rays", budget_rays, "A frame as good as it gets with so many rays, instead")
-            ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000}));
-    samples->excludes(time)->excludes(rays);
-    time->excludes(rays);
+void BudgetOptions::add_to(Parser app) {
+    const Option samples = app.option("--spp", spp, "Samples per pixel instead of the scene's").range(1, 65535);
+    const Option time =
+        app.option("--budget-ms", budget_ms, "A frame as good as it gets in so many milliseconds, instead")
+            .range(0.001, 1e6);
+    const Option rays =
+        app.option("--budget-rays", budget_rays, "A frame as good as it gets with so many rays, instead")
+            .range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000});
+    samples.excludes(time).excludes(rays);
+    time.excludes(rays);
 }
 
 void BudgetOptions::override_scene(RenderSettings& render) const {

@@ -1,10 +1,10 @@
 /// apps/budget_options.h - --spp, --budget-ms, --budget-rays: one of them, in place of what the scene says.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <optional>
 
+#include "apps/options.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa::cli {
@@ -14,7 +14,7 @@ struct BudgetOptions {
     std::optional<double> budget_ms;
     std::optional<std::uint64_t> budget_rays;
 
-    void add_to(CLI::App& app);
+    void add_to(Parser app);
     void override_scene(RenderSettings& render) const;
 };
 

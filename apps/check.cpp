@@ -239,14 +239,14 @@ Outcome check(const Options& o) {
 
 }  // namespace
 
-Command add_check(CLI::App& app) {
+Command add_check(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c =
-        app.add_subcommand("check", "Is the scene good, and can this machine run it? Names what is missing");
-    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
-    c->add_option("DEVICE", o->devices,
-                  "Devices that the run will need, to be tried: vcan0, slcan:PORT, /dev/video10 ...");
-    c->add_option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
+    const Parser c =
+        app.subcommand("check", "Is the scene good, and can this machine run it? Names what is missing");
+    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("DEVICE", o->devices,
+             "Devices that the run will need, to be tried: vcan0, slcan:PORT, /dev/video10 ...");
+    c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
     return [o] { return check(*o); };
 }
 

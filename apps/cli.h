@@ -2,13 +2,14 @@
 /// JSON document of --json to standard output; exit status: base/result.h.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "apps/options.h"
 #include "base/result.h"
 #include "renderer/scene/scene.h"
 
@@ -20,18 +21,16 @@ using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 
 /// Each adds its subcommand and returns what runs when it is chosen.
-Command add_check(CLI::App& app);
-Command add_run(CLI::App& app);
-Command add_fly(CLI::App& app);
-Command add_render(CLI::App& app);
-Command add_scan(CLI::App& app);
-Command add_bench(CLI::App& app);
-Command add_replay(CLI::App& app);
-Command add_estimate(CLI::App& app);
-Command add_rehearse(CLI::App& app);
+Command add_check(Parser app);
+Command add_run(Parser app);
+Command add_fly(Parser app);
+Command add_render(Parser app);
+Command add_scan(Parser app);
+Command add_bench(Parser app);
+Command add_replay(Parser app);
+Command add_estimate(Parser app);
+Command add_rehearse(Parser app);
 
-/// For numbers: CLI::Range lets NaN through.
-[[nodiscard]] CLI::Validator finite_number();
 /// Words for people, on standard error.
 void say(std::string_view text);
 /// Reads a scene, with another method than its own if one is given, and tells its warnings.

@@ -21,7 +21,7 @@ struct Options {
     int every = 1;
     TrackerFlags tracker;
     OneOptions one;  ///< of a single file
-    std::vector<const CLI::Option*> only_of_files, only_of_logs;
+    std::vector<Option> only_of_files, only_of_logs;
 };
 
 /// Frames are made again, bit for bit, and looked at one after another as navigation would.
@@ -90,9 +90,9 @@ Outcome estimate(const Options& o) {
     if (!tracker) return tracker.error();
     std::error_code error;
     const bool of_log = std::filesystem::is_directory(o.input, error);
-    for (const CLI::Option* option : of_log ? o.only_of_files : o.only_of_logs)
-        if (option->count() > 0)
-            return Error{fmt::format("{} goes with {}", option->get_name(),
+    for (const Option& option : of_log ? o.only_of_files : o.only_of_logs)
+        if (option.given())
+            return Error{fmt::format("{} goes with {}", option.name(),
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
     if (of_log) return estimate_log(o, *tracker);
@@ -109,35 +109,34 @@ Outcome estimate(const Options& o) {
 
 }  // namespace
 
-Command add_estimate(CLI::App& app) {
+Command add_estimate(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand(
+    const Parser c = app.subcommand(
         "estimate",
         "Estimate the target's pose from a logged run, a frame or a sweep, beside the truth and the bound");
-    c->add_option("INPUT", o->input, "Folder that `run --log` has written, or a scene file with --frame or --sweep")
-        ->required();
-    c->add_option("--camera,--lidar", o->camera, "Name of the camera or LiDAR (default: the first of the scene)");
-    c->add_option("--frame", o->one.frame,
-                  "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
-    c->add_option("--sweep", o->one.sweep, "FILE.pcap: the LiDAR's data packets, from the first on for one turn");
-    c->add_option("--time", o->one.time_s, "Simulation time of the frame or the sweep's first shot, s")
-        ->check(CLI::Range(-9e9, 9e9) & finite_number());
-    c->add_option("--range-noise", o->one.range_noise_m, "Standard deviation of the sweep's ranges, m")
-        ->check(CLI::Range(1e-6, 1e3))
-        ->capture_default_str();
-    o->one.pose.add_to(*c);
-    c->add_option("--scene", o->scene, "Scene file (default: the one that the run had)");
-    o->tracker.add_to(*c, "");
-    c->add_option("--every", o->every, "Look at each so-many-th frame")->check(CLI::Range(1, 1000000));
-    c->add_option("--threads", o->one.threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
-    c->add_option("--csv", o->csv, "FILE.csv: a row for each frame");
-    c->add_option("-o,--output", o->picture,
-                  "FILE.png: errors over time, with three standard deviations and bound");
+    c.option("INPUT", o->input, "Folder that `run --log` has written, or a scene file with --frame or --sweep")
+        .required();
+    c.option("--camera,--lidar", o->camera, "Name of the camera or LiDAR (default: the first of the scene)");
+    c.option("--frame", o->one.frame,
+             "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
+    c.option("--sweep", o->one.sweep, "FILE.pcap: the LiDAR's data packets, from the first on for one turn");
+    c.option("--time", o->one.time_s, "Simulation time of the frame or the sweep's first shot, s")
+        .range(-9e9, 9e9)
+        .finite();
+    c.option("--range-noise", o->one.range_noise_m, "Standard deviation of the sweep's ranges, m")
+        .range(1e-6, 1e3)
+        .shows_default();
+    o->one.pose.add_to(c);
+    c.option("--scene", o->scene, "Scene file (default: the one that the run had)");
+    o->tracker.add_to(c, "");
+    c.option("--every", o->every, "Look at each so-many-th frame").range(1, 1000000);
+    c.option("--threads", o->one.threads, "Threads (default: all cores)").range(0, 1024);
+    c.option("--csv", o->csv, "FILE.csv: a row for each frame");
+    c.option("-o,--output", o->picture, "FILE.png: errors over time, with three standard deviations and bound");
     for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})
-        o->only_of_files.push_back(c->get_option(name));
-    for (const char* name : {"--scene", "--every", "--csv", "--output"})
-        o->only_of_logs.push_back(c->get_option(name));
-    c->footer("Exit status 1 where no frame gave a pose, or a sweep's is not credible.");
+        o->only_of_files.push_back(c.find(name));
+    for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
+    c.footer("Exit status 1 where no frame gave a pose, or a sweep's is not credible.");
     return [o] { return estimate(*o); };
 }
 

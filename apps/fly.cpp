@@ -182,26 +182,23 @@ Outcome fly(const Options& o) {
 
 }  // namespace
 
-Command add_fly(CLI::App& app) {
+Command add_fly(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
-    c->add_option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)")->required();
-    c->add_option("--can", o->bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE")->required();
-    c->add_option("--id", o->ids,
-                  "BODY=ID: base identifier of a body's commands, the scene's can_id (default: 0x100)")
-        ->take_all()
-        ->allow_extra_args(false);
-    c->add_option("--start", o->start_s,
-                  "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)");
-    c->add_option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")
-        ->check(CLI::Range(0.0, 1.0))
-        ->capture_default_str();
-    c->add_option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
-        ->check(CLI::Range(0.0, 3600.0))
-        ->capture_default_str();
-    c->add_flag("--lockstep", o->lockstep,
-                "Send the next command when the emulator's clock has reached the last one");
-    c->add_flag("--classic", o->classic, "Nine classic frames a command even where the bus carries CAN FD");
+    const Parser c = app.subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
+    c.option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)").required();
+    c.option("--can", o->bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").required();
+    c.option("--id", o->ids, "BODY=ID: base identifier of a body's commands, the scene's can_id (default: 0x100)")
+        .repeatable();
+    c.option("--start", o->start_s,
+             "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)");
+    c.option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")
+        .range(0.0, 1.0)
+        .shows_default();
+    c.option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
+        .range(0.0, 3600.0)
+        .shows_default();
+    c.flag("--lockstep", o->lockstep, "Send the next command when the emulator's clock has reached the last one");
+    c.flag("--classic", o->classic, "Nine classic frames a command even where the bus carries CAN FD");
     return [o] { return fly(*o); };
 }
 

@@ -1,22 +1,13 @@
 // narpa - hardware-in-the-loop camera and LiDAR emulator. This file: subcommands, --json, exit status.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 
 #include "apps/cli.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa::cli {
-
-CLI::Validator finite_number() {
-    return {[](std::string& text) {
-                return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
-            },
-            ""};
-}
 
 void say(std::string_view text) {
     fmt::print(stderr, "{}\n", text);
@@ -64,35 +55,23 @@ int finish(const Outcome& outcome, bool json) {
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
 }
 
-int run(int argc, char** argv) {
-    CLI::App app{
-        "narpa stands where a spacecraft's camera and LiDAR would stand: poses in on CAN, camera frames out "
-        "on V4L2, LiDAR packets out on UDP."};
-    app.set_version_flag("--version", NARPA_VERSION);
-    app.require_subcommand(1);
-    app.fallthrough();
-    app.footer(
-        "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.");
-    constexpr const char* kJsonHelp = "Put one JSON document on standard output";
-    bool json = false;
-    app.add_flag("--json", json, kJsonHelp);
+constexpr const char* kDescription =
+    "narpa stands where a spacecraft's camera and LiDAR would stand: poses in on CAN, camera frames out on V4L2, "
+    "LiDAR "
+    "packets out on UDP.";
+constexpr const char* kFooter =
+    "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.";
 
+int run(int argc, char** argv) {
+    bool json = false;
     Command chosen;
-    for (const auto& add :
-         {add_check, add_run, add_fly, add_render, add_scan, add_replay, add_estimate, add_rehearse, add_bench}) {
-        const Command command = add(app);
-        CLI::App* subcommand = app.get_subcommands([](const CLI::App*) { return true; }).back();
-        subcommand->add_flag("--json", json, kJsonHelp);
-        for (CLI::App* part : subcommand->get_subcommands({})) part->add_flag("--json", json, kJsonHelp);
-        subcommand->final_callback([&chosen, command] { chosen = command; });
-    }
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& e) {
-        const int asked_for_help = app.exit(e, std::cout, std::cerr);
-        return asked_for_help == 0 ? 0 : exit_status(ErrorKind::bad_input);
-    }
-    return finish(chosen(), json);
+    const auto add_subcommands = [&](const Parser& app) {
+        app.choice<Command>(
+            {add_check, add_run, add_fly, add_render, add_scan, add_replay, add_estimate, add_rehearse, add_bench},
+            chosen);
+    };
+    return parse_and_run(argc, argv, {kDescription, NARPA_VERSION, kFooter}, json, add_subcommands,
+                         [&] { return finish(chosen(), json); });
 }
 
 }  // namespace

@@ -32,14 +32,12 @@ Result<Rigid3> parse_pose(const std::string& text) {
 
 }  // namespace
 
-void PoseOptions::add_to(CLI::App& app) {
-    app.add_option("--trajectory", trajectory, "Trajectory or truth log (CSV) that says where bodies are");
-    app.add_option("--pose", poses,
-                   "BODY=x,y,z,qw,qx,qy,qz: puts a body there (metres; body to world), at any time")
-        ->type_name("POSE")
-        ->expected(1)
-        ->take_all()
-        ->allow_extra_args(false);
+void PoseOptions::add_to(Parser app) {
+    app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) that says where bodies are");
+    app.option("--pose", poses, "BODY=x,y,z,qw,qx,qy,qz: puts a body there (metres; body to world), at any time")
+        .type_name("POSE")
+        .values(1, 1)
+        .repeatable();
 }
 
 Status PoseOptions::place(Scene& scene) const {

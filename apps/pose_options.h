@@ -13,7 +13,7 @@ struct PoseOptions {
     std::string trajectory;
     std::vector<std::string> poses;
 
-    void add_to(CLI::App& app);
+    void add_to(Parser app);
     /// --pose: before the world is made. --trajectory: after.
     [[nodiscard]] Status place(Scene& scene) const;
     [[nodiscard]] Status load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const;

@@ -99,42 +99,37 @@ Outcome rehearse(const Options& given) {
 
 }  // namespace
 
-Command add_rehearse(CLI::App& app) {
+Command add_rehearse(Parser app) {
     auto o = std::make_shared<Options>();
     rehearsal::RehearsalOptions& r = o->run;
     r.version = NARPA_VERSION;
-    CLI::App* c = app.add_subcommand(
+    const Parser c = app.subcommand(
         "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");
-    c->add_option("SCENARIO", r.scenario, "Scenario file (default: the docking that comes with narpa)");
-    c->add_option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
-    c->add_flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
-    c->add_option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
-    CLI::Option* runs =
-        c->add_option("--runs", o->runs,
-                      "So many runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
-                      "goes on where it was interrupted")
-            ->check(CLI::Range(1, 100000));
-    c->add_option("--jobs", o->jobs, "Runs at the same time")->check(CLI::Range(1, 256))->needs(runs);
-    c->add_option("--can", r.bus, "BUS: slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
-        ->capture_default_str();
-    c->add_option("--video", o->video,
-                  "CAMERA=DEVICE instead of a FIFO, like nav=/dev/video10; may be given many times")
-        ->take_all()
-        ->allow_extra_args(false);
-    c->add_option(
+    c.option("SCENARIO", r.scenario, "Scenario file (default: the docking that comes with narpa)");
+    c.option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
+    c.flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
+    c.option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
+    const Option runs = c.option("--runs", o->runs,
+                                 "So many runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
+                                 "goes on where it was interrupted")
+                            .range(1, 100000);
+    c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
+    c.option("--can", r.bus, "BUS: slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2").shows_default();
+    c.option("--video", o->video, "CAMERA=DEVICE instead of a FIFO, like nav=/dev/video10; may be given many times")
+        .repeatable();
+    c.option(
         "--dynamics", r.dynamics,
         "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it, "
         "last");
-    c->add_option(
+    c.option(
         "--navigation", r.navigation,
         "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
         "set; says \"ready\" when it listens, or has 10 s; none: you start it, and press Enter when it listens");
-    c->add_option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)")
-        ->check(CLI::Range(0, 1024));
-    c->add_option("--patience", r.patience_s, "Seconds without progress after which it is given up")
-        ->check(CLI::Range(1.0, 86400.0))
-        ->capture_default_str();
-    c->footer("Exit status: 0 all gates passed; 1 one failed; 2 bad input; 3 a device is missing.");
+    c.option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)").range(0, 1024);
+    c.option("--patience", r.patience_s, "Seconds without progress after which it is given up")
+        .range(1.0, 86400.0)
+        .shows_default();
+    c.footer("Exit status: 0 all gates passed; 1 one failed; 2 bad input; 3 a device is missing.");
     return [o] { return rehearse(*o); };
 }
 

@@ -12,10 +12,10 @@
 #include <set>
 #include <thread>
 
-#include "emulator/camera_unit.h"
 #include "apps/budget_options.h"
 #include "apps/cli.h"
 #include "apps/pose_options.h"
+#include "emulator/camera_unit.h"
 #include "emulator/clock.h"
 #include "emulator/threads.h"
 #include "renderer/image/image_file.h"
@@ -189,29 +189,26 @@ Outcome render(const Options& o) {
 
 }  // namespace
 
-Command add_render(CLI::App& app) {
+Command add_render(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand(
+    const Parser c = app.subcommand(
         "render", "Render one frame of a camera, byte for byte as `run` would put it out but for a budget in time");
-    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
-    c->add_option("--camera", o->camera, "Name of the camera (default: the first)");
-    c->add_option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)")
-        ->check(CLI::Range(-9e9, 9e9));
-    c->add_option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
-    o->pose.add_to(*c);
-    c->add_option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
-    o->budget.add_to(*c);
-    c->add_option("--method", o->method, "direct: light straight from its sources; path: all light")
-        ->check(CLI::IsMember({"direct", "path"}));
-    c->add_option("--max-depth", o->max_depth, "With path: surfaces that light may meet on its way")
-        ->check(CLI::Range(1, 40));
-    c->add_option("--seed", o->seed, "Seed instead of the scene's");
-    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
-        ->check(CLI::Range(0, 1024));
-    c->add_option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance");
-    c->add_option("-o,--output", o->out,
-                  "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
-        ->required();
+    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("--camera", o->camera, "Name of the camera (default: the first)");
+    c.option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)").range(-9e9, 9e9);
+    c.option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
+    o->pose.add_to(c);
+    c.option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
+    o->budget.add_to(c);
+    c.option("--method", o->method, "direct: light straight from its sources; path: all light")
+        .one_of({"direct", "path"});
+    c.option("--max-depth", o->max_depth, "With path: surfaces that light may meet on its way").range(1, 40);
+    c.option("--seed", o->seed, "Seed instead of the scene's");
+    c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);
+    c.option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance");
+    c.option("-o,--output", o->out,
+             "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
+        .required();
     return [o] { return render(*o); };
 }
 

@@ -161,23 +161,21 @@ Outcome replay_any(const Options& o) {
 
 }  // namespace
 
-Command add_replay(CLI::App& app) {
+Command add_replay(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand(
+    const Parser c = app.subcommand(
         "replay", "Render the frames of a logged run once more, bit for bit, and tell what their budget cost");
-    c->add_option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written")->required();
-    c->add_option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
-    c->add_option("--scene", o->scene, "Scene file (default: the one that the run had)");
-    c->add_option("--reference", o->reference,
-                  "Compare with so many samples per pixel: error, similarity, shifts of bodies and edges")
-        ->check(CLI::Range(2, 65535));
-    c->add_option("--frames", o->frames,
-                  "Frames to look at, spread over the run (default: all; 10 with --reference)")
-        ->check(CLI::Range(1, 1000000));
-    c->add_option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it")
-        ->check(CLI::Range(0, 1024));
-    c->add_option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
-    c->footer(
+    c.option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written").required();
+    c.option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
+    c.option("--scene", o->scene, "Scene file (default: the one that the run had)");
+    c.option("--reference", o->reference,
+             "Compare with so many samples per pixel: error, similarity, shifts of bodies and edges")
+        .range(2, 65535);
+    c.option("--frames", o->frames, "Frames to look at, spread over the run (default: all; 10 with --reference)")
+        .range(1, 1000000);
+    c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);
+    c.option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
+    c.footer(
         "Exit status 1 where a frame does not repeat bit for bit, or none has an image to repeat. RMSE, bias and "
         "errors are of the mean of the bands, as parts of the radiance that fills the sensor's scale.");
     return [o] { return replay_any(*o); };

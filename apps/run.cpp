@@ -87,40 +87,35 @@ Outcome run(const Options& options) {
 
 }  // namespace
 
-Command add_run(CLI::App& app) {
+Command add_run(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c =
-        app.add_subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
-    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
-    c->add_option("--can", o->run.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE");
-    c->add_option("--video", o->video,
-                  "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
-        ->take_all()
-        ->allow_extra_args(false);
-    c->add_option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")
-        ->take_all()
-        ->allow_extra_args(false);
-    CLI::Option* lockstep = c->add_flag("--lockstep", o->run.lockstep,
-                                        "The clock advances only with commands; no wall time enters any result");
-    c->add_option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
-        ->check(CLI::Range(0.0, 9e9));
-    c->add_option("--log", o->run.log_folder, "Folder for run.json, truth, ledger, CAN log and contact sheet");
-    CLI::Option* estimate =
-        c->add_option(
+    const Parser c =
+        app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
+    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("--can", o->run.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE");
+    c.option("--video", o->video, "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
+        .repeatable();
+    c.option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")
+        .repeatable();
+    const Option lockstep = c.flag("--lockstep", o->run.lockstep,
+                                   "The clock advances only with commands; no wall time enters any result");
+    c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
+        .range(0.0, 9e9);
+    c.option("--log", o->run.log_folder, "Folder for run.json, truth, ledger, CAN log and contact sheet");
+    const Option estimate =
+        c.option(
              "--estimate", o->run.estimate_camera,
              "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
-            ->expected(0, 1);
-    o->estimator.add_to(*c, "estimate-");
+            .values(0, 1);
+    o->estimator.add_to(c, "estimate-");
     for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-seed"})
-        c->get_option(name)->needs(estimate);
-    o->budget.add_to(*c);
-    c->add_option("--cpus", o->cpus,
-                  "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
-        ->excludes(lockstep);
-    c->add_option("--threads", o->run.threads, "Threads that trace rays (default: all cores)")
-        ->check(CLI::Range(0, 1024));
+        c.find(name).needs(estimate);
+    o->budget.add_to(c);
+    c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
+        .excludes(lockstep);
+    c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
     return [o, estimate] {
-        o->estimates = estimate->count() > 0;
+        o->estimates = estimate.given();
         return run(*o);
     };
 }

@@ -190,19 +190,17 @@ Outcome scan(const Options& o) {
 
 }  // namespace
 
-Command add_scan(CLI::App& app) {
+Command add_scan(Parser app) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("scan", "Trace what a LiDAR sees from a time on: points, shots or packets");
-    c->add_option("SCENE", o->scene, "Scene file (TOML)")->required();
-    c->add_option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");
-    c->add_option("--time", o->time_s, "Simulation time in seconds of the first packet")
-        ->check(CLI::Range(0.0, 9e9))
-        ->capture_default_str();
-    c->add_option("--duration", o->duration_s, "Seconds (default: one turn)")->check(CLI::Range(0.0, 3600.0));
-    o->pose.add_to(*c);
-    c->add_option("-o,--output", o->out,
-                  "FILE.ply or .pcd (points), .csv (one row a shot, ranges unquantised), .pcap (packets)")
-        ->required();
+    const Parser c = app.subcommand("scan", "Trace what a LiDAR sees from a time on: points, shots or packets");
+    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");
+    c.option("--time", o->time_s, "Simulation time in seconds of the first packet").range(0.0, 9e9).shows_default();
+    c.option("--duration", o->duration_s, "Seconds (default: one turn)").range(0.0, 3600.0);
+    o->pose.add_to(c);
+    c.option("-o,--output", o->out,
+             "FILE.ply or .pcd (points), .csv (one row a shot, ranges unquantised), .pcap (packets)")
+        .required();
     return [o] { return scan(*o); };
 }
 

@@ -7,19 +7,18 @@
 
 namespace narpa::cli {
 
-void TrackerFlags::add_to(CLI::App& app, const std::string& prefix) {
+void TrackerFlags::add_to(Parser app, const std::string& prefix) {
     const std::string dashes = "--" + prefix;
-    app.add_option(dashes + "target", tracker.target,
-                   "Body whose pose is looked for (default: the first with a mesh that does not carry the camera)");
-    app.add_option(dashes + "method", method,
-                   "features: points of the frame and of a render; dense: all pixels, from where the points lead")
-        ->check(CLI::IsMember({"features", "dense"}))
-        ->capture_default_str();
-    app.add_option(dashes + "start", start,
-                   "DEG,PERCENT: how far the first guess is off the truth, in attitude and of the range")
-        ->capture_default_str();
-    app.add_option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders")
-        ->capture_default_str();
+    app.option(dashes + "target", tracker.target,
+               "Body whose pose is looked for (default: the first with a mesh that does not carry the camera)");
+    app.option(dashes + "method", method,
+               "features: points of the frame and of a render; dense: all pixels, from where the points lead")
+        .one_of({"features", "dense"})
+        .shows_default();
+    app.option(dashes + "start", start,
+               "DEG,PERCENT: how far the first guess is off the truth, in attitude and of the range")
+        .shows_default();
+    app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
 }
 
 Result<TrackerOptions> TrackerFlags::options() const {

@@ -14,7 +14,7 @@ struct TrackerFlags {
     TrackerOptions tracker;
 
     /// With `prefix` before each name: --target, or --estimate-target.
-    void add_to(CLI::App& app, const std::string& prefix);
+    void add_to(Parser app, const std::string& prefix);
     [[nodiscard]] Result<TrackerOptions> options() const;
 };
 

@@ -1,0 +1,96 @@
+/// apps/options.h - options of a subcommand. CLI11 reads them, and is included by options.cpp alone: it costs 7 s
+/// of compiling for each file.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace narpa::cli {
+
+/// A handle of one option; methods return the handle, so that they can be chained.
+class Option {
+public:
+    explicit Option(CLI::Option* option) : option_(option) {}
+
+    Option required() const;
+    /// least <= value <= most.
+    Option range(int least, int most) const;
+    Option range(double least, double most) const;
+    Option range(std::uint64_t least, std::uint64_t most) const;
+    /// Refuses NaN and infinity; `range` lets NaN through.
+    Option finite() const;
+    Option one_of(const std::vector<std::string>& values) const;
+    /// `complaint`: what is wrong with a value; empty: nothing.
+    Option check(const std::function<std::string(const std::string&)>& complaint) const;
+    Option needs(Option other) const;
+    Option excludes(Option other) const;
+    /// --help shows the default.
+    Option shows_default() const;
+    /// May be given many times, with one value each.
+    Option repeatable() const;
+    /// One value, of comma-separated parts.
+    Option comma_separated() const;
+    /// So many values.
+    Option values(int least, int most) const;
+    Option type_name(const std::string& name) const;
+
+    [[nodiscard]] bool given() const;
+    [[nodiscard]] std::string name() const;
+
+private:
+    CLI::Option* option_;
+};
+
+class Parser {
+public:
+    explicit Parser(CLI::App& app) : app_(&app) {}
+
+    /// For units that use CLI11 themselves.
+    operator CLI::App&() const { return *app_; }
+
+    Parser subcommand(const std::string& name, const std::string& help) const;
+    /// `names`: "--spp", "-o,--output", or "SCENE" for a positional argument. T: a string or number, or an optional
+    /// or vector of them.
+    template <class T>
+    Option option(const std::string& names, T& value, const std::string& help) const;
+    Option flag(const std::string& names, bool& value, const std::string& help) const;
+    /// An option that was added before.
+    [[nodiscard]] Option find(const std::string& name) const;
+    void footer(const std::string& text) const;
+
+    /// Adds subcommands, each by a function that returns what runs when it is chosen; one of them must be. Sets
+    /// `chosen` while the command line is parsed.
+    template <class Command>
+    void choice(const std::vector<std::function<Command(Parser)>>& adders, Command& chosen) const {
+        require_subcommand();
+        for (const auto& add : adders) {
+            const Command command = add(*this);
+            when_last_is_chosen([&chosen, command] { chosen = command; });
+        }
+    }
+
+private:
+    void require_subcommand() const;
+    void when_last_is_chosen(const std::function<void()>& f) const;
+
+    CLI::App* app_;
+};
+
+struct ProgramTexts {
+    std::string description, version, footer;
+};
+/// Parses a command line, then calls `run` while the options still exist. Prints help, version and errors itself.
+/// Returns the exit status. `json`: whether --json was given, anywhere on the line.
+int parse_and_run(int argc, char** argv, const ProgramTexts& texts, bool& json,
+                  const std::function<void(Parser)>& add_subcommands, const std::function<int()>& run);
+
+}  // namespace narpa::cli

@@ -55,10 +55,10 @@ NARPA_EACH_ISA void aim_through_lens(const Frame& f, const CameraSamples& s, Ray
     Vec3Lanes origin, direction;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const double x = s.x[i] + u[0][i] - 0.5, y = s.y[i] + u[1][i] - 0.5;
-        const auto [o, d] =
+        const Ray ray =
             lens_ray(f.camera, *f.lens, f.T_world_camera, x, y, aperture_point(*f.lens, u[2][i], u[3][i]));
-        origin.x[i] = o.x, origin.y[i] = o.y, origin.z[i] = o.z;
-        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+        origin.put(i, ray.origin);
+        direction.put(i, ray.direction);
     }
     rays.origin = origin;
     rays.direction = direction;

@@ -296,7 +296,8 @@ NARPA_EACH_ISA void mark_boxes(const std::vector<BoxNode>& nodes, const Grid& gr
 /// a sphere, the rays that meet it make a circular cone, and so do, about them, those of a rectangle of the image.
 class SeenEllipsoid {
 public:
-    SeenEllipsoid(const Vec3& semi_axes_m, const Grid& grid, const BodyView& view) : grid_(grid) {
+    SeenEllipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view) : grid_(grid) {
+        const Vec3& semi_axes_m = bounds.semi_axes_m;
         // Rays from elsewhere on the lens meet what those from its centre meet when a ball of the lens's radius is
         // added to it: an ellipsoid that holds the sum (A. Kurzhanski, I. Valyi, "Ellipsoidal Calculus for
         // Estimation and Control", 1997, the one of least trace; of a sphere it is the sum itself).
@@ -306,7 +307,7 @@ public:
             axes[k] = (1 + 1e-9) * std::sqrt((1 + 1 / p) * semi_axes_m[k] * semi_axes_m[k] + (1 + p) * ball * ball);
         const double radius = std::max({axes.x, axes.y, axes.z});
         const Vec3 squeeze{radius / axes.x, radius / axes.y, radius / axes.z};
-        to_centre_ = -(view.camera_body * squeeze);
+        to_centre_ = (bounds.centre_m - view.camera_body) * squeeze;
         const double distance = norm(to_centre_);
         around_ = !(distance > radius);
         if (around_) return;
@@ -368,10 +369,12 @@ private:
 };
 
 /// Within the box about it, which is the tighter of the two for one that is very flat or long.
-void mark_ellipsoid(const Vec3& semi_axes_m, const Grid& grid, const BodyView& view, TileMask& mask) {
-    const Vec3f high = vec_cast<float>(semi_axes_m);
-    const BoxNode node{{-high.x, -high.y, -high.z}, {high.x, high.y, high.z}};
-    const SeenBox box(node, grid, view, 0x1p-23 * norm(semi_axes_m) + view.rounding_m);
+void mark_ellipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view, TileMask& mask) {
+    const Vec3f low = vec_cast<float>(bounds.centre_m - bounds.semi_axes_m),
+                high = vec_cast<float>(bounds.centre_m + bounds.semi_axes_m);
+    const BoxNode node{{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+    const double rounding_m = 0x1p-23 * (norm(bounds.centre_m) + norm(bounds.semi_axes_m)) + view.rounding_m;
+    const SeenBox box(node, grid, view, rounding_m);
     if (box.behind()) return;
     TileRect rect{0, 0, grid.tiles_x - 1, grid.tiles_y - 1};
     if (box.in_front()) {
@@ -379,7 +382,7 @@ void mark_ellipsoid(const Vec3& semi_axes_m, const Grid& grid, const BodyView& v
         if (!e.within(grid)) return;
         rect = tiles_of(e, grid);
     }
-    SeenEllipsoid(semi_axes_m, grid, view).mark(rect, mask);
+    SeenEllipsoid(bounds, grid, view).mark(rect, mask);
 }
 
 }  // namespace
@@ -393,7 +396,12 @@ TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
       most_listed_(std::min(kMostListed, tracer.scene().bodies.size())),
       listed_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
       lists_(most_listed_ * listed_.size()) {
-    for (const Mesh& mesh : tracer.scene().meshes) trees_.push_back(box_tree(mesh));
+    for (const std::uint32_t body : tracer.all_bodies()) {
+        const auto same = std::find_if(shapes_.begin(), shapes_.end(),
+                                       [&](const OutlinedShape& s) { return s.shape == &tracer.shape(body); });
+        outline_of_body_.push_back(static_cast<std::size_t>(same - shapes_.begin()));
+        if (same == shapes_.end()) shapes_.push_back({&tracer.shape(body), tracer.shape(body).boxes()});
+    }
 }
 
 void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept {
@@ -401,13 +409,13 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
     const Grid grid(camera_, lens, tiles_x_, tiles_y_);
     for (const std::uint32_t body : tracer_.all_bodies()) {
         const BodyView view(at.T_world_body[body], T_world_camera);
-        const auto& shape = tracer_.scene().bodies[body].shape;
-        if (const int* mesh = std::get_if<int>(&shape)) {
+        const std::vector<BoxNode>& boxes = shapes_[outline_of_body_[body]].boxes;
+        if (!boxes.empty()) {
             // Embree's rays are in single precision, and meet edges that they miss by so little.
             const double slack_m = kEmbreeSlack * tracer_.bounding_radius_m(body) + view.rounding_m;
-            mark_boxes(trees_[static_cast<std::size_t>(*mesh)], grid, view, slack_m, mask_);
+            mark_boxes(boxes, grid, view, slack_m, mask_);
         } else {
-            mark_ellipsoid(tracer_.bounds(body).semi_axes_m, grid, view, mask_);
+            mark_ellipsoid(tracer_.bounds(body), grid, view, mask_);
         }
         list(body);
     }

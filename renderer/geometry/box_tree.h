@@ -1,21 +1,12 @@
 /// renderer/geometry/box_tree.h - boxes about the parts of a mesh, from one about all of it down to a few thousand.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <vector>
 
+#include "renderer/geometry/shape.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
-
-inline constexpr std::size_t kBoxLeaves = 4096;  ///< at most
-
-/// In the mesh's frame, metres; along its axes.
-struct BoxNode {
-    std::array<float, 3> low{}, high{};
-    std::uint32_t children = 0;  ///< index of the first of two; 0: a leaf
-};
 
 /// Root first, every node before its children; empty for a mesh without faces. Each triangle, to rounding in single
 /// precision, lies in the union of the leaves, in pieces where it is large: a box about a whole panel that stands

@@ -1,5 +1,4 @@
-/// renderer/geometry/ellipsoid.h - an exact sphere or ellipsoid about its body's origin, in the body's frame, in
-/// double.
+/// renderer/geometry/ellipsoid.h - a sphere or ellipsoid about its body's origin, solved in double.
 ///
 /// Squeezed along its axes it is the sphere of its largest semi-axis, and lines stay lines: it is solved there,
 /// with a direction that is no longer unit. A sphere is squeezed by exactly 1, so nothing is rounded for it.
@@ -11,28 +10,29 @@
 #include <limits>
 #include <numbers>
 
+#include "renderer/geometry/shape.h"
 #include "renderer/geometry/sphere_roots.h"
 
 namespace narpa {
 
-/// Where a ray meets the surface.
+/// Where a ray hits the surface.
 struct Crossing {
-    double range = std::numeric_limits<double>::infinity();  ///< multiples of the direction; infinity: it does not
-    bool outside = true;                                     ///< met from the outer side
+    double range = std::numeric_limits<double>::infinity();  ///< multiples of the direction; infinity: nowhere
+    bool outside = true;                                     ///< from the outer side
 };
 
-class EllipsoidShape {
+class EllipsoidShape final : public Shape {
 public:
-    explicit EllipsoidShape(const Vec3& semi_axes_m)
-        : semi_axes_m_(semi_axes_m),
-          radius_m_(std::max({semi_axes_m.x, semi_axes_m.y, semi_axes_m.z})),
-          squeeze_{radius_m_ / semi_axes_m.x, radius_m_ / semi_axes_m.y, radius_m_ / semi_axes_m.z} {}
+    /// `material` is an index into Scene::materials; a textured one gets texture coordinates.
+    explicit EllipsoidShape(const Vec3& semi_axes_m, int material = 0, bool textured = false);
 
-    /// Largest semi-axis, metres.
-    [[nodiscard]] double radius_m() const noexcept { return radius_m_; }
+    std::uint32_t intersect(const ShapeRays& rays, std::uint32_t wanted, ShapeHits& hits) const noexcept override;
+    [[nodiscard]] std::uint32_t occluded(const ShapeRays& rays, std::uint32_t wanted) const noexcept override;
+    void surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept override;
+    [[nodiscard]] TextureFrame texture_frame(const Hit& hit) const noexcept override;
+    [[nodiscard]] std::unique_ptr<const EmissiveSurface> emission(const Scene& scene) const override;
 
-    /// The nearest crossing that is not behind the ray. Without a branch, as all that follows, for loops over many
-    /// rays.
+    /// The nearest crossing that is not behind the ray. Branch-free, as all that follows, for loops over lanes.
     [[nodiscard]] Crossing first_crossing(const Vec3& o, const Vec3& d) const noexcept {
         const SphereRoots roots = sphere_roots(o * squeeze_, d * squeeze_, radius_m_);
         const bool outside = roots.near >= 0;
@@ -41,7 +41,7 @@ public:
     }
 
     /// As above for a ray that leaves the surface at `start`. The shape is convex: from its outer side the ray
-    /// meets it only by starting into it, from its inner side it meets the other end of the chord. Both starts are
+    /// hits it only by starting into it, from its inner side it hits the other end of the chord. Both starts are
     /// at range 0.
     [[nodiscard]] Crossing own_crossing(const Vec3& start, const Vec3& d, bool outside) const noexcept {
         const Vec3 o = start * squeeze_, e = d * squeeze_;
@@ -67,26 +67,17 @@ public:
         return {u < 0 ? u + 1 : u, 1 - colatitude / std::numbers::pi};
     }
 
-    /// Metres along the surface per unit of u and of v where this is the outward normal. At a pole u turns on the
-    /// spot, and v runs along the meridian of u = 0.
-    [[nodiscard]] std::array<Vec3, 2> per_uv(const Vec3& n) const noexcept {
-        const double s = std::hypot(n.x, n.y), cos_longitude = s > 0 ? n.x / s : 1,
-                     sin_longitude = s > 0 ? n.y / s : 0;
-        const Vec3 dn_du = 2 * std::numbers::pi * Vec3{-n.y, n.x, 0};
-        const Vec3 dn_dv = -std::numbers::pi * Vec3{n.z * cos_longitude, n.z * sin_longitude, -s};
-        // The point whose normal is n: p = A n / h, A = diag(semi-axes^2), h^2 = n.A n.
-        const Vec3 a2 = semi_axes_m_ * semi_axes_m_, a2_n = a2 * n;
-        const double h = std::sqrt(dot(n, a2_n));
-        const auto dp = [&](const Vec3& dn) { return (1 / h) * (a2 * dn - (dot(a2_n, dn) / (h * h)) * a2_n); };
-        return {dp(dn_du), dp(dn_dv)};
-    }
-
 private:
+    std::uint32_t nearest(const ShapeRays& rays, std::uint32_t wanted, ShapeHits& hits) const noexcept;
+    void fill_surface(const ShapeHits& found, HitBatch& hits) const noexcept;
+
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
     Vec3 semi_axes_m_;
-    double radius_m_;
-    Vec3 squeeze_;  ///< radius over semi-axes
+    double radius_m_;  ///< largest semi-axis
+    Vec3 squeeze_;     ///< radius over semi-axes
+    int material_;
+    bool textured_;
 };
 
 }  // namespace narpa

@@ -210,8 +210,7 @@ private:
     }
     /// What stands so close before a body's surface cannot be told from it: meshes are held in single precision.
     [[nodiscard]] double touching_m(std::size_t body) const {
-        const bool is_mesh = std::holds_alternative<int>(scene_.bodies[body].shape);
-        return (is_mesh ? 4e-6 : 4e-15) * tracer_.bounding_radius_m(body);
+        return tracer_.shape(body).properties().resolution_m;
     }
     [[nodiscard]] Bounce* bounce_at(const Path& path, int met) {
         return met == 1 && path.bounce >= 0 ? &bounces_[static_cast<std::size_t>(path.bounce)] : nullptr;

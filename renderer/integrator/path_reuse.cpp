@@ -58,7 +58,7 @@ int Starts::add(const BodyPoses& at, const FirstSurface& first, std::size_t ray,
     b.hits.face[i] = hits.face[from];
     b.hits.departure_body.put(i, departure);
     b.hits.outside |= static_cast<std::uint32_t>(is_set(hits.outside, from)) << i;
-    b.origin.put(i, at.T_world_body[static_cast<std::size_t>(hits.body[from])] * departure);
+    b.origin.put(i, at.T_world_body_at(static_cast<std::size_t>(hits.body[from]), hits.time[from]) * departure);
     b.plane.put(i, hits.geometric_normal[from]);
     b.diffuse.put(i, kInvPi * first.surfaces->diffuse[from]);
     b.chance[i] = chance;
@@ -76,7 +76,7 @@ int Starts::add(const BodyPoses& at, const Hit& hit, const PathPoint& point, con
     b.hits.face[i] = hit.face;
     b.hits.departure_body.put(i, hit.departure_body);
     b.hits.outside |= static_cast<std::uint32_t>(hit.outside) << i;
-    b.origin.put(i, at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body);
+    b.origin.put(i, at.T_world_body_at(static_cast<std::size_t>(hit.body), hit.time) * hit.departure_body);
     b.plane.put(i, point.plane());
     b.diffuse.put(i, kInvPi * point.surface().diffuse);
     b.chance[i] = chance;

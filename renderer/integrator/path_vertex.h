@@ -32,7 +32,7 @@ public:
         if (!fold) return;
         plane_ = hit.geometric_normal;
         if (hit.shading_normal != hit.geometric_normal) {
-            const Vec3 flat = at.T_world_body[static_cast<std::size_t>(hit.body)] * hit.departure_body;
+            const Vec3 flat = at.T_world_body_at(static_cast<std::size_t>(hit.body), hit.time) * hit.departure_body;
             if (flat != hit.position) plane_ = hit.shading_normal;
         }
         // Vertex normals that face away from the viewer say nothing of what he sees.

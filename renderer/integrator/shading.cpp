@@ -129,8 +129,7 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
     const bool filter = has_levels(colour) || has_levels(glow) || has_levels(normals) || has_levels(heights);
     const bool turn = normals != nullptr || heights != nullptr;
 
-    const bool mesh = std::holds_alternative<int>(scene.bodies[static_cast<std::size_t>(hit.body)].shape);
-    const TextureLayout layout = mesh ? TextureLayout::flat : TextureLayout::globe;
+    const TextureLayout layout = tracer.shape(static_cast<std::size_t>(hit.body)).properties().texture_layout;
     const TextureFrame frame = filter || turn ? tracer.texture_frame(at, hit) : TextureFrame{};
     const TextureFootprint seen = filter ? spot(frame, hit, ray_direction, width_m, layout) : TextureFootprint{};
 

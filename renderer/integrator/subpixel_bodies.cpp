@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "renderer/geometry/body_bounds.h"
 #include "renderer/camera/lens.h"
 
 namespace narpa {

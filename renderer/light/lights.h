@@ -10,12 +10,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "renderer/light/sun_disc.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/light/sun_disc.h"
 
 namespace narpa {
 
@@ -24,6 +25,7 @@ struct Receiver {
     Vec3 anchor{}, offset{};
     Vec3 up{};      ///< unit: only light from directions with a positive part along it counts
     int body = -1;  ///< the one that the point lies on; -1: none
+    double time = kMidExposure;
 };
 /// Of a camera, say.
 [[nodiscard]] Receiver receiver_at(const Vec3& position) noexcept;
@@ -49,8 +51,8 @@ struct LightSample {
 
 class Lights {
 public:
-    /// `scene` must outlive it.
-    explicit Lights(const Scene& scene);
+    /// The tracer's scene must outlive it, the tracer itself need not.
+    explicit Lights(const Tracer& tracer);
 
     /// Are there lights beside the Sun and the ambient? Then method "direct" needs `path_radiance`. Surfaces that
     /// shine do not count: they light nothing in that method.
@@ -78,23 +80,17 @@ public:
 
 private:
     struct Emitter {
-        int light = -1;  ///< index into Scene::lights
-        int body = -1;   ///< or into Scene::bodies
-        int mount = -1;  ///< body whose frame the rest stands in; -1: the world
-        Vec3 centre{};   ///< of a sphere that holds what shines
+        int light = -1;                            ///< index into Scene::lights
+        int body = -1;                             ///< or into Scene::bodies
+        const EmissiveSurface* surface = nullptr;  ///< of the body
+        int mount = -1;                            ///< body whose frame the rest stands in; -1: the world
+        Vec3 centre{};                             ///< of a sphere that holds what shines
         double radius_m = 0;
         double power = 0;       ///< mean band of radiance times area, or intensity, or irradiance
         double touching_m = 0;  ///< what stands closer before it is its mounting
     };
-    /// Faces of a mesh that shine, each to be chosen in proportion to its area times its radiance.
-    struct Faces {
-        std::vector<std::uint32_t> face;
-        std::vector<double> cumulative;  ///< of area times radiance, W/sr; the last is the sum
-    };
-
     void add_light(std::size_t index);
-    void add_body(std::size_t index);
-    [[nodiscard]] Faces shining_faces(const Mesh& mesh) const;
+    void add_body(std::size_t index, const Shape& shape);
     [[nodiscard]] std::span<const Emitter> emitters(Group group) const noexcept;
     /// What the emitter could send to the receiver, W m^-2, if all of it stood at its centre; 0 only where it sends
     /// nothing.
@@ -104,10 +100,6 @@ private:
                                 const Emitter& e) const noexcept;
     [[nodiscard]] LightSample sample_light(const BodyPoses& at, const Receiver& to, const Emitter& e, double u,
                                            double v) const noexcept;
-    [[nodiscard]] LightSample sample_mesh(const BodyPoses& at, const Receiver& to, const Emitter& e, double choice,
-                                          double u, double v) const noexcept;
-    [[nodiscard]] LightSample sample_exact(const BodyPoses& at, const Receiver& to, const Emitter& e, double u,
-                                           double v) const noexcept;
 
     const Scene* scene_;
     std::optional<SunDisc> sun_;
@@ -115,7 +107,7 @@ private:
     std::size_t lights_ = 0;
     bool any_with_extent_ = false;
     std::vector<int> emitter_of_body_;  ///< -1: does not shine
-    std::vector<Faces> faces_;          ///< one for each mesh of the scene; empty where no body of it shines
+    std::vector<std::unique_ptr<const EmissiveSurface>> surfaces_;
 };
 
 }  // namespace narpa

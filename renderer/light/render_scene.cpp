@@ -15,12 +15,13 @@ Status check_light(const Scene& s, const Light& l) {
 
 }  // namespace
 
-Result<RenderScene> RenderScene::create(const Scene& scene, int threads) {
-    auto tracer = Tracer::create(scene, threads);
+Result<RenderScene> RenderScene::create(const Scene& scene, int threads,
+                                        const std::vector<std::shared_ptr<const Shape>>& shapes) {
+    auto tracer = Tracer::create(scene, threads, shapes);
     if (!tracer) return tracer.error();
     for (const Light& l : scene.lights)
         if (const Status good = check_light(scene, l); !good) return good.error();
-    return RenderScene(scene, *std::move(tracer));
+    return RenderScene(*std::move(tracer));
 }
 
 }  // namespace narpa

@@ -13,14 +13,16 @@ class RenderScene {
 public:
     /// `scene` must outlive it. `threads` bounds the threads that build; 0 is all. Errors: of Tracer::create; a
     /// light that rides on a body that is not there or has no size.
-    static Result<RenderScene> create(const Scene& scene, int threads = 0);
+    /// `shapes` as in Tracer::create.
+    static Result<RenderScene> create(const Scene& scene, int threads = 0,
+                                      const std::vector<std::shared_ptr<const Shape>>& shapes = {});
 
     [[nodiscard]] const Scene& scene() const noexcept { return tracer_.scene(); }
     [[nodiscard]] const Tracer& tracer() const noexcept { return tracer_; }
     [[nodiscard]] const Lights& lights() const noexcept { return lights_; }
 
 private:
-    RenderScene(const Scene& scene, Tracer tracer) : tracer_(std::move(tracer)), lights_(scene) {}
+    explicit RenderScene(Tracer tracer) : tracer_(std::move(tracer)), lights_(tracer_) {}
 
     Tracer tracer_;
     Lights lights_;

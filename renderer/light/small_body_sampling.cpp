@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <variant>
 
 namespace narpa {
 namespace {
@@ -13,9 +12,9 @@ namespace {
 constexpr double kWide = 0.25;
 /// Bodies that fill less of the sky than this send next to nothing: not worth many rays.
 constexpr double kNegligible = 1e-6;
-/// A mesh may fill so much of its own sky, and leaves so much of the guidance whatever it is: enough for its dark
+/// A shape that is not convex may fill so much of its own sky, and leaves so much of the guidance whatever it is: enough for its dark
 /// side, and little lost on the lit one.
-constexpr double kOwnMesh = 0.25, kLeastGuidance = 0.1;
+constexpr double kOwnShape = 0.25, kLeastGuidance = 0.1;
 
 /// A body's bounding sphere in the sky of the receiver.
 struct Cone {
@@ -37,7 +36,7 @@ Cone cone_of(const Tracer& tracer, const BodyPoses& at, const Receiver& to, std:
     Cone c;
     if (static_cast<int>(body) == to.body) return c;
     const double radius_m = tracer.bounding_radius_m(body);
-    c.to_centre = (at.T_world_body[body].t - to.anchor) - to.offset;
+    c.to_centre = (at.position_at(body, to.time) - to.anchor) - to.offset;
     c.distance2 = dot(c.to_centre, c.to_centre);
     const double highest = dot(c.to_centre, to.up) + radius_m;
     if (highest <= 0) return c;
@@ -49,15 +48,15 @@ Cone cone_of(const Tracer& tracer, const BodyPoses& at, const Receiver& to, std:
 }  // namespace
 
 SmallBodySampling::SmallBodySampling(const Tracer& tracer, const BodyPoses& at, const Receiver& to) noexcept {
-    const bool own_mesh =
-        to.body >= 0 && std::holds_alternative<int>(tracer.scene().bodies[static_cast<std::size_t>(to.body)].shape);
-    double wide = own_mesh ? kOwnMesh : 0;
+    const bool meets_itself =
+        to.body >= 0 && !tracer.shape(static_cast<std::size_t>(to.body)).properties().convex;
+    double wide = meets_itself ? kOwnShape : 0;
     for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
         const Cone c = cone_of(tracer, at, to, body);
         (c.is_guide() ? sum_ : wide) += c.importance;
     }
     if (!(sum_ > 0)) return;
-    const double guidance = std::max(sum_ / (sum_ + wide), own_mesh ? kLeastGuidance : 0);
+    const double guidance = std::max(sum_ / (sum_ + wide), meets_itself ? kLeastGuidance : 0);
     share_ = 0.5 * guidance * std::min(1.0, sum_ / kNegligible);
 }
 

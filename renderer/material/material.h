@@ -67,4 +67,8 @@ struct Material {
     float bump_height_m = 0;
 };
 
+[[nodiscard]] inline bool is_textured(const Material& m) noexcept {
+    return m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0;
+}
+
 }  // namespace narpa

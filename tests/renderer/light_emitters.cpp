@@ -286,9 +286,9 @@ TEST(Lights, WithoutLightsTheQuickDirectPathSuffices) {
     Scene s = floor_scene();
     add_sun(s, {0, 0, 1});
     s.materials[0].emission = {1, 1, 1};
-    EXPECT_FALSE(Lights(s).beyond_the_sun());
+    EXPECT_FALSE(RenderScene::create(s, 1)->lights().beyond_the_sun());
     s.lights.push_back(lamp(Light::Kind::point, {}, {1, 1, 1}));
-    EXPECT_TRUE(Lights(s).beyond_the_sun());
+    EXPECT_TRUE(RenderScene::create(s, 1)->lights().beyond_the_sun());
 }
 
 }  // namespace

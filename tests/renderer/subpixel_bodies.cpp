@@ -9,7 +9,6 @@
 
 #include "renderer/camera/camera_ray.h"
 #include "renderer/film/camera_image.h"
-#include "renderer/geometry/body_bounds.h"
 #include "renderer/integrator/subpixel_bodies.h"
 #include "tests/renderer/camera_support.h"
 #include "tests/support/allocation_counter.h"
@@ -335,24 +334,23 @@ TEST(TinyBody, OffTheAxisAndOverTheEdgeOfTheImage) {
 TEST(TinyBody, BoundsHoldTheMesh) {
     std::mt19937_64 random(4);
     Scene s;
-    s.meshes = {bumpy(3, 2, 0.5), box(10, 0.1, 0.1), plate(3, 2), icosphere(3, 7)};
-    for (Vec3f& p : s.meshes[1].positions) p += Vec3f{100, 0, -3};
-    for (int m = 0; m < 4; ++m) {
-        Body body;
-        body.shape = m;
-        const BodyBounds b = bounds_of(s, body);
-        for (const Vec3f& p : s.meshes[static_cast<std::size_t>(m)].positions) {
+    s.materials.resize(1);
+    Mesh far_box = box(10, 0.1, 0.1);
+    for (Vec3f& p : far_box.positions) p += Vec3f{100, 0, -3};
+    for (const Mesh& mesh : {bumpy(3, 2, 0.5), far_box, plate(3, 2), icosphere(3, 7)}) add_mesh(s, mesh);
+    const auto tracer = Tracer::create(s, 1);
+    ASSERT_TRUE(tracer) << tracer.error().text();
+    for (std::size_t m = 0; m < 4; ++m) {
+        const BodyBounds& b = tracer->bounds(m);
+        for (const Vec3f& p : s.meshes[m].positions) {
             const Vec3 d = vec_cast<double>(p) - b.centre_m;
             const Vec3 unit{d.x / b.semi_axes_m.x, d.y / b.semi_axes_m.y, d.z / b.semi_axes_m.z};
             EXPECT_LE(norm(unit), 1) << m;
         }
     }
-    Body ball;
-    ball.shape = 3;
-    EXPECT_NEAR(bounds_of(s, ball).semi_axes_m.y, 7, 1e-5);  // a sphere's are the sphere
-    ball.shape = 1;
-    EXPECT_NEAR(bounds_of(s, ball).centre_m.x, 100, 1e-4);
-    EXPECT_NEAR(bounds_of(s, ball).semi_axes_m.x, 5 * std::sqrt(3), 1e-4);
+    EXPECT_NEAR(tracer->bounds(3).semi_axes_m.y, 7, 1e-5);  // a sphere's are the sphere
+    EXPECT_NEAR(tracer->bounds(1).centre_m.x, 100, 1e-4);
+    EXPECT_NEAR(tracer->bounds(1).semi_axes_m.x, 5 * std::sqrt(3), 1e-4);
 }
 
 Scene swarm_over_a_globe() {

@@ -10,6 +10,7 @@
 
 #include "renderer/camera/camera_ray.h"
 #include "renderer/camera/lens.h"
+#include "renderer/geometry/box_tree.h"
 #include "tests/support/allocation_counter.h"
 
 namespace narpa {

@@ -1,0 +1,100 @@
+#include "renderer/geometry/ellipsoid.h"
+
+#include "base/each_isa.h"
+
+namespace narpa {
+
+EllipsoidShape::EllipsoidShape(const Vec3& semi_axes_m, int material, bool textured)
+    : semi_axes_m_(semi_axes_m),
+      radius_m_(std::max({semi_axes_m.x, semi_axes_m.y, semi_axes_m.z})),
+      squeeze_{radius_m_ / semi_axes_m.x, radius_m_ / semi_axes_m.y, radius_m_ / semi_axes_m.z},
+      material_(material),
+      textured_(textured) {
+    properties_ = {.radius_m = radius_m_,
+                   .bound_m = radius_m_ * (1 + 1e-5),
+                   .bounds = {{}, semi_axes_m},
+                   .resolution_m = 4e-15 * radius_m_,
+                   .convex = true,
+                   .texture_layout = TextureLayout::globe};
+}
+
+NARPA_EACH_ISA std::uint32_t EllipsoidShape::nearest(const ShapeRays& rays, std::uint32_t wanted,
+                                                     ShapeHits& __restrict hits) const noexcept {
+    Lanes<double> range;
+    Lanes<int> met = masks_of(wanted), inner;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Crossing c = first_crossing(rays.origin[i], rays.direction[i]);
+        range[i] = c.range;
+        inner[i] = c.outside ? 0 : -1;
+    }
+    if (rays.leaving != 0) {
+        const Lanes<int> leaving = masks_of(rays.leaving), inside = masks_of(rays.inside);
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            const bool leaves = leaving[i] != 0, within = inside[i] != 0;
+            const Crossing c = own_crossing(rays.origin[i], rays.direction[i], !within);
+            range[i] = choose(leaves, c.range, range[i]);
+            inner[i] = leaves ? inside[i] : inner[i];
+        }
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const bool here = (met[i] != 0) & (range[i] < rays.t_max[i]);
+        const Vec3 position = rays.origin[i] + range[i] * rays.direction[i];
+        met[i] = -static_cast<int>(here);
+        hits.face[i] = here ? 0 : hits.face[i];
+        hits.range_m[i] = choose(here, range[i], hits.range_m[i]);
+        hits.position.put(i, choose(here, position, hits.position[i]));
+    }
+    const std::uint32_t taken = bits_of(met);
+    hits.inner = (hits.inner & ~taken) | (bits_of(inner) & taken);
+    return taken;
+}
+
+std::uint32_t EllipsoidShape::intersect(const ShapeRays& rays, std::uint32_t wanted,
+                                        ShapeHits& hits) const noexcept {
+    return nearest(rays, wanted, hits);
+}
+
+std::uint32_t EllipsoidShape::occluded(const ShapeRays& rays, std::uint32_t wanted) const noexcept {
+    ShapeHits unused;
+    return nearest(rays, wanted, unused);
+}
+
+NARPA_EACH_ISA void EllipsoidShape::fill_surface(const ShapeHits& found, HitBatch& __restrict hits) const noexcept {
+    const Lanes<int> inner = masks_of(found.inner);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 p = onto_surface(found.position[i]), outwards = normal(p),
+                   facing = choose(inner[i] != 0, -outwards, outwards);
+        hits.position.put(i, p);
+        hits.geometric_normal.put(i, facing);
+        hits.shading_normal.put(i, facing);
+        hits.departure_body.put(i, p);
+        hits.beyond_body.put(i, p);
+    }
+}
+
+void EllipsoidShape::surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept {
+    fill_surface(found, hits);
+    hits.outside = ~found.inner;
+    hits.material.fill(material_);
+    hits.u.fill(0), hits.v.fill(0);
+    if (!textured_) return;
+    for_each_lane(wanted, [&](std::size_t i) {
+        const auto [u, v] = uv(normal(hits.departure_body[i]));
+        hits.u[i] = static_cast<float>(u), hits.v[i] = static_cast<float>(v);
+    });
+}
+
+/// At a pole u turns on the spot, and v runs along the meridian of u = 0.
+TextureFrame EllipsoidShape::texture_frame(const Hit& hit) const noexcept {
+    const Vec3 n = normal(hit.departure_body);
+    const double s = std::hypot(n.x, n.y), cos_longitude = s > 0 ? n.x / s : 1, sin_longitude = s > 0 ? n.y / s : 0;
+    const Vec3 dn_du = 2 * std::numbers::pi * Vec3{-n.y, n.x, 0};
+    const Vec3 dn_dv = -std::numbers::pi * Vec3{n.z * cos_longitude, n.z * sin_longitude, -s};
+    // The point whose normal is n: p = A n / h, A = diag(semi-axes^2), h^2 = n.A n.
+    const Vec3 a2 = semi_axes_m_ * semi_axes_m_, a2_n = a2 * n;
+    const double h = std::sqrt(dot(n, a2_n));
+    const auto dp = [&](const Vec3& dn) { return (1 / h) * (a2 * dn - (dot(a2_n, dn) / (h * h)) * a2_n); };
+    return {dp(dn_du), dp(dn_dv)};
+}
+
+}  // namespace narpa

@@ -1,0 +1,137 @@
+#include "renderer/geometry/mesh_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "renderer/geometry/box_tree.h"
+#include "renderer/geometry/mesh_topology.h"
+
+namespace narpa {
+namespace {
+
+Status check_mesh(const Scene& scene, const Mesh& mesh) {
+    const auto bad = [&](const std::string& what) { return Error{"mesh \"" + mesh.name + "\": " + what}; };
+    const std::size_t n = mesh.positions.size();
+    if (!mesh.normals.empty() && mesh.normals.size() != n)
+        return bad(std::to_string(mesh.normals.size()) + " normals for " + std::to_string(n) + " vertices");
+    if (!mesh.uvs.empty() && mesh.uvs.size() != n)
+        return bad(std::to_string(mesh.uvs.size()) + " texture coordinates for " + std::to_string(n) + " vertices");
+    if (mesh.face_material.size() != mesh.faces.size())
+        return bad(std::to_string(mesh.face_material.size()) + " materials for " +
+                   std::to_string(mesh.faces.size()) + " faces");
+    for (const std::uint16_t material : mesh.face_material)
+        if (material >= scene.materials.size())
+            return Error{"mesh \"" + mesh.name + "\" names material " + std::to_string(material) + " of " +
+                         std::to_string(scene.materials.size())};
+    for (std::size_t i = 0; i < n; ++i)
+        if (!is_finite(mesh.positions[i])) return bad("vertex " + std::to_string(i) + " is not finite");
+    for (std::size_t i = 0; i < mesh.faces.size(); ++i)
+        for (const std::uint32_t v : mesh.faces[i])
+            if (v >= n)
+                return bad("face " + std::to_string(i) + " names vertex " + std::to_string(v) + " of " +
+                           std::to_string(n));
+    return Ok{};
+}
+
+/// The ellipsoid in the proportions of the bounding box, about its centre, just large enough for the vertices: for
+/// a box its outline is up to 2.4 times as large as the box's own. A flat mesh keeps a thousandth of its largest
+/// extent in thickness.
+BodyBounds ellipsoid_about(const Mesh& mesh) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
+    const auto for_each_vertex = [&](const auto& f) {
+        for (const auto& face : mesh.faces)
+            for (const std::uint32_t vertex : face) f(vec_cast<double>(mesh.positions[vertex]));
+    };
+    for_each_vertex([&](const Vec3& p) {
+        for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+    });
+    if (mesh.faces.empty()) return {{}, {}};
+    BodyBounds b{0.5 * (low + high), 0.5 * (high - low)};
+    const double largest = std::max({b.semi_axes_m.x, b.semi_axes_m.y, b.semi_axes_m.z});
+    for (int k = 0; k < 3; ++k) b.semi_axes_m[k] = std::max(b.semi_axes_m[k], 1e-3 * largest);
+    double farthest2 = 0;  // at most 3, at a corner of the box
+    for_each_vertex([&](const Vec3& p) {
+        const Vec3 unit = (p - b.centre_m) / b.semi_axes_m;
+        farthest2 = std::max(farthest2, dot(unit, unit));
+    });
+    b.semi_axes_m *= std::sqrt(farthest2) * (1 + 1e-9);
+    return b;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const MeshShape>> MeshShape::build(RTCDevice device, const Scene& scene, const Mesh& mesh) {
+    if (const Status good = check_mesh(scene, mesh); !good) return good.error();
+    std::shared_ptr<MeshShape> shape(new MeshShape(scene, mesh));
+    if (const Status good = shape->build_hierarchy(device); !good) return good.error();
+    return std::shared_ptr<const MeshShape>(std::move(shape));
+}
+
+MeshShape::MeshShape(const Scene& scene, const Mesh& mesh) : mesh_(mesh), closed_(is_closed(mesh)) {
+    Vec3 low{}, high{};
+    if (!mesh.positions.empty()) low = high = vec_cast<double>(mesh.positions.front());
+    for (const Vec3f& p : mesh.positions)
+        for (int k = 0; k < 3; ++k) {
+            low[k] = std::min<double>(low[k], p[k]);
+            high[k] = std::max<double>(high[k], p[k]);
+        }
+    centre_ = 0.5 * (low + high);
+    double reach_m = 0;  // about the body's origin
+    for (const Vec3f& p : mesh.positions) {
+        radius_m_ = std::max(radius_m_, norm(vec_cast<double>(p) - centre_));
+        reach_m = std::max(reach_m, norm(vec_cast<double>(p)));
+    }
+    // A margin for the rounding of a ray that comes from far away.
+    radius_m_ *= 1 + 1e-5;
+    reach_m *= 1 + 1e-5;
+    off_centre_ = reach_m > 1.25 * radius_m_;
+    // A mesh modelled far from its own origin is held relative to its centre, where single precision is finer.
+    // Near the origin the vertices stay bit for bit as they were read.
+    if (norm(centre_) > 4 * radius_m_) vertex_origin_ = vec_cast<double>(vec_cast<float>(centre_));
+    properties_ = {.radius_m = reach_m,
+                   .bound_m = reach_m,
+                   .bounds = ellipsoid_about(mesh),
+                   .resolution_m = 4e-6 * reach_m,
+                   .triangles = mesh.faces.size()};
+    if (!mesh.uvs.empty())
+        for (const Material& m : scene.materials) textured_.push_back(is_textured(m));
+}
+
+Status MeshShape::build_hierarchy(RTCDevice device) {
+    const auto failed = [&](const std::string& what) {
+        return Error{"mesh \"" + mesh_.name + "\": Embree " + what, {}, 0, 0, ErrorKind::failed};
+    };
+    scene_.reset(rtcNewScene(device));
+    const embree::Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                 RTC_FORMAT_FLOAT3, sizeof(Vec3f),
+                                                                 std::max<std::size_t>(1, mesh_.positions.size())));
+    auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
+        rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(std::uint32_t), std::max<std::size_t>(1, mesh_.faces.size())));
+    if (vertices == nullptr || indices == nullptr)
+        return failed("has no memory for " + std::to_string(mesh_.faces.size()) + " triangles");
+    vertices[0] = {};
+    indices[0] = {0, 0, 0};
+    for (std::size_t i = 0; i < mesh_.positions.size(); ++i)
+        vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) - vertex_origin_);
+    std::copy(mesh_.faces.begin(), mesh_.faces.end(), indices);
+    vertices_ = vertices;
+
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometry(scene_.get(), geometry.get());
+    rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
+    rtcJoinCommitScene(scene_.get());  // on the calling thread's TBB arena
+    if (const RTCError e = rtcGetDeviceError(device); e != RTC_ERROR_NONE)
+        return failed("could not build its hierarchy (error " + std::to_string(static_cast<int>(e)) + ")");
+    return Ok{};
+}
+
+std::vector<BoxNode> MeshShape::boxes() const {
+    if (mesh_.faces.empty()) return {BoxNode{}};
+    return box_tree(mesh_);
+}
+
+}  // namespace narpa

@@ -1,0 +1,107 @@
+/// renderer/geometry/shape.h - the surface of a body, as rays meet it.
+///
+/// A kind of shape is a class derived from Shape, in its own files. Only make_shapes.cpp, which makes them from the
+/// scene, names the kinds. Everything here is in the frame of the body, in metres. One virtual call serves a batch
+/// of rays.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "renderer/geometry/emissive_surface.h"
+#include "renderer/geometry/ray_batch.h"
+#include "renderer/geometry/triangle.h"
+#include "renderer/material/texture_lookup.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// Rays in the body's frame. All lanes hold finite numbers, also those that are not traced.
+struct ShapeRays {
+    Vec3Lanes origin, direction;  ///< at any distance; unit
+    Lanes<double> entry_m;        ///< where the ray enters the sphere of `bound_m`; from inside it is not above 0
+    Lanes<double> t_max;
+    std::uint32_t leaving = 0;  ///< lanes whose ray starts on this shape, at a point from `depart`
+    std::uint32_t inside = 0;   ///< those of them that leave its inner side
+    bool coherent = false;      ///< the rays run close together, as those of neighbouring pixels do
+};
+
+/// The nearest hits so far. A shape writes `range_m`, `face`, `inner` and whatever else its own `surface` reads.
+struct ShapeHits {
+    std::uint32_t inner = 0;  ///< lanes that surely meet the inner side
+    Lanes<std::uint32_t> face;
+    Lanes<double> range_m;  ///< from the ray's origin
+    Vec3Lanes direction, position;
+    Lanes<double> b1, b2;    ///< barycentric weights of a triangle's second and third corner
+    TriangleLanes triangle;  ///< where the shape has triangles
+
+    [[nodiscard]] TrianglePoint point(std::size_t i) const { return {position[i], b1[i], b2[i]}; }
+};
+
+/// How the surface lies under its texture: metres along the surface per unit of u and of v. Zero where there are no
+/// texture coordinates.
+struct TextureFrame {
+    Vec3 dp_du{}, dp_dv{};
+};
+
+/// An ellipsoid that holds a body and fits it loosely, its axes along the body's.
+struct BodyBounds {
+    Vec3 centre_m{};
+    Vec3 semi_axes_m{1, 1, 1};
+};
+
+inline constexpr std::size_t kBoxLeaves = 4096;  ///< of a shape's tree of boxes, at most
+
+/// A box along the body's axes.
+struct BoxNode {
+    std::array<float, 3> low{}, high{};
+    std::uint32_t children = 0;  ///< index of the first of two; 0: a leaf
+};
+
+class Shape {
+public:
+    struct Properties {
+        double radius_m = 0;  ///< of a sphere about the body's origin that holds the shape
+        double bound_m = 0;   ///< a little more, so that rounding cannot cut off the limb
+        BodyBounds bounds{};
+        double resolution_m = 0;  ///< surfaces closer together than this cannot be told apart
+        bool convex = false;      ///< a ray that leaves its outer side never meets it again
+        TextureLayout texture_layout = TextureLayout::flat;
+        std::size_t triangles = 0;
+    };
+
+    virtual ~Shape() = default;
+    Shape(const Shape&) = delete;
+    Shape& operator=(const Shape&) = delete;
+    [[nodiscard]] const Properties& properties() const noexcept { return properties_; }
+
+    /// Nearest hits with 0 <= range < t_max. Returns those of the `wanted` lanes that have one; other lanes of
+    /// `hits` stay as they were.
+    virtual std::uint32_t intersect(const ShapeRays& rays, std::uint32_t wanted,
+                                    ShapeHits& hits) const noexcept = 0;
+    /// Those of the `wanted` lanes that meet the shape before t_max.
+    [[nodiscard]] virtual std::uint32_t occluded(const ShapeRays& rays, std::uint32_t wanted) const noexcept = 0;
+    /// The surface at hits of `wanted` lanes: position, both normals (on the side of the ray's origin), departure,
+    /// beyond, outside, texture coordinates, material. Positions and normals are still in the body's frame. Other
+    /// lanes may be overwritten.
+    virtual void surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept = 0;
+    /// Where rays that leave start, so that rounding cannot take them through the surface: here, the points
+    /// themselves. Other lanes of `starts` stay as they were.
+    virtual void depart(const SurfacePoints& points, std::uint32_t wanted, Vec3Lanes& starts) const noexcept {
+        for_each_lane(wanted, [&](std::size_t i) { starts.put(i, points.departure_body[i]); });
+    }
+    /// In the body's frame.
+    [[nodiscard]] virtual TextureFrame texture_frame(const Hit& hit) const noexcept = 0;
+    /// A tree of boxes whose leaves hold the surface, root first; empty: the ellipsoid of `bounds` fits it best.
+    [[nodiscard]] virtual std::vector<BoxNode> boxes() const { return {}; }
+    /// Null where none of the materials shines. The scene must outlive it.
+    [[nodiscard]] virtual std::unique_ptr<const EmissiveSurface> emission(const Scene&) const { return nullptr; }
+
+protected:
+    Shape() = default;
+    Properties properties_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,412 @@
+// Batches of rays through the bodies of a scene: the bodies that they may hit, nearest first, and the surfaces
+// there.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <limits>
+
+#include "base/each_isa.h"
+#include "renderer/geometry/sphere_roots.h"
+#include "renderer/geometry/tracer_impl.h"
+
+namespace narpa {
+
+/// Rays in the world's axes. Where they start is held in two parts, as their sum would be rounded. All are finite,
+/// also those that are not traced.
+struct WorldRays {
+    bool coherent;
+    const Vec3Lanes& direction;
+    const Vec3Lanes& base;    ///< world: the ray's origin, or that of the body that it leaves
+    const Vec3Lanes& offset;  ///< from there to the start
+    const Lanes<double>& time;
+    const Lanes<int>* own = nullptr;       ///< the bodies that they leave; null: none
+    const Vec3Lanes* own_start = nullptr;  ///< in the frame of that body
+    std::uint32_t inside = 0;              ///< those that leave an inner side
+
+    /// From a body at `t`. Differences of positions come before anything else: a common offset of the whole scene
+    /// cancels.
+    [[nodiscard]] Vec3 origin_from(const Vec3& t, std::size_t i) const { return offset[i] + (base[i] - t); }
+    [[nodiscard]] std::uint32_t that_leave(std::uint32_t body) const {
+        return own == nullptr ? 0 : lanes_with(*own, static_cast<int>(body));
+    }
+};
+
+/// The nearest hit of each ray so far.
+struct NearestHits {
+    std::uint32_t met = 0;
+    Lanes<int> body;  ///< -1: none
+    ShapeHits at;     ///< infinite range: none
+};
+
+namespace {
+
+constexpr std::size_t kSortedBodies = 32;  ///< bodies that are sorted at a time
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Lanes<double> for_all(double value) {
+    Lanes<double> lanes;
+    lanes.fill(value);
+    return lanes;
+}
+const Lanes<double> kNoEnd = for_all(kInfinity);
+const Vec3Lanes kZero{};
+
+/// Lanes by body.
+class BodyGroups {
+public:
+    struct Group {
+        std::size_t body;
+        std::uint32_t lanes;
+    };
+    BodyGroups(const Lanes<int>& body, std::uint32_t lanes) noexcept {
+        for (std::uint32_t rest = lanes; rest != 0; rest &= ~groups_[n_++].lanes) {
+            const int first = body[static_cast<std::size_t>(std::countr_zero(rest))];
+            groups_[n_] = {static_cast<std::size_t>(first), lanes_with(body, first) & rest};
+        }
+    }
+    [[nodiscard]] const Group* begin() const { return groups_.data(); }
+    [[nodiscard]] const Group* end() const { return groups_.data() + n_; }
+
+private:
+    Lanes<Group> groups_;
+    std::size_t n_ = 0;
+};
+
+/// Where each ray enters the bounds of a body at `t`; infinity where it misses them. The rays that `leave` the body
+/// start inside.
+NARPA_EACH_ISA void enter(const WorldRays& rays, std::uint32_t leave, const Vec3& t, double bound_m,
+                          Lanes<double>& __restrict entry_m) {
+    const Lanes<int> own = masks_of(leave);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const double entry = bounding_entry(rays.origin_from(t, i), rays.direction[i], bound_m);
+        entry_m[i] = choose(own[i] != 0, 0, entry);
+    }
+}
+
+/// The rays in the frame of a body.
+NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid3& T_world_body,
+                         ShapeRays& __restrict local) {
+    const auto [x, y, z] = columns(T_world_body.q);  // the body's axes
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 o = rays.origin_from(T_world_body.t, i), d = rays.direction[i];
+        local.origin.put(i, {dot(x, o), dot(y, o), dot(z, o)});
+        local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
+    }
+    if (leave == 0) return;
+    const Lanes<int> own = masks_of(leave);
+    for (std::size_t i = 0; i < kLanes; ++i)
+        local.origin.put(i, choose(own[i] != 0, (*rays.own_start)[i], local.origin[i]));
+}
+
+/// The same two for a body that moves within the exposure: each ray meets it at its own moment.
+void enter_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, double bound_m,
+                  Lanes<double>& entry_m) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 o = rays.origin_from(at.position_at(body, rays.time[i]), i);
+        entry_m[i] = is_set(leave, i) ? 0 : bounding_entry(o, rays.direction[i], bound_m);
+    }
+}
+void turn_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave,
+                 ShapeRays& local) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Rigid3 T = at.T_world_body_at(body, rays.time[i]);
+        const auto [x, y, z] = columns(T.q);
+        const Vec3 o = rays.origin_from(T.t, i), d = rays.direction[i];
+        local.origin.put(i, is_set(leave, i) ? (*rays.own_start)[i] : Vec3{dot(x, o), dot(y, o), dot(z, o)});
+        local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
+    }
+}
+
+/// Into the frame of a body, at each ray's moment.
+void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, ShapeRays& local) {
+    if (at.moves(body))
+        turn_moving(at, body, rays, leave, local);
+    else
+        turn(rays, leave, at.T_world_body[body], local);
+    local.leaving = leave;
+    local.inside = rays.inside & leave;
+    local.coherent = rays.coherent;
+}
+
+/// Poses of a body at the moments of these lanes.
+void put_poses(const BodyPoses& at, std::size_t body, const Lanes<double>& time, std::uint32_t lanes,
+               PoseLanes& T_world_body) {
+    if (at.moves(body))
+        for_each_lane(lanes, [&](std::size_t i) { T_world_body.put(i, at.T_world_body_at(body, time[i])); });
+    else
+        for_each_lane(lanes, [&, &T = at.T_world_body[body]](std::size_t i) { T_world_body.put(i, T); });
+}
+
+/// Starts in the world's axes; and directions and times, but for lanes that are not wanted some that are finite.
+NARPA_EACH_ISA void set_out(const PoseLanes& T_world_body, const SurfacePoints& from, const Vec3Lanes& start,
+                            const Vec3Lanes& directions, std::uint32_t wanted, Vec3Lanes& __restrict offset,
+                            Vec3Lanes& __restrict direction, Lanes<double>& __restrict time) {
+    const Lanes<int> mine = masks_of(wanted);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        offset.put(i, T_world_body[i].q * start[i]);
+        direction.put(i, choose(mine[i] != 0, directions[i], {0, 0, 1}));
+        time[i] = choose(mine[i] != 0, from.time[i], kMidExposure);
+    }
+}
+
+std::uint32_t lanes_before(const Lanes<double>& entry_m, const Lanes<double>& end_m) {
+    Lanes<int> before;
+    for (std::size_t i = 0; i < kLanes; ++i) before[i] = -static_cast<int>(entry_m[i] < end_m[i]);
+    return bits_of(before);
+}
+
+/// From the body's frame to the world's.
+template <class Pose>
+inline void to_world_each(const Pose& pose, HitBatch& __restrict hits) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Rigid3 T = pose(i);
+        hits.position.put(i, T * hits.position[i]);
+        hits.geometric_normal.put(i, T.q * hits.geometric_normal[i]);
+        hits.shading_normal.put(i, T.q * hits.shading_normal[i]);
+    }
+}
+NARPA_EACH_ISA void to_world(const Rigid3& T_world_body, HitBatch& __restrict hits) {
+    to_world_each([&](std::size_t) { return T_world_body; }, hits);
+}
+NARPA_EACH_ISA void to_world(const PoseLanes& T_world_body, HitBatch& __restrict hits) {
+    to_world_each([&](std::size_t i) { return T_world_body[i]; }, hits);
+}
+
+/// Copies what Shape::surface writes.
+void copy_surfaces(const HitBatch& from, std::uint32_t lanes, HitBatch& to) {
+    to.outside = (to.outside & ~lanes) | (from.outside & lanes);
+    for_each_lane(lanes, [&](std::size_t i) {
+        to.position.put(i, from.position[i]);
+        to.geometric_normal.put(i, from.geometric_normal[i]);
+        to.shading_normal.put(i, from.shading_normal[i]);
+        to.departure_body.put(i, from.departure_body[i]);
+        to.beyond_body.put(i, from.beyond_body[i]);
+        to.u[i] = from.u[i], to.v[i] = from.v[i];
+        to.material[i] = from.material[i];
+    });
+}
+
+}  // namespace
+
+/// Rays that leave surfaces. Each starts in the frame of its own body, which knows no distances but its own.
+class Tracer::Impl::LeavingRays {
+public:
+    LeavingRays(const Impl& impl, const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                std::uint32_t wanted) noexcept
+        : inside_(wanted & ~from.outside) {
+        own_.fill(-1);
+        for (const auto& [body, mine] : BodyGroups(from.body, wanted)) {
+            for_each_lane(mine, [&](std::size_t i) { own_[i] = from.body[i]; });
+            impl.shapes[body]->depart(from, mine, start_);
+            if (mine == wanted && !at.moves(body))
+                own_at_.fill(at.T_world_body[body]);
+            else
+                put_poses(at, body, from.time, mine, own_at_);
+        }
+        set_out(own_at_, from, start_, directions, wanted, offset_, direction_, time_);
+    }
+    [[nodiscard]] WorldRays rays(bool coherent) const noexcept {
+        return {coherent, direction_, own_at_.t, offset_, time_, &own_, &start_, inside_};
+    }
+
+private:
+    std::uint32_t inside_;
+    Lanes<int> own_;
+    Vec3Lanes start_{};
+    PoseLanes own_at_{};
+    Vec3Lanes offset_, direction_;
+    Lanes<double> time_;
+};
+
+void Tracer::Impl::trace_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body, std::uint32_t wanted,
+                              ShapeRays& local, NearestHits& nearest) const noexcept {
+    to_body(at, body, rays, rays.that_leave(body), local);
+    local.t_max = nearest.at.range_m;
+    const std::uint32_t met = shapes[body]->intersect(local, wanted, nearest.at);
+    if (met == 0) return;
+    const Lanes<int> here = masks_of(met);
+    for (std::size_t i = 0; i < kLanes; ++i)
+        nearest.body[i] = here[i] != 0 ? static_cast<int>(body) : nearest.body[i];
+    nearest.met |= met;
+}
+
+void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body,
+                              Lanes<double>& entry_m) const noexcept {
+    const std::uint32_t leave = rays.that_leave(body);
+    const double bound_m = shapes[body]->properties().bound_m;
+    if (at.moves(body))
+        enter_moving(at, body, rays, leave, bound_m, entry_m);
+    else
+        enter(rays, leave, at.T_world_body[body].t, bound_m, entry_m);
+}
+
+void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,
+                                std::span<const std::uint32_t> bodies, NearestHits& nearest) const noexcept {
+    nearest.met = nearest.at.inner = 0;
+    nearest.body.fill(-1);
+    nearest.at.range_m = kNoEnd;
+    ShapeRays local;
+    if (bodies.size() == 1) {
+        enter_body(at, rays, bodies[0], local.entry_m);
+        const std::uint32_t entering = lanes_before(local.entry_m, nearest.at.range_m) & wanted;
+        if (entering != 0) trace_body(at, rays, bodies[0], entering, local, nearest);
+        return;
+    }
+    struct Candidate {
+        std::uint32_t body;
+        double nearest_m;  ///< of the batch
+        Lanes<double> entry_m;
+    };
+    std::array<Candidate, kSortedBodies> candidates;
+    std::array<std::size_t, kSortedBodies> order;
+    while (!bodies.empty()) {
+        // Bounds about the bodies' origins first, nearest body first.
+        std::size_t m = 0;
+        for (; !bodies.empty() && m < kSortedBodies; bodies = bodies.subspan(1)) {
+            Candidate& c = candidates[m];
+            c.body = bodies.front();
+            c.nearest_m = kInfinity;
+            enter_body(at, rays, c.body, c.entry_m);
+            const std::uint32_t entering = lanes_before(c.entry_m, nearest.at.range_m) & wanted;
+            if (entering == 0) continue;
+            for_each_lane(entering, [&](std::size_t i) { c.nearest_m = std::min(c.nearest_m, c.entry_m[i]); });
+            std::size_t k = m;
+            for (; k > 0 && candidates[order[k - 1]].nearest_m > c.nearest_m; --k) order[k] = order[k - 1];
+            order[k] = m++;
+        }
+        for (std::size_t k = 0; k < m; ++k) {
+            const Candidate& c = candidates[order[k]];
+            const std::uint32_t entering = lanes_before(c.entry_m, nearest.at.range_m) & wanted;
+            if (entering == 0) continue;
+            local.entry_m = c.entry_m;
+            trace_body(at, rays, c.body, entering, local, nearest);
+        }
+    }
+}
+
+std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const WorldRays& rays, const Lanes<double>& t_max,
+                                          std::uint32_t wanted) const noexcept {
+    ShapeRays local;
+    local.t_max = t_max;
+    std::uint32_t dark = 0;
+    for (const std::uint32_t body : all_bodies) {
+        if (dark == wanted) break;
+        enter_body(at, rays, body, local.entry_m);
+        const std::uint32_t entering = lanes_before(local.entry_m, t_max) & wanted & ~dark;
+        if (entering == 0) continue;
+        to_body(at, body, rays, rays.that_leave(body), local);
+        dark |= shapes[body]->occluded(local, entering);
+    }
+    return dark;
+}
+
+void Tracer::Impl::finish(const BodyPoses& at, const WorldRays& rays, const NearestHits& nearest,
+                          HitBatch& hits) const noexcept {
+    hits.met = nearest.met;
+    hits.outside = 0;
+    hits.body = nearest.body;
+    hits.time = rays.time;
+    if (nearest.met == 0) return;
+    hits.face = nearest.at.face;
+    hits.range_m = nearest.at.range_m;
+    const BodyGroups groups(nearest.body, nearest.met);
+    const auto& [first, firsts] = *groups.begin();
+    shapes[first]->surface(nearest.at, firsts, hits);
+    hits.outside &= nearest.met;
+    if (firsts == nearest.met && !at.moves(first)) return to_world(at.T_world_body[first], hits);
+
+    PoseLanes T_world_body;
+    HitBatch others;
+    for (const auto& [body, lanes] : groups) {
+        put_poses(at, body, rays.time, lanes, T_world_body);
+        if (body == first) continue;
+        shapes[body]->surface(nearest.at, lanes, others);
+        copy_surfaces(others, lanes, hits);
+    }
+    to_world(T_world_body, hits);
+}
+
+void Tracer::intersect(const BodyPoses& at, const RayBatch& rays, std::span<const std::uint32_t> bodies,
+                       HitBatch& hits) const noexcept {
+    if (bodies.empty() || rays.n == 0) return hits.clear();
+    NearestHits nearest;
+    const auto trace = [&](const RayBatch& all) {
+        const WorldRays world{true, all.direction, all.origin, kZero, all.time};
+        impl_->find_nearest(at, world, lanes_below(rays.n), bodies, nearest);
+        impl_->finish(at, world, nearest, hits);
+    };
+    if (rays.n == kLanes) return trace(rays);
+    RayBatch filled = rays;
+    for (std::size_t i = rays.n; i < kLanes; ++i) filled.put(i, rays[0]);
+    trace(filled);
+}
+
+void Tracer::intersect(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                       std::uint32_t wanted, HitBatch& hits) const noexcept {
+    if (wanted == 0) return hits.clear();
+    const Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
+    NearestHits nearest;
+    impl_->find_nearest(at, leaving.rays(false), wanted, impl_->all_bodies, nearest);
+    impl_->finish(at, leaving.rays(false), nearest, hits);
+}
+
+std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                               std::uint32_t wanted) const noexcept {
+    if (wanted == 0) return 0;
+    const Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
+    return impl_->find_occluded(at, leaving.rays(true), kNoEnd, wanted);
+}
+
+std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                               const Lanes<double>& t_max, std::uint32_t wanted) const noexcept {
+    if (wanted == 0) return 0;
+    const Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
+    return impl_->find_occluded(at, leaving.rays(false), t_max, wanted);
+}
+
+namespace {
+
+/// The same of hits that do not lie side by side, and their directions.
+struct SideBySide {
+    SideBySide(std::span<const Hit> from, std::span<const Vec3> directions, std::uint32_t wanted) noexcept {
+        for_each_lane(wanted, [&](std::size_t i) {
+            points.put(i, from[i]);
+            direction.put(i, directions[i]);
+        });
+    }
+    SurfacePoints points;
+    Vec3Lanes direction;
+};
+
+}  // namespace
+
+void Tracer::intersect(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                       std::uint32_t wanted, std::span<Hit> hits) const noexcept {
+    wanted &= lanes_below(std::min({from.size(), directions.size(), hits.size(), kLanes}));
+    if (wanted == 0) return;
+    const SideBySide starts(from, directions, wanted);
+    HitBatch batch;
+    intersect(at, starts.points, starts.direction, wanted, batch);
+    for_each_lane(wanted & batch.met, [&](std::size_t i) { hits[i] = batch[i]; });
+    for_each_lane(wanted & ~batch.met, [&](std::size_t i) { hits[i].body = -1; });
+}
+
+std::uint32_t Tracer::occluded(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                               std::uint32_t wanted) const noexcept {
+    wanted &= lanes_below(std::min({from.size(), directions.size(), kLanes}));
+    const SideBySide starts(from, directions, wanted);
+    if (wanted == 0) return 0;
+    const Impl::LeavingRays leaving(*impl_, at, starts.points, starts.direction, wanted);
+    return impl_->find_occluded(at, leaving.rays(false), kNoEnd, wanted);
+}
+
+std::uint32_t Tracer::occluded(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
+                               std::span<const double> t_max, std::uint32_t wanted) const noexcept {
+    wanted &= lanes_below(std::min({from.size(), directions.size(), t_max.size(), kLanes}));
+    const SideBySide starts(from, directions, wanted);
+    Lanes<double> ends{};
+    for_each_lane(wanted, [&](std::size_t i) { ends[i] = t_max[i]; });
+    return occluded(at, starts.points, starts.direction, ends, wanted);
+}
+
+}  // namespace narpa

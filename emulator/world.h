@@ -44,10 +44,13 @@ public:
     PlacementSource place(std::int64_t t_ns, int rider, BodyPoses& out,
                           std::span<Motion> motions = {}) const noexcept;
     /// Puts only the bodies that move (all but those at rest without a can_id): after a first `place`.
-    void place_moving(std::int64_t t_ns, BodyPoses& out) const noexcept;
+    /// Their paths have one pose for each of these times, up to kLanes.
+    void place_moving(std::span<const std::int64_t> times_ns, BodyPoses& out) const noexcept;
 
-    [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const BodyPoses& at) const noexcept {
-        return mount < 0 ? T_mount_sensor : at.T_world_body[static_cast<std::size_t>(mount)] * T_mount_sensor;
+    [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const BodyPoses& at,
+                                     double time = kMidExposure) const noexcept {
+        return mount < 0 ? T_mount_sensor
+                         : at.T_world_body_at(static_cast<std::size_t>(mount), time) * T_mount_sensor;
     }
     [[nodiscard]] std::optional<std::size_t> body_named(std::string_view name) const noexcept;
 

@@ -88,11 +88,11 @@ private:
     Status synchronise() {
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
         if (!options_.lockstep) {
-            while (!clock_.heard() && monotonic_ns() < deadline && !stop_flag()) {
+            while (!clock_.synchronized() && monotonic_ns() < deadline && !stop_flag()) {
                 bus_.wait(50 * kMs);
                 clock_.listen(bus_);
             }
-            if (!clock_.heard()) {
+            if (!clock_.synchronized()) {
                 say(fmt::format("no heartbeat in {} s: time 0 is now", options_.wait_s));
                 clock_.start_here();
             }

@@ -1,4 +1,4 @@
-/// protocols/closed_loop.h - what dynamics and navigation say to each other in a closed loop.
+/// protocols/closed_loop.h - the messages between dynamics and navigation in a closed loop.
 #pragma once
 
 #include <array>
@@ -13,12 +13,12 @@ namespace narpa {
 enum class DynamicsPhase : std::uint8_t {
     flying,
     captured,  ///< contact within the envelope: the docking system holds
-    bounced,   ///< contact outside of it: they part again
-    finished,  ///< the last word: the run is over
+    bounced,   ///< contact outside the envelope: the bodies separate again
+    finished,  ///< the run is over; the last report
 };
 inline constexpr std::array<std::string_view, 4> kDynamicsPhases{"flying", "captured", "bounced", "finished"};
 
-/// Before the pose commands of the same time; at every control period, and when the phase changes.
+/// Sent before the pose commands of the same time, at every control period and when the phase changes.
 struct DynamicsReport {
     std::uint8_t counter = 0;     ///< +1 with every one, wraps
     std::int64_t t_ns = 0;        ///< simulation clock
@@ -39,12 +39,12 @@ enum class GuidancePhase : std::uint8_t { moving, holding, closing, docked, retr
 inline constexpr std::array<std::string_view, 6> kGuidancePhases{"moving", "holding",    "closing",
                                                                  "docked", "retreating", "done"};
 
-/// Why the navigation has given up.
+/// Why the navigation aborts.
 enum class AbortReason : std::uint8_t { none, lost, uncertain, off_reference, bounced };
 inline constexpr std::array<std::string_view, 5> kAbortReasons{"none", "lost", "uncertain", "off_reference",
                                                                "bounced"};
 
-/// What the thrusters are to do from t_ns on, within one control period.
+/// The impulses of the thrusters from t_ns on, within one control period.
 struct ActuatorCommand {
     std::uint8_t counter = 0;
     std::int64_t t_ns = 0;
@@ -55,13 +55,13 @@ struct ActuatorCommand {
     AbortReason abort = AbortReason::none;
 };
 
-/// The target beside the chaser as the navigation believes it, at t_ns: body axes of both, as in the scene.
+/// The estimated pose of the target relative to the chaser at t_ns: body axes of both, as in the scene.
 struct NavigationEstimate {
     std::uint32_t cycle = 0;
     std::int64_t t_ns = 0;
     Rigid3 T_chaser_target{};
     Vec3 sigma_rotation_rad{}, sigma_position_m{};  ///< standard deviations, chaser's body axes
-    std::uint8_t frames = 0, sweeps = 0;            ///< measurements taken since the estimate before
+    std::uint8_t frames = 0, sweeps = 0;            ///< measurements used since the last estimate
 };
 
 }  // namespace narpa

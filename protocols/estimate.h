@@ -9,10 +9,10 @@
 
 namespace narpa {
 
-/// What an estimate rests on.
+/// What an estimate is based on.
 enum class EstimateState : std::uint8_t {
-    lost,       ///< nothing: the frame gave no pose, and there is none to go on from
-    predicted,  ///< the motion so far: the frame gave no pose that could be trusted
+    lost,       ///< nothing: the frame gave no pose, and there is no earlier one
+    predicted,  ///< the motion so far: the frame gave no credible pose
     measured,   ///< the frame
 };
 inline constexpr std::array<std::string_view, 3> kEstimateStates{"lost", "predicted", "measured"};

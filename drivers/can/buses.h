@@ -12,9 +12,9 @@ namespace narpa {
 using CanBusResult = Result<std::unique_ptr<CanBus>>;
 
 CanBusResult open_socketcan(const std::string& interface);
-/// Port 0 takes a free port, which description() tells.
+/// Port 0 takes a free port; description() names it.
 CanBusResult open_slcan_hub(std::uint16_t port);
-/// Comes back once the hub has opened the channel: no frame of the bus is missed after that.
+/// Returns once the hub has opened the channel: no frame of the bus is missed after that.
 CanBusResult open_slcan_client(std::uint16_t port);
 /// `group`: an IPv4 multicast address.
 CanBusResult open_udp_multicast(const std::string& group);
@@ -29,7 +29,8 @@ CanBusResult open_candump_writer(const std::string& path);
     return 64;
 }
 
-/// What every bus can carry at all: lengths and identifiers in range, no error reports, no remote FD frames.
+/// True for frames that every bus can carry: lengths and identifiers in range, no error reports, no remote FD
+/// frames.
 [[nodiscard]] constexpr bool sendable(const CanFrame& f) noexcept {
     if (f.error || (f.fd && f.remote) || f.size > (f.fd ? 64 : 8)) return false;
     return f.id <= (f.extended ? 0x1FFFFFFFu : 0x7FFu);

@@ -19,7 +19,7 @@ std::optional<std::uint16_t> port_number(std::string_view text) {
 
 CanBusResult open_slcan(std::string_view text, CanRole role) {
     const auto port = port_number(text);
-    // Port 0 lets the kernel choose, which only the side that listens can do.
+    // Port 0 lets the kernel choose; only a listening socket can do that.
     if (!port || (*port == 0 && role == CanRole::client))
         return Error{"slcan:" + std::string(text) + ": expected a TCP port from 1 to 65535, such as slcan:29537"};
     return role == CanRole::hub ? open_slcan_hub(*port) : open_slcan_client(*port);

@@ -1,7 +1,7 @@
-/// drivers/can/can_bus.h - one small interface for every CAN bus: SocketCAN, the slcan hub, UDP multicast, logs.
+/// drivers/can/can_bus.h - the interface of every CAN bus: SocketCAN, slcan, UDP multicast, logs.
 ///
-/// Nothing here blocks, allocates or throws after `open_can_bus`: what cannot be sent or stored is dropped and
-/// counted, and a bus that goes away (interface down, client gone) is waited for, not given up.
+/// Nothing here blocks, allocates or throws after `open_can_bus`. Frames that cannot be sent or stored are dropped
+/// and counted. A bus that goes away (interface down, client gone) is reopened when it is back.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,19 @@
 
 namespace narpa {
 
-/// What a bus has met since it was opened.
+/// Since the bus was opened.
 struct CanCounters {
     std::uint64_t received = 0;
     std::uint64_t sent = 0;
     std::uint64_t send_drops = 0;        ///< queue full, no client, interface down, FD on a classic bus
-    std::uint64_t receive_overflow = 0;  ///< frames that the kernel or a full buffer threw away before we saw them
-    std::uint64_t malformed = 0;         ///< lines or datagrams that are no CAN frame
+    std::uint64_t receive_overflow = 0;  ///< frames that the kernel or a full buffer dropped before they were read
+    std::uint64_t malformed = 0;         ///< lines or datagrams that are not a CAN frame
     std::uint64_t error_frames = 0;      ///< controller error reports
     std::uint64_t bus_off = 0;           ///< times that the controller went bus-off
     std::uint64_t interface_down = 0;    ///< times that the interface or the connection went away
 };
 
-/// A frame and when it arrived (CLOCK_MONOTONIC, ns). For a log: the stamp of its line since the first line.
+/// A frame and its time of arrival (CLOCK_MONOTONIC). For a log: the time since its first line.
 struct ReceivedFrame {
     CanFrame frame{};
     std::int64_t t_received_ns = 0;
@@ -36,18 +36,18 @@ class CanBus {
 public:
     virtual ~CanBus() = default;
 
-    /// The next waiting frame; false when there is none now. Error frames are counted, not returned.
+    /// Reads the next frame in the receive queue; false when it is empty. Error frames are counted, not returned.
     [[nodiscard]] virtual bool receive(ReceivedFrame& out) noexcept = 0;
     /// False: dropped and counted.
     virtual bool send(const CanFrame& frame) noexcept = 0;
-    /// Waits until `receive` may have something or the time is over; -1 waits for ever. May wake early.
+    /// Waits until `receive` may have a frame or the timeout; -1: no timeout. May wake early.
     virtual void wait(std::int64_t timeout_ns) noexcept = 0;
-    /// No frame will ever come again (the end of a log).
+    /// No frame will arrive any more (the end of a log).
     [[nodiscard]] virtual bool ended() const noexcept { return false; }
-    /// Frames are a recording: all there at once, `t_received_ns` says when each is due.
+    /// The frames are a recording: all can be read at once, and each is due at its `t_received_ns`.
     [[nodiscard]] virtual bool recorded() const noexcept { return false; }
     [[nodiscard]] virtual bool carries_fd() const noexcept = 0;
-    /// How a client reaches this bus, for people: "slcan: 127.0.0.1:29537 and /dev/pts/3".
+    /// How a client connects to this bus, for messages: "slcan: 127.0.0.1:29537 and /dev/pts/3".
     [[nodiscard]] virtual std::string description() const = 0;
     [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 
@@ -55,8 +55,8 @@ protected:
     CanCounters counters_{};
 };
 
-/// `hub` is the side of `narpa run`; `client` the side of those who command it (`narpa fly`). They differ where
-/// a bus has a server (slcan) or a direction (log: a hub reads it, a client writes it).
+/// `hub` is the side of `narpa run`, `client` that of programs that command it (`narpa fly`). They differ where a
+/// bus has a server (slcan) or a direction (log: a hub reads it, a client writes it).
 enum class CanRole : std::uint8_t { hub, client };
 
 /// BUS: `vcan0`/`can0` (SocketCAN) | `slcan:PORT` | `udp:GROUP` | `log:FILE`.

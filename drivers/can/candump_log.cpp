@@ -1,4 +1,4 @@
-// A candump log as a bus: the hub reads it, a client writes it.
+// A candump log as a bus: a hub reads it, a client writes it.
 #include <fcntl.h>
 
 #include <array>
@@ -15,7 +15,7 @@
 namespace narpa {
 namespace {
 
-/// All frames are there at once, with the time since the first line; a real-time run paces them itself.
+/// All frames can be read at once, with their time since the first line; a real-time run paces them itself.
 class CandumpReader final : public CanBus {
 public:
     CandumpReader(std::vector<ReceivedFrame> frames, std::uint64_t error_frames, std::string path)
@@ -29,12 +29,12 @@ public:
         ++counters_.received;
         return true;
     }
-    /// Nobody listens to a log.
+    /// A log that is read takes no frames.
     bool send(const CanFrame&) noexcept override {
         ++counters_.send_drops;
         return false;
     }
-    /// Nothing more will come after the end: then only the time passes, and -1 returns at once.
+    /// At the end of the log only the timeout passes, and -1 returns at once.
     void wait(std::int64_t timeout_ns) noexcept override {
         if (ended() && timeout_ns > 0) wait_ready({}, timeout_ns);
     }
@@ -55,7 +55,7 @@ class CandumpWriter final : public CanBus {
 public:
     CandumpWriter(Descriptor fd, std::string path) : fd_(std::move(fd)), path_(std::move(path)) {}
 
-    /// A log that is being written has no other side.
+    /// A log that is written has no frames to read.
     [[nodiscard]] bool receive(ReceivedFrame&) noexcept override { return false; }
     bool send(const CanFrame& frame) noexcept override {
         bool written = false;

@@ -8,8 +8,8 @@
 namespace narpa {
 namespace {
 
-/// The kernel stamps with CLOCK_REALTIME; the age of the stamp carries it over to CLOCK_MONOTONIC. An age that
-/// cannot be (the wall clock was set meanwhile) counts as none.
+/// The kernel stamps with CLOCK_REALTIME; the age of the stamp converts it to CLOCK_MONOTONIC. An impossible age
+/// (the wall clock was set meanwhile) counts as 0.
 std::int64_t to_monotonic(const timespec& stamp) noexcept {
     constexpr std::int64_t max_age_ns = 10 * kSecond_ns;
     const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) - (stamp.tv_sec * kSecond_ns + stamp.tv_nsec);
@@ -20,7 +20,7 @@ std::int64_t to_monotonic(const timespec& stamp) noexcept {
 
 void prepare_for_bursts(int fd) noexcept {
     const int bytes = 4 << 20, on = 1;
-    // Only root may go beyond net.core.rmem_max; others get as much as that allows.
+    // Only root may exceed net.core.rmem_max; others get at most that.
     if (::setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0)
         ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
     ::setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);

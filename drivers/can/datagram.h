@@ -17,7 +17,7 @@ struct Datagram {
     long bytes = -1;  ///< as recvmsg: -1 with errno when there is none
     bool truncated = false;
     std::int64_t t_received_ns = 0;  ///< CLOCK_MONOTONIC
-    std::uint32_t lost = 0;          ///< datagrams that the kernel threw away, up to now; 0: not told
+    std::uint32_t lost = 0;          ///< datagrams dropped by the kernel so far (SO_RXQ_OVFL); 0: no count
 };
 
 /// Does not wait. `source`, where given, gets the sender's address.

@@ -54,7 +54,7 @@ inline void wait_ready(std::span<pollfd> fds, std::int64_t timeout_ns) noexcept 
     ::ppoll(fds.data(), fds.size(), timeout_ns < 0 ? nullptr : &t, nullptr);
 }
 
-/// Says at most once a second that a try is due: for what has gone away and may come back.
+/// True at most once a second: when to retry a device that has gone away.
 class RetryTimer {
 public:
     [[nodiscard]] bool due() noexcept {

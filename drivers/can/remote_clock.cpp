@@ -11,10 +11,10 @@ namespace narpa {
 
 bool RemoteClock::accept(const ReceivedFrame& received) noexcept {
     if (decode(received.frame, newest_.t_ns, newest_) != DecodeStatus::complete) return false;
-    // The quickest heartbeat is the truest: all others were held up on their way.
+    // The heartbeat with the least delay is the most accurate.
     const std::int64_t offset_ns = newest_.t_ns - received.t_received_ns;
-    offset_ns_ = heard_ ? std::max(offset_ns_, offset_ns) : offset_ns;
-    heard_ = true;
+    offset_ns_ = synchronized_ ? std::max(offset_ns_, offset_ns) : offset_ns;
+    synchronized_ = true;
     return true;
 }
 

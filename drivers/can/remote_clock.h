@@ -1,4 +1,4 @@
-/// drivers/can/remote_clock.h - the emulator's clock, as those learn it who share its bus.
+/// drivers/can/remote_clock.h - the emulator's clock, from its heartbeats on CAN.
 #pragma once
 
 #include <cstdint>
@@ -12,35 +12,35 @@
 
 namespace narpa {
 
-/// The simulation clock of `narpa run` as its heartbeats tell it. Allocates nothing.
+/// The simulation clock of `narpa run`, synchronised by its heartbeats. Allocates nothing.
 class RemoteClock {
 public:
-    /// Takes in a heartbeat; false: the frame is something else.
+    /// Updates the clock by a heartbeat; false: the frame is not one.
     bool accept(const ReceivedFrame& received) noexcept;
-    /// Takes in what has arrived; what is no heartbeat is passed over.
+    /// Reads all frames that have arrived and drops those that are not heartbeats.
     void listen(CanBus& bus) noexcept;
     /// Without heartbeats: time 0 is now.
     void start_here() noexcept;
 
-    [[nodiscard]] bool heard() const noexcept { return heard_; }
-    /// In real time: what the emulator's clock shows now. Heartbeats carry whole microseconds.
+    [[nodiscard]] bool synchronized() const noexcept { return synchronized_; }
+    /// In real time: the emulator's time now. Heartbeats carry whole microseconds.
     [[nodiscard]] std::int64_t now_ns() const noexcept;
-    /// Of the last heartbeat; its time is where the clock stands in lockstep.
+    /// The last heartbeat; in lockstep its time is the simulation time.
     [[nodiscard]] const Heartbeat& newest() const noexcept { return newest_; }
-    /// In lockstep: all that falls due up to t_ns has been made. What stands at 0 before it started does not count.
+    /// In lockstep: everything due up to t_ns has been sent. Heartbeats in state `starting` do not count.
     [[nodiscard]] bool reached(std::int64_t t_ns) const noexcept {
         constexpr std::int64_t kRoundingNs = 1000;
-        return heard_ && newest_.state != RunState::starting && newest_.t_ns + kRoundingNs > t_ns;
+        return synchronized_ && newest_.state != RunState::starting && newest_.t_ns + kRoundingNs > t_ns;
     }
 
 private:
     Heartbeat newest_{};
     std::int64_t offset_ns_ = 0;
-    bool heard_ = false;
+    bool synchronized_ = false;
 };
 
-/// As a client; where there is no such bus yet (the emulator may still be reading its scene) it tries again for
-/// wait_s seconds, or until stopped.
+/// Opens a bus as a client. While the bus does not exist yet (the emulator may still be reading its scene) it
+/// retries for wait_s seconds, or until stopped.
 Result<std::unique_ptr<CanBus>> join_can_bus(std::string_view spec, double wait_s, const StopFlag& stop);
 
 }  // namespace narpa

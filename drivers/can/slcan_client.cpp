@@ -1,4 +1,4 @@
-// The side of slcan that commands: it connects to a hub on loopback, opens the channel, and comes back when the hub
+// The client side of slcan: connects to a hub on loopback, opens the channel, and returns when the hub
 // does.
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -32,7 +32,7 @@ Connection connect_to(std::uint16_t port, Descriptor& fd) noexcept {
     return errno == EINPROGRESS ? Connection::under_way : Connection::refused;
 }
 
-/// How a connection under way has come out; errno says why it was refused.
+/// The result of a pending connect(); errno has the reason of a failure.
 Connection outcome(int fd, std::int64_t timeout_ns) noexcept {
     std::array<pollfd, 1> fds{{{fd, POLLOUT, 0}}};
     wait_ready(fds, timeout_ns);

@@ -1,5 +1,5 @@
-// The slcan bus as narpa offers it: clients come over TCP on loopback or over one pseudo-terminal, and all of them
-// and narpa share the bus. Wire: protocols/can/slcan.h.
+// The slcan hub: clients connect over TCP on loopback or over one pseudo-terminal; all of them and narpa share the
+// bus. Wire: protocols/can/slcan.h.
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -22,12 +22,12 @@ constexpr std::size_t kTcpClients = 8, kPty = kTcpClients, kClients = kTcpClient
 
 struct Client {
     SlcanStream stream{};
-    bool open = false;  ///< it has sent O: it takes part in the bus
+    bool open = false;  ///< it has sent O: it is on the bus
     std::uint64_t overlong = 0;
-    std::int64_t t_full_ns = 0;  ///< since when it leaves no room for what others say; 0: it keeps up
+    std::int64_t t_full_ns = 0;  ///< since when its send queue has been too full for others' frames; 0: it keeps up
 };
 
-/// Frames that have come in and not been taken yet; its size is fixed at the start.
+/// Receive queue of fixed size.
 class FrameQueue {
 public:
     [[nodiscard]] bool empty() const noexcept { return begin_ == end_; }
@@ -42,11 +42,11 @@ private:
 
 /// No read brings more frames than this: the shortest line is "t1230" and CR.
 constexpr std::size_t kFramesPerRead = SlcanStream::kReadBytes / 6 + 1;
-/// What all of them take on their way to another client.
+/// Bytes that they need in another client's send queue.
 constexpr std::size_t kRoomForRead = kFramesPerRead * kSlcanMaxLine;
-/// Of the kernel's own buffer for a client: the larger it is, the later the kernel says that there is room again.
+/// The kernel's send buffer for a client: the larger it is, the later POLLOUT reports room again.
 constexpr int kSocketBytes = 128 << 10;
-/// How long all others wait for one who does not read. Then he is left behind.
+/// How long all clients wait for one that does not read. After that it misses frames.
 constexpr std::int64_t kPatience_ns = 1000'000'000;
 
 class SlcanHub final : public CanBus {
@@ -85,9 +85,9 @@ public:
         bool held_up = false;
         for (std::size_t i = 0; i < kClients; ++i) {
             const SlcanStream& s = clients_[i].stream;
-            const bool may_speak = others_keep_up(clients_[i]);
-            held_up = held_up || !may_speak;
-            fds[i] = {s.fd(), static_cast<short>((may_speak ? POLLIN : 0) | (s.pending() ? POLLOUT : 0)), 0};
+            const bool may_send = others_keep_up(clients_[i]);
+            held_up = held_up || !may_send;
+            fds[i] = {s.fd(), static_cast<short>((may_send ? POLLIN : 0) | (s.pending() ? POLLOUT : 0)), 0};
         }
         const bool patience_ends_first = held_up && (timeout_ns < 0 || timeout_ns > kPatience_ns);
         wait_ready(fds, patience_ends_first ? kPatience_ns : timeout_ns);
@@ -108,16 +108,16 @@ private:
         for (Client& client : clients_) {
             if (!client.stream) continue;
             client.stream.flush();
-            // What finds no room stays in the client's socket: it is slowed down, and nothing is lost.
+            // Without room the data stays in the client's socket: the client is slowed down, and nothing is lost.
             if (queue_.free() >= kFramesPerRead && others_keep_up(client)) serve(client);
         }
     }
 
-    /// There is room for what this client may say, at everyone whom it would be told.
-    bool others_keep_up(const Client& speaker) noexcept {
+    /// All other clients have room for what this one may send.
+    bool others_keep_up(const Client& sender) noexcept {
         bool all = true;
         for (Client& c : clients_)
-            if (&c != &speaker) all = keeps_up(c) && all;
+            if (&c != &sender) all = keeps_up(c) && all;
         return all;
     }
     static bool keeps_up(Client& client) noexcept {
@@ -142,14 +142,14 @@ private:
                 clients_[i].open = false;
                 clients_[i].overlong = 0;
                 break;
-            }  // no place left: fd closes, and the client sees it
+            }  // no slot left: fd closes, and the client sees it
         }
     }
 
     void serve(Client& client) noexcept {
         const bool there = client.stream.read();
         std::string_view line;
-        while (client.stream.next_line(line)) obey(client, line);
+        while (client.stream.next_line(line)) execute(client, line);
         for (; client.overlong < client.stream.overlong(); ++client.overlong) refuse(client);
         if (there || &client == &clients_[kPty]) return;
         client.stream.close();
@@ -157,14 +157,14 @@ private:
         ++counters_.interface_down;
     }
 
-    void obey(Client& client, std::string_view line) noexcept {
+    void execute(Client& client, std::string_view line) noexcept {
         const bool bare = line.size() == 1;
         switch (line[0]) {
             case 'O':
             case 'C':
                 if (!bare) return refuse(client);
                 client.open = line[0] == 'O';
-                if (&client == &clients_[kPty] && !client.open) forget_unread(client);
+                if (&client == &clients_[kPty] && !client.open) discard_unread(client);
                 return answer(client, "\r");
             case 'S':
                 return line.size() == 2 && line[1] >= '0' && line[1] <= '9' ? answer(client, "\r") : refuse(client);
@@ -186,7 +186,7 @@ private:
         deliver({text.data(), n}, &client);
     }
 
-    /// To every open client but `from`. One that has fallen too far behind misses it: that is counted.
+    /// Sends to every open client but `from`. A client whose queue is full misses the line; this is counted.
     Delivery deliver(std::string_view line, const Client* from) noexcept {
         Delivery delivery;
         for (Client& client : clients_)
@@ -203,8 +203,8 @@ private:
         answer(client, "\a");
     }
 
-    /// What nobody read on the pty would otherwise wait there for the next program that opens it.
-    void forget_unread(Client& client) noexcept {
+    /// Unread data on the pty would otherwise reach the next program that opens it.
+    void discard_unread(Client& client) noexcept {
         client.stream.discard();
         ::tcflush(pty_far_.get(), TCIFLUSH);
     }
@@ -246,7 +246,7 @@ CanBusResult open_slcan_hub(std::uint16_t port) {
     if (!near || ::grantpt(near.get()) != 0 || ::unlockpt(near.get()) != 0 ||
         ::ptsname_r(near.get(), path.data(), path.size()) != 0)
         return failed(name + ": cannot make a pseudo-terminal");
-    // The far end stays open here, so that clients may come and go without hanging up the near one.
+    // The far end stays open here, so that a client that closes it does not hang up the near end.
     Descriptor far(::open(path.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
     termios mode{};
     if (!far || ::tcgetattr(far.get(), &mode) != 0) return failed(name + ": " + path.data());

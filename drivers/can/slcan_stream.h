@@ -27,7 +27,7 @@ public:
     [[nodiscard]] bool write(std::string_view line) noexcept;
     /// Sends what is queued, as far as it goes without waiting.
     void flush() noexcept;
-    /// Throws away what is queued.
+    /// Drops the send queue.
     void discard() noexcept { out_begin_ = out_end_ = 0; }
     /// Bytes that `write` would still take.
     [[nodiscard]] std::size_t room() const noexcept { return out_.size() - (out_end_ - out_begin_); }

@@ -1,4 +1,4 @@
-// Linux's own CAN: a raw socket on one interface, which may go down, vanish and come back.
+// SocketCAN: a raw socket on one interface, which may go down, be removed and come back.
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
@@ -140,7 +140,7 @@ private:
     void note_failure(int reason) noexcept {
         if (!down_) ++counters_.interface_down;
         down_ = true;
-        // ENETDOWN: down, and the socket will hear it when it is up again. ENODEV, ENXIO: removed.
+        // ENETDOWN: down; the socket works again when the interface is up. ENODEV, ENXIO: removed.
         if (reason == ENODEV || reason == ENXIO) bound_ = false;
     }
 

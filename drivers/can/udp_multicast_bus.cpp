@@ -33,7 +33,7 @@ public:
                 counters_.receive_overflow += static_cast<std::uint32_t>(d.lost - lost_);
                 lost_ = d.lost;
             }
-            // The group sends our own frames back to us.
+            // The group loops our own frames back.
             if (source.sin_port == own_.sin_port && source.sin_addr.s_addr == own_.sin_addr.s_addr) continue;
             const auto datagram = std::span<const std::uint8_t>(bytes).first(static_cast<std::size_t>(d.bytes));
             CanFrame frame;
@@ -105,7 +105,7 @@ bool join(int fd, const sockaddr_in& group, in_addr loopback) {
            ::setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0;
 }
 
-/// A second socket with a port of its own, by which our own frames are told from others'.
+/// A second socket for sending; its source port distinguishes our own frames.
 bool prepare_sender(int fd, in_addr loopback, sockaddr_in& own) {
     const int ttl = 1;
     own = ipv4(loopback, 0);

@@ -17,7 +17,7 @@ std::size_t be16(const std::uint8_t* at) {
     return static_cast<std::size_t>(at[0] << 8 | at[1]);
 }
 
-/// Where the payload of a whole UDP datagram of this size lies in the frame; 0: it is none.
+/// Offset of the payload of a whole UDP datagram of this size; 0: the frame is not one.
 std::size_t payload_at(const std::uint8_t* frame, std::size_t size, std::size_t payload_bytes) {
     constexpr std::size_t kIpv4 = 0x0800, kOffsetMask = 0x3FFF;  // more fragments, or not the first
     if (size < kEthernetBytes + kIpBytes + kUdpBytes || be16(frame + 12) != kIpv4) return 0;

@@ -1,4 +1,4 @@
-/// drivers/lidar/packet_capture.h - the UDP datagrams of a capture file, for reading a recorded LiDAR.
+/// drivers/lidar/packet_capture.h - reads the UDP datagrams of a capture file.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 namespace narpa {
 
 /// The payloads of this size of all UDP datagrams over IPv4 and Ethernet, in the file's order; other traffic is
-/// passed over. Errors: not a capture, another link than Ethernet, a file cut short, none of that size.
+/// skipped. Errors: not a capture, another link than Ethernet, a file cut short, none of that size.
 Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string& path, std::size_t payload_bytes);
 
 }  // namespace narpa

@@ -14,7 +14,7 @@ namespace narpa {
 
 struct PacketCounters {
     std::uint64_t sent = 0;
-    std::uint64_t dropped = 0;  ///< socket buffer full, nobody listening, disk full
+    std::uint64_t dropped = 0;  ///< socket buffer full, no receiver, disk full
 };
 
 /// Each kind has its own port (LidarNetwork). `udp:HOST:PORT` sets the data port; position packets keep their

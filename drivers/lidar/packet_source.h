@@ -1,4 +1,4 @@
-/// drivers/lidar/packet_source.h - where LiDAR packets come from: a UDP port.
+/// drivers/lidar/packet_source.h - source of LiDAR packets: a UDP port.
 #pragma once
 
 #include <cstddef>
@@ -14,15 +14,15 @@ namespace narpa {
 
 struct PacketSourceCounters {
     std::uint64_t received = 0;
-    std::uint64_t refused = 0;  ///< empty, or longer than the room that was given for it
-    std::uint64_t lost = 0;     ///< the kernel threw them away: nobody took them in time
+    std::uint64_t refused = 0;  ///< empty, or longer than the buffer
+    std::uint64_t lost = 0;     ///< dropped by the kernel: the receive buffer was full
 };
 
 class PacketSource {
 public:
     virtual ~PacketSource() = default;
-    /// Waits for the next packet, at most `timeout_ns` (0: takes what is there), and writes it into `bytes`. The
-    /// number of its bytes; 0: nothing in time.
+    /// Waits for the next packet, at most `timeout_ns` (0: does not wait), and writes it into `bytes`. Returns its
+    /// size; 0: timeout.
     [[nodiscard]] virtual std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t timeout_ns) noexcept = 0;
     [[nodiscard]] const PacketSourceCounters& counters() const noexcept { return counters_; }
     [[nodiscard]] virtual std::string description() const = 0;
@@ -34,8 +34,7 @@ protected:
 /// The longest UDP datagram over IPv4: a buffer of this size takes any LiDAR's packets.
 inline constexpr std::size_t kDatagramBytesMax = 65507;
 
-/// SOURCE: `udp:PORT` (of any of this machine's addresses) | `udp:ADDRESS:PORT` (of this one; an IPv6 address
-/// stands in brackets).
+/// SOURCE: `udp:PORT` (on all of this machine's addresses) | `udp:ADDRESS:PORT` (an IPv6 address is in brackets).
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec);
 
 }  // namespace narpa

@@ -12,13 +12,13 @@
 #include <cstdio>
 #include <cstring>
 
-#include "drivers/outbox.h"
+#include "drivers/write_queue.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::size_t kEthernetBytes = 14, kIpBytes = 20, kUdpBytes = 8;
-constexpr std::size_t kHeaderBytes = kEthernetBytes + kIpBytes + kUdpBytes;  // 42, as the manual counts
+constexpr std::size_t kHeaderBytes = kEthernetBytes + kIpBytes + kUdpBytes;  // 42
 constexpr std::size_t kPayloadMax = 1500 - kIpBytes - kUdpBytes;
 constexpr std::size_t kRecordSlots = 2048;  // 2.7 s of data packets: a disk may pause
 constexpr std::int64_t kSecondNs = 1'000'000'000;
@@ -78,8 +78,8 @@ std::size_t put_frame(std::uint8_t* frame, const LidarNetwork& from, int port,
     return kHeaderBytes + payload.size();
 }
 
-// The file always ends with a whole record: what a full disk cut short is taken back.
-class PcapWriter final : public OutboxWriter {
+// The file always ends with a whole record: one that a full disk cut short is removed.
+class PcapWriter final : public QueueWriter {
 public:
     /// The file's header is already written.
     PcapWriter(pcap_t* pcap, pcap_dumper_t* dumper)
@@ -89,7 +89,7 @@ public:
         ::pcap_close(pcap_);
     }
 
-    void write(std::span<const std::uint8_t> record, const Outbox&) noexcept override {
+    void write(std::span<const std::uint8_t> record, const WriteQueue&) noexcept override {
         std::int64_t unix_ns = 0;
         std::memcpy(&unix_ns, record.data(), kStampBytes);
         const auto length = static_cast<bpf_u_int32>(record.size() - kStampBytes);
@@ -128,7 +128,7 @@ public:
           network_(network),
           epoch_unix_ns_(epoch_unix_ns),
           writer_(pcap, dumper),
-          outbox_(writer_, kRecordSlots, sizeof(Record), wait_when_full) {}
+          queue_(writer_, kRecordSlots, sizeof(Record), wait_when_full) {}
 
     bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept override {
         if (payload.size() > kPayloadMax) {
@@ -140,11 +140,11 @@ public:
         std::memcpy(record.data(), &unix_ns, kStampBytes);
         const int port = kind == PacketKind::data ? network_.data_port : network_.position_port;
         const std::size_t size = kStampBytes + put_frame(record.data() + kStampBytes, network_, port, payload);
-        return outbox_.push(std::span(record).first(size));
+        return queue_.push(std::span(record).first(size));
     }
-    void flush() noexcept override { outbox_.flush(); }
+    void flush() noexcept override { queue_.flush(); }
     PacketCounters counters() const noexcept override {
-        return {writer_.sent.load(std::memory_order_relaxed), outbox_.dropped() + writer_.lost_packets()};
+        return {writer_.sent.load(std::memory_order_relaxed), queue_.dropped() + writer_.lost_packets()};
     }
     std::string description() const override { return description_; }
 
@@ -153,7 +153,7 @@ private:
     LidarNetwork network_;
     std::int64_t epoch_unix_ns_;
     PcapWriter writer_;
-    Outbox outbox_;
+    WriteQueue queue_;
 };
 
 }  // namespace

@@ -109,10 +109,10 @@ Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, co
     const Result<Destination> destination = resolve(host, address);
     if (!destination) return destination.error();
 
-    // Not connected: a connected socket would be told by ICMP that nobody listens, and lose the next packet.
+    // Not connected: on a connected socket an ICMP "port unreachable" makes the next send fail.
     const int fd = ::socket(destination->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return Error{"udp:" + address + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
-    const int on = 1;  // the instrument itself broadcasts
+    const int on = 1;  // as the instrument does
     ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
     return std::unique_ptr<PacketSink>(
         std::make_unique<UdpSink>(fd, *destination, *port, network.position_port_offset(), host));

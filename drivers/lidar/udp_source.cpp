@@ -38,7 +38,7 @@ public:
     [[nodiscard]] std::string description() const override { return description_; }
 
 private:
-    /// The kernel's count is of 32 bits and never starts anew.
+    /// The kernel's count has 32 bits and wraps.
     void note_lost(std::uint32_t total) noexcept {
         if (total == 0) return;
         counters_.lost += static_cast<std::uint32_t>(total - lost_);

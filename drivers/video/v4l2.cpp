@@ -7,12 +7,12 @@
 #include <cstring>
 #include <numeric>
 
-#include "drivers/outbox.h"
 #include "drivers/video/backends.h"
 #include "drivers/video/v4l2_device.h"
+#include "drivers/write_queue.h"
 
 // v4l2loopback 0.12.7 (Debian 12) decides the way here: memory-mapped output always returns the same buffer, so
-// frames go by write(); an unknown format is "accepted" as another, so what comes back is compared; without
+// frames go by write(); an unknown format is "accepted" as another, so the result is compared; without
 // STREAMON before the first write the device is unusable once the writer has closed it, and newer versions (0.13)
 // refuse that same STREAMON with EINVAL, harmlessly. See v4l2loopback issues 191, 442 and 607.
 
@@ -108,13 +108,13 @@ Error describe(const std::string& path, const VideoFormat& format, const Start& 
     return error;
 }
 
-class V4l2Writer final : public OutboxWriter {
+class V4l2Writer final : public QueueWriter {
 public:
     V4l2Writer(std::string path, const VideoFormat& format, int fd)
         : path_(std::move(path)), format_(format), fd_(fd) {}
     ~V4l2Writer() override { close_device(); }
 
-    void write(std::span<const std::uint8_t> frame, const Outbox&) noexcept override {
+    void write(std::span<const std::uint8_t> frame, const WriteQueue&) noexcept override {
         if (fd_ < 0 && !look_for_device()) return abandon(frame);
         ssize_t n = 0;
         do n = ::write(fd_, frame.data(), frame.size());
@@ -160,16 +160,16 @@ public:
         : description_("V4L2 output " + path + ", " + format_text(v4l2_wanted_format(format))),
           frame_size_(frame_bytes(format)),
           writer_(path, format, fd),
-          outbox_(writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
+          queue_(writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
 
     bool send(std::span<const std::uint8_t> frame) noexcept override {
-        if (frame.size() == frame_size_) return outbox_.push(frame);
+        if (frame.size() == frame_size_) return queue_.push(frame);
         writer_.abandon(frame);
         return false;
     }
-    void flush() noexcept override { outbox_.flush(); }
+    void flush() noexcept override { queue_.flush(); }
     VideoCounters counters() const noexcept override {
-        return {writer_.written.load(std::memory_order_relaxed), outbox_.dropped(), 0,
+        return {writer_.written.load(std::memory_order_relaxed), queue_.dropped(), 0,
                 writer_.failed.load(std::memory_order_relaxed), writer_.reconnects.load(std::memory_order_relaxed)};
     }
     std::string description() const override { return description_; }
@@ -178,7 +178,7 @@ private:
     std::string description_;
     std::size_t frame_size_;
     V4l2Writer writer_;
-    Outbox outbox_;
+    WriteQueue queue_;
 };
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace narpa {
 namespace {
 
 constexpr std::uint32_t kBuffers = 4;
-constexpr std::int64_t kLook_ns = 20'000'000;  // between two looks whether the device is a camera by now
+constexpr std::int64_t kPollPeriod_ns = 20'000'000;  // between two checks whether the device can capture yet
 
 /// A buffer of the driver, mapped as long as this lives.
 class MappedBuffer {
@@ -65,7 +65,7 @@ Error cannot(const std::string& what) {
     return {.what = what + ": " + std::strerror(errno), .kind = ErrorKind::missing};
 }
 
-/// Agrees on the format. Zeros, or nothing at all, is what v4l2loopback tells before its writer has set one.
+/// Negotiates the format. Before its writer has set one, v4l2loopback reports zeros or fails.
 Result<Stage> agree_on_format(int fd, const VideoFormat& format) {
     const v4l2_pix_format wanted = v4l2_wanted_format(format);
     v4l2_format f{};
@@ -132,7 +132,7 @@ public:
             if (stage_ == Stage::streaming)
                 wait_ready(fds, left_ns);
             else
-                wait_ready({}, std::min(left_ns, kLook_ns));
+                wait_ready({}, std::min(left_ns, kPollPeriod_ns));
             if ((fds[0].revents & POLLERR) != 0) stop();  // it streams no more
         }
         return false;

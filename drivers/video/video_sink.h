@@ -1,7 +1,7 @@
-/// drivers/video/video_sink.h - where frames go: a V4L2 output device, a Y4M file or FIFO, or nowhere.
+/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a Y4M file or FIFO, or none.
 ///
-/// A sink owns a thread and a ring of preallocated frames, so that handing a frame over is one copy: no disk, no
-/// reader and no device can hold the loop up.
+/// A sink owns a thread and a ring of preallocated frames, so that handing over a frame is one copy: no disk,
+/// reader or device can block the loop.
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@ namespace narpa {
 struct VideoCounters {
     std::uint64_t written = 0;     ///< whole frames that reached the device, file or reader
     std::uint64_t ring_full = 0;   ///< dropped: the sink could not keep up
-    std::uint64_t no_reader = 0;   ///< dropped: a FIFO that nobody reads
+    std::uint64_t no_reader = 0;   ///< dropped: a FIFO without a reader
     std::uint64_t failed = 0;      ///< dropped: the write failed (device gone, disk full)
-    std::uint64_t reconnects = 0;  ///< times that a reader or a device came back
+    std::uint64_t reconnects = 0;  ///< times that a reader or a device was connected again
 };
 
-/// What to do when the ring is full: a real-time run drops, a lockstep run waits (and no frame is ever lost).
+/// When the ring is full, a real-time run drops the frame and a lockstep run waits, so that no frame is lost.
 enum class WhenFull : std::uint8_t { drop, wait };
 
 class VideoSink {

@@ -1,4 +1,4 @@
-/// drivers/video/video_source.h - where frames come from: a V4L2 capture device, a Y4M FIFO or file.
+/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a Y4M FIFO or file.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,23 @@
 namespace narpa {
 
 struct VideoSourceCounters {
-    std::uint64_t received = 0;   ///< whole frames handed out
-    std::uint64_t truncated = 0;  ///< thrown away: the writer left in the middle, or the device gave too few bytes
-    std::uint64_t lost = 0;       ///< the device skipped them (by its own count): nobody took them in time
+    std::uint64_t received = 0;  ///< whole frames handed out
+    std::uint64_t truncated =
+        0;                   ///< dropped: the writer closed within a frame, or the device returned too few bytes
+    std::uint64_t lost = 0;  ///< gaps in the device's sequence numbers: the frames were not read in time
 };
 
-/// Frames in the order of their coming, none of them twice, none torn. Whoever writes may come later, go, and come
-/// again: a FIFO's next writer begins a stream of its own. A FIFO holds its writer up rather than lose a frame; of
-/// frames that nobody takes, v4l2loopback (0.12) keeps two and then only the newest.
+/// Whole frames in the order of arrival, none twice. A writer may open later, close, and open again: a FIFO's next
+/// writer begins a new stream. A FIFO blocks its writer rather than lose a frame; v4l2loopback (0.12) keeps two
+/// unread frames and then only the newest.
 class VideoSource {
 public:
     virtual ~VideoSource() = default;
 
-    /// Waits for the next whole frame, at most `timeout_ns` (0: takes what is there), and writes it into `frame`
-    /// (frame_bytes of the format). False: nothing in time, or `status` has an error.
+    /// Waits for the next whole frame, at most `timeout_ns` (0: does not wait), and writes it into `frame`
+    /// (frame_bytes of the format). False: timeout, or `status` has an error.
     [[nodiscard]] virtual bool receive(std::span<std::uint8_t> frame, std::int64_t timeout_ns) = 0;
-    /// An error when no frame will ever come: the stream has another format than was asked for, or is no video.
+    /// An error when no frame can arrive: the stream has another format than requested, or is not video.
     [[nodiscard]] const Status& status() const noexcept { return status_; }
     [[nodiscard]] const VideoSourceCounters& counters() const noexcept { return counters_; }
     [[nodiscard]] virtual std::string description() const = 0;
@@ -39,7 +40,7 @@ protected:
 };
 
 /// SOURCE: `/dev/videoN` (V4L2 capture) | an existing FIFO or `FILE.y4m` (Y4M, as the sink writes it; a file is
-/// followed as it grows). Does not wait for a writer: what cannot be known before one comes, `status` tells later.
+/// followed as it grows). Does not wait for a writer: errors that only its stream shows are in `status` later.
 Result<std::unique_ptr<VideoSource>> open_video_source(std::string_view spec, const VideoFormat& format);
 
 }  // namespace narpa

@@ -13,13 +13,13 @@
 #include <cstring>
 #include <vector>
 
-#include "drivers/outbox.h"
 #include "drivers/video/backends.h"
+#include "drivers/write_queue.h"
 
 namespace narpa {
 namespace {
 
-constexpr int kPatienceMs = 20;  // between two looks at the clock while a reader is stuck or away
+constexpr int kPollPeriodMs = 20;  // between two checks of the deadline while a reader blocks or is away
 
 void add_one(std::atomic<std::uint64_t>& counter) noexcept {
     counter.fetch_add(1, std::memory_order_relaxed);
@@ -52,7 +52,7 @@ private:
     std::size_t first_ = 0, last_ = 0;
 };
 
-class Y4mWriter : public OutboxWriter {
+class Y4mWriter : public QueueWriter {
 public:
     Y4mWriter(const VideoFormat& format, std::string header) : format_(format), header_(std::move(header)) {
         if (!y4m_is_verbatim(format.pixel)) planar_.resize(frame_bytes(format));
@@ -83,14 +83,14 @@ private:
     std::vector<std::uint8_t> planar_;
 };
 
-// A file always ends with a whole frame: what a full disk cut short is taken back.
+// A file always ends with a whole frame: one that a full disk cut short is removed.
 class FileWriter final : public Y4mWriter {
 public:
     FileWriter(int fd, const VideoFormat& format, std::string header)
         : Y4mWriter(format, std::move(header)), fd_(fd) {}
     ~FileWriter() override { ::close(fd_); }
 
-    void write(std::span<const std::uint8_t> frame, const Outbox&) noexcept override {
+    void write(std::span<const std::uint8_t> frame, const WriteQueue&) noexcept override {
         Pieces left = pieces(samples(frame), end_of_last_frame_ == 0);
         off_t end = end_of_last_frame_;
         while (!left.empty()) {
@@ -122,11 +122,11 @@ public:
         : Y4mWriter(format, std::move(header)), path_(std::move(path)), wait_for_reader_(wait_for_reader) {}
     ~FifoWriter() override { lost(); }
 
-    void write(std::span<const std::uint8_t> frame, const Outbox& outbox) noexcept override {
+    void write(std::span<const std::uint8_t> frame, const WriteQueue& queue) noexcept override {
         const std::span<const std::uint8_t> data = samples(frame);
         for (;;) {
-            if (!reach_reader(outbox)) return add_one(no_reader);
-            switch (write_to_reader(data, outbox)) {
+            if (!reach_reader(queue)) return add_one(no_reader);
+            switch (write_to_reader(data, queue)) {
                 case Outcome::written: return add_one(written);
                 case Outcome::out_of_time:
                     lost();  // what follows would continue half a frame
@@ -148,32 +148,32 @@ private:
     enum class Outcome { written, reader_left, out_of_time };
 
     // A FIFO opens for writing without blocking only while somebody reads it.
-    bool reach_reader(const Outbox& outbox) noexcept {
+    bool reach_reader(const WriteQueue& queue) noexcept {
         while (fd_ < 0) {
             fd_ = ::open(path_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
             if (fd_ >= 0) {
                 stream_header_due_ = true;
                 if (had_reader_) add_one(reconnects);
                 had_reader_ = true;
-            } else if (!wait_for_reader_ || outbox.time_left_ms() == 0) {
+            } else if (!wait_for_reader_ || queue.time_left_ms() == 0) {
                 return false;
             } else {
-                ::poll(nullptr, 0, kPatienceMs);
+                ::poll(nullptr, 0, kPollPeriodMs);
             }
         }
         return true;
     }
 
-    Outcome write_to_reader(std::span<const std::uint8_t> data, const Outbox& outbox) noexcept {
+    Outcome write_to_reader(std::span<const std::uint8_t> data, const WriteQueue& queue) noexcept {
         Pieces left = pieces(data, stream_header_due_);
         while (!left.empty()) {
             const ssize_t n = left.write_to(fd_);
             if (n > 0) {
                 left.consume(static_cast<std::size_t>(n));
             } else if (n < 0 && errno == EAGAIN) {
-                if (outbox.time_left_ms() == 0) return Outcome::out_of_time;
+                if (queue.time_left_ms() == 0) return Outcome::out_of_time;
                 pollfd fd{fd_, POLLOUT, 0};
-                ::poll(&fd, 1, kPatienceMs);
+                ::poll(&fd, 1, kPollPeriodMs);
             } else if (n == 0 || errno != EINTR) {
                 return Outcome::reader_left;
             }
@@ -193,16 +193,16 @@ public:
         : writer_(std::move(writer)),
           frame_size_(frame_bytes(format)),
           description_(std::move(description)),
-          outbox_(*writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
+          queue_(*writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
 
     bool send(std::span<const std::uint8_t> frame) noexcept override {
-        if (frame.size() == frame_size_) return outbox_.push(frame);
+        if (frame.size() == frame_size_) return queue_.push(frame);
         add_one(writer_->failed);
         return false;
     }
-    void flush() noexcept override { outbox_.flush(); }
+    void flush() noexcept override { queue_.flush(); }
     VideoCounters counters() const noexcept override {
-        return {writer_->written.load(std::memory_order_relaxed), outbox_.dropped(),
+        return {writer_->written.load(std::memory_order_relaxed), queue_.dropped(),
                 writer_->no_reader.load(std::memory_order_relaxed), writer_->failed.load(std::memory_order_relaxed),
                 writer_->reconnects.load(std::memory_order_relaxed)};
     }
@@ -212,7 +212,7 @@ private:
     std::unique_ptr<Y4mWriter> writer_;
     std::size_t frame_size_;
     std::string description_;
-    Outbox outbox_;
+    WriteQueue queue_;
 };
 
 }  // namespace

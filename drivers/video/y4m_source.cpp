@@ -1,4 +1,4 @@
-// Frames from a Y4M stream: a FIFO whose writers come and go, or a file that may still grow.
+// Frames from a Y4M stream: a FIFO whose writers may open and close, or a file that may still grow.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -15,8 +15,8 @@ namespace narpa {
 namespace {
 
 constexpr std::size_t kLongestLine = 256;
-constexpr int kPipeBytes = 1 << 20;           // an unprivileged process may have this: a frame goes in at once
-constexpr std::int64_t kLook_ns = 1'000'000;  // between two looks for a writer, where the kernel tells nothing
+constexpr int kPipeBytes = 1 << 20;  // an unprivileged process may have this: a frame goes in at once
+constexpr std::int64_t kPollPeriod_ns = 1'000'000;  // between two checks for a writer, which poll() does not report
 
 class Y4mSource final : public VideoSource {
 public:
@@ -36,7 +36,7 @@ public:
             const std::int64_t left_ns = until_ns - monotonic_ns();
             if (left_ns <= 0) return false;
             if (progress == Progress::end) {
-                wait_ready({}, std::min(left_ns, kLook_ns));
+                wait_ready({}, std::min(left_ns, kPollPeriod_ns));
             } else {
                 std::array<pollfd, 1> fds{{{fd_.get(), POLLIN, 0}}};
                 wait_ready(fds, left_ns);
@@ -87,7 +87,7 @@ private:
     }
 
     void take_line(std::string_view line) {
-        // A writer may have left, and its successor come, between two looks of ours.
+        // A writer may have closed and another opened between two checks.
         if (part_ == Part::stream_header || line.starts_with("YUV4MPEG2 ")) {
             const Status status = check_y4m_stream_header(line, format_);
             if (!status) return fail(status.error());

@@ -23,24 +23,24 @@ Result<std::unique_ptr<RowLog>> RowLog::create(const std::string& path, std::str
 RowLog::RowLog(std::string path, std::FILE* file, bool wait_when_full)
     : path_(std::move(path)),
       file_(file),
-      outbox_(std::make_unique<Outbox>(*this, kLines, kMaxLine, wait_when_full)) {}
+      queue_(std::make_unique<WriteQueue>(*this, kLines, kMaxLine, wait_when_full)) {}
 
 RowLog::~RowLog() {
     (void)close();
 }
 
 void RowLog::append(std::string_view line) noexcept {
-    outbox_->push({reinterpret_cast<const std::uint8_t*>(line.data()), line.size()});
+    queue_->push({reinterpret_cast<const std::uint8_t*>(line.data()), line.size()});
 }
 
-void RowLog::write(std::span<const std::uint8_t> item, const Outbox&) noexcept {
+void RowLog::write(std::span<const std::uint8_t> item, const WriteQueue&) noexcept {
     if (std::fwrite(item.data(), 1, item.size(), file_) != item.size()) ++lost_;
 }
 
 Status RowLog::close() {
     if (!file_) return Ok{};
-    std::uint64_t dropped = outbox_->dropped();
-    outbox_.reset();  // ends its thread: nobody else writes the file or `lost_`
+    std::uint64_t dropped = queue_->dropped();
+    queue_.reset();  // ends its thread: nobody else writes the file or `lost_`
     dropped += lost_;
     const bool closed = std::fclose(file_) == 0;
     file_ = nullptr;

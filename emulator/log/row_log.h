@@ -8,11 +8,11 @@
 #include <string_view>
 
 #include "base/result.h"
-#include "drivers/outbox.h"
+#include "drivers/write_queue.h"
 
 namespace narpa {
 
-class RowLog final : public OutboxWriter {
+class RowLog final : public QueueWriter {
 public:
     /// Makes the file and writes `header` (with its line end) first. One thread appends. `wait_when_full`: a
     /// lockstep run waits for the disk where a real-time run drops the line and counts it.
@@ -29,13 +29,13 @@ public:
 
 private:
     RowLog(std::string path, std::FILE* file, bool wait_when_full);
-    void write(std::span<const std::uint8_t> item, const Outbox&) noexcept override;
+    void write(std::span<const std::uint8_t> item, const WriteQueue&) noexcept override;
     void abandon(std::span<const std::uint8_t>) noexcept override { ++lost_; }
 
     std::string path_;
     std::FILE* file_;
-    std::uint64_t lost_ = 0;  // the outbox's thread only, until it has ended
-    std::unique_ptr<Outbox> outbox_;
+    std::uint64_t lost_ = 0;  // the queue's thread only, until it has ended
+    std::unique_ptr<WriteQueue> queue_;
 };
 
 }  // namespace narpa

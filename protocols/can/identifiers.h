@@ -34,7 +34,7 @@ inline constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;  ///< in real ti
     return static_cast<std::uint8_t>((id - kTelemetryBaseId) / kBaseIdStep);
 }
 
-/// An Error (bad_input, without file) that says what is wrong with a body's `can_id`.
+/// An Error (bad_input, without file) where a body's `can_id` is not allowed.
 Status check_body_base_id(std::int64_t can_id);
 
 /// A body that is commanded on CAN.

@@ -55,10 +55,9 @@ class PoseDecoder {
 public:
     explicit PoseDecoder(std::uint32_t base_id) noexcept;
 
-    /// `t_reference_ns` (simulation clock, within 39 h of the command) tells which turn of the 48-bit time is
-    /// meant. Writes `out`, with its quaternion normalised, only when the status is `complete`. Whether a command
-    /// comes too late in time is for the receiver to judge. `incomplete_set` is never returned, only counted: see
-    /// SetDecoder.
+    /// `t_reference_ns` (simulation clock, within 39 h of the command) resolves the 48-bit time. Writes `out`, with
+    /// its quaternion normalised, only when the status is `complete`. Whether a command is too late is for the
+    /// receiver to decide. `incomplete_set` is never returned, only counted: see SetDecoder.
     [[nodiscard]] PoseStatus accept(const CanFrame& frame, std::int64_t t_reference_ns, PoseCommand& out) noexcept;
 
     [[nodiscard]] std::uint32_t base_id() const noexcept { return set_.base_id(); }

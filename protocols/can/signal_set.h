@@ -1,4 +1,4 @@
-/// protocols/can/signal_set.h - any set of signals.h, to frames and back. No allocation, no sockets.
+/// protocols/can/signal_set.h - encodes and decodes any set of signals.h. No allocation, no sockets.
 #pragma once
 
 #include <array>
@@ -12,19 +12,19 @@
 
 namespace narpa {
 
-/// What became of one frame.
+/// The result of decoding one frame.
 enum class DecodeStatus : std::uint8_t {
     not_mine,        ///< another identifier, or a controller's error report
-    partial,         ///< a valid part of a set that still misses others
-    complete,        ///< with this frame the set is whole
+    partial,         ///< a valid part of a set that is not complete yet
+    complete,        ///< this frame completes the set
     too_short,       ///< fewer bytes than the message has
     too_long,        ///< more bytes than the message has
-    wrong_kind,      ///< right identifier, but remote, 29-bit, or classic where FD belongs and the other way round
+    wrong_kind,      ///< right identifier, but remote, 29-bit, or the wrong one of classic and FD
     bad_checksum,    ///< CRC-8 or CRC-16 differs
     duplicate,       ///< same counter and content as a part already seen or the last whole set
     incomplete_set,  ///< counted only: an earlier set was dropped because this frame belongs to another one
-    not_a_number,    ///< the set is whole, but a signal says "not available"
-    not_unit,        ///< the set is whole, but its quaternion's norm is more than 1e-3 from 1
+    not_a_number,    ///< the set is complete, but a signal is "not available" or an unknown choice
+    not_unit,        ///< the set is complete, but its quaternion's norm differs from 1 by more than 1e-3
 };
 inline constexpr std::size_t kDecodeStatusCount = 11;
 
@@ -64,13 +64,12 @@ private:
 [[nodiscard]] CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
                                  std::uint32_t base_id) noexcept;
 
-/// Gathers the frames of one set. A set takes effect when all its classic frames of one counter have arrived, in
+/// Collects the frames of one set. A set takes effect when all its classic frames of one counter have arrived, in
 /// any order, or with its one FD frame. A frame with another counter (or other content under the same counter)
-/// drops what was gathered: that is counted as `incomplete_set`, and the frame itself is accepted as the first of
-/// its own set.
+/// drops the frames collected so far, which is counted as `incomplete_set`, and starts a new set.
 class SetDecoder {
 public:
-    /// Judges a whole set: `complete`, `not_a_number` or `not_unit`.
+    /// Checks a complete set: `complete`, `not_a_number` or `not_unit`.
     using Verdict = DecodeStatus (*)(const RawSignals&) noexcept;
 
     SetDecoder(const SetLayout& layout, std::uint32_t base_id, Verdict verdict) noexcept
@@ -78,11 +77,11 @@ public:
 
     [[nodiscard]] DecodeStatus accept(const CanFrame& frame) noexcept;
 
-    /// The newest whole set; meaningful once `accept` has returned complete.
+    /// The newest complete set; meaningful once `accept` has returned complete.
     [[nodiscard]] const RawSignals& raw() const noexcept { return whole_.raw; }
     [[nodiscard]] std::uint8_t counter() const noexcept { return whole_.counter; }
     [[nodiscard]] std::uint32_t base_id() const noexcept { return base_id_; }
-    /// How often each status was met (for incomplete_set: how many sets were dropped).
+    /// How often each status occurred (for incomplete_set: how many sets were dropped).
     [[nodiscard]] std::uint64_t count(DecodeStatus status) const noexcept {
         return counts_[static_cast<std::size_t>(status)];
     }

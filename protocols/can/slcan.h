@@ -25,14 +25,14 @@ inline constexpr std::size_t kSlcanMaxLine = 27;
 /// One line without its CR. A time stamp of four digits after the data is allowed and ignored (LAWICEL Z1).
 [[nodiscard]] bool decode_slcan(std::string_view line, CanFrame& out) noexcept;
 
-/// Cuts a stream of bytes into lines. Lines longer than any valid one are thrown away whole, and counted.
+/// Cuts a stream of bytes into lines. Lines longer than any valid one are dropped and counted.
 class SlcanLines {
 public:
     /// Takes bytes from the front of `bytes` up to and with the next line end (CR; LF and BEL end a line too) and
     /// returns true when `line()` now holds a line that is not empty; false when all bytes are used up.
     [[nodiscard]] bool next(std::span<const char>& bytes) noexcept;
     [[nodiscard]] std::string_view line() const noexcept { return {buffer_.data(), size_}; }
-    /// Lines thrown away because they were too long.
+    /// Lines dropped because they were too long.
     [[nodiscard]] std::uint64_t overlong() const noexcept { return overlong_; }
 
 private:

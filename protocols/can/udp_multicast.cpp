@@ -25,6 +25,8 @@ enum Key : std::size_t {
     kErrorState,
     kKeyCount
 };
+// msgpack is written by hand: nlohmann::json and msgpack-cxx build a tree on the heap for each datagram, and the
+// loop, which sends and receives here, must not allocate. One flat map with eleven known keys needs no tree.
 constexpr std::array<std::string_view, kKeyCount> kKeys{
     "timestamp", "arbitration_id", "is_extended_id", "is_remote_frame", "is_error_frame",       "channel",
     "dlc",       "data",           "is_fd",          "bitrate_switch",  "error_state_indicator"};
@@ -60,7 +62,7 @@ private:
     std::uint8_t *start_, *p_;
 };
 
-/// Each reader takes one value of its type from the front, or nothing when there is none.
+/// Each function reads one value of its type from the front; nothing when there is another one or none.
 class Reader {
 public:
     explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
@@ -119,7 +121,7 @@ public:
         const auto n = big_endian(*type == kBin8 ? 1 : *type == kBin16 ? 2 : 4);
         return n ? take(*n) : std::nullopt;
     }
-    /// A time stamp or a channel: of no use here, but it has to be well formed.
+    /// A time stamp or a channel: not used, but it must be well formed.
     bool skip_number_or_text() {
         if (rest_.empty()) return false;
         const std::uint8_t type = rest_.front();
@@ -149,7 +151,7 @@ std::size_t encode_udp_multicast(const CanFrame& frame,
     w.byte(kFixMap | kKeyCount);
     w.key(kTimestamp);
     w.byte(kFloat64);
-    w.bytes(std::array<std::uint8_t, 8>{});  // the receiver puts its own stamp
+    w.bytes(std::array<std::uint8_t, 8>{});  // the receiver stamps it
     w.unsigned_integer(kId, frame.id);
     w.boolean(kExtended, frame.extended);
     w.boolean(kRemote, frame.remote);

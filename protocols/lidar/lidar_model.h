@@ -3,7 +3,7 @@
 /// A model is a stateless object of static lifetime. Adding one takes a pair of files that implement LidarModel and
 /// a line in lidar_model.cpp; a program or a test may add its own at start with add_lidar_model().
 ///
-/// Frame: the maker's own, which the model's document defines. Packet p = 0, 1, ... starts p periods after
+/// Frame: x right, y forward, z up, as `look_at` in a scene assumes. Packet p = 0, 1, ... starts p periods after
 /// simulation time 0. Nothing here allocates or throws.
 #pragma once
 

@@ -1,6 +1,6 @@
 /// protocols/video/embedded_line.h - the identity and time ledger of a frame, inside the frame.
 ///
-/// The ledger stands as raw bytes at the start of the image's last row; the rest of the row stays image. It
+/// The ledger is written as raw bytes at the start of the image's last row; the rest of the row stays image. It
 /// survives every lossless path (V4L2 loopback, Y4M, raw files), which carry neither a frame number nor a time
 /// of validity of their own. README.md in this folder has the table and a decoder in Python.
 #pragma once
@@ -24,8 +24,8 @@ inline constexpr std::uint8_t kEmbeddedLineVersion = 2;
 /// written: the row is too narrow.
 [[nodiscard]] bool encode_embedded_line(const FrameLedger& ledger, std::span<std::uint8_t> row) noexcept;
 
-/// What the ledger says of the delivery is not in the line: a repeated frame still carries its own.
-/// Nothing: too narrow, no magic, another version, or a wrong CRC.
+/// The ledger's `delivery` is not in the line: a repeated frame still has its own line. Nothing: too narrow, no
+/// magic, another version, or a wrong CRC.
 [[nodiscard]] std::optional<FrameLedger> decode_embedded_line(std::span<const std::uint8_t> row) noexcept;
 
 }  // namespace narpa

@@ -19,10 +19,10 @@ namespace narpa {
 Result<std::string> y4m_stream_header(const VideoFormat& format);
 
 /// Whether a stream of this header (its first line, without the line feed) has frames of this format. Its frame
-/// rate is not compared: a stream tells it, no frame depends on it.
+/// rate is not compared: no frame depends on it.
 Status check_y4m_stream_header(std::string_view line, const VideoFormat& format);
 
-/// Stands before each frame's samples.
+/// Precedes each frame's samples.
 inline constexpr std::string_view kY4mFrameHeader = "FRAME\n";
 
 /// Y4M's samples are the frame's own bytes in their own order.

@@ -109,7 +109,7 @@ private:
     /// Time 0 is a whole second of the emulator's clock.
     Status synchronise() {
         const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.wait_s * 1e9);
-        while (!clock_.heard() && !stop_) {
+        while (!clock_.synchronized() && !stop_) {
             if (monotonic_ns() > deadline_ns)
                 return failed(fmt::format("no heartbeat in {} s: is `narpa run` there?", options_.wait_s));
             bus_.wait(kShortWaitNs);
@@ -165,7 +165,9 @@ private:
         return t_ns >= t_start_ns_ && t_ns <= now_ns + scenario_.period_ns();
     }
 
-    bool emulator_has_stopped() const { return clock_.heard() && clock_.newest().state == RunState::stopping; }
+    bool emulator_has_stopped() const {
+        return clock_.synchronized() && clock_.newest().state == RunState::stopping;
+    }
 
     // --- Motion, and what is said of it ---
     std::int64_t next_pose_ns() const {

@@ -53,12 +53,13 @@ private:
         const std::int64_t deadline = monotonic_ns() + kPatience_ns;
         while (!loop_.over()) {
             listen(20 * kMs);
-            if (loop_.link.clock().heard() && loop_.link.dynamics() && loop_.link.attitude()) return Ok{};
+            if (loop_.link.clock().synchronized() && loop_.link.dynamics() && loop_.link.attitude()) return Ok{};
             if (monotonic_ns() > deadline)
-                return Error{fmt::format("{} in {} s: are `narpa run` and the dynamics there?",
-                                         loop_.link.clock().heard() ? "no report of the dynamics" : "no heartbeat",
-                                         kPatience_ns / kSecond_ns),
-                             loop_.link.description(), 0, 0, ErrorKind::failed};
+                return Error{
+                    fmt::format("{} in {} s: are `narpa run` and the dynamics there?",
+                                loop_.link.clock().synchronized() ? "no report of the dynamics" : "no heartbeat",
+                                kPatience_ns / kSecond_ns),
+                    loop_.link.description(), 0, 0, ErrorKind::failed};
         }
         return Ok{};
     }

@@ -110,7 +110,7 @@ struct Camera {
 struct Lidar {
     std::string name;
     int mount = -1;
-    Rigid3 T_mount_lidar{};             ///< lidar frame: the maker's own
+    Rigid3 T_mount_lidar{};             ///< lidar frame: x right, y forward, z up
     const LidarModel* model = nullptr;  ///< never null in a scene that was read
     double rate_hz = 10;                ///< turns a second, within the model's limits
     double range_max_m = 100;           ///< returns beyond are not reported

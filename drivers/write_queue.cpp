@@ -1,4 +1,4 @@
-#include "drivers/outbox.h"
+#include "drivers/write_queue.h"
 
 #include <poll.h>
 #include <pthread.h>
@@ -34,7 +34,7 @@ std::thread start_without_signals(auto body) {
 
 }  // namespace
 
-Outbox::Outbox(OutboxWriter& writer, std::size_t slots, std::size_t slot_bytes, bool wait_when_full)
+WriteQueue::WriteQueue(QueueWriter& writer, std::size_t slots, std::size_t slot_bytes, bool wait_when_full)
     : writer_(writer),
       slots_(slots),
       slot_bytes_(slot_bytes),
@@ -47,7 +47,7 @@ Outbox::Outbox(OutboxWriter& writer, std::size_t slots, std::size_t slot_bytes, 
     thread_ = start_without_signals([this] { run(); });
 }
 
-Outbox::~Outbox() {
+WriteQueue::~WriteQueue() {
     flush();
     ending_.store(true, std::memory_order_release);
     ::eventfd_write(wake_fd_, 1);
@@ -56,7 +56,7 @@ Outbox::~Outbox() {
     ::close(wake_fd_);
 }
 
-bool Outbox::push(std::span<const std::uint8_t> item) noexcept {
+bool WriteQueue::push(std::span<const std::uint8_t> item) noexcept {
     const bool fits = item.size() <= slot_bytes_;
     if (!fits || (wait_when_full_ ? sem_wait(&free_slots_) : sem_trywait(&free_slots_)) != 0) {
         dropped_.fetch_add(1, std::memory_order_relaxed);
@@ -70,21 +70,21 @@ bool Outbox::push(std::span<const std::uint8_t> item) noexcept {
     return true;
 }
 
-void Outbox::flush() noexcept {
+void WriteQueue::flush() noexcept {
     flush_deadline_ns_.store(now_ns() + kFlushNs, std::memory_order_release);
-    // Who holds every slot knows that the ring is empty.
+    // The ring is empty when every slot is free.
     for (std::size_t held = 0; held < slots_;) held += sem_wait(&free_slots_) == 0 ? 1 : 0;
     for (std::size_t held = slots_; held > 0; --held) sem_post(&free_slots_);
     flush_deadline_ns_.store(0, std::memory_order_release);
 }
 
-int Outbox::time_left_ms() const noexcept {
+int WriteQueue::time_left_ms() const noexcept {
     const std::int64_t deadline_ns = flush_deadline_ns_.load(std::memory_order_acquire);
     if (deadline_ns == 0) return -1;
     return static_cast<int>(std::max<std::int64_t>(0, (deadline_ns - now_ns()) / 1'000'000));
 }
 
-void Outbox::run() noexcept {
+void WriteQueue::run() noexcept {
     for (std::uint64_t next = 0;;) {
         if (next == pushed_.load(std::memory_order_acquire)) {
             if (ending_.load(std::memory_order_acquire)) return;
@@ -102,7 +102,7 @@ void Outbox::run() noexcept {
     }
 }
 
-void Outbox::wait_for_work() noexcept {
+void WriteQueue::wait_for_work() noexcept {
     pollfd fds[] = {{wake_fd_, POLLIN, 0}, {writer_.watched(), 0, 0}};
     if (::poll(fds, 2, -1) < 0) return;
     if (fds[1].revents & (POLLERR | POLLHUP)) writer_.lost();

@@ -3,8 +3,8 @@
 #include <atomic>
 #include <numeric>
 
-#include "drivers/outbox.h"
 #include "drivers/video/video_sink.h"
+#include "drivers/write_queue.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/temporary_folder.h"
@@ -14,12 +14,12 @@ namespace {
 
 using test::Bytes;
 
-// Writes into memory; while `stuck`, as long as the outbox lets it.
-class MemoryWriter final : public OutboxWriter {
+// Writes into memory; while `stuck`, as long as the queue lets it.
+class MemoryWriter final : public QueueWriter {
 public:
-    void write(std::span<const std::uint8_t> item, const Outbox& outbox) noexcept override {
+    void write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept override {
         started = true;
-        while (stuck && outbox.time_left_ms() != 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        while (stuck && queue.time_left_ms() != 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
         if (stuck) {
             ++abandoned;
             return;
@@ -33,67 +33,67 @@ public:
     std::atomic<bool> stuck{false}, started{false};
 };
 
-TEST(Outbox, WaitingLosesNothingAndKeepsTheOrder) {
+TEST(WriteQueue, WaitingLosesNothingAndKeepsTheOrder) {
     MemoryWriter writer;
-    Outbox outbox(writer, 3, 64, true);
+    WriteQueue queue(writer, 3, 64, true);
     std::vector<Bytes> sent;
     for (int i = 0; i < 5000; ++i) {
         Bytes item(static_cast<std::size_t>(1 + i % 64));
         std::iota(item.begin(), item.end(), static_cast<std::uint8_t>(i));
-        ASSERT_TRUE(outbox.push(item));
+        ASSERT_TRUE(queue.push(item));
         sent.push_back(item);
     }
-    outbox.flush();
+    queue.flush();
     EXPECT_EQ(writer.items, sent);
-    EXPECT_EQ(outbox.dropped(), 0U);
+    EXPECT_EQ(queue.dropped(), 0U);
 }
 
-TEST(Outbox, FullRingDropsAndCounts) {
+TEST(WriteQueue, FullRingDropsAndCounts) {
     MemoryWriter writer;
     writer.stuck = true;
-    Outbox outbox(writer, 4, 8, false);
+    WriteQueue queue(writer, 4, 8, false);
     const Bytes item(8, 1);
-    for (int i = 0; i < 4; ++i) EXPECT_TRUE(outbox.push(item));
-    for (int i = 0; i < 10; ++i) EXPECT_FALSE(outbox.push(item));
-    EXPECT_EQ(outbox.dropped(), 10U);
+    for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.push(item));
+    for (int i = 0; i < 10; ++i) EXPECT_FALSE(queue.push(item));
+    EXPECT_EQ(queue.dropped(), 10U);
     writer.stuck = false;
-    outbox.flush();
+    queue.flush();
     EXPECT_EQ(writer.items.size(), 4U);
-    EXPECT_TRUE(outbox.push(item));
-    outbox.flush();
+    EXPECT_TRUE(queue.push(item));
+    queue.flush();
     EXPECT_EQ(writer.items.size(), 5U);
 }
 
-TEST(Outbox, RefusesWhatIsLargerThanASlot) {
+TEST(WriteQueue, RefusesWhatIsLargerThanASlot) {
     MemoryWriter writer;
-    Outbox outbox(writer, 2, 8, true);
-    EXPECT_FALSE(outbox.push(Bytes(9)));
-    EXPECT_EQ(outbox.dropped(), 1U);
+    WriteQueue queue(writer, 2, 8, true);
+    EXPECT_FALSE(queue.push(Bytes(9)));
+    EXPECT_EQ(queue.dropped(), 1U);
 }
 
-TEST(Outbox, FlushAndEndDoNotHangOnAStuckWriter) {
+TEST(WriteQueue, FlushAndEndDoNotHangOnAStuckWriter) {
     MemoryWriter writer;
     writer.stuck = true;
     {
-        Outbox outbox(writer, 4, 8, true);
-        for (int i = 0; i < 4; ++i) outbox.push(Bytes(8, 1));
-        outbox.flush();
+        WriteQueue queue(writer, 4, 8, true);
+        for (int i = 0; i < 4; ++i) queue.push(Bytes(8, 1));
+        queue.flush();
         EXPECT_EQ(writer.abandoned, 4);
         writer.stuck = false;  // and it works again afterwards
-        outbox.push(Bytes(8, 2));
-        outbox.flush();
+        queue.push(Bytes(8, 2));
+        queue.flush();
         EXPECT_EQ(writer.items.size(), 1U);
         writer.stuck = true;
-        outbox.push(Bytes(8, 3));
+        queue.push(Bytes(8, 3));
     }
     EXPECT_EQ(writer.abandoned, 5);
 }
 
-TEST(Outbox, EndWritesWhatIsInTheRing) {
+TEST(WriteQueue, EndWritesWhatIsInTheRing) {
     MemoryWriter writer;
     {
-        Outbox outbox(writer, 100, 8, false);
-        for (int i = 0; i < 100; ++i) EXPECT_TRUE(outbox.push(Bytes(8, 1)));
+        WriteQueue queue(writer, 100, 8, false);
+        for (int i = 0; i < 100; ++i) EXPECT_TRUE(queue.push(Bytes(8, 1)));
     }
     EXPECT_EQ(writer.items.size(), 100U);
 }

@@ -129,7 +129,7 @@ TEST_F(JointLidar, PacketsOfALockstepRunDecodeToTheGeometry) {
         GTEST_SKIP() << "built without libpcap";
     ASSERT_TRUE(emulator) << emulator.error().text();
     ASSERT_TRUE((*emulator)->run(StopFlag{false}));
-    const LidarSensor& lidar = lidar_of(**emulator);
+    const LidarSensor& lidar = test::lidar_of(**emulator);
     EXPECT_EQ(lidar.stats().packets, 4U);  // a turn of 0.5 s each
     EXPECT_EQ(lidar.stats().returns, 4U * Fan8::kShots);
     EXPECT_DOUBLE_EQ(lidar.sweeps(), 4);

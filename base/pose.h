@@ -1,6 +1,6 @@
 /// base/pose.h - rotations and rigid transforms.
 ///
-/// Quaternions are Hamilton, written (w, x, y, z), and turn body coordinates into parent coordinates.
+/// Quaternions are Hamilton, written (w, x, y, z), and rotate body coordinates into parent coordinates.
 /// `T_world_body` takes body coordinates to world coordinates, so neighbours cancel:
 /// `p_world = T_world_body * p_body`, `T_world_camera = T_world_body * T_body_camera`.
 #pragma once
@@ -21,7 +21,7 @@ struct Quat {
         return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
                 a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
     }
-    /// Turns a vector; the quaternion has norm 1.
+    /// Rotates a vector; the quaternion has norm 1.
     friend constexpr Vec3 operator*(const Quat& q, const Vec3& v) {
         const Vec3 t = 2.0 * cross(q.vec(), v);
         return v + q.w * t + cross(q.vec(), t);

@@ -1,4 +1,4 @@
-/// base/result.h - a value or a sentence that a person can act on.
+/// base/result.h - a value or an error message that a person can act on.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace narpa {
 
-/// What went wrong decides the exit status of the program (README, "Exit status").
+/// The kind of an error decides the exit status of the program (README, "Exit status").
 enum class ErrorKind : std::uint8_t {
     failed,     ///< it ran, but a gate or a comparison failed: exit 1
     bad_input,  ///< a scene, mesh, trajectory, argument ... that cannot be used: exit 2
-    missing,    ///< a device or a permission that is not there: exit 3
+    missing,    ///< a device or a permission is missing: exit 3
 };
 
 /// `line` and `column` count from 1; 0 means "the file as a whole".
@@ -21,9 +21,9 @@ struct Error {
     std::string file{};
     int line = 0, column = 0;
     ErrorKind kind = ErrorKind::bad_input;
-    std::string remedy{};  ///< the command that mends it, for `missing`
+    std::string remedy{};  ///< a command that fixes it, for `missing`
 
-    /// `file:line:column: what`, with the parts that are known.
+    /// `file:line:column: what`, without the parts that are unknown.
     [[nodiscard]] std::string text() const {
         std::string s;
         if (!file.empty()) {
@@ -38,7 +38,7 @@ struct Error {
     }
 };
 
-/// The exit status that belongs to an error.
+/// The exit status of an error.
 [[nodiscard]] constexpr int exit_status(ErrorKind kind) {
     switch (kind) {
         case ErrorKind::failed: return 1;

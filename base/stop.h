@@ -1,4 +1,4 @@
-/// base/stop.h - the one request to end, set by signals and looked at by every wait.
+/// base/stop.h - the request to stop, set by signals and checked by every wait.
 #pragma once
 
 #include <unistd.h>
@@ -12,16 +12,15 @@ namespace narpa {
 
 using StopFlag = std::atomic<bool>;
 
-/// The program's flag: what SIGINT and SIGTERM set.
+/// The program's flag, set by SIGINT and SIGTERM.
 inline StopFlag& stop_flag() noexcept {
     static StopFlag flag{false};
     return flag;
 }
 
-/// SIGINT and SIGTERM set the flag; one more after two seconds or longer ends the program at once, with status 130.
-/// (timeout(1) and others signal a process and then its group, which it is in: that is one request, not two.
-/// Between the two, real-time threads may keep such a sender from its processor for the better part of two
-/// seconds.)
+/// SIGINT and SIGTERM set the flag; another one after two seconds or more exits at once with status 130.
+/// (timeout(1) and others signal a process and then its process group: that is one request. Real-time threads may
+/// delay the second signal by nearly two seconds.)
 inline void stop_on_signals() noexcept {
     struct sigaction action {};
     action.sa_handler = [](int) {
@@ -38,7 +37,7 @@ inline void stop_on_signals() noexcept {
     ::sigaction(SIGINT, &action, nullptr);
     ::sigaction(SIGTERM, &action, nullptr);
     struct sigaction ignore {};
-    ignore.sa_handler = SIG_IGN;  // a reader that leaves a FIFO or a socket is an error code, not a death
+    ignore.sa_handler = SIG_IGN;  // a reader that closes a FIFO or a socket is an error code
     ::sigaction(SIGPIPE, &ignore, nullptr);
 }
 

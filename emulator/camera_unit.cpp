@@ -86,7 +86,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     t_radiance_ns_ = monotonic_ns();
     durations_.radiance_ns = t_radiance_ns_ - begun_ns;
     const std::int64_t lit_ns = t_radiance_ns_;
-    // A renderer that stopped late is allowed for as well.
+    // The allowance includes the time by which the renderer stopped late.
     if (settings.budget.kind == FrameBudget::Kind::time)
         t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, render.seed, frame, bytes_);

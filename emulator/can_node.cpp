@@ -17,7 +17,7 @@ CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded)
 
 void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
     if (!waiting_) return bus_.wait(timeout_ns);
-    // Recorded frames are all there, so the bus itself would not wait for the next one's time.
+    // A recorded bus always has its next frame, so it would not wait for the frame's time.
     const std::int64_t ns = std::clamp<std::int64_t>(received_.t_received_ns - t_now_ns, 0, timeout_ns);
     const timespec time{ns / 1'000'000'000, ns % 1'000'000'000};
     ::clock_nanosleep(CLOCK_MONOTONIC, 0, &time, nullptr);
@@ -115,7 +115,7 @@ CommandCounters CanNode::counters() const noexcept {
     for (const Listener& l : listeners_)
         for (std::size_t s = 0; s < kDecodeStatusCount; ++s)
             c.by_status[s] += l.decoder.count(static_cast<DecodeStatus>(s));
-    c.by_status[static_cast<std::size_t>(DecodeStatus::not_mine)] = 0;  // `foreign` says it once for all bodies
+    c.by_status[static_cast<std::size_t>(DecodeStatus::not_mine)] = 0;  // counted once for all bodies in `foreign`
     return c;
 }
 

@@ -15,14 +15,14 @@
 
 namespace narpa {
 
-/// Why commands were not taken, beyond the bus's own counters.
+/// Commands accepted and rejected; the bus has counters of its own.
 struct CommandCounters {
-    std::uint64_t taken = 0;    ///< whole commands that moved a body
+    std::uint64_t taken = 0;    ///< complete commands accepted by a track
     std::uint64_t past = 0;     ///< time of validity not after the newest: late, repeated, out of order
     std::uint64_t overrun = 0;  ///< further ahead than the track is deep
-    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, as PoseDecoder counts them
+    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, by PoseDecoder
     std::uint64_t foreign = 0;                                  ///< frames of other identifiers
-    std::uint64_t missed = 0;                                   ///< commands lost by the gaps in their counters
+    std::uint64_t missed = 0;                                   ///< lost commands, by gaps in the counters
 
     /// Frames and commands rejected, by cause.
     [[nodiscard]] std::vector<std::pair<std::string_view, std::uint64_t>> rejected() const;
@@ -30,8 +30,8 @@ struct CommandCounters {
 
 class CanNode {
 public:
-    /// `log` may be null. All outlive the node. `pace_recorded`: a frame of a recorded bus waits for its time (real
-    /// time); otherwise it is taken at once (lockstep).
+    /// `log` may be null. All outlive the node. `pace_recorded`: frames of a recorded bus wait for their time (real
+    /// time); otherwise they are received at once (lockstep).
     CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded);
 
     [[nodiscard]] CanBus& bus() noexcept { return bus_; }
@@ -39,16 +39,16 @@ public:
 
     /// Waits until `receive` may have something to read or the time is over; may wake early.
     void wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept;
-    /// Reads one waiting frame. `moved`: it completed a command that was taken. False: nothing was waiting.
+    /// Reads one waiting frame. `moved`: it completed a command that was accepted. False: no frame was waiting.
     bool receive(std::int64_t t_now_ns, bool& moved) noexcept;
-    /// Nothing more will come, and nothing waits for its time.
+    /// No frame is left on the bus or waits for its time.
     [[nodiscard]] bool ended() const noexcept { return bus_.ended() && !waiting_; }
     void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
     void send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept;
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
 
-    /// Simulation time up to which every commanded body has commands, and the time of the first frame that has
-    /// them: the clock of a lockstep run. `commanded` is false until every commanded body has a command.
+    /// The times up to and from which every commanded body has commands: the limits of a lockstep run's clock.
+    /// `commanded` is false until every commanded body has a command.
     [[nodiscard]] bool commanded() const noexcept;
     [[nodiscard]] std::int64_t granted_ns() const noexcept;
     [[nodiscard]] std::int64_t first_ns() const noexcept;

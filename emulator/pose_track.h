@@ -1,9 +1,9 @@
-/// emulator/pose_track.h - the pose of one commanded body at any time, from the commands that came in on CAN.
+/// emulator/pose_track.h - the pose of one commanded body at any time, from its pose commands.
 ///
 /// Between two commands: cubic Hermite in position through the commanded velocities (straight when both commands
-/// carry none), shortest-arc slerp in attitude. After the newest: constant velocity and body rate, up to
-/// `stale_after_s`; from there the body holds and is reported stale. One thread writes, any number read: neither
-/// locks nor allocates.
+/// carry none), shortest-arc slerp in attitude. After the newest: constant velocity and body rate for
+/// `stale_after_s`; then the body holds still and is reported as stale. One thread writes, any number read; neither
+/// side locks or allocates.
 #pragma once
 
 #include <array>
@@ -15,12 +15,12 @@
 
 namespace narpa {
 
-/// Moves on at constant velocity (world) and rate (body axes).
+/// Extrapolates with constant velocity (world) and rate (body axes).
 [[nodiscard]] Motion extrapolate(const Motion& from, double dt_s);
 
 struct TrackedPose {
-    Motion motion{};             ///< velocity and rate are the derivatives of the pose as it is shown
-    std::uint8_t counter = 0;    ///< of the newest command at or before the time asked for
+    Motion motion{};             ///< velocity and rate are the derivatives of this pose
+    std::uint8_t counter = 0;    ///< of the newest command at or before the requested time
     std::int64_t t_pose_ns = 0;  ///< its time of validity
     bool commanded = false;      ///< false: no command yet, the scene's own motion
     bool stale = true;
@@ -29,7 +29,7 @@ struct TrackedPose {
 enum class TrackStatus : std::uint8_t {
     taken,
     past,     ///< time of validity not after the newest: late, repeated or out of order
-    overrun,  ///< so far ahead of the clock that it would push out commands still in use
+    overrun,  ///< so far ahead that it would overwrite commands still in use
 };
 
 class PoseTrack {
@@ -37,7 +37,7 @@ public:
     /// `initial` is the scene's own motion, used until the first command.
     PoseTrack(const Motion& initial, double stale_after_s);
 
-    /// `t_now_ns`: commands older than a second before this may be forgotten.
+    /// `t_now_ns`: commands older than a second before this may be overwritten.
     TrackStatus push(const PoseCommand& command, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] TrackedPose at(std::int64_t t_ns) const noexcept;
 
@@ -54,9 +54,9 @@ private:
         std::uint64_t counter = 0;
         Motion motion{};
     };
-    /// A sample that is rewritten only after kDepth - 1 others; a reader that meets a rewrite reads again.
+    /// A seqlock, rewritten only after kDepth - 1 others; a reader that meets a write repeats.
     struct Slot {
-        std::atomic<std::uint64_t> version{0};  ///< odd while it is written
+        std::atomic<std::uint64_t> version{0};  ///< odd during a write
         std::array<std::atomic<std::uint64_t>, sizeof(Sample) / 8> words{};
         void store(const Sample&) noexcept;
         [[nodiscard]] bool load(Sample&) const noexcept;

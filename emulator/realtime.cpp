@@ -15,7 +15,7 @@ namespace narpa {
 
 namespace {
 
-constexpr std::size_t kStackBytes = 1024 * 1024;  // twice what a tile of paths and its callers need
+constexpr std::size_t kStackBytes = 1024 * 1024;  // twice what a tile of paths and its callers use
 
 bool may_use(int cpu) noexcept {
     cpu_set_t allowed;
@@ -28,14 +28,14 @@ bool may_use(int cpu) noexcept {
 
 void keep_heap() noexcept {
     ::mallopt(M_MMAP_MAX, 0);
-    ::mallopt(M_ARENA_MAX, 1);  // a thread that asks for its first block gets no heap of its own
+    ::mallopt(M_ARENA_MAX, 1);  // no heap per thread, which would be new pages
     ::mallopt(M_TRIM_THRESHOLD, INT_MAX);
 }
 
 void touch_stack() noexcept {
     std::array<unsigned char, kStackBytes> below;
     below.fill(0);
-    asm volatile("" : : "r"(below.data()) : "memory");  // as if someone read it
+    asm volatile("" : : "r"(below.data()) : "memory");  // keeps the compiler from removing the writes
 }
 
 bool lock_memory() noexcept {

@@ -1,4 +1,4 @@
-/// emulator/threads.h - the threads that trace rays: the only place where the emulator meets oneTBB.
+/// emulator/threads.h - the tracing threads: the emulator uses oneTBB only here and in loop.cpp.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -18,8 +18,8 @@
 namespace narpa {
 
 struct TracingThreads {
-    /// `count` threads in all, with the one that calls; 0: one for each of `cpus`, or as many as the machine has.
-    /// `cpus`: processors that they are bound to, one each by turns; empty: wherever the kernel likes.
+    /// `count` threads including the caller; 0: one for each of `cpus`, or one per core. `cpus`: processors that
+    /// the threads are bound to in turn; empty: not bound.
     explicit TracingThreads(int count, std::vector<int> cpus = {})
         : limit(tbb::global_control::max_allowed_parallelism,
                 static_cast<std::size_t>(wanted(count, cpus) > 0 ? wanted(count, cpus)
@@ -27,16 +27,16 @@ struct TracingThreads {
           arena(wanted(count, cpus) > 0 ? wanted(count, cpus) : tbb::task_arena::automatic),
           real_time(arena, std::move(cpus)) {}
 
-    /// From now on, whoever enters the arena is bound to its processor, and workers get this SCHED_FIFO priority.
+    /// From now on, a thread that enters the arena is bound to its processor, and a worker gets this SCHED_FIFO
+    /// priority.
     void make_real_time(int priority) {
         real_time.priority = priority;
         real_time.observe(true);
     }
     [[nodiscard]] bool refused() const noexcept { return real_time.refused; }
 
-    /// Returns when all threads were in the arena at once, so that each has its stack, its heap and its priority;
-    /// or, where the kernel does not let them run, when `patience` has passed. Called by the thread that will
-    /// trace.
+    /// Waits until all threads are in the arena at once, so that each has its stack, heap and priority; at most
+    /// `patience`, because the kernel may not run them all. Called by the thread that will trace.
     void gather(std::chrono::seconds patience = std::chrono::seconds(1)) {
         using namespace std::chrono_literals;
         const int wanted_here = arena.max_concurrency();
@@ -72,7 +72,7 @@ struct TracingThreads {
             touch_stack();
             if (is_worker && !take_fifo_priority(priority)) refused = true;
         }
-        /// Of this object, from 1: another may come to stand where it was.
+        /// Of this object, from 1: its address may be reused.
         static inline std::atomic<std::uint64_t> made{0};
         const std::uint64_t number = ++made;
         std::vector<int> cpus;

@@ -1,8 +1,9 @@
-/// emulator/trajectory.h - poses of bodies over time as CSV: what `narpa fly` plays and what the truth log is.
+/// emulator/trajectory.h - poses of bodies over time as CSV: the input of `narpa fly` and the format of the truth
+/// log.
 ///
-/// First line: kTrajectoryHeader. Then one row a body and time: seconds of simulation time, the body's name,
+/// First line: kTrajectoryHeader. Then one row per body and time: seconds of simulation time, the body's name,
 /// position (m, world), attitude (w, x, y, z; body to world), velocity (m/s, world), rate (rad/s, body axes).
-/// Times rise for each body. Lines that start with # are comments.
+/// Times increase for each body. Lines that start with # are comments.
 #pragma once
 
 #include <cstdint>

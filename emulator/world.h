@@ -1,4 +1,4 @@
-/// emulator/world.h - a scene with its tracer and the tracks of its commanded bodies: where everything is, when.
+/// emulator/world.h - a scene with its tracer and the pose tracks of its commanded bodies.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@
 
 namespace narpa {
 
-/// Which command a placement rests on, for the ledger.
+/// The command that a placement is based on, for the ledger.
 struct PlacementSource {
     std::uint8_t counter = 0;
     std::int64_t t_pose_ns = 0;  ///< 0: no command
@@ -34,16 +34,16 @@ public:
     [[nodiscard]] PoseTrack* track(std::size_t body) noexcept { return tracks_[body].get(); }
     [[nodiscard]] bool has_commanded_bodies() const noexcept { return commanded_ > 0; }
 
-    /// For a single picture or scan: the rows of a trajectory that matter between two times, taken as commands.
-    /// Bodies that it does not name keep the scene's own motion.
+    /// For a single image or scan: takes the rows of a trajectory that matter between two times as commands.
+    /// Other bodies keep the scene's own motion.
     Status load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns);
 
-    /// Puts every body where it is at t. `rider`: the body whose command the source names first (a sensor's
-    /// mount); -1 for none. `motions`: how the bodies move there, as far as it is long; what is asked later may
-    /// rest on newer commands. Allocates nothing.
+    /// Computes every body's pose at t. `rider`: the body whose command the source names first (a sensor's
+    /// mount); -1 for none. `motions`: receives the bodies' motions, up to its length; a later call may use
+    /// newer commands. Allocates nothing.
     PlacementSource place(std::int64_t t_ns, int rider, BodyPoses& out,
                           std::span<Motion> motions = {}) const noexcept;
-    /// Puts only the bodies that move (all but those at rest without a can_id): after a first `place`.
+    /// Updates only the bodies that can move (all but those at rest without a can_id), after a first `place`.
     /// Their paths have one pose for each of these times, up to kLanes.
     void place_moving(std::span<const std::int64_t> times_ns, BodyPoses& out) const noexcept;
 

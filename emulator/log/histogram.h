@@ -60,12 +60,12 @@ private:
     std::uint64_t total_ = 0, max_ = 0;
 };
 
-/// The same of times that may lie before or after a mark; before is negative.
+/// The same for signed times, negative before a mark.
 class SignedHistogram {
 public:
     void add(std::int64_t ns) noexcept { ns < 0 ? before_.add(-ns) : after_.add(ns); }
     [[nodiscard]] std::uint64_t count() const noexcept { return before_.count() + after_.count(); }
-    /// How many samples do not exceed a value, to the bucket; on which side of the mark they are is exact.
+    /// How many samples do not exceed a value, to the bucket; the sign is exact.
     [[nodiscard]] std::uint64_t count_up_to(std::int64_t ns) const noexcept {
         return ns < 0 ? before_.count() - before_.count_up_to(-ns - 1) : before_.count() + after_.count_up_to(ns);
     }

@@ -1,4 +1,4 @@
-/// emulator/log/row_log.h - lines to a file from the loop, without the disk ever holding the loop up.
+/// emulator/log/row_log.h - writes lines from the loop to a file without ever waiting for the disk.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace narpa {
 
 class RowLog final : public QueueWriter {
 public:
-    /// Makes the file and writes `header` (with its line end) first. One thread appends. `wait_when_full`: a
+    /// Creates the file and writes `header` (with its line end) first. One thread appends. `wait_when_full`: a
     /// lockstep run waits for the disk where a real-time run drops the line and counts it.
     static Result<std::unique_ptr<RowLog>> create(const std::string& path, std::string_view header,
                                                   bool wait_when_full);

@@ -1,4 +1,4 @@
-/// emulator/log/run_record.h - what a run's log folder tells of the run as a whole: run.json.
+/// emulator/log/run_record.h - run.json: the settings of a whole run in its log folder.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace narpa {
 
-/// The scene's file, and of its [render] what decides a frame's bytes beside its ledger, so that a file changed
-/// since does not. Budgets, which the command line may have changed, are not here: each frame's ledger has its own.
+/// The scene's file, and the keys of [render] that decide a frame's bytes together with its ledger, so that later
+/// changes of the file have no effect. Budgets are in each frame's ledger.
 struct RunRecord {
     std::string scene_file;  ///< absolute
     RenderSettings::Method method{};

@@ -1,4 +1,5 @@
-/// emulator/replay/replay.h - the frames of a logged run once more, bit for bit, and what the budget of each cost.
+/// emulator/replay/replay.h - renders the frames of a logged run again, bit for bit, and measures what their
+/// budgets cost.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +15,19 @@
 
 namespace narpa {
 
-/// The same view with many samples for each pixel.
+/// Difference from a render with many samples per pixel.
 struct ReferenceComparison {
     ImageDifference difference;
     double reference_error = 0;  ///< the reference's own standard error, W m^-2 sr^-1
 };
 
-/// A logged run of one camera, open to be looked at again.
+/// A logged run of one camera.
 ///
 /// A frame follows from the scene, the bodies' poses, its number, the seed, its step and the sizes of its passes
-/// (renderer/integrator/frame_budget.h): the log has them all, so that frames made against the clock repeat as well.
+/// (renderer/film/frame_budget.h). The log has them all, so frames with a time budget repeat too.
 class Replay {
 public:
-    /// `camera` empty: the first of the scene. `scene_file` empty: the one that the run had.
+    /// `camera` empty: the first of the scene. `scene_file` empty: the run's own.
     static Result<std::unique_ptr<Replay>> open(const std::string& folder, const std::string& camera,
                                                 const std::string& scene_file);
     ~Replay();
@@ -35,20 +36,20 @@ public:
     [[nodiscard]] const World& world() const noexcept;
     [[nodiscard]] const Camera& camera() const noexcept;
     [[nodiscard]] std::size_t camera_index() const noexcept;
-    /// Where the bodies were in frame i.
+    /// Body poses of frame i.
     [[nodiscard]] const BodyPoses& placement(std::size_t i) const noexcept;
 
-    /// Whether frame i has an image of its own: one that did not even get to its coarsest step has none to repeat.
+    /// Whether frame i has an image of its own; false if not even the coarsest step was rendered.
     [[nodiscard]] bool has_image(std::size_t i) const noexcept;
 
-    /// Makes frame i as it was made. Returns what is not as the log tells, in words: nothing where the frame
-    /// repeats bit for bit, or has no image and took nothing.
+    /// Renders frame i again. Returns the differences from the log as text: empty if the frame repeats bit for bit,
+    /// or has no image and cost nothing.
     std::vector<std::string> make(std::size_t i);
     [[nodiscard]] const RadianceImage& picture() const noexcept;
-    /// The frame made last as the device would take it.
+    /// The last frame rendered, in the device's format.
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept;
 
-    /// Compares the frame made last with `spp` samples for each pixel, of other random numbers than the run's.
+    /// Compares the last frame rendered with `spp` samples per pixel of other random numbers.
     ReferenceComparison against(int spp);
     [[nodiscard]] const RadianceImage& reference() const noexcept;
 

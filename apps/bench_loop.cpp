@@ -24,8 +24,7 @@ struct Options {
     RunOptions run;
 };
 
-/// `busy` processes, or one where nothing is asked for: on the first processors that this process may use, over
-/// again where these are fewer.
+/// `busy` processes, by default one, on the first processors that this process may use, in turn.
 Status choose_load(Options& o) {
     for (const int cpu : o.load)
         if (!parse_cpus(std::to_string(cpu)))
@@ -106,28 +105,27 @@ Command add_bench_loop(Parser bench_command) {
     auto o = std::make_shared<Options>();
     o->run.duration_s = 10;
     const Parser c = bench_command.subcommand(
-        "loop",
-        "The real-time loop, alone and beside processes that keep processors busy: jitter, latency, deadlines");
+        "loop", "The real-time loop, alone and under load from other processes: jitter, latency, deadlines");
     c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that narpa brings along)");
     c.option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
         .range(0.1, 86400.0)
         .shows_default();
     const Option load =
         c.option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)").comma_separated();
-    const Option busy = c.option("--busy", o->busy, "So many processes that keep processors busy (default: 1)")
+    const Option busy = c.option("--busy", o->busy, "Number of processes that keep processors busy (default: 1)")
                             .range(1, kCpusMax)
                             .excludes(load);
-    c.flag("--idle-only", o->idle_only, "No run beside load").excludes(load).excludes(busy);
+    c.flag("--idle-only", o->idle_only, "Without the run under load").excludes(load).excludes(busy);
     o->budget.add_to(c);
     c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one");
     c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
-    c.option("--late-max", o->late_max_percent, "Percent of the frames that may be handed over late")
+    c.option("--late-max", o->late_max_percent, "Percentage of frames that may be late")
         .range(0.0, 100.0)
         .shows_default();
     c.option("-o,--output", o->plot, "FILE.png: how many frames exceed which time");
     c.footer(
-        "Exit status 1 where a frame is not whole, more frames are late than --late-max, none fell due, or the "
-        "bench was interrupted.");
+        "Exit status 1 if a frame is incomplete, more frames are late than --late-max, none fell due, or the bench "
+        "was interrupted.");
     return [o] { return bench(*o); };
 }
 

@@ -7,11 +7,9 @@ namespace narpa::cli {
 void BudgetOptions::add_to(Parser app) {
     const Option samples = app.option("--spp", spp, "Samples per pixel instead of the scene's").range(1, 65535);
     const Option time =
-        app.option("--budget-ms", budget_ms, "A frame as good as it gets in so many milliseconds, instead")
-            .range(0.001, 1e6);
-    const Option rays =
-        app.option("--budget-rays", budget_rays, "A frame as good as it gets with so many rays, instead")
-            .range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000});
+        app.option("--budget-ms", budget_ms, "Time budget per frame in milliseconds, instead").range(0.001, 1e6);
+    const Option rays = app.option("--budget-rays", budget_rays, "Budget per frame in rays, instead")
+                            .range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000});
     samples.excludes(time).excludes(rays);
     time.excludes(rays);
 }

@@ -1,4 +1,4 @@
-// narpa check - is the scene good, and can this machine run it? Names what is missing, and what mends it.
+// narpa check - checks the scene and this machine; names what is missing and how to fix it.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -27,7 +27,7 @@ struct Options {
     std::vector<std::string> devices;
 };
 
-/// One thing that a run may want of this machine.
+/// One thing that a run may need from this machine.
 struct Finding {
     std::string name;
     bool there = false;
@@ -80,7 +80,7 @@ Finding locked_memory() {
             ::getenv("USER") ? ::getenv("USER") : "USER")};
 }
 
-/// How many materials there are of each kind that the scene has.
+/// The number of materials of each kind.
 std::map<std::string_view, int> material_kinds(const Scene& scene) {
     std::map<std::string_view, int> count;
     for (const Material& m : scene.materials) ++count[name_of(m.kind, kMaterialKinds)];
@@ -149,11 +149,11 @@ std::string light_words(const Light& l) {
 }
 
 std::string budget_words(const RenderSettings& r) {
-    if (r.budget_rays > 0) return fmt::format("at most {} rays a frame", r.budget_rays);
+    if (r.budget_rays > 0) return fmt::format("at most {} rays per frame", r.budget_rays);
     if (r.budget_ns > 0)
         return fmt::format("{:g} ms from the end of an exposure to the hand-over",
                            static_cast<double>(r.budget_ns) * 1e-6);
-    return fmt::format("{} sample{} a pixel", r.spp, r.spp > 1 ? "s" : "");
+    return fmt::format("{} sample{} per pixel", r.spp, r.spp > 1 ? "s" : "");
 }
 
 void tell_light(const Scene& s) {
@@ -183,7 +183,7 @@ void tell(const World& world) {
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
                         1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
     for (const Lidar& l : s.lidars)
-        say(fmt::format("  lidar {}: {} at {} turns a second", l.name, l.model->spec().name, l.rate_hz));
+        say(fmt::format("  lidar {}: {} at {} turns per second", l.name, l.model->spec().name, l.rate_hz));
 }
 
 Status save_dbc(const Scene& scene, const std::string& path) {
@@ -196,7 +196,7 @@ Status save_dbc(const Scene& scene, const std::string& path) {
     return Ok{};
 }
 
-/// Tries the very devices that a run would use.
+/// Opens the device as a run would.
 Result<Finding> try_device(const std::string& spec) {
     if (spec.starts_with("/dev/video")) {
         auto sink = open_video_sink(spec, {640, 480, PixelFormat::grey, 100'000'000}, WhenFull::drop);
@@ -231,7 +231,7 @@ Outcome check(const Options& o) {
                         f.remedy.empty() ? "" : "\n         try: " + f.remedy));
         machine.push_back({{"name", f.name}, {"there", f.there}, {"detail", f.detail}, {"remedy", f.remedy}});
     }
-    for (std::size_t i = general; i < findings.size(); ++i)  // what was asked for by name must be there
+    for (std::size_t i = general; i < findings.size(); ++i)  // devices named on the command line must exist
         if (!findings[i].there)
             return Error{findings[i].detail, findings[i].name, 0, 0, ErrorKind::missing, findings[i].remedy};
     return nlohmann::json{{"scene", describe(**world)}, {"machine", machine}};
@@ -241,11 +241,10 @@ Outcome check(const Options& o) {
 
 Command add_check(Parser app) {
     auto o = std::make_shared<Options>();
-    const Parser c =
-        app.subcommand("check", "Is the scene good, and can this machine run it? Names what is missing");
+    const Parser c = app.subcommand("check", "Check the scene and this machine; names what is missing");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();
     c.option("DEVICE", o->devices,
-             "Devices that the run will need, to be tried: vcan0, slcan:PORT, /dev/video10 ...");
+             "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, /dev/video10 ...");
     c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
     return [o] { return check(*o); };
 }

@@ -1,5 +1,5 @@
-/// apps/cli.h - the subcommands of `narpa`, one file each. Words for people go to standard error, the one
-/// JSON document of --json to standard output; exit status: base/result.h.
+/// apps/cli.h - the subcommands of `narpa`, one file each. Text goes to standard error, the JSON document of --json
+/// to standard output; exit status: base/result.h.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,7 @@
 
 namespace narpa::cli {
 
-/// What a subcommand found out, for --json; or why it could not. Where it judges, the document says `passed`, and
-/// false is exit status 1.
+/// The result of a subcommand, for --json, or an Error. A gate's document has `passed`; false is exit status 1.
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 
@@ -31,9 +30,9 @@ Command add_replay(Parser app);
 Command add_estimate(Parser app);
 Command add_rehearse(Parser app);
 
-/// Words for people, on standard error.
+/// Prints a line on standard error.
 void say(std::string_view text);
-/// Reads a scene, with another method than its own if one is given, and tells its warnings.
+/// Reads a scene, with another method than its own if one is given, and prints its warnings.
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
 /// "NAME=VALUE" -> {NAME, VALUE}; an Error that says what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);

@@ -24,7 +24,7 @@ struct Options {
     std::vector<Option> only_of_files, only_of_logs;
 };
 
-/// Frames are made again, bit for bit, and looked at one after another as navigation would.
+/// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
 Result<std::vector<TrackedFrame>> track(const Options& o, Replay& run, FrameTracker& tracker) {
     TracingThreads threads(o.one.threads);
     const Progress progress;
@@ -111,9 +111,9 @@ Outcome estimate(const Options& o) {
 
 Command add_estimate(Parser app) {
     auto o = std::make_shared<Options>();
-    const Parser c = app.subcommand(
-        "estimate",
-        "Estimate the target's pose from a logged run, a frame or a sweep, beside the truth and the bound");
+    const Parser c = app.subcommand("estimate",
+                                    "Estimate the target's pose from a logged run, a frame or a sweep, and compare "
+                                    "with the truth and the bound");
     c.option("INPUT", o->input, "Folder that `run --log` has written, or a scene file with --frame or --sweep")
         .required();
     c.option("--camera,--lidar", o->camera, "Name of the camera or LiDAR (default: the first of the scene)");
@@ -127,16 +127,16 @@ Command add_estimate(Parser app) {
         .range(1e-6, 1e3)
         .shows_default();
     o->one.pose.add_to(c);
-    c.option("--scene", o->scene, "Scene file (default: the one that the run had)");
+    c.option("--scene", o->scene, "Scene file (default: the run's)");
     o->tracker.add_to(c, "");
-    c.option("--every", o->every, "Look at each so-many-th frame").range(1, 1000000);
+    c.option("--every", o->every, "Use every N-th frame").range(1, 1000000);
     c.option("--threads", o->one.threads, "Threads (default: all cores)").range(0, 1024);
     c.option("--csv", o->csv, "FILE.csv: a row for each frame");
     c.option("-o,--output", o->picture, "FILE.png: errors over time, with three standard deviations and bound");
     for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
-    c.footer("Exit status 1 where no frame gave a pose, or a sweep's is not credible.");
+    c.footer("Exit status 1 if no frame gave a pose, or a sweep's pose is not credible.");
     return [o] { return estimate(*o); };
 }
 

@@ -139,9 +139,10 @@ private:
             if (stop_flag()) return Ok{};
             if (monotonic_ns() > deadline)
                 return Error{
-                    fmt::format("no heartbeat of {:.6f} s in {} s: is `narpa run --lockstep` there, and are all of "
-                                "its scene's commanded bodies in the trajectory?",
-                                static_cast<double>(granted) * 1e-9, options_.wait_s),
+                    fmt::format(
+                        "no heartbeat of {:.6f} s in {} s: is `narpa run --lockstep` running, and are all of "
+                        "its scene's commanded bodies in the trajectory?",
+                        static_cast<double>(granted) * 1e-9, options_.wait_s),
                     options_.bus, 0, 0, ErrorKind::failed};
             bus_.wait(20 * kMs);
         }
@@ -172,7 +173,7 @@ Outcome fly(const Options& o) {
     if (auto played = player.play(*rows); !played) return played.error();
 
     const CanCounters& c = (*bus)->counters();
-    say(fmt::format("{} commands sent from {:.3f} s on, {} frames dropped, {} frames heard", player.commands,
+    say(fmt::format("{} commands sent from {:.3f} s on, {} frames dropped, {} frames received", player.commands,
                     static_cast<double>(player.start_ns()) * 1e-9, player.frames_dropped, c.received));
     return nlohmann::json{{"commands", player.commands},   {"start_ns", player.start_ns()},
                           {"frames_sent", c.sent},         {"frames_dropped", player.frames_dropped},
@@ -197,8 +198,9 @@ Command add_fly(Parser app) {
     c.option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
         .range(0.0, 3600.0)
         .shows_default();
-    c.flag("--lockstep", o->lockstep, "Send the next command when the emulator's clock has reached the last one");
-    c.flag("--classic", o->classic, "Nine classic frames a command even where the bus carries CAN FD");
+    c.flag("--lockstep", o->lockstep,
+           "Send the next command when the emulator's clock has reached the previous one");
+    c.flag("--classic", o->classic, "Nine classic frames per command even if the bus carries CAN FD");
     return [o] { return fly(*o); };
 }
 

@@ -33,8 +33,8 @@ Result<Rigid3> parse_pose(const std::string& text) {
 }  // namespace
 
 void PoseOptions::add_to(Parser app) {
-    app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) that says where bodies are");
-    app.option("--pose", poses, "BODY=x,y,z,qw,qx,qy,qz: puts a body there (metres; body to world), at any time")
+    app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) with the bodies' poses");
+    app.option("--pose", poses, "BODY=x,y,z,qw,qx,qy,qz: a body's pose (metres; body to world), at any time")
         .type_name("POSE")
         .values(1, 1)
         .repeatable();

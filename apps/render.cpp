@@ -1,4 +1,4 @@
-// narpa render - one frame of one camera, as the run would make it, to an image file.
+// narpa render - renders one frame of one camera, as a run would, to an image file.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -36,7 +36,7 @@ struct Options {
     int threads = 0;
 };
 
-/// What the command line says differently from the scene.
+/// Applies the options that override the scene.
 Status override_scene(const Options& o, Scene& scene, Camera& camera) {
     o.budget.override_scene(scene.render);
     if (o.seed) scene.render.seed = *o.seed;
@@ -57,7 +57,7 @@ Status override_scene(const Options& o, Scene& scene, Camera& camera) {
 constexpr std::array<std::string_view, 8> kOutputs{"radiance", "depth", "range",  "normal",
                                                    "position", "body",  "albedo", "variance"};
 
-/// The names in "depth,normal"; an Error for one that is not known.
+/// The names in "depth,normal"; an Error for an unknown one.
 Result<std::set<std::string>> parse_outputs(const std::string& list) {
     std::set<std::string> names;
     for (std::size_t start = 0; start < list.size();) {
@@ -71,7 +71,7 @@ Result<std::set<std::string>> parse_outputs(const std::string& list) {
     return names;
 }
 
-/// The image file holds what is not empty.
+/// The image file contains the outputs that are not empty.
 void keep_only(const std::set<std::string>& names, Aovs& a) {
     if (!names.contains("depth")) a.depth_m.clear();
     if (!names.contains("range")) a.range_m.clear();
@@ -86,7 +86,7 @@ std::string_view name(Method m) {
     return m == Method::path ? "path" : "direct";
 }
 
-/// Shows on standard error how far a long frame is, where that is a terminal.
+/// Shows the progress of a long frame on standard error, if that is a terminal.
 class Progress {
 public:
     explicit Progress(std::size_t pixels) : pixels_(pixels) {
@@ -112,7 +112,7 @@ private:
 
     std::size_t pixels_;
     bool shown_ = false;
-    std::jthread watcher_;  // last: it is joined before what it looks at goes
+    std::jthread watcher_;  // last: joined before the members that it reads are destroyed
 };
 
 Outcome render(const Options& o) {
@@ -143,7 +143,7 @@ Outcome render(const Options& o) {
     Aovs values;
     Aovs* const aovs = outputs->empty() ? nullptr : &values;
     const std::int64_t budget_ns = (*world)->scene().render.budget_ns;
-    // A run's frames have others before them, which show how fast the machine is and what the way out takes.
+    // In a run, earlier frames calibrate the renderer and the time for the hand-over.
     if (budget_ns > 0)
         threads.arena.execute([&] {
             unit.embed(unit.expose(frame, t_ns, monotonic_ns() + budget_ns));
@@ -192,7 +192,7 @@ Outcome render(const Options& o) {
 Command add_render(Parser app) {
     auto o = std::make_shared<Options>();
     const Parser c = app.subcommand(
-        "render", "Render one frame of a camera, byte for byte as `run` would put it out but for a budget in time");
+        "render", "Render one frame of a camera, byte for byte as `run` does (except with a time budget)");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();
     c.option("--camera", o->camera, "Name of the camera (default: the first)");
     c.option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)").range(-9e9, 9e9);
@@ -200,9 +200,9 @@ Command add_render(Parser app) {
     o->pose.add_to(c);
     c.option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
     o->budget.add_to(c);
-    c.option("--method", o->method, "direct: light straight from its sources; path: all light")
+    c.option("--method", o->method, "direct: light from its sources only; path: all light")
         .one_of({"direct", "path"});
-    c.option("--max-depth", o->max_depth, "With path: surfaces that light may meet on its way").range(1, 40);
+    c.option("--max-depth", o->max_depth, "With path: surfaces that a path may hit").range(1, 40);
     c.option("--seed", o->seed, "Seed instead of the scene's");
     c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);
     c.option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance");

@@ -1,5 +1,5 @@
-// narpa replay - the frames of a logged run once more: bit for bit, and beside what an unlimited budget would have
-// shown.
+// narpa replay - renders the frames of a logged run again, bit for bit, and compares them with a reference of many
+// samples.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -164,20 +164,20 @@ Outcome replay_any(const Options& o) {
 Command add_replay(Parser app) {
     auto o = std::make_shared<Options>();
     const Parser c = app.subcommand(
-        "replay", "Render the frames of a logged run once more, bit for bit, and tell what their budget cost");
+        "replay", "Render the frames of a logged run again, bit for bit, and report what their budget cost");
     c.option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written").required();
     c.option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
-    c.option("--scene", o->scene, "Scene file (default: the one that the run had)");
+    c.option("--scene", o->scene, "Scene file (default: the run's)");
     c.option("--reference", o->reference,
-             "Compare with so many samples per pixel: error, similarity, shifts of bodies and edges")
+             "Compare with this number of samples per pixel: error, similarity, shifts of bodies and edges")
         .range(2, 65535);
-    c.option("--frames", o->frames, "Frames to look at, spread over the run (default: all; 10 with --reference)")
+    c.option("--frames", o->frames, "Number of frames, spread over the run (default: all; 10 with --reference)")
         .range(1, 1000000);
     c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);
     c.option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
     c.footer(
-        "Exit status 1 where a frame does not repeat bit for bit, or none has an image to repeat. RMSE, bias and "
-        "errors are of the mean of the bands, as parts of the radiance that fills the sensor's scale.");
+        "Exit status 1 if a frame does not repeat bit for bit, or none has an image. RMSE, bias and errors are of "
+        "the mean of the bands, as fractions of the radiance at full scale.");
     return [o] { return replay_any(*o); };
 }
 

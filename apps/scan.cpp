@@ -192,7 +192,7 @@ Outcome scan(const Options& o) {
 
 Command add_scan(Parser app) {
     auto o = std::make_shared<Options>();
-    const Parser c = app.subcommand("scan", "Trace what a LiDAR sees from a time on: points, shots or packets");
+    const Parser c = app.subcommand("scan", "Scan with a LiDAR from a time on: points, shots or packets");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();
     c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");
     c.option("--time", o->time_s, "Simulation time in seconds of the first packet").range(0.0, 9e9).shows_default();

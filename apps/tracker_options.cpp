@@ -10,13 +10,13 @@ namespace narpa::cli {
 void TrackerFlags::add_to(Parser app, const std::string& prefix) {
     const std::string dashes = "--" + prefix;
     app.option(dashes + "target", tracker.target,
-               "Body whose pose is looked for (default: the first with a mesh that does not carry the camera)");
+               "Body whose pose is estimated (default: the first with a mesh that does not carry the camera)");
     app.option(dashes + "method", method,
-               "features: points of the frame and of a render; dense: all pixels, from where the points lead")
+               "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
         .one_of({"features", "dense"})
         .shows_default();
     app.option(dashes + "start", start,
-               "DEG,PERCENT: how far the first guess is off the truth, in attitude and of the range")
+               "DEG,PERCENT: error of the first guess, in attitude and as a part of the range")
         .shows_default();
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
 }

@@ -40,7 +40,7 @@ Emulator::~Emulator() = default;
 
 Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions& options) {
     if (options.video.empty() && options.lidar.empty())
-        return Error{"nothing to put out, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
+        return Error{"no output, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
     if (options.lockstep && options.bus.empty())
         return Error{"--lockstep needs --can BUS: the clock advances only with commands"};
     if (auto good = check_budget(scene, options); !good) return good.error();

@@ -83,7 +83,7 @@ Result<std::unique_ptr<OnlineEstimator>> open_estimator(const World& world, cons
     for (const auto& sensor : sensors)
         if (auto* camera = dynamic_cast<CameraSensor*>(sensor.get())) cameras.push_back(camera);
     if (cameras.empty())
-        return Error{"--estimate needs frames to look at, expected --video CAMERA=SINK too (SINK may be none)"};
+        return Error{"--estimate needs a camera, expected --video CAMERA=SINK too (SINK may be none)"};
     const std::string name =
         options.estimate_camera.empty() ? std::string(cameras.front()->name()) : options.estimate_camera;
     const auto index = sensor_named(scene.cameras, name, "camera", scene.file);
@@ -99,8 +99,7 @@ Result<std::unique_ptr<OnlineEstimator>> open_estimator(const World& world, cons
         camera->show_to(*estimator);
         return estimator;
     }
-    return Error{
-        fmt::format("--estimate {}: this camera puts nothing out, expected --video {}=SINK too", name, name)};
+    return Error{fmt::format("--estimate {}: this camera has no sink, expected --video {}=SINK too", name, name)};
 }
 
 }  // namespace narpa

@@ -138,8 +138,8 @@ NARPA_EACH_ISA std::uint32_t MeshShape::trace(const ShapeRays& rays, std::uint32
         const Triangle triangle{corners(0, i) + vertex_origin_, corners(1, i) + vertex_origin_,
                                 corners(2, i) + vertex_origin_};
         const Vec3 start = batch.start[i], d = rays.direction[i];
-        const TrianglePoint p = meeting_point(triangle, start, d, static_cast<double>(batch.rays.hit.u[i]),
-                                              static_cast<double>(batch.rays.hit.v[i]));
+        const TrianglePoint p = hit_point(triangle, start, d, static_cast<double>(batch.rays.hit.u[i]),
+                                          static_cast<double>(batch.rays.hit.v[i]));
         const double range = batch.skipped_m[i] + std::max(0.0, dot(p.position - start, d));
         const bool take = (met[i] != 0) & (range < rays.t_max[i]);
         met[i] = -static_cast<int>(take);

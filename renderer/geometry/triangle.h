@@ -33,11 +33,12 @@ struct TrianglePoint {
     double b1 = 0, b2 = 0;  ///< barycentric weights of b and c
 };
 
-/// Where a ray that is known to meet the triangle does so (T. Moller, B. Trumbore, "Fast, minimum storage
+/// Where a ray that is known to hit the triangle hits it (T. Moller, B. Trumbore, "Fast, minimum storage
 /// ray-triangle intersection", Journal of Graphics Tools 2(1), 1997), kept inside the triangle so that a hit on an
-/// edge stays on the surface. Where that has no answer, as for a needle seen from its end, the weights are u and v.
-[[nodiscard]] inline TrianglePoint meeting_point(const Triangle& t, const Vec3& start, const Vec3& direction,
-                                                 double u, double v) noexcept {
+/// edge stays on the surface. Where that has no solution, as for a needle seen from its end, the weights are u and
+/// v.
+[[nodiscard]] inline TrianglePoint hit_point(const Triangle& t, const Vec3& start, const Vec3& direction, double u,
+                                             double v) noexcept {
     const Vec3 e1 = t.b - t.a, e2 = t.c - t.a;
     const Vec3 p = cross(direction, e2), s = start - t.a, q = cross(s, e1);
     const double inverse_det = 1 / dot(e1, p);
@@ -123,7 +124,7 @@ struct Departure {
 }
 
 /// A point of the triangle, moved towards the middle of the circle that touches its edges until it is as far from
-/// each as the departure asks, by at most eight times that.
+/// each as `clearance_m`, by at most eight times that.
 [[nodiscard]] inline Vec3 away_from_edges(const Triangle& t, const Vec3& p, const Departure& d) noexcept {
     if (d.normal == Vec3{}) return p;
     const std::array<Vec3, 3> corner{t.a, t.b, t.c}, edge{t.b - t.a, t.c - t.b, t.a - t.c};

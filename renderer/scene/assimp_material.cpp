@@ -42,7 +42,7 @@ Material gltf_material(const aiMaterial& m) {
                               ior, emission);
 }
 
-/// Reads what a material names, and tells what is passed over.
+/// Reads the images that a material names, and warns about what is not supported.
 class TextureFinder {
 public:
     TextureFinder(const aiScene& scene, const aiMaterial& m, const std::string& path,
@@ -57,22 +57,22 @@ public:
         aiTextureMapMode modes[3] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
         if (m_.GetTexture(type, 0, &name, nullptr, &channel, nullptr, nullptr, modes) != AI_SUCCESS) return out;
         if (channel != 0) {
-            tell("a texture that lies by the second texture coordinates is not used");
+            warn("a texture that lies by the second texture coordinates is not used");
             return out;
         }
         aiUVTransform transform;
         if (m_.Get(AI_MATKEY_UVTRANSFORM(type, 0), transform) == AI_SUCCESS)
-            tell("shifts, turns and scales of textures (KHR_texture_transform) are not used");
+            warn("shifts, turns and scales of textures (KHR_texture_transform) are not used");
         if (modes[0] == aiTextureMapMode_Clamp && modes[1] == aiTextureMapMode_Clamp)
             out.wrap = Texture::Wrap::clamp;
         else if (modes[0] != aiTextureMapMode_Wrap || modes[1] != aiTextureMapMode_Wrap)
-            tell("textures that are mirrored, or clamped along one axis only, repeat");
+            warn("textures that are mirrored, or clamped along one axis only, repeat");
         if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
             const auto* bytes = reinterpret_cast<const std::uint8_t*>(inside->pcData);
             if (inside->mHeight == 0)
                 out.file = path_ + name.C_Str(), out.bytes.assign(bytes, bytes + inside->mWidth);
             else
-                tell("textures that the file holds as bare pixels are not used");
+                warn("textures that the file holds as bare pixels are not used");
         } else {
             out.file = texture_path(path_, name.C_Str());
         }
@@ -81,8 +81,8 @@ public:
 
     [[nodiscard]] bool has(aiTextureType type) const { return m_.GetTextureCount(type) > 0; }
 
-    /// Once a file, however many materials it is true of.
-    void tell(std::string_view what) {
+    /// Once a file, however many materials it applies to.
+    void warn(std::string_view what) {
         std::string text = fmt::format("{}: {}", path_, what);
         if (std::find(warnings_.begin(), warnings_.end(), text) == warnings_.end())
             warnings_.push_back(std::move(text));
@@ -115,9 +115,9 @@ MeshMaterial from_assimp(const aiScene& scene, const aiMaterial& m, const std::s
         std::clamp(number(m, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1), 0.0f, 100.0f);
     const bool opaque = out.material.kind != Material::Kind::dielectric;
     if (opaque && (number(m, AI_MATKEY_OPACITY, 1) < 1 || number(m, AI_MATKEY_TRANSMISSION_FACTOR, 0) > 0))
-        textures.tell("transparent materials are drawn opaque");
+        textures.warn("transparent materials are drawn opaque");
     if (gltf && textures.has(aiTextureType_UNKNOWN))
-        textures.tell("metallic-roughness textures are not used, their factors are");
+        textures.warn("metallic-roughness textures are not used, their factors are");
     return out;
 }
 

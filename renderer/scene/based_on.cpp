@@ -7,7 +7,7 @@
 namespace narpa {
 namespace {
 
-/// Nodes are moved: only so do they keep their place in the file.
+/// Nodes are moved, not copied: a copy would lose its place in the file.
 void merge(toml::table& over, toml::table&& base) {
     for (auto&& [key, node] : base) {
         toml::node* const own = over.get(key.str());

@@ -1,4 +1,4 @@
-/// renderer/scene/kind_names.h - the words that scene files have for kinds, both ways.
+/// renderer/scene/kind_names.h - names of kinds in scene files, both ways.
 #pragma once
 
 #include <array>

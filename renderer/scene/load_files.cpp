@@ -73,7 +73,7 @@ private:
         const auto known = plain_.find(key);
         if (known != plain_.end()) return known->second;
         Mesh mesh = file.mesh;
-        std::map<std::uint16_t, std::uint16_t> scene_material;  // only those that some face has
+        std::map<std::uint16_t, std::uint16_t> scene_material;  // of materials that some face has
         for (std::uint16_t& m : mesh.face_material) {
             auto [it, is_new] = scene_material.try_emplace(m);
             if (is_new) it->second = add_material(file.materials[m], key.second);
@@ -102,7 +102,7 @@ private:
         return static_cast<std::uint16_t>(r_.scene.materials.size() - 1);
     }
 
-    /// MTL has one word for normal maps and for heights: the picture tells which.
+    /// MTL has one keyword for normal maps and for heights: the image decides.
     void add_bump(const MeshMaterial& given, double scale, Material& m) {
         const Result<int> normals = normal_map_index(given.bump);
         if (!normals) {
@@ -141,7 +141,7 @@ private:
         return sum[2] - std::max(sum[0], sum[1]) > 0.2 * white;
     }
 
-    /// -1 where the image cannot be read, which is told with what follows from it.
+    /// -1 where the image cannot be read; that is reported with its consequence.
     int index_or_warn(const MeshTexture& texture, Colour colour, const char* otherwise) {
         const Result<int> index = texture_index(texture, {.colour = colour, .wrap = texture.wrap});
         if (index) return *index;

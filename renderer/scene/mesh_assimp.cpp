@@ -55,7 +55,7 @@ public:
     }
 
 private:
-    /// Assimp 5.2 passes over this extension and the textures with it, in silence.
+    /// Assimp 5.2 ignores this extension, and the textures with it, without a warning.
     void warn_of_lost_textures() {
         if (const std::string kind = extension_of(path_); kind != ".gltf" && kind != ".glb") return;
         const Result<std::string> bytes = read_file(path_);
@@ -101,7 +101,7 @@ private:
             if (is_sound(part.mFaces[f], part.mNumVertices)) read_face(part.mFaces[f], corner, part.mMaterialIndex);
     }
 
-    /// Assimp hands on what some formats' files say, unchecked.
+    /// Assimp does not check the indices of some formats.
     bool is_sound(const aiFace& face, unsigned vertices) {
         if (face.mNumIndices > kMostCorners)
             problem_ = fmt::format("a face of {} corners, expected at most {}", face.mNumIndices, kMostCorners);

@@ -76,7 +76,7 @@ bool is_degenerate(const std::array<Vec3f, 3>& p) {
     return !(norm(area_vector(p)) > 0x1p-24 * longest2);
 }
 
-/// Sifts a soup's triangles and joins their vertices into a Mesh.
+/// Drops bad triangles of a soup and welds its vertices into a Mesh.
 class MeshBuilder {
 public:
     MeshBuilder(TriangleSoup& soup, double scale)
@@ -171,7 +171,7 @@ private:
     }
 
     static constexpr std::uint32_t kUnknown = 0xffff'ffffu;
-    /// What the last triangle made of a position: most others of the same position want the same.
+    /// The vertex that the last triangle used at a position: most others there share it.
     struct Last {
         std::uint32_t point = kUnknown, uv = 0, normal = 0, vertex = kUnknown;
     };
@@ -207,14 +207,14 @@ void take_textures_off_bare_triangles(TriangleSoup& soup, const std::string& pat
 }
 
 void tell_dropped(MeshFile& file, const std::string& path) {
-    const auto tell = [&](std::size_t count, std::string_view kind) {
+    const auto warn = [&](std::size_t count, std::string_view kind) {
         if (count > 0)
             file.warnings.push_back(
                 fmt::format("{}: {} {} triangle{} dropped", path, count, kind, count > 1 ? "s" : ""));
     };
-    tell(file.non_finite, "not finite (NaN or infinite coordinates)");
-    tell(file.degenerate, "degenerate (without area)");
-    tell(file.duplicate, "duplicated");
+    warn(file.non_finite, "not finite (NaN or infinite coordinates)");
+    warn(file.degenerate, "degenerate (without area)");
+    warn(file.duplicate, "duplicated");
 }
 
 }  // namespace
@@ -229,7 +229,7 @@ std::string texture_path(const std::string& mesh_path, std::string name) {
     while (!name.empty() && (name.back() == ' ' || name.back() == '\r' || name.back() == '\t')) name.pop_back();
     std::replace(name.begin(), name.end(), '\\', '/');
     const auto folder = std::filesystem::path(mesh_path).parent_path();
-    const auto as_written = folder / name;  // an absolute name stays what it is
+    const auto as_written = folder / name;  // an absolute name is not changed
     const auto beside = folder / std::filesystem::path(name).filename();
     std::error_code problem;
     const bool other = !std::filesystem::exists(as_written, problem) && std::filesystem::exists(beside, problem);

@@ -25,7 +25,7 @@ struct MeshTexture {
 struct MeshMaterial {
     Material material;
     MeshTexture colour{}, emission{}, normal{};
-    MeshTexture bump{};                      ///< MTL's: a normal map or a height map, as its picture tells
+    MeshTexture bump{};                      ///< MTL's: a normal map or a height map, decided by its image
     std::optional<float> bump_multiplier{};  ///< MTL's -bm
     [[nodiscard]] bool has_textures() const {
         return colour.named() || emission.named() || normal.named() || bump.named();
@@ -36,16 +36,16 @@ struct MeshMaterial {
 struct MeshFile {
     Mesh mesh;  ///< face_material is an index into `materials`
     std::vector<MeshMaterial> materials;
-    std::size_t degenerate = 0, duplicate = 0, non_finite = 0;  ///< triangles dropped, also told in `warnings`
+    std::size_t degenerate = 0, duplicate = 0, non_finite = 0;  ///< triangles dropped, also in `warnings`
     std::vector<std::string> warnings;
 };
 
-/// Reads OBJ + MTL, glTF, PLY, STL, 3DS, DAE and what else Assimp knows; `scale` turns the file's unit into metres
-/// and is applied in double. Node transforms are applied. Faces are triangulated; points and lines are left out.
-/// Normals are kept where the file gives them, and never made up. Dropped and counted: triangles with a coordinate
-/// that is not finite, triangles whose height is below 2^-24 of their longest side (float cannot hold their
-/// normal), and second copies of a triangle, whichever way round. Errors name the mesh file, and the line where it
-/// is an OBJ.
+/// Reads OBJ + MTL, glTF, PLY, STL, 3DS, DAE and the other formats of Assimp; `scale` turns the file's unit into
+/// metres and is applied in double. Node transforms are applied. Faces are triangulated; points and lines are left
+/// out. Normals are kept where the file gives them, and never computed. Dropped and counted: triangles with a
+/// coordinate that is not finite, triangles whose height is below 2^-24 of their longest side (float cannot hold
+/// their normal), and second copies of a triangle, whichever way round. Errors name the mesh file, and the line
+/// where it is an OBJ.
 Result<MeshFile> read_mesh(const std::string& path, double scale);
 
 }  // namespace narpa

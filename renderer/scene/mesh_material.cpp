@@ -6,7 +6,7 @@ namespace narpa {
 
 namespace {
 
-constexpr float kOrdinaryIor = 1.5f;  ///< glass and plastics; what glTF means where it says nothing
+constexpr float kOrdinaryIor = 1.5f;  ///< glass and plastics; the default of glTF
 
 float clamped(float x, float high) {
     return x > 0 ? std::min(x, high) : 0.0f;  // NaN is 0

@@ -22,14 +22,14 @@ public:
         while (in_.next_line())
             if (!read_line()) return *error_;
         finish();
-        tell(transparent_, "transparent (d, Tr), drawn opaque");
-        tell(with_options_, "options of maps passed over, all but -clamp and -bm");
+        warn(transparent_, "transparent (d, Tr), drawn opaque");
+        warn(with_options_, "options of maps passed over, all but -clamp and -bm");
         tell_unused_maps();
         return Ok{};
     }
 
 private:
-    void tell(int materials, std::string_view what) {
+    void warn(int materials, std::string_view what) {
         if (materials > 0)
             warnings_.push_back(
                 fmt::format("{}: {} material{}: {}", path_, materials, materials > 1 ? "s" : "", what));

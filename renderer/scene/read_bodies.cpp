@@ -37,7 +37,7 @@ NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<
             .place = table.place("mesh")};
 }
 
-/// Notes a problem unless the body has exactly one shape.
+/// Records a problem unless the body has exactly one shape.
 void check_one_shape(TableReader& table) {
     const char* first = nullptr;
     for (const char* key : {"mesh", "sphere", "ellipsoid", "dem"}) {

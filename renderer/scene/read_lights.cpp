@@ -10,7 +10,7 @@ namespace {
 
 constexpr Range kLength{.low = 0, .high = 1e12, .low_open = true};
 
-/// The key that says how bright a light of this kind is.
+/// The key for the brightness of a light of this kind.
 const char* emission_key(Light::Kind kind) {
     switch (kind) {
         case Light::Kind::point: return "intensity_w_sr";
@@ -60,7 +60,7 @@ Light read_light(TableReader& table, std::vector<std::string>& names, const std:
     light.name = read_name(table, names);
     table.require("kind", "one of \"point\", \"directional\", \"rectangle\", \"disc\"");
     const auto kind = table.choice<Light::Kind>("kind", kLightKinds);
-    if (!kind) return light;  // what its keys should be is not known
+    if (!kind) return light;  // its keys depend on the kind
     light.kind = *kind;
     refuse_foreign_keys(table, name_of(*kind, kLightKinds));
     read_emission(table, light);

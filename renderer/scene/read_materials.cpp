@@ -13,7 +13,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr Range kRadiance{.low = 0, .high = 1e30};
 
-/// What each kind has beside the keys of all: emission, normals, heights.
+/// Keys of each kind beside those that all have: emission, normals, heights.
 const std::array<KindKeys, 9> kKindKeys{{
     {"lambert", {"albedo", "texture"}},
     {"phong", {"albedo", "texture", "specular", "exponent"}},
@@ -26,11 +26,11 @@ const std::array<KindKeys, 9> kKindKeys{{
     {"hapke", {"albedo", "texture", "b", "c", "opposition_b0", "opposition_h", "roughness_deg"}},
 }};
 
-/// Notes a problem where the surface would send back more than it gets.
+/// Records a problem where the surface would reflect more than it receives.
 void check_energy(TableReader& table, const Material& m) {
     using enum Material::Kind;
     if (m.kind != phong && m.kind != lunar_lambert && m.kind != hapke)
-        return;                                              // the ranges of their keys see to it
+        return;                                              // the ranges of their keys ensure it
     const float rounding = m.kind == hapke ? 5e-3f : 1e-6f;  // of largest_albedo: by quadrature, or exact
     const Rgb most = largest_albedo(m);
     for (int b = 0; b < 3; ++b)
@@ -97,7 +97,7 @@ void read_texture_table(TableReader table, std::string& file, TextureUse& use) {
     table.finish();
 }
 
-/// A texture is "FILE" or a table; `use` is how it is read where the table does not say.
+/// A texture is "FILE" or a table; `use` is how it is read where the table does not specify it.
 void read_texture_key(TableReader& table, const char* key, int Material::*slot, TextureUse use,
                       SceneReading& reading) {
     const toml::node* node = table.find(key);

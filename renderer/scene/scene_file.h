@@ -12,8 +12,8 @@ namespace narpa {
 /// docs/scene.md. Errors carry file, line and column; a key that is not known is an error.
 Result<Scene> read_scene(const std::string& path);
 
-/// Gives a scene that has been read another method, by the rules of reading: its warnings follow; an error where a
-/// material does not allow it.
+/// Changes the method of a scene that has been read, and updates its warnings; an error where a material does not
+/// allow the method.
 Status use_method(Scene& scene, RenderSettings::Method method);
 
 }  // namespace narpa

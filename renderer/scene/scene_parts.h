@@ -31,7 +31,7 @@ struct NamedTexture {
     toml::source_region place;
 };
 
-/// What one reading of a scene file holds on to.
+/// State while one scene file is read.
 struct SceneReading {
     Scene scene;
     Problems problems;

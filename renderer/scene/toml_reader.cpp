@@ -272,7 +272,7 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
 }
 
 void TableReader::refuse(std::string_view key, const std::string& why) {
-    if (table_->get(key) == nullptr) return;  // and it stays unknown to the suggestions
+    if (table_->get(key) == nullptr) return;  // it is not suggested for misspelt keys
     find(key);
     fail(key, why);
 }

@@ -1,8 +1,8 @@
-/// renderer/scene/toml_reader.h - reads TOML tables key by key, and remembers which keys were asked for.
+/// renderer/scene/toml_reader.h - reads TOML tables key by key, and records which keys were read.
 ///
-/// A value that is absent or wrong comes back as nullopt, and what is wrong is noted with its place; so a reader is
-/// a flat list of `x = table.number("x").value_or(1)`, and the problem that stands first in the file is told at the
-/// end.
+/// A value that is absent or wrong is returned as nullopt, and the problem is recorded with its place. So a reader
+/// is a flat list of `x = table.number("x").value_or(1)`, and the first problem in the file's order is reported at
+/// the end.
 #pragma once
 
 #include <toml++/toml.h>
@@ -27,12 +27,12 @@ class Problems {
 public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
     void add(const toml::source_region& at, std::string what);
-    /// A key that is not there. Told when nothing else is wrong: it may be there under a misspelt name.
+    /// A missing key. Reported when nothing else is wrong: it may be present under a misspelt name.
     void add_missing(const toml::source_region& at, std::string what);
     /// An error of another file (a mesh, a texture) that was named at this place.
     void add(const toml::source_region& at, Error error);
     [[nodiscard]] bool none() const { return problems_.empty(); }
-    /// The one that stands first in the file; keys that are missing come last.
+    /// The first in the file; missing keys come last.
     [[nodiscard]] Error first() const;
     [[nodiscard]] const std::string& file() const { return file_; }
 
@@ -71,7 +71,7 @@ struct KindKeys {
 /// One table of the file.
 class TableReader {
 public:
-    /// `name` as a person would write it: "[sun]", "[[camera]]", "sphere".
+    /// `name` as the file has it: "[sun]", "[[camera]]", "sphere".
     TableReader(const toml::table& table, std::string name, Problems& problems)
         : table_(&table), name_(std::move(name)), problems_(&problems) {}
 
@@ -113,16 +113,16 @@ public:
 
     /// The node of a key, counted as read; null when absent.
     const toml::node* find(std::string_view key);
-    /// A key that is known and must not be here; `why` completes "KEY: ...". Nothing where it is not here.
+    /// A known key that is not allowed here; `why` completes "KEY: ...". No effect where it is absent.
     void refuse(std::string_view key, const std::string& why);
     /// Refuses the keys that belong to other kinds only: each kind of table has its own.
     void refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds);
-    /// A key that the design names and this version does not know.
+    /// A key that this version does not support yet.
     void not_in_this_version(std::string_view key, std::string_view instead);
     /// Notes a problem at the value of a key (at the table when absent).
     void fail(std::string_view key, const std::string& what);
     [[nodiscard]] const toml::source_region& place(std::string_view key) const;
-    /// Every key that nobody asked for is a problem. Call it last.
+    /// Every key that was not read is a problem. Call it last.
     void finish();
 
 private:

@@ -1,4 +1,5 @@
-/// renderer/scene/triangle_soup.h - what a mesh reader hands on, before vertices are joined and triangles sifted.
+/// renderer/scene/triangle_soup.h - the output of a mesh reader, before vertices are welded and bad triangles
+/// dropped.
 #pragma once
 
 #include <array>
@@ -27,7 +28,7 @@ struct TriangleSoup {
     std::vector<std::string> warnings;
 };
 
-/// Materials beyond this cannot be told apart in a mesh.
+/// Most materials of a mesh.
 inline constexpr std::size_t kMaxMaterials = 65535;
 
 Result<TriangleSoup> read_soup_with_assimp(const std::string& path);

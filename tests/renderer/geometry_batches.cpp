@@ -1,4 +1,4 @@
-// Rays that travel together meet what each would meet alone.
+// The rays of a batch hit what each would hit alone.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -35,7 +35,7 @@ Scene crowd(std::mt19937_64& rng) {
 }
 
 HitBatch traced(const Tracer& tracer, const BodyPoses& at, std::span<const Ray> rays,
-                 std::span<const std::uint32_t> bodies) {
+                std::span<const std::uint32_t> bodies) {
     RayBatch packet;
     packet.n = rays.size();
     for (std::size_t i = 0; i < rays.size(); ++i) packet.put(i, rays[i]);
@@ -44,7 +44,7 @@ HitBatch traced(const Tracer& tracer, const BodyPoses& at, std::span<const Ray> 
     return hits;
 }
 
-TEST(Packets, MeetWhatEachRayMeetsAlone) {
+TEST(RayBatches, HitWhatEachRayHitsAlone) {
     std::mt19937_64 rng(11);
     std::normal_distribution<double> n(0, 1);
     std::size_t seen = 0, hidden = 0, shadows_differ = 0;
@@ -98,10 +98,10 @@ TEST(Packets, MeetWhatEachRayMeetsAlone) {
     EXPECT_LE(shadows_differ, 1U);  // a ray that grazes an edge may go either way
 }
 
-TEST(Packets, ThatLeaveSurfacesMeetWhatEachRayMeetsAlone) {
+TEST(RayBatches, LeavingSurfacesHitWhatEachRayHitsAlone) {
     std::mt19937_64 rng(12);
     std::normal_distribution<double> n(0, 1);
-    int asked = 0, met = 0, same = 0, ends = 0, shadows = 0, single = 0;
+    int traced = 0, met = 0, same = 0, ends = 0, shadows = 0, single = 0;
     for (int round = 0; round < 4; ++round) {
         const Scene scene = crowd(rng);
         const auto tracer = Tracer::create(scene, 1);
@@ -116,7 +116,7 @@ TEST(Packets, ThatLeaveSurfacesMeetWhatEachRayMeetsAlone) {
                 const Vec3 eye{20 * n(rng), 20 * n(rng), 20 * n(rng)};
                 from[i] = tracer->intersect(at, {eye, normalized(Vec3{n(rng), n(rng), n(rng)} - eye)}, kInfinity);
                 next[i].body = 77;
-                if (from[i].body < 0 || i % 5 == 4) continue;  // some are not asked
+                if (from[i].body < 0 || i % 5 == 4) continue;  // some lanes are not traced
                 wanted |= 1u << i;
                 if (i % 3 == 0) from[i] = other_side(from[i]);
                 directions[i] = test::random_direction(rng);
@@ -131,7 +131,7 @@ TEST(Packets, ThatLeaveSurfacesMeetWhatEachRayMeetsAlone) {
                     ASSERT_EQ(next[i].body, 77);
                     continue;
                 }
-                ++asked;
+                ++traced;
                 const Rigid3& T_own = at.T_world_body[static_cast<std::size_t>(from[i].body)];
                 const Vec3 start = T_own * from[i].departure_body + 1e-5 * from[i].geometric_normal;
                 const Hit alone = tracer->intersect(at, {start, directions[i]}, kInfinity);
@@ -183,17 +183,17 @@ TEST(Packets, ThatLeaveSurfacesMeetWhatEachRayMeetsAlone) {
                 }
         }
     }
-    EXPECT_GT(asked, 5000);
+    EXPECT_GT(traced, 5000);
     EXPECT_GT(met, 2500);
     // A ray that starts or passes within rounding of an edge may go either way, and smooth meshes lift their
     // starts.
-    EXPECT_GE(same, asked * 0.995);
-    EXPECT_GE(ends, asked - 2);
-    EXPECT_GE(shadows, asked - 2);
-    EXPECT_GE(single, asked - 2);
+    EXPECT_GE(same, traced * 0.995);
+    EXPECT_GE(ends, traced - 2);
+    EXPECT_GE(shadows, traced - 2);
+    EXPECT_GE(single, traced - 2);
 }
 
-TEST(Packets, OfNoLengthAreNeverHidden) {
+TEST(RayBatches, ShadowRaysOfNoLengthAreNotOccluded) {
     Scene scene;
     scene.materials.push_back(test::lambert(0.5f));
     test::add_mesh(scene, test::box(2, 2, 2));
@@ -211,7 +211,7 @@ TEST(Packets, OfNoLengthAreNeverHidden) {
     }
 }
 
-TEST(Packets, OfNothingAskNothing) {
+TEST(RayBatches, EmptyBatchesHitNothing) {
     const Scene scene;
     const auto tracer = Tracer::create(scene, 1);
     ASSERT_TRUE(tracer);

@@ -112,7 +112,7 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
 void trace_samples(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p,
                    RgbLanes& radiance) {
     trace_rays(f, s, bodies, p);
-    light_along(f, p, radiance);
+    f.integrator.radiance(f, p, radiance);
 }
 
 void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p) {

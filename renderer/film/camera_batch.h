@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "renderer/integrator/frame_light.h"
+#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 

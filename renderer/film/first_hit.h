@@ -2,7 +2,7 @@
 #pragma once
 
 #include "renderer/image/radiance_image.h"
-#include "renderer/integrator/frame_light.h"
+#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 

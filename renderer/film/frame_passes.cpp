@@ -9,10 +9,10 @@
 #include <cmath>
 
 #include "renderer/camera/camera_ray.h"
+#include "renderer/film/subpixel_light.h"
+#include "renderer/film/tile_worker.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/light/lights.h"
-#include "renderer/film/tile_worker.h"
-#include "renderer/film/subpixel_light.h"
 
 namespace narpa {
 namespace {
@@ -36,11 +36,13 @@ bool in_a_sixteenth(int tx, int ty) {
     return (tx + 6 * ty) % 16 == 0;
 }
 
-/// Where rays that meet no body may still find light: the Sun's disc, lamps.
+/// Where rays that meet no body may still find light: the Sun's disc, lights with extent, a background that is not
+/// uniform, a medium.
 class EmittersInView {
 public:
     EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
-        lamps_ = !f.quick && f.render_scene.lights().any_with_extent();
+        everywhere_ = !f.quick && (f.render_scene.lights().any_with_extent() ||
+                                   !f.render_scene.background().uniform() || f.render_scene.medium() != nullptr);
         if (f.quick || f.path.direct || !f.sun || f.sun->is_point()) return;
         // Bounds, all of them generous: of half the disc, of half a tile and of the way from point to point of a
         // lens.
@@ -52,7 +54,7 @@ public:
     }
     /// Through a tile that begins here.
     [[nodiscard]] bool any(int x, int y) const {
-        if (lamps_ || !sun_) return lamps_;
+        if (everywhere_ || !sun_) return everywhere_;
         const Vec3 to_tile = camera_ray(f_.camera, f_.T_world_camera, x + 0.5 * kTile, y + 0.5 * kTile).direction;
         const Vec3& to_sun = f_.sun->centre();
         return std::atan2(norm(cross(to_tile, to_sun)), dot(to_tile, to_sun)) < within_rad_;
@@ -60,7 +62,7 @@ public:
 
 private:
     const Frame& f_;
-    bool lamps_ = false, sun_ = false;
+    bool everywhere_ = false, sun_ = false;
     double within_rad_ = 0;
 };
 
@@ -155,7 +157,7 @@ void FramePasses::find_background(const Frame& f) {
     p.hits.met = 0;
     p.hits.body.fill(-1);
     if (f.sun) p.to_sun.fill(f.sun->centre());
-    light_along(f, p, radiance);
+    f.integrator.radiance(f, p, radiance);
     background_ = radiance[0];
 }
 

@@ -26,12 +26,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "renderer/integrator/frame_light.h"
 #include "renderer/film/tile_culling.h"
+#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 
-inline constexpr int kTile = kTileSize;                   ///< pixels a side
+inline constexpr int kTile = kTileSize;                    ///< pixels a side
 inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four packets of 4 x 4, one after another
 
 /// Place of a pixel of a tile, in the order of the packets.

@@ -114,7 +114,7 @@ void Collector::trace(std::size_t body) {
     for (std::size_t i = 0; i < packet_.rays.n; ++i)
         if (packet_.hits.body[i] != static_cast<int>(body)) packet_.hits.put(i, {});
     RgbLanes radiance;
-    light_along(f_, packet_, radiance);
+    f_.integrator.radiance(f_, packet_, radiance);
     for (std::size_t i = 0; i < packet_.rays.n; ++i) {
         if (packet_.hits.body[i] < 0) continue;
         const std::size_t pixel = pixel_[i];

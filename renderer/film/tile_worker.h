@@ -113,7 +113,7 @@ struct FramePasses::Worker {
     template <class Sink>
     void light(Sink&& sink) {
         std::array<PacketLight, kTogether> lights;
-        if (full > 0) light_along(f, packets.first(full), lights);
+        if (full > 0) f.integrator.radiance(f, packets.first(full), lights);
         for (std::size_t k = 0; k < full; ++k) {
             sink(batches[k], packets[k], lights[k]);
             traced += batches[k].samples.n;

@@ -1,4 +1,5 @@
-/// renderer/integrator/batch_sampler.h - PixelSampler::point for sixteen samples at once: the same numbers, bit for bit.
+/// renderer/integrator/batch_sampler.h - PixelSampler::point for sixteen samples at once: the same numbers, bit for
+/// bit.
 #pragma once
 
 #include "renderer/geometry/lanes.h"
@@ -12,7 +13,7 @@ public:
 
     /// Of each of the first n lanes: the number of its pixel, and of the sample in that pixel's sequence.
     BatchSampler(std::uint64_t seed, std::uint32_t frame, std::size_t n, const Lanes<std::uint32_t>& pixel,
-                  const Lanes<std::uint32_t>& sample) noexcept
+                 const Lanes<std::uint32_t>& sample) noexcept
         : n_(n), sample_(sample) {
         using sampler_detail::mix;
         const std::uint64_t frame_part = mix(seed) ^ (std::uint64_t{frame} << 32);

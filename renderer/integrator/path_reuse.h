@@ -1,12 +1,11 @@
-/// renderer/integrator/path_reuse.h - light that one path has found lights the points of its neighbours as well.
+/// renderer/integrator/path_reuse.h - light found by one path lights the first vertices of its neighbours as well.
 ///
-/// Most rays that leave a spacecraft's surfaces meet nothing, and the few that meet a sunlit part of it bring all
-/// that its other parts send. So the points that those few find are joined to thirty-two points from which paths
-/// set out, their own among them, by rays that ask for visibility alone, and each such point stands for all of
-/// them: multiple importance sampling by the balance heuristic over the points that could have found it (P.
-/// Bekaert, M. Sbert, J. Halton, "Accelerating path tracing by re-using paths", EGWR 2002). Nothing is biased, as
-/// visibility is known for every pair; a point's own find never weighs more than its albedo, so corners send no
-/// fireflies.
+/// Most rays that leave a spacecraft's surfaces escape, and the few that meet a sunlit part of it bring all that
+/// its other parts send. So the second vertices of paths are joined by shadow rays to thirty-two first vertices,
+/// their own among them, and each stands for all of these: multiple importance sampling by the balance heuristic
+/// over the first vertices that could have found it (P. Bekaert, M. Sbert, J. Halton, "Accelerating path tracing by
+/// re-using paths", EGWR 2002). Unbiased, as visibility is known for every pair. A second vertex never weighs more
+/// in its own path than the albedo, so corners send no fireflies.
 #pragma once
 
 #include <array>
@@ -15,58 +14,64 @@
 #include <span>
 
 #include "renderer/integrator/path.h"
-#include "renderer/integrator/path_vertex.h"
 #include "renderer/integrator/path_state.h"
+#include "renderer/integrator/path_vertex.h"
+#include "renderer/integrator/uninitialized_array.h"
 
 namespace narpa {
 
-/// A point that a path from one of the starts has found, and the light that falls in on it.
-struct Bounce {
+/// The second vertex of a path, and the light that falls in on it.
+struct SecondVertex {
     struct Incident {
         Vec3 from{};  ///< unit
-        Rgb light{};  ///< irradiance on a surface that faces it, W m^-2, or what stands for it by its density
+        Rgb light{};  ///< irradiance on a surface that faces it, W m^-2, or radiance by density
     };
-    enum : std::size_t { sun, emitter, path, kIncidents };
+    enum : std::size_t { sun, emitter, background, path, kIncidents };
 
-    PathPoint point;
-    Vec3 position{};             ///< world
-    double touching_m = 0;       ///< what stands so close before it cannot be told from it
-    std::size_t found_from = 0;  ///< the start
+    SecondVertex(const Tracer& tracer, const PathVertex& vertex, const Hit& hit, std::size_t found_from) noexcept;
+
+    PathVertex vertex;
+    Vec3 position;           ///< world
+    double touching_m;       ///< closer surfaces cannot be told from it
+    std::size_t found_from;  ///< number of its path's first vertex
     std::array<Incident, kIncidents> incident{};
 
-    /// May it stand for others? It must send light to all directions of its side.
-    [[nodiscard]] static bool possible(const PathPoint& point) noexcept;
+    /// True for BSDFs that scatter over the whole hemisphere.
+    [[nodiscard]] static bool is_reusable(const PathVertex& vertex) noexcept;
+    /// Lets a path go on in the direction s: what it finds then falls in here. `made_up`: 1 / probability with
+    /// which it survived. False: the direction has no density.
+    [[nodiscard]] bool leave(Path& path, const BsdfSample& s, float made_up) noexcept;
     /// Radiance towards a unit direction on its side.
-    [[nodiscard]] Rgb towards(const Vec3& direction) const noexcept;
+    [[nodiscard]] Rgb radiance(const Vec3& direction) const noexcept;
 };
 
-/// The points from which paths set out: first surfaces of up to kSharing rays.
-class Starts {
+/// The first vertices of up to kReuseGroup paths.
+class FirstVertices {
 public:
     void clear() noexcept { n_ = 0; }
-    /// One that is lit already. `ray`: whose radiance it adds to; `chance`: with which a path sets out. Returns its
-    /// number.
-    int add(const BodyPoses& at, const FirstSurface& first, std::size_t ray, float chance) noexcept;
+    /// One whose direct light is known. `ray`: to whose radiance it adds; `survival`: probability with which the
+    /// path leaves it. Returns its number.
+    int add(const BodyPoses& at, const PathStart& start, std::size_t ray, float survival) noexcept;
     /// Any other.
-    int add(const BodyPoses& at, const Hit& hit, const PathPoint& point, const Path& path, float chance) noexcept;
+    int add(const BodyPoses& at, const Hit& hit, const PathVertex& vertex, const Path& path,
+            float survival) noexcept;
 
-    /// Adds to each start's radiance what the bounces send it that were found from it or from others of its
-    /// sixteen, as they were added one after another. `choice`: in [0, 1), chooses some of the bounces where they
-    /// are many. `variance`: out, of the mean band of what was added, as far as one go can tell. Returns the number
-    /// of rays.
-    std::uint64_t gather(const Tracer& tracer, const BodyPoses& at, std::span<Bounce> bounces, double choice,
+    /// Adds to each first vertex's radiance what it receives from the second vertices of its thirty-two. `choice`:
+    /// in [0, 1), chooses some of the second vertices where there are many. `variance`: out, estimated for the mean
+    /// band of what was added. Returns the number of rays.
+    std::uint64_t gather(const Tracer& tracer, const BodyPoses& at, std::span<SecondVertex> second, double choice,
                          double pixel_angle_rad, std::span<Rgb> radiance, std::span<float> variance) noexcept;
 
 private:
     struct Block {
-        std::uint32_t special;  ///< those that reflect by another law than Lambert's about `plane`
-        std::uint32_t guided;   ///< of these those from which rays are guided
-        HitBatch hits;         ///< what of them tells where rays leave
+        std::uint32_t special;       ///< lanes that do not scatter by Lambert's law about `plane` alone
+        std::uint32_t small_bodies;  ///< lanes of these that sample small bodies
+        SurfacePoints points;
         Vec3Lanes origin, plane;
         RgbLanes diffuse;  ///< over pi
-        Lanes<float> chance;
+        Lanes<float> survival;
     };
-    /// What a bounce is to sixteen starts.
+    /// A second vertex joined to a block.
     struct Join {
         Vec3Lanes direction;
         Lanes<double> range_m, density, geometry;
@@ -75,21 +80,21 @@ private:
     };
 
     [[nodiscard]] Block& next_block() noexcept;
-    void make_points(const Tracer& tracer, const BodyPoses& at, double pixel_angle_rad) noexcept;
+    void make_vertices(const Tracer& tracer, const BodyPoses& at, double pixel_angle_rad) noexcept;
     [[nodiscard]] std::size_t blocks() const noexcept { return (n_ + kLanes - 1) / kLanes; }
-    static void join(const Block& b, const Bounce& bounce, Join& j) noexcept;
-    std::uint64_t join_seen(const Tracer& tracer, const BodyPoses& at, std::size_t block, const Bounce& bounce,
-                            Join& j) const noexcept;
-    std::uint64_t gather(const Tracer& tracer, const BodyPoses& at, const Bounce& bounce, float scale,
+    static void join(const Block& b, const SecondVertex& second, Join& j) noexcept;
+    std::uint64_t join_visible(const Tracer& tracer, const BodyPoses& at, std::size_t block,
+                               const SecondVertex& second, Join& j) const noexcept;
+    std::uint64_t gather(const Tracer& tracer, const BodyPoses& at, const SecondVertex& second, float scale,
                          std::span<Rgb> radiance) noexcept;
 
     std::size_t n_ = 0;
-    std::array<Block, kSharing / kLanes> block_;
-    std::array<std::uint32_t, kSharing> ray_;
-    std::array<float, kSharing> sum_, squares_;      ///< of the mean bands that bounces send to each
-    std::array<const FirstSurface*, kSharing> lit_;  ///< null: the others
-    Room<PathPoint> points_;                         ///< of those that are special
-    Room<Path> paths_;                               ///< of those that are guided
+    std::array<Block, kReuseGroup / kLanes> block_;
+    std::array<std::uint32_t, kReuseGroup> ray_;
+    std::array<float, kReuseGroup> sum_, squares_;          ///< of the mean bands received
+    std::array<const PathStart*, kReuseGroup> lit_;         ///< null: the others
+    UninitializedArray<PathVertex, kReuseGroup> vertices_;  ///< of special lanes
+    UninitializedArray<Path, kReuseGroup> paths_;           ///< of lanes that sample small bodies
 };
 
 }  // namespace narpa

@@ -1,11 +1,11 @@
-/// renderer/integrator/path_vertex.h - a point of a surface as a path meets it, and how it sends light on.
+/// renderer/integrator/path_vertex.h - a vertex of a path: the surface that it meets, and its BSDF there.
 #pragma once
 
 #include <limits>
 #include <numbers>
 
-#include "renderer/material/directions.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/material/directions.h"
 
 namespace narpa {
 
@@ -19,13 +19,13 @@ namespace narpa {
 /// stays white whatever its normals are. (Its kin: the upright mirror that sends on what a tilted facet would lose
 /// in V. Schuessler, E. Heitz, J. Hanika, C. Dachsbacher, "Microfacet-based normal mapping for robust Monte Carlo
 /// path tracing", ACM TOG 36(6), 2017.)
-class PathPoint {
+class PathVertex {
 public:
-    PathPoint() = default;
+    PathVertex() = default;
     /// Seen along a unit direction with a beam of this width (see surface_at). Unless `fold`, light counts as it
-    /// does in the quick direct light: by the surface's normal alone.
-    PathPoint(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction, double width_m,
-              bool fold) noexcept
+    /// does in direct lighting: by the surface's normal alone.
+    PathVertex(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction, double width_m,
+               bool fold) noexcept
         : surface_(surface_at(tracer, at, hit, ray_direction, width_m)),
           plane_(surface_.normal),
           view_(-ray_direction) {
@@ -35,7 +35,7 @@ public:
             const Vec3 flat = at.T_world_body_at(static_cast<std::size_t>(hit.body), hit.time) * hit.departure_body;
             if (flat != hit.position) plane_ = hit.shading_normal;
         }
-        // Vertex normals that face away from the viewer say nothing of what he sees.
+        // Vertex normals that face away from the viewer are of no use.
         if (dot(surface_.normal, view_) <= 0) surface_.normal = hit.geometric_normal;
         bent_ = surface_.normal != plane_;
         plain_ = !bent_ && surface_.material->kind == Material::Kind::lambert && dot(plane_, view_) > 0;
@@ -45,16 +45,16 @@ public:
     /// Normal of the plane, unit, on the viewer's side but for silhouettes of smooth meshes.
     [[nodiscard]] const Vec3& plane() const noexcept { return plane_; }
 
-    /// Unit, to where the light is wanted.
+    /// Unit, towards the viewer.
     [[nodiscard]] const Vec3& view() const noexcept { return view_; }
-    /// Is the surface's normal not the plane's?
+    /// True where the surface's normal is not the plane's.
     [[nodiscard]] bool bent() const noexcept { return bent_; }
-    /// Lambert's law about the plane's normal: most of most scenes.
+    /// Lambert's law about the plane's normal: most vertices of most scenes.
     [[nodiscard]] bool plain() const noexcept { return plain_; }
 
-    /// Does light turn in single directions only (bsdf.h)?
+    /// True where the BSDF is a delta distribution (bsdf.h).
     [[nodiscard]] bool specular() const noexcept { return is_specular(*surface_.material); }
-    /// Lambert's law alone, about whatever normal?
+    /// True for Lambert's law alone, about whatever normal.
     [[nodiscard]] bool has_no_lobe() const noexcept {
         return surface_.material->kind <= Material::Kind::phong && surface_.specular == Rgb{};
     }
@@ -74,7 +74,7 @@ public:
         return {straight.f_cos + image.f_cos, straight.pdf + image.pdf};
     }
 
-    /// Chooses where a path goes on. The density is infinite where nothing else could find the direction.
+    /// BSDF sampling of the next direction. The density is infinite where nothing else could find it.
     [[nodiscard]] BsdfSample scatter(const std::array<double, 3>& u) const noexcept {
         if (plain_) {
             BsdfSample s;

@@ -1,8 +1,8 @@
 /// renderer/integrator/shading.h - the surface at a hit: material, textures, shading normal.
 #pragma once
 
-#include "renderer/material/bsdf.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/material/bsdf.h"
 
 namespace narpa {
 

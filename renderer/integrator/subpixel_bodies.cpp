@@ -29,7 +29,7 @@ std::array<Vec3, 2> frame_about(const Vec3& z, const Vec3& towards) {
 }  // namespace
 
 SubpixelBodies::SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera,
-                       const Rigid3& T_world_camera, const Lens* lens)
+                               const Rigid3& T_world_camera, const Lens* lens)
     : tracer_(tracer), at_(at), camera_(camera), T_world_camera_(T_world_camera), lens_(lens) {
     for (std::size_t body = 0; body < at.T_world_body.size() && !any_; ++body)
         any_ = disc_within(static_cast<int>(body), 0, 0, camera.width - 1, camera.height - 1).has_value();
@@ -53,7 +53,7 @@ bool SubpixelBodies::contains(int body) const noexcept {
 }
 
 std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, int y_first, int x_last,
-                                                int y_last) const noexcept {
+                                                        int y_last) const noexcept {
     SubpixelDisc disc;
     disc.body = static_cast<std::size_t>(body);
     const Vec3 centre = centre_camera(disc.body);

@@ -1,9 +1,9 @@
-/// renderer/integrator/subpixel_bodies.h - bodies so small in the image that a pixel's few rays would miss them, or overrate
-/// them, by chance.
+/// renderer/integrator/subpixel_bodies.h - bodies so small in the image that a pixel's few rays would miss them, or
+/// overrate them, by chance.
 ///
 /// A sphere of 10 m at 100 km covers 0.014 of a pixel: 64 random samples give its light with 107 % of noise. Such a
 /// body is taken out of the camera's regular rays and sampled by rays of its own, over its own outline:
-/// tiny_light.h.
+/// renderer/film/subpixel_light.h.
 #pragma once
 
 #include <optional>
@@ -29,14 +29,14 @@ class SubpixelBodies {
 public:
     /// `lens` is null for a pinhole. All arguments outlive this.
     SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-               const Lens* lens);
+                   const Lens* lens);
 
     /// Is there any in the image? If not, nobody asks further.
     [[nodiscard]] bool any() const noexcept { return any_; }
     [[nodiscard]] bool contains(int body) const noexcept;
     /// The disc of a body, if it is tiny and its circle meets this rectangle of pixels.
     [[nodiscard]] std::optional<SubpixelDisc> disc_within(int body, int x_first, int y_first, int x_last,
-                                                      int y_last) const noexcept;
+                                                          int y_last) const noexcept;
     /// What the ray meets that is not tiny, given that it first meets `hit`.
     [[nodiscard]] Hit beyond(const Ray& ray, Hit hit) const noexcept;
 

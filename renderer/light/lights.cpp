@@ -6,13 +6,14 @@
 #include <numbers>
 
 #include "renderer/light/concentric_disc.h"
+#include "renderer/light/medium.h"
 
 namespace narpa {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// What stands so close before a light cannot be told from what it is mounted on: a part of the size of both, for
-/// rounding in single precision there, and of the distance, for rounding in double.
+/// Occluders so close to a light are taken for its mounting: relative to the size of both, for rounding in single
+/// precision, and to the distance, for rounding in double.
 constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;
 
 Rigid3 frame_of(const BodyPoses& at, int mount, double time) {
@@ -20,7 +21,7 @@ Rigid3 frame_of(const BodyPoses& at, int mount, double time) {
 }
 
 /// From the receiver to a point that stands `from_origin` (world's axes) from the origin of a frame.
-Vec3 way(const Receiver& to, const Rigid3& T_world_frame, const Vec3& from_origin) {
+Vec3 vector_to(const Receiver& to, const Rigid3& T_world_frame, const Vec3& from_origin) {
     return (T_world_frame.t - to.anchor) + (from_origin - to.offset);
 }
 
@@ -101,7 +102,7 @@ std::span<const Lights::Emitter> Lights::emitters(Group group) const noexcept {
 
 double Lights::importance(const BodyPoses& at, const Receiver& to, const Emitter& e) const noexcept {
     const Rigid3 T = frame_of(at, e.mount, to.time);
-    const Vec3 centre = way(to, T, T.q * e.centre);
+    const Vec3 centre = vector_to(to, T, T.q * e.centre);
     if (e.light >= 0) {
         const Light& l = scene_->lights[static_cast<std::size_t>(e.light)];
         const Vec3 shines_along = T.q * (l.T_mount_light.q * Vec3{0, 0, 1});
@@ -115,7 +116,8 @@ double Lights::importance(const BodyPoses& at, const Receiver& to, const Emitter
     return e.power / (distance * distance) * std::min(1.0, highest / distance);
 }
 
-double Lights::chance(const BodyPoses& at, const Receiver& to, Group group, const Emitter& chosen) const noexcept {
+double Lights::probability(const BodyPoses& at, const Receiver& to, Group group,
+                           const Emitter& chosen) const noexcept {
     if (emitters(group).size() == 1) return importance(at, to, chosen) > 0 ? 1 : 0;
     double sum = 0;
     for (const Emitter& e : emitters(group)) sum += importance(at, to, e);
@@ -172,7 +174,7 @@ LightSample Lights::sample_light(const BodyPoses& at, const Receiver& to, const 
         const auto [x, y] = concentric_disc(u, v);
         point = {l.radius_m * x, l.radius_m * y, 0};
     }
-    const Vec3 there = way(to, T, T.q * e.centre + q_world_light * point);
+    const Vec3 there = vector_to(to, T, T.q * e.centre + q_world_light * point);
     const double distance = norm(there);
     s.direction = there / distance;
     s.range_m = distance * (1 - kTouchingFarOff) - e.touching_m;
@@ -189,14 +191,14 @@ double Lights::pdf(const BodyPoses& at, const Receiver& to, Group group, const V
     const int index = emitter_of_body_[static_cast<std::size_t>(met.body)];
     if (index < 0 || group == Group::lights) return 0;
     const Emitter& e = emitters_[static_cast<std::size_t>(index)];
-    const double chosen = chance(at, to, group, e);
+    const double chosen = probability(at, to, group, e);
     if (chosen == 0) return 0;
     const Rigid3 T = frame_of(at, e.mount, to.time);
     return chosen * e.surface->pdf(view_of(to, T, e.body), direction, met);
 }
 
-Rgb Lights::met_before(double range_m, const BodyPoses& at, const Receiver& to, Group group, const Vec3& direction,
-                       double direction_pdf) const noexcept {
+Rgb Lights::radiance_before(double range_m, const BodyPoses& at, const Receiver& to, Group group,
+                            const Vec3& direction, double direction_pdf, const Medium* medium) const noexcept {
     Rgb radiance{};
     for (const Emitter& e : emitters(Group::lights)) {
         const Light& l = scene_->lights[static_cast<std::size_t>(e.light)];
@@ -205,7 +207,7 @@ Rgb Lights::met_before(double range_m, const BodyPoses& at, const Receiver& to, 
         const auto [x, y, z] = columns(T.q * l.T_mount_light.q);
         const double against = dot(direction, z);
         if (against >= 0) continue;
-        const Vec3 centre = way(to, T, T.q * e.centre);
+        const Vec3 centre = vector_to(to, T, T.q * e.centre);
         const double t = dot(centre, z) / against;
         if (!(t > 0 && t * (1 - kTouchingFarOff) - e.touching_m < range_m)) continue;
         const Vec3 p = t * direction - centre;
@@ -214,9 +216,13 @@ Rgb Lights::met_before(double range_m, const BodyPoses& at, const Receiver& to, 
                                ? px * px + py * py < l.radius_m * l.radius_m
                                : 2 * std::abs(px) < l.width_m && 2 * std::abs(py) < l.height_m;
         if (!on_it) continue;
-        const double other =
-            direction_pdf == kInfinity ? 0 : chance(at, to, group, e) * per_solid_angle(1 / area_m2(l), t, against);
-        radiance += static_cast<float>(power_heuristic(direction_pdf, other)) * l.emission;
+        const double other = direction_pdf == kInfinity
+                                 ? 0
+                                 : probability(at, to, group, e) * per_solid_angle(1 / area_m2(l), t, against);
+        Rgb arriving = static_cast<float>(power_heuristic(direction_pdf, other)) * l.emission;
+        if (medium != nullptr)
+            arriving = arriving * medium->transmittance(at, {to.anchor + to.offset, direction, to.time}, t);
+        radiance += arriving;
     }
     return radiance;
 }

@@ -3,29 +3,45 @@
 /// Made once at start; frames differ in the poses of the bodies alone.
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "base/result.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/light/background.h"
 #include "renderer/light/lights.h"
+#include "renderer/light/medium.h"
 
 namespace narpa {
 
 class RenderScene {
 public:
-    /// `scene` must outlive it. `threads` bounds the threads that build; 0 is all. Errors: of Tracer::create; a
-    /// light that rides on a body that is not there or has no size.
-    /// `shapes` as in Tracer::create.
+    /// `scene` must outlive it. `threads` bounds the threads that build; 0 is all. `shapes` as in Tracer::create.
+    /// `background` null: the scene's ambient radiance; `medium` null: a vacuum. Errors: of Tracer::create; a light
+    /// that rides on a body that is not there or has no size.
     static Result<RenderScene> create(const Scene& scene, int threads = 0,
-                                      const std::vector<std::shared_ptr<const Shape>>& shapes = {});
+                                      const std::vector<std::shared_ptr<const Shape>>& shapes = {},
+                                      std::unique_ptr<const Background> background = nullptr,
+                                      std::unique_ptr<const Medium> medium = nullptr);
 
     [[nodiscard]] const Scene& scene() const noexcept { return tracer_.scene(); }
     [[nodiscard]] const Tracer& tracer() const noexcept { return tracer_; }
     [[nodiscard]] const Lights& lights() const noexcept { return lights_; }
+    [[nodiscard]] const Background& background() const noexcept { return *background_; }
+    /// Null: a vacuum.
+    [[nodiscard]] const Medium* medium() const noexcept { return medium_.get(); }
 
 private:
-    explicit RenderScene(Tracer tracer) : tracer_(std::move(tracer)), lights_(tracer_) {}
+    RenderScene(Tracer tracer, std::unique_ptr<const Background> background, std::unique_ptr<const Medium> medium)
+        : tracer_(std::move(tracer)),
+          lights_(tracer_),
+          background_(std::move(background)),
+          medium_(std::move(medium)) {}
 
     Tracer tracer_;
     Lights lights_;
+    std::unique_ptr<const Background> background_;
+    std::unique_ptr<const Medium> medium_;
 };
 
 }  // namespace narpa

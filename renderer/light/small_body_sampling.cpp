@@ -7,14 +7,14 @@
 namespace narpa {
 namespace {
 
-/// Squared sine of a cone's half angle, which is the part of a Lambert surface's rays that find it overhead: wider
-/// ones need no guide.
+/// Squared sine of a cone's half angle, which is the part of a Lambert surface's rays that find it overhead: the
+/// BSDF finds wider ones by itself.
 constexpr double kWide = 0.25;
-/// Bodies that fill less of the sky than this send next to nothing: not worth many rays.
+/// Bodies that fill less of the sky than this are not worth many rays.
 constexpr double kNegligible = 1e-6;
-/// A shape that is not convex may fill so much of its own sky, and leaves so much of the guidance whatever it is: enough for its dark
-/// side, and little lost on the lit one.
-constexpr double kOwnShape = 0.25, kLeastGuidance = 0.1;
+/// A shape that is not convex may fill so much of its own sky, and leaves at least this part of the rays: enough
+/// for its dark side, and little lost on the lit one.
+constexpr double kOwnShape = 0.25, kLeastOfMesh = 0.1;
 
 /// A body's bounding sphere in the sky of the receiver.
 struct Cone {
@@ -23,7 +23,7 @@ struct Cone {
     double sine2 = 0;       ///< squared sine of the half angle, 1 from within the sphere
     double importance = 0;  ///< roughly the part of a Lambert surface's rays that find it
 
-    [[nodiscard]] bool is_guide() const { return importance > 0 && sine2 < kWide; }
+    [[nodiscard]] bool is_small() const { return importance > 0 && sine2 < kWide; }
     [[nodiscard]] double one_minus_cosine() const { return sine2 / (1 + std::sqrt(1 - sine2)); }
     [[nodiscard]] double pdf() const { return 1 / (2 * std::numbers::pi * one_minus_cosine()); }
     [[nodiscard]] bool holds(const Vec3& direction) const {
@@ -48,16 +48,15 @@ Cone cone_of(const Tracer& tracer, const BodyPoses& at, const Receiver& to, std:
 }  // namespace
 
 SmallBodySampling::SmallBodySampling(const Tracer& tracer, const BodyPoses& at, const Receiver& to) noexcept {
-    const bool meets_itself =
-        to.body >= 0 && !tracer.shape(static_cast<std::size_t>(to.body)).properties().convex;
+    const bool meets_itself = to.body >= 0 && !tracer.shape(static_cast<std::size_t>(to.body)).properties().convex;
     double wide = meets_itself ? kOwnShape : 0;
     for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
         const Cone c = cone_of(tracer, at, to, body);
-        (c.is_guide() ? sum_ : wide) += c.importance;
+        (c.is_small() ? sum_ : wide) += c.importance;
     }
     if (!(sum_ > 0)) return;
-    const double guidance = std::max(sum_ / (sum_ + wide), meets_itself ? kLeastGuidance : 0);
-    share_ = 0.5 * guidance * std::min(1.0, sum_ / kNegligible);
+    const double part = std::max(sum_ / (sum_ + wide), meets_itself ? kLeastOfMesh : 0);
+    share_ = 0.5 * part * std::min(1.0, sum_ / kNegligible);
 }
 
 bool SmallBodySampling::may_help(const Tracer& tracer, const BodyPoses& at) noexcept {
@@ -73,13 +72,13 @@ bool SmallBodySampling::may_help(const Tracer& tracer, const BodyPoses& at) noex
     return false;
 }
 
-Vec3 SmallBodySampling::direction(const Tracer& tracer, const BodyPoses& at, const Receiver& to, double choice, double u,
-                      double v) const noexcept {
+Vec3 SmallBodySampling::direction(const Tracer& tracer, const BodyPoses& at, const Receiver& to, double choice,
+                                  double u, double v) const noexcept {
     double left = choice * sum_;
     Cone chosen;
     for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
         const Cone c = cone_of(tracer, at, to, body);
-        if (!c.is_guide()) continue;
+        if (!c.is_small()) continue;
         chosen = c;
         if (left < c.importance) break;
         left -= c.importance;
@@ -89,11 +88,11 @@ Vec3 SmallBodySampling::direction(const Tracer& tracer, const BodyPoses& at, con
 }
 
 double SmallBodySampling::pdf(const Tracer& tracer, const BodyPoses& at, const Receiver& to,
-                  const Vec3& direction) const noexcept {
+                              const Vec3& direction) const noexcept {
     double density = 0;
     for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
         const Cone c = cone_of(tracer, at, to, body);
-        if (c.is_guide() && c.holds(direction)) density += c.importance / sum_ * c.pdf();
+        if (c.is_small() && c.holds(direction)) density += c.importance / sum_ * c.pdf();
     }
     return density;
 }

@@ -1,27 +1,27 @@
-/// renderer/light/small_body_sampling.h - rays towards bodies that look small: a planet's light on the night side of its moon.
+/// renderer/light/small_body_sampling.h - rays towards bodies that look small from a vertex.
 ///
-/// The BSDF alone would send one ray of a thousand to the Earth in the Moon's sky. So in scenes with a Sun a part
-/// of the rays is sent, evenly, into the cones about the bounding spheres of other bodies; the density is that of
-/// the mixture, and nothing is biased. Where other bodies fill much of the sky they are likelier to send the light,
-/// and fewer rays are guided. So are those from a mesh, which may light itself.
+/// BSDF sampling alone would send one ray of a thousand to the Earth in the Moon's sky. So in scenes with a Sun a
+/// part of the rays is sent, uniformly, into the cones about the bounding spheres of other bodies; the density is
+/// that of the mixture, so the estimate is unbiased. Where other bodies fill much of the sky, and on meshes, which
+/// may light themselves, that part is smaller.
 #pragma once
 
-#include "renderer/light/lights.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/light/lights.h"
 
 namespace narpa {
 
 class SmallBodySampling {
 public:
-    /// Does any body look small from anywhere on another?
+    /// True where some body looks small from somewhere on another.
     [[nodiscard]] static bool may_help(const Tracer& tracer, const BodyPoses& at) noexcept;
-    /// No ray is guided.
+    /// The BSDF alone.
     SmallBodySampling() = default;
     SmallBodySampling(const Tracer& tracer, const BodyPoses& at, const Receiver& to) noexcept;
 
-    /// Part of the rays to be guided, at most a half.
+    /// Part of the rays that it chooses, at most a half.
     [[nodiscard]] double share() const noexcept { return share_; }
-    /// Into the cone that the first number chooses. Receiver and placement as before.
+    /// Into the cone that the first number chooses. `at` and `to` as for the constructor.
     [[nodiscard]] Vec3 direction(const Tracer& tracer, const BodyPoses& at, const Receiver& to, double choice,
                                  double u, double v) const noexcept;
     /// Density per solid angle of the above.

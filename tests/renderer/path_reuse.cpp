@@ -63,9 +63,9 @@ std::uint64_t each_for_itself(const RenderScene& render_scene, const BodyPoses& 
 std::uint64_t together(const RenderScene& render_scene, const BodyPoses& at, const View& view,
                        const PathSettings& settings, std::uint64_t seed, std::uint32_t sample,
                        std::array<Rgb, kPixels>& light) {
-    static_assert(kPixels == kSharing);
-    const FirstSurfaces nothing_known{};
-    std::array<FirstSurface, kSharing> first;
+    static_assert(kPixels == kReuseGroup);
+    const LitSurfaces nothing_known{};
+    std::array<PathStart, kReuseGroup> first;
     for (std::size_t i = 0; i < kPixels; ++i)
         first[i] = {&view.ray_packets[i / kLanes],
                     &view.hit_packets[i / kLanes],
@@ -73,8 +73,8 @@ std::uint64_t together(const RenderScene& render_scene, const BodyPoses& at, con
                     i % kLanes,
                     view.number[i],
                     sample};
-    std::array<float, kSharing> variance;
-    return shared_path_radiance(render_scene, at, settings, first, seed, 0, light, variance);
+    std::array<float, kReuseGroup> variance;
+    return reused_path_radiance(render_scene, at, settings, first, seed, 0, light, variance);
 }
 
 Picture picture(const RenderScene& render_scene, const BodyPoses& at, const View& view,
@@ -201,7 +201,7 @@ Picture frames(const Scene& s, int spp) {
     return p;
 }
 
-TEST(SharedPaths, TakeTheSunsLightOnFirstSurfacesAsDirectLightDoes) {
+TEST(SharedPaths, TakeTheSunsLightOnLitSurfacesAsDirectLightDoes) {
     Scene s = dish_and_block();
     const Picture quick = frames(s, 16);
     // Something shines: nothing is simple any more. Nobody sees it.

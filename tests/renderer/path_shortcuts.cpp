@@ -61,7 +61,7 @@ TEST(PathShortcuts, GuidingRaysFromAMeshToASmallBodyChangesNoMean) {
     const BodyPoses at = placed(s);
     EXPECT_TRUE(SmallBodySampling::may_help(render_scene->tracer(), at));
     const Ray ray = ray_to({-1, 0.1, 2}, {-1.1, 0, 0});
-    const PathSettings guided{.max_depth = 2}, left_to_chance{.max_depth = 2, .guided = false};
+    const PathSettings guided{.max_depth = 2}, left_to_chance{.max_depth = 2, .small_bodies = false};
     const Estimate with = light_along(*render_scene, at, ray, guided, 1024, 3);
     const Estimate without = light_along(*render_scene, at, ray, left_to_chance, 8192, 4);
     ASSERT_GT(with.mean.x, 0);

@@ -1,0 +1,48 @@
+#include <cmath>
+
+#include "renderer/integrator/path_integrator.h"
+#include "renderer/integrator/sun_direct_lighting.h"
+#include "renderer/light/small_body_sampling.h"
+
+namespace narpa {
+namespace {
+
+/// PathSettings::first_survival where edges make most of the error: in frames of one sample a pixel, and where
+/// paths are traced from all samples.
+constexpr float kFewSurvive = 0.5f;
+
+const SunDirectLighting kSunDirectLighting;
+const DirectIntegrator kDirectIntegrator;
+const PathIntegrator kPathIntegrator;
+
+}  // namespace
+
+Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
+                 const Rigid3& T_world_camera, const FrameSettings& settings) {
+    const Tracer& tracer = render_scene.tracer();
+    const Scene& scene = render_scene.scene();
+    const bool direct = settings.method == RenderSettings::Method::direct;
+    // One sample passes the lens at its centre, as through a pinhole.
+    const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
+    const Lens* const lens = blurred ? &*camera.lens : nullptr;
+    const bool small_bodies = !direct && SmallBodySampling::may_help(tracer, at);
+    const bool sun_only = direct && SunDirectLighting::suffices(render_scene);
+    const bool sun_first = !direct && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
+    const Integrator& by_waves = direct ? static_cast<const Integrator&>(kDirectIntegrator) : kPathIntegrator;
+    return {render_scene,
+            tracer,
+            at,
+            camera,
+            T_world_camera,
+            settings,
+            lens,
+            scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
+            sun_only ? kSunDirectLighting : by_waves,
+            sun_only,
+            sun_first,
+            {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, small_bodies,
+             sun_first && settings.spp > 1 ? 1 : kFewSurvive},
+            SubpixelBodies(tracer, at, camera, T_world_camera, lens)};
+}
+
+}  // namespace narpa

@@ -1,0 +1,245 @@
+#include "renderer/integrator/sun_direct_lighting.h"
+
+#include <algorithm>
+#include <bit>
+#include <numbers>
+
+#include "base/each_isa.h"
+#include "renderer/integrator/shading.h"
+
+namespace narpa {
+namespace {
+
+/// The surfaces met, lane by lane, of Lambert's and Phong's materials.
+struct SurfaceLanes {
+    RgbLanes diffuse, specular, emission;
+    Lanes<float> exponent;
+    Vec3Lanes normal;
+    std::uint32_t lanes = 0;   ///< those that are set
+    std::uint32_t shiny = 0;   ///< of them those with a lobe
+    std::uint32_t others = 0;  ///< hits on materials of other kinds
+};
+
+/// Sunlight reflected along each ray, where nothing shades the surface.
+struct Sunlight {
+    RgbLanes radiance;
+    std::uint32_t lanes = 0;  ///< where it is not zero
+};
+
+Surface surface_of(const Frame& f, const Packet& p, std::size_t i) {
+    return surface_at(f.tracer, f.at, p.hits[i], p.rays.direction[i], p.hits.range_m[i] * f.path.pixel_angle_rad);
+}
+
+bool has_textures(const Material& m) {
+    return m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0;
+}
+
+void put(SurfaceLanes& surfaces, std::size_t i, const Rgb& diffuse, const Rgb& specular, const Rgb& emission,
+         float exponent) {
+    surfaces.diffuse.put(i, diffuse);
+    surfaces.specular.put(i, specular);
+    surfaces.emission.put(i, emission);
+    surfaces.exponent[i] = exponent;
+}
+
+void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& specular) {
+    surfaces.diffuse.fill(m.diffuse);
+    surfaces.specular.fill(specular);
+    surfaces.emission.fill(m.emission);
+    surfaces.exponent.fill(m.exponent);
+}
+
+/// Material by material, of which a batch seldom meets more than two.
+void gather_surfaces(const Frame& f, const Packet& p, SurfaceLanes& surfaces) {
+    const Scene& scene = f.tracer.scene();
+    fill(surfaces, kPlainMaterial, {});
+    surfaces.normal = p.hits.shading_normal;
+    for (std::uint32_t left = p.hits.met; left != 0;) {
+        const int material = p.hits.material[static_cast<std::size_t>(std::countr_zero(left))];
+        std::uint32_t same = 0;
+        for (std::size_t i = 0; i < kLanes; ++i)
+            same |= static_cast<std::uint32_t>(p.hits.material[i] == material) << i;
+        same &= left;
+        const bool alone = same == p.hits.met;
+        left &= ~same;
+        const Material& m = scene.materials[static_cast<std::size_t>(material)];
+        if (m.kind > Material::Kind::phong) {
+            surfaces.others |= same;
+            continue;
+        }
+        const Rgb specular = m.kind == Material::Kind::lambert ? Rgb{} : m.specular;
+        surfaces.lanes |= same;
+        if (specular != Rgb{}) surfaces.shiny |= same;
+        if (has_textures(m)) {
+            for (std::uint32_t rest = same; rest != 0; rest &= rest - 1) {
+                const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+                const Surface s = surface_of(f, p, i);
+                put(surfaces, i, s.diffuse, s.specular, s.emission, s.exponent);
+                surfaces.normal.put(i, s.normal);
+            }
+        } else if (alone) {
+            fill(surfaces, m, specular);
+        } else {
+            for (std::uint32_t rest = same; rest != 0; rest &= rest - 1)
+                put(surfaces, static_cast<std::size_t>(std::countr_zero(rest)), m.diffuse, specular, m.emission,
+                    m.exponent);
+        }
+    }
+}
+
+/// Emission and ambient light of the lanes that are set.
+NARPA_EACH_ISA void emit(const SurfaceLanes& surfaces, const Rgb& ambient, RgbLanes& radiance) noexcept {
+    RgbLanes out;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        out.r[i] = surfaces.emission.r[i] + ambient.x * (surfaces.diffuse.r[i] + surfaces.specular.r[i]);
+        out.g[i] = surfaces.emission.g[i] + ambient.y * (surfaces.diffuse.g[i] + surfaces.specular.g[i]);
+        out.b[i] = surfaces.emission.b[i] + ambient.z * (surfaces.diffuse.b[i] + surfaces.specular.b[i]);
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const bool is = (surfaces.lanes >> i & 1u) != 0;
+        out.r[i] = is ? out.r[i] : 0;
+        out.g[i] = is ? out.g[i] : 0;
+        out.b[i] = is ? out.b[i] : 0;
+    }
+    radiance = out;
+}
+
+/// Phong's lobe about the mirror direction (bsdf.h), without its colour; 0 where the material has none.
+void lobes_of(const SurfaceLanes& surfaces, const Lanes<double>& r_v, Lanes<float>& lobe) noexcept {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const double power =
+            unit_power(std::min(std::max(r_v[i], 1e-300), 1.0), static_cast<double>(surfaces.exponent[i]));
+        const float scale = (surfaces.exponent[i] + 2) * 0.5f * static_cast<float>(std::numbers::inv_pi);
+        lobe[i] = r_v[i] > 0 ? scale * static_cast<float>(power) : 0;
+    }
+}
+
+NARPA_EACH_ISA void reflect_sun(const SurfaceLanes& surfaces, const Vec3Lanes& direction, const Vec3Lanes& to_sun,
+                                const Vec3& centre, float irradiance, Sunlight& out) noexcept {
+    constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
+    const Vec3Lanes& n = surfaces.normal;
+    Lanes<double> r_v;
+    Lanes<float> arriving, lobe{};
+    Lanes<std::uint32_t> faces;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const double n_l = n.x[i] * to_sun.x[i] + n.y[i] * to_sun.y[i] + n.z[i] * to_sun.z[i];
+        const double n_v = -(n.x[i] * direction.x[i] + n.y[i] * direction.y[i] + n.z[i] * direction.z[i]);
+        const double l_v =
+            -(to_sun.x[i] * direction.x[i] + to_sun.y[i] * direction.y[i] + to_sun.z[i] * direction.z[i]);
+        const double as_centre = to_sun.x[i] * centre.x + to_sun.y[i] * centre.y + to_sun.z[i] * centre.z;
+        r_v[i] = 2 * n_l * n_v - l_v;
+        // The disc is sampled evenly as it faces.
+        arriving[i] = irradiance * static_cast<float>(n_l / as_centre);
+        faces[i] = static_cast<std::uint32_t>(n_l > 0) & static_cast<std::uint32_t>(n_v > 0);
+    }
+    if (surfaces.shiny != 0) lobes_of(surfaces, r_v, lobe);
+    RgbLanes reflected;
+    Lanes<std::uint32_t> sent;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const float r = surfaces.diffuse.r[i] * kInvPi + surfaces.specular.r[i] * lobe[i];
+        const float g = surfaces.diffuse.g[i] * kInvPi + surfaces.specular.g[i] * lobe[i];
+        const float b = surfaces.diffuse.b[i] * kInvPi + surfaces.specular.b[i] * lobe[i];
+        const bool dark = (r == 0) & (g == 0) & (b == 0);
+        sent[i] = dark ? 0 : faces[i];
+        reflected.r[i] = r * arriving[i];
+        reflected.g[i] = g * arriving[i];
+        reflected.b[i] = b * arriving[i];
+    }
+    std::uint32_t lanes = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) lanes |= sent[i] << i;
+    out.radiance = reflected;
+    out.lanes = lanes & surfaces.lanes;
+}
+
+/// The same for one lane of another material.
+void light_other(const Frame& f, const Packet& p, std::size_t i, RgbLanes& radiance, Sunlight& sunlight) {
+    const Surface surface = surface_of(f, p, i);
+    radiance.put(i, surface.emission + f.render_scene.background().ambient() * ambient_reflectance(surface));
+    if (!f.sun) return;
+    const double cosine = dot(surface.normal, p.to_sun[i]);
+    if (cosine <= 0) return;
+    const Rgb reflected = bsdf(surface, surface.normal, p.to_sun[i], -p.rays.direction[i]);
+    if (reflected == Rgb{}) return;
+    const double projected = cosine / dot(p.to_sun[i], f.sun->centre());
+    sunlight.radiance.put(i, reflected * (f.sun->irradiance() * static_cast<float>(projected)));
+    sunlight.lanes |= 1u << i;
+}
+
+/// Adds it where `lit`.
+NARPA_EACH_ISA void add_sunlight(const Sunlight& sunlight, std::uint32_t lit, RgbLanes& radiance) noexcept {
+    RgbLanes out;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const bool is = (lit >> i & 1u) != 0;
+        out.r[i] = radiance.r[i] + (is ? sunlight.radiance.r[i] : 0);
+        out.g[i] = radiance.g[i] + (is ? sunlight.radiance.g[i] : 0);
+        out.b[i] = radiance.b[i] + (is ? sunlight.radiance.b[i] : 0);
+    }
+    radiance = out;
+}
+
+/// Traces the shadow rays of the lanes set, and adds what arrives.
+void add_sun(const Frame& f, Packet& p, Sunlight& sunlight, PhaseClock& clock, RgbLanes& radiance) {
+    clock.ends(Phase::shading);
+    if (sunlight.lanes == 0) return;
+    p.lit = sunlight.lanes & ~f.tracer.occluded(f.at, p.hits, p.to_sun, sunlight.lanes);
+    p.rays_traced += static_cast<std::uint64_t>(std::popcount(sunlight.lanes));
+    clock.ends(Phase::shadow_rays);
+    if (p.lit != 0) add_sunlight(sunlight, p.lit, radiance);
+}
+
+/// Flat faces without too sharp a lobe: next-event estimation alone finds the Sun's light there.
+NARPA_EACH_ISA std::uint32_t lit_by_sun_alone(const HitBatch& hits, const SurfaceLanes& surfaces) noexcept {
+    const Vec3Lanes &flat = hits.geometric_normal, &n = surfaces.normal;
+    Lanes<int> are;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const bool same = (flat.x[i] == n.x[i]) & (flat.y[i] == n.y[i]) & (flat.z[i] == n.z[i]);
+        are[i] = -static_cast<int>(same & (surfaces.exponent[i] <= kSharpLobe));
+    }
+    return bits_of(are) & surfaces.lanes;
+}
+
+}  // namespace
+
+bool SunDirectLighting::suffices(const RenderScene& render_scene) noexcept {
+    return !render_scene.lights().beyond_the_sun() && render_scene.background().uniform() &&
+           render_scene.medium() == nullptr;
+}
+
+void SunDirectLighting::radiance(const Frame& f, Packet& p, RgbLanes& radiance) const noexcept {
+    p.lit = 0;
+    if (p.hits.met == 0) {
+        radiance.fill({});
+        return;
+    }
+    PhaseClock clock(p.times);
+    SurfaceLanes surfaces;
+    Sunlight sunlight;
+    gather_surfaces(f, p, surfaces);
+    emit(surfaces, f.render_scene.background().ambient(), radiance);
+    if (f.sun && surfaces.lanes != 0)
+        reflect_sun(surfaces, p.rays.direction, p.to_sun, f.sun->centre(), f.sun->irradiance(), sunlight);
+    for_each_lane(surfaces.others, [&](std::size_t i) { light_other(f, p, i, radiance, sunlight); });
+    add_sun(f, p, sunlight, clock, radiance);
+}
+
+void SunDirectLighting::radiance(const Frame& f, std::span<Packet> packets,
+                                 std::span<PacketLight> light) const noexcept {
+    for (std::size_t k = 0; k < packets.size(); ++k) radiance(f, packets[k], light[k].first);
+}
+
+void light_first_surfaces(const Frame& f, Packet& p, RgbLanes& radiance) noexcept {
+    PhaseClock clock(p.times);
+    SurfaceLanes surfaces;
+    Sunlight sunlight;
+    gather_surfaces(f, p, surfaces);
+    surfaces.lanes = lit_by_sun_alone(p.hits, surfaces);
+    if (surfaces.lanes == 0) return;
+    p.first.lanes = surfaces.lanes;
+    p.first.diffuse = surfaces.diffuse;
+    p.first.specular = surfaces.specular;
+    emit(surfaces, {}, radiance);
+    reflect_sun(surfaces, p.rays.direction, p.to_sun, f.sun->centre(), f.sun->irradiance(), sunlight);
+    add_sun(f, p, sunlight, clock, radiance);
+}
+
+}  // namespace narpa

@@ -1,0 +1,345 @@
+#include "renderer/integrator/wavefront.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "base/each_isa.h"
+#include "renderer/integrator/path_dimensions.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Russian roulette: a path whose throughput is less than this may end; one that has found no light yet, as on
+/// night sides, only at less, and only behind so many vertices.
+constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;
+constexpr int kVerticesInTheDark = 4;
+
+float greatest(const Rgb& c) {
+    return std::max({c.x, c.y, c.z});
+}
+
+NARPA_EACH_ISA void draw_points(const PathNumbers& from, std::size_t n, const Lanes<std::uint32_t>& pixel,
+                                const Lanes<std::uint32_t>& sample, std::uint32_t group,
+                                BatchSampler::Points& u) noexcept {
+    BatchSampler(from.seed, from.frame, n, pixel, sample).points(group, u);
+}
+
+}  // namespace
+
+Wavefront::Wavefront(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
+                     const PathNumbers& numbers)
+    : render_scene_(render_scene),
+      tracer_(render_scene.tracer()),
+      lights_(render_scene.lights()),
+      background_(render_scene.background()),
+      medium_(render_scene.medium()),
+      at_(at),
+      settings_(settings),
+      numbers_(numbers),
+      group_(settings.direct ? Lights::Group::lights : Lights::Group::all),
+      sun_(lights_.sun() ? &*lights_.sun() : nullptr),
+      sun_has_extent_(sun_ != nullptr && !sun_->is_point()),
+      narrow_sun_(sun_ != nullptr && render_scene.scene().sun->angular_diameter_rad < kNarrowSun_rad),
+      small_bodies_(settings.small_bodies && sun_ != nullptr && !settings.direct),
+      emitters_(lights_.any(group_)),
+      background_sampled_(background_.is_sampled() && !settings.direct),
+      receivers_(emitters_ || lights_.any_with_extent() || small_bodies_ || medium_ != nullptr),
+      finds_alone_(background_.uniform() != Rgb{} || (sun_has_extent_ && !narrow_sun_)),
+      sun_alone_(!lights_.any(Lights::Group::all) && !lights_.any_with_extent() && background_.uniform() == Rgb{} &&
+                 medium_ == nullptr) {}
+
+void Wavefront::run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance) {
+    radiance_ = radiance;
+    n_ = rays.size();
+    for (std::size_t i = 0; i < n_; ++i) {
+        radiance_[i] = {};
+        hits_[i] = first[i];
+        directions_[i] = rays[i].direction;
+        paths_[i] = Path{};
+        paths_[i].ray = static_cast<std::uint32_t>(i);
+        paths_[i].to = &radiance_[i];
+        if (receivers_) paths_[i].start = receiver_at(rays[i].origin), paths_[i].start.time = rays[i].time;
+    }
+    run_rounds();
+}
+
+void Wavefront::run_reused(std::span<const PathStart> starts, std::span<Rgb> radiance, std::span<float> variance) {
+    grouped_ = !settings_.direct && settings_.max_depth > 1;
+    // Between the vertices that reuse joins nothing may absorb light.
+    reuse_ = grouped_ && settings_.reuse && medium_ == nullptr;
+    radiance_ = radiance;
+    variance_ = variance;
+    std::fill(variance.begin(), variance.end(), 0.0f);
+    begin_reused(starts);
+    run_rounds();
+}
+
+void Wavefront::run_rounds() {
+    const int depth = settings_.direct ? 1 : settings_.max_depth;
+    for (int vertex = 0;; ++vertex) {
+        arrive(vertex);
+        if (vertex == 1 && grouped_) collect_second_vertices();
+        if (vertex == depth || n_ == 0) break;
+        connect(vertex, vertex + 1 < depth);
+        if (settings_.direct && !lights_.any_with_extent()) return;
+        scatter(vertex, vertex + 1 == depth);
+        extend();
+    }
+    if (n_second_ > 0) reuse();
+}
+
+void Wavefront::extend() {
+    for (std::size_t first = 0; first < n_; first += kLanes) {
+        const std::size_t n = std::min(kLanes, n_ - first);
+        SurfacePoints from;
+        Vec3Lanes directions;
+        HitBatch hits;
+        for (std::size_t k = 0; k < n; ++k) {
+            from.put(k, hits_[first + k]);
+            directions.put(k, directions_[first + k]);
+        }
+        hits.met = 0;
+        tracer_.intersect(at_, from, directions, lanes_below(n), hits);
+        for (std::size_t k = 0; k < n; ++k) {
+            if (is_set(hits.met, k))
+                hits_[first + k] = hits[k];
+            else
+                hits_[first + k].body = -1;
+        }
+        rays_traced_ += n;
+    }
+}
+
+/// Adds what the rays have found; paths that have escaped, or that end here, leave.
+void Wavefront::arrive(int vertex) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < n_; ++i) {
+        Path& path = paths_[i];
+        const bool is_escaped = hits_[i].body < 0;
+        const double range_m = is_escaped ? kInfinity : hits_[i].range_m;
+        if (lights_.any_with_extent())
+            add(path, lights_.radiance_before(range_m, at_, path.start, group_, directions_[i], path.direction_pdf,
+                                              medium_));
+        if (medium_ != nullptr) add_segment(i, vertex);
+        if (is_escaped) add(path, escaped(path, directions_[i], vertex));
+        if (is_escaped || (vertex > 0 && settings_.direct)) continue;
+        keep(i, kept);
+        shade(kept++);
+    }
+    n_ = kept;
+}
+
+/// The medium along the ray.
+void Wavefront::add_segment(std::size_t i, int vertex) {
+    Path& path = paths_[i];
+    const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[path.ray]);
+    const double u = numbers.point(numbers_.sample[path.ray], medium_group(vertex))[0];
+    const double range_m = hits_[i].body < 0 ? kInfinity : hits_[i].range_m;
+    const Ray ray{path.start.anchor + path.start.offset, directions_[i], path.start.time};
+    const MediumSegment segment = medium_->along(at_, ray, range_m, u);
+    add(path, segment.in_scattering);
+    path.throughput = path.throughput * segment.transmittance;
+}
+
+Rgb Wavefront::escaped(const Path& path, const Vec3& direction, int vertex) const {
+    if (settings_.direct) return vertex == 0 ? background_.direct_radiance(direction) : Rgb{};
+    Rgb radiance = background_.radiance(direction);
+    if (background_sampled_)
+        radiance *= static_cast<float>(power_heuristic(path.direction_pdf, background_.pdf(direction)));
+    if (!sun_has_extent_ || path.sun_sampled) return radiance;
+    const double sun_pdf = sun_->pdf(direction);
+    if (sun_pdf == 0) return radiance;
+    const float sunlight = static_cast<float>(power_heuristic(path.direction_pdf, sun_pdf)) * sun_->radiance();
+    return radiance + Rgb{sunlight, sunlight, sunlight};
+}
+
+/// The surface at the end of the ray, and its emission.
+void Wavefront::shade(std::size_t i) {
+    Path& path = paths_[i];
+    const Hit& hit = hits_[i];
+    path.length_m += hit.range_m;
+    vertices_[i] =
+        PathVertex(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * path.length_m, !settings_.direct);
+    const Surface& surface = vertices_[i].surface();
+    if (surface.emission != Rgb{} && !path.lit) {
+        const double light_pdf =
+            path.direction_pdf == kInfinity ? 0 : lights_.pdf(at_, path.start, group_, directions_[i], hit);
+        add(path, surface.emission * static_cast<float>(power_heuristic(path.direction_pdf, light_pdf)));
+    }
+    if (settings_.direct) add(path, background_.ambient() * ambient_reflectance(surface));
+    if (receivers_) path.start = receiver_at(at_, hit, vertices_[i].plane());
+}
+
+/// Chooses the next rays, and ends paths that would bring little, or nothing.
+void Wavefront::scatter(int vertex, bool last) {
+    std::size_t kept = 0;
+    Points u, roulette;
+    for (std::size_t first = 0; first < n_; first += kLanes) {
+        bool drawn = false;
+        draw(first, direction_group(vertex), u);
+        for (std::size_t k = 0; k < kLanes && first + k < n_; ++k) {
+            const std::size_t i = first + k;
+            Path& path = paths_[i];
+            if (last && sun_alone_ && path.sun_sampled) continue;
+            float made_up = 1;
+            const auto survives = [&](float probability) {
+                if (probability >= 1) return true;
+                if (!drawn) draw(first, roulette_group(vertex), roulette);
+                drawn = true;
+                if (roulette[roulette_dimension(vertex)][k] >= static_cast<double>(probability)) return false;
+                made_up = 1 / probability;
+                path.throughput = path.throughput / probability;
+                return true;
+            };
+            const bool is_first = vertex == 0 && grouped_ && !vertices_[i].specular();
+            if (is_first && !path.lit) {
+                const Surface& surface = vertices_[i].surface();
+                const bool plain = surface.material->kind <= Material::Kind::phong;
+                const float probability = first_survival(plain ? surface.diffuse + surface.specular : Rgb{1, 1, 1},
+                                                         radiance_[path.ray] == Rgb{});
+                if (reuse_) path.first_vertex = first_.add(at_, hits_[i], vertices_[i], path, probability);
+                if (!survives(probability)) continue;
+            }
+            const BsdfSample s = next_direction(i, {u[0][k], u[1][k], u[2][k], u[3][k]});
+            path.throughput = path.throughput * s.weight;
+            path.radiance_scale *= s.radiance_scale;
+            // Out of many shells of dense glass, one in another, it may outgrow single precision.
+            if (path.throughput == Rgb{} || !is_finite(path.throughput)) continue;
+            if (!is_first && !survives(survival(path, vertex + 1))) continue;
+            if (SecondVertex* const second = second_vertex(path, vertex);
+                second != nullptr && !second->leave(path, s, made_up))
+                continue;
+            path.direction_pdf = s.pdf;
+            directions_[i] = s.l;
+            if (s.transmitted) {
+                hits_[i] = other_side(hits_[i]);
+                if (receivers_) path.start = receiver_at(at_, hits_[i], -vertices_[i].plane());
+            }
+            keep(i, kept++);
+        }
+    }
+    n_ = kept;
+}
+
+BsdfSample Wavefront::next_direction(std::size_t i, const SamplePoint& numbers) const {
+    const auto& [u, v, lobe, choice] = numbers;
+    const Path& path = paths_[i];
+    const double share = path.small_bodies.share();
+    if (share == 0) return vertices_[i].scatter({lobe, u, v});
+    BsdfSample s;
+    if (choice < share)
+        s.l = path.small_bodies.direction(tracer_, at_, path.start, choice / share, u, v);
+    else
+        s = vertices_[i].scatter({lobe, u, v});
+    const PathVertex::Response r = vertices_[i].respond(s.l);
+    s.pdf = scatter_pdf(path, s.l, r.pdf);
+    s.weight = r.f_cos == Rgb{} ? Rgb{} : r.f_cos * static_cast<float>(1 / s.pdf);
+    return s;
+}
+
+/// Density per solid angle with which `next_direction` finds what the BSDF alone finds with `bsdf_pdf`.
+double Wavefront::scatter_pdf(const Path& path, const Vec3& direction, double bsdf_pdf) const {
+    const double share = path.small_bodies.share();
+    if (share == 0) return bsdf_pdf;
+    return (1 - share) * bsdf_pdf + share * path.small_bodies.pdf(tracer_, at_, path.start, direction);
+}
+
+/// Probability with which a path survives the roulette behind so many vertices.
+float Wavefront::survival(const Path& path, int vertices) const {
+    // What a wide Sun sends comes by two ways that make up for each other: neither is left to chance.
+    const bool nothing_yet = radiance_[path.ray] == Rgb{} && !path.sunlit;
+    const bool in_the_dark = nothing_yet || (sun_has_extent_ && !narrow_sun_);
+    if (in_the_dark && vertices < kVerticesInTheDark) return 1;
+    return std::min(1.0f,
+                    greatest(path.throughput) / path.radiance_scale / (in_the_dark ? kFaintInTheDark : kFaint));
+}
+/// The same of a path that is reused, at its first vertex, before the direction is known.
+float Wavefront::first_survival(const Rgb& albedo, bool in_the_dark) const {
+    if (finds_alone_) return 1;
+    return settings_.first_survival * std::min(1.0f, greatest(albedo) / (in_the_dark ? kFaintInTheDark : kFaint));
+}
+
+void Wavefront::begin_reused(std::span<const PathStart> starts) {
+    first_.clear();
+    n_ = 0;
+    for (std::size_t from = 0; from < starts.size(); from += kLanes) {
+        const std::span<const PathStart> batch = starts.subspan(from, std::min(kLanes, starts.size() - from));
+        Points roulette;
+        if (!finds_alone_) {
+            Lanes<std::uint32_t> pixel{}, sample{};
+            for (std::size_t k = 0; k < batch.size(); ++k) pixel[k] = batch[k].pixel, sample[k] = batch[k].sample;
+            draw_points(numbers_, batch.size(), pixel, sample, roulette_group(0), roulette);
+        }
+        for (std::size_t k = 0; k < batch.size(); ++k) {
+            const std::size_t ray = from + k;
+            const PathStart& s = batch[k];
+            radiance_[ray] = {};
+            float probability = 1;
+            int number = -1;
+            if (s.lit()) {
+                if (!grouped_) continue;
+                const Rgb albedo = s.surfaces->diffuse[s.lane] + s.surfaces->specular[s.lane];
+                probability = first_survival(albedo, !s.sunlit);
+                if (reuse_) number = first_.add(at_, s, ray, probability);
+                if (probability < 1 && roulette[roulette_dimension(0)][k] >= static_cast<double>(probability))
+                    continue;
+            }
+            Path& path = paths_[n_];
+            path = Path{};
+            path.ray = static_cast<std::uint32_t>(ray);
+            path.to = &radiance_[ray];
+            path.first_vertex = number;
+            path.lit = path.sun_sampled = s.lit();
+            path.sunlit = s.lit() && s.sunlit;
+            path.throughput = Rgb{1, 1, 1} / probability;
+            if (receivers_)
+                path.start = receiver_at(s.rays->origin[s.lane]), path.start.time = s.rays->time[s.lane];
+            hits_[n_] = (*s.hits)[s.lane];
+            directions_[n_] = s.rays->direction[s.lane];
+            ++n_;
+        }
+    }
+}
+
+void Wavefront::collect_second_vertices() {
+    n_second_ = 0;
+    for (std::size_t i = 0; i < n_; ++i) {
+        Path& path = paths_[i];
+        path.lit = false;
+        if (path.first_vertex < 0 || !SecondVertex::is_reusable(vertices_[i])) continue;
+        path.second_vertex = static_cast<int>(n_second_);
+        second_[n_second_++] =
+            SecondVertex(tracer_, vertices_[i], hits_[i], static_cast<std::size_t>(path.first_vertex));
+    }
+}
+SecondVertex* Wavefront::second_vertex(const Path& path, int vertex) {
+    return vertex == 1 && path.second_vertex >= 0 ? &second_[static_cast<std::size_t>(path.second_vertex)]
+                                                  : nullptr;
+}
+void Wavefront::reuse() {
+    const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[0]);
+    rays_traced_ += first_.gather(tracer_, at_, second_.first(n_second_),
+                                  numbers.point(numbers_.sample[0], kReuseDimensions)[0], settings_.pixel_angle_rad,
+                                  radiance_, variance_);
+}
+
+void Wavefront::draw(std::size_t first, std::uint32_t group, Points& u) const {
+    const std::size_t n = std::min(kLanes, n_ - first);
+    Lanes<std::uint32_t> pixel{}, sample{};
+    for (std::size_t k = 0; k < n; ++k) {
+        pixel[k] = numbers_.pixel[paths_[first + k].ray];
+        sample[k] = numbers_.sample[paths_[first + k].ray];
+    }
+    draw_points(numbers_, n, pixel, sample, group, u);
+}
+
+void Wavefront::keep(std::size_t from, std::size_t to) {
+    if (from == to) return;
+    paths_[to] = paths_[from];
+    hits_[to] = hits_[from];
+    directions_[to] = directions_[from];
+}
+
+}  // namespace narpa

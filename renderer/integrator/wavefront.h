@@ -1,0 +1,136 @@
+/// renderer/integrator/wavefront.h - the kernel of light transport: many paths, one vertex at a time.
+///
+/// Each round
+///   extend:  traces the ray of every path; light of escaped rays and emission are added;
+///   connect: at the vertices met, next-event estimation collects shadow rays, traces them in batches and adds what
+///            arrives;
+///   scatter: Russian roulette, then BSDF sampling of the next ray.
+/// Paths that have ended leave the arrays, so that batches stay full. What becomes of a path follows from its own
+/// ray and its own random numbers, unless paths are reused.
+///
+/// Direct lighting is one round of it, path tracing max_depth. Used by path.h alone.
+#pragma once
+
+#include <limits>
+
+#include "renderer/integrator/batch_sampler.h"
+#include "renderer/integrator/path.h"
+#include "renderer/integrator/path_reuse.h"
+#include "renderer/integrator/path_vertex.h"
+#include "renderer/integrator/uninitialized_array.h"
+#include "renderer/light/small_body_sampling.h"
+
+namespace narpa {
+
+/// Paths on their way together.
+inline constexpr std::size_t kWavefront = 128;
+static_assert(kWavefront % kLanes == 0);
+
+/// A shadow ray, and what it carries.
+struct ShadowRay {
+    std::size_t path;  ///< it leaves the vertex of this path
+    Vec3 direction{};
+    double range_m;      ///< to the light; infinite for the Sun and the background
+    Rgb* to;             ///< where it is added, if nothing is in the way:
+    Rgb contribution{};  ///< for emissive surfaces: per radiance
+    // Of an emissive surface, which the ray must meet:
+    double scatter_pdf;  ///< with which BSDF sampling finds the direction
+    int body;
+    std::uint32_t face;
+};
+
+class Wavefront {
+public:
+    Wavefront(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
+              const PathNumbers& numbers);
+
+    /// Each path by itself. Spans as of path_radiance; at most kWavefront rays.
+    void run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance);
+    /// With path reuse. As of reused_path_radiance.
+    void run_reused(std::span<const PathStart> starts, std::span<Rgb> radiance, std::span<float> variance);
+    [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
+
+private:
+    using Points = BatchSampler::Points;
+
+    void run_rounds();
+
+    // Extend.
+    void extend();
+    void arrive(int vertex);
+    void add_segment(std::size_t i, int vertex);
+    void shade(std::size_t i);
+    [[nodiscard]] Rgb escaped(const Path& path, const Vec3& direction, int vertex) const;
+
+    // Connect: wavefront_connect.cpp.
+    void connect(int vertex, bool lit_surfaces_count);
+    void sample_sun(std::size_t i, double u, double v, SecondVertex* second);
+    void sample_emitters(std::size_t i, double choice, double u, double v, SecondVertex* second);
+    void sample_background(std::size_t i, double u, double v, SecondVertex* second);
+    struct ShadowBatch;
+    void fill(const UninitializedArray<ShadowRay, kWavefront>& rays, std::size_t first, std::size_t end,
+              ShadowBatch& batch);
+    void trace_shadow_rays(UninitializedArray<ShadowRay, kWavefront>& rays, std::size_t n);
+    void trace_to_surfaces();
+    [[nodiscard]] Rgb emission(const Path& path, const Vec3& direction, const Hit& hit) const;
+    [[nodiscard]] Rgb transmittance(std::size_t path, const Vec3& direction, double range_m) const;
+
+    // Scatter.
+    void scatter(int vertex, bool last);
+    [[nodiscard]] BsdfSample next_direction(std::size_t i, const SamplePoint& numbers) const;
+    [[nodiscard]] double scatter_pdf(const Path& path, const Vec3& direction, double bsdf_pdf) const;
+    [[nodiscard]] float survival(const Path& path, int vertices) const;
+    [[nodiscard]] float first_survival(const Rgb& albedo, bool in_the_dark) const;
+
+    // Path reuse.
+    void begin_reused(std::span<const PathStart> starts);
+    void collect_second_vertices();
+    [[nodiscard]] SecondVertex* second_vertex(const Path& path, int vertex);
+    void reuse();
+
+    /// Random numbers of the batch that begins with this path.
+    void draw(std::size_t first, std::uint32_t group, Points& u) const;
+    void keep(std::size_t from, std::size_t to);
+    static void add(const Path& path, const Rgb& radiance) { *path.to += path.throughput * radiance; }
+
+    const RenderScene& render_scene_;
+    const Tracer& tracer_;
+    const Lights& lights_;
+    const Background& background_;
+    const Medium* const medium_;
+    const BodyPoses& at_;
+    const PathSettings& settings_;
+    const PathNumbers numbers_;
+    // What the scene has, so that nothing is done for what it has not:
+    const Lights::Group group_;
+    const SunDisc* const sun_;
+    const bool sun_has_extent_, narrow_sun_;
+    const bool small_bodies_;  ///< some body may look small from another
+    const bool emitters_;      ///< beside the Sun
+    const bool background_sampled_;
+    const bool receivers_;    ///< Path::start is needed
+    const bool finds_alone_;  ///< escaped rays bring light that is not reused: background, a wide Sun
+    const bool sun_alone_;    ///< nothing else brings light
+    bool grouped_ = false;    ///< paths of several pixels (run_reused), with the roulette at their first vertices
+    bool reuse_ = false;
+
+    std::span<Rgb> radiance_;
+    std::span<float> variance_;
+    std::uint64_t rays_traced_ = 0;
+
+    std::size_t n_ = 0;  ///< paths that have not ended
+    template <class T>
+    using PerPath = UninitializedArray<T, kWavefront>;
+    PerPath<Path> paths_;
+    PerPath<PathVertex> vertices_;
+    PerPath<Vec3> directions_;  ///< of the rays
+    PerPath<Hit> hits_;         ///< where the rays start; after `extend` where they end
+    std::size_t n_shadow_ = 0, n_to_lights_ = 0, n_to_surfaces_ = 0;
+    PerPath<ShadowRay> shadow_rays_;  ///< without an end
+    PerPath<ShadowRay> to_lights_, to_surfaces_;
+    std::size_t n_second_ = 0;
+    UninitializedArray<SecondVertex, kReuseGroup> second_;
+    FirstVertices first_;
+};
+
+}  // namespace narpa

@@ -1,0 +1,32 @@
+/// renderer/light/medium.h - what lies between surfaces: it absorbs, emits and scatters light along rays.
+///
+/// A new kind (an atmosphere, a plume) is a class in files of its own, handed to RenderScene::create. A scene
+/// without one pays nothing.
+#pragma once
+
+#include "base/vec3.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa {
+
+/// Of a segment of a ray.
+struct MediumSegment {
+    Rgb transmittance{1, 1, 1};  ///< part of the radiance from its end that reaches its start
+    Rgb in_scattering{};         ///< radiance that arises along it and reaches its start, W m^-2 sr^-1
+};
+
+/// Thread-safe; allocates nothing when it is evaluated.
+class Medium {
+public:
+    virtual ~Medium() = default;
+
+    /// From the ray's origin (world, metres) as far as range_m, which is infinite for escaped rays. `u` is a random
+    /// number in [0, 1) for media that estimate the integral from one point of the segment; its mean over u must be
+    /// the integral.
+    [[nodiscard]] virtual MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
+                                              double u) const noexcept = 0;
+    /// For shadow rays.
+    [[nodiscard]] virtual Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept = 0;
+};
+
+}  // namespace narpa

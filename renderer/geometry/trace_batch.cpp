@@ -155,21 +155,18 @@ std::uint32_t lanes_before(const Lanes<double>& entry_m, const Lanes<double>& en
     return bits_of(before);
 }
 
-/// From the body's frame to the world's.
-template <class Pose>
-inline void to_world_each(const Pose& pose, HitBatch& __restrict hits) {
-    for (std::size_t i = 0; i < kLanes; ++i) {
-        const Rigid3 T = pose(i);
-        hits.position.put(i, T * hits.position[i]);
-        hits.geometric_normal.put(i, T.q * hits.geometric_normal[i]);
-        hits.shading_normal.put(i, T.q * hits.shading_normal[i]);
-    }
-}
+/// From the body's frame to the world's. By a pose that is a copy, as the stores might change one in memory.
 NARPA_EACH_ISA void to_world(const Rigid3& T_world_body, HitBatch& __restrict hits) {
-    to_world_each([&](std::size_t) { return T_world_body; }, hits);
+    const Rigid3 T = T_world_body;
+    for (std::size_t i = 0; i < kLanes; ++i) hits.position.put(i, T * hits.position[i]);
+    for (std::size_t i = 0; i < kLanes; ++i) hits.geometric_normal.put(i, T.q * hits.geometric_normal[i]);
+    for (std::size_t i = 0; i < kLanes; ++i) hits.shading_normal.put(i, T.q * hits.shading_normal[i]);
 }
 NARPA_EACH_ISA void to_world(const PoseLanes& T_world_body, HitBatch& __restrict hits) {
-    to_world_each([&](std::size_t i) { return T_world_body[i]; }, hits);
+    for (std::size_t i = 0; i < kLanes; ++i) hits.position.put(i, T_world_body[i] * hits.position[i]);
+    for (std::size_t i = 0; i < kLanes; ++i)
+        hits.geometric_normal.put(i, T_world_body[i].q * hits.geometric_normal[i]);
+    for (std::size_t i = 0; i < kLanes; ++i) hits.shading_normal.put(i, T_world_body[i].q * hits.shading_normal[i]);
 }
 
 /// Copies what Shape::surface writes.

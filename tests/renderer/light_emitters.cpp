@@ -282,7 +282,7 @@ TEST(Emitters, OfAllKindsAddUp) {
     EXPECT_LT(together.error, 0.01 * sum);
 }
 
-TEST(Lights, WithoutLightsTheQuickDirectPathSuffices) {
+TEST(Lights, WithoutLightsSunOnlyDirectLightingSuffices) {
     Scene s = floor_scene();
     add_sun(s, {0, 0, 1});
     s.materials[0].emission = {1, 1, 1};

@@ -49,7 +49,7 @@ void expect_sky_colour(const Scene& s, const Vec3& eye, double tolerance) {
     }
 }
 
-TEST(Furnace, AWhiteSphereCannotBeToldFromTheSky) {
+TEST(Furnace, AWhiteSphereIsIndistinguishableFromTheBackground) {
     Scene s;
     s.materials.push_back(lambert(1));
     s.ambient = {2, 3, 5};
@@ -57,7 +57,7 @@ TEST(Furnace, AWhiteSphereCannotBeToldFromTheSky) {
     expect_sky_colour(s, {4, 0, 0}, 1e-6);
 }
 
-TEST(Furnace, AWhiteMeshWithVertexNormalsCannotBeToldFromTheSky) {
+TEST(Furnace, AWhiteMeshWithVertexNormalsIsIndistinguishableFromTheBackground) {
     for (const int level : {0, 1, 2}) {
         Scene s;
         s.materials.push_back(lambert(1));
@@ -67,7 +67,7 @@ TEST(Furnace, AWhiteMeshWithVertexNormalsCannotBeToldFromTheSky) {
     }
 }
 
-TEST(Furnace, NeitherCanAWhiteBowl) {
+TEST(Furnace, SoIsAWhiteBowl) {
     // Seen from within, vertex normals describe a hollow: rays leave from the faces, and some directions above the
     // normal lie behind them.
     for (const int level : {0, 1, 2}) {
@@ -129,7 +129,7 @@ TEST(Furnace, NormalMapsNeitherMakeNorLoseLight) {
     }
 }
 
-TEST(Furnace, NoMaterialSendsBackMoreThanItGets) {
+TEST(Furnace, NoMaterialReflectsMoreThanItReceives) {
     using Kind = Material::Kind;
     for (const Kind kind : {Kind::lambert, Kind::phong, Kind::mirror, Kind::dielectric, Kind::ggx,
                             Kind::lommel_seeliger, Kind::lunar_lambert, Kind::hapke}) {
@@ -154,7 +154,7 @@ TEST(Furnace, NoMaterialSendsBackMoreThanItGets) {
     }
 }
 
-TEST(Furnace, AGlassSphereCannotBeToldFromTheSky) {
+TEST(Furnace, AGlassSphereIsIndistinguishableFromTheBackground) {
     // Fresnel's reflectance and transmittance add up to one, and what refraction does to radiance on the way in it
     // undoes on the way out. Paths of more than 40 surfaces are lost: R^39 of them.
     Scene s;

@@ -121,9 +121,9 @@ struct Case {
     const char* name;
     void (*add)(Scene&);
 };
-class Sharing : public testing::TestWithParam<Case> {};
+class PathReuse : public testing::TestWithParam<Case> {};
 
-TEST_P(Sharing, ChangesNoMeanAndTakesTheNoiseOfWhatFewFind) {
+TEST_P(PathReuse, KeepsTheMeanAndReducesTheNoise) {
     Scene s = dish_and_block();
     GetParam().add(s);
     const auto render_scene = RenderScene::create(s, 1);
@@ -148,7 +148,7 @@ TEST_P(Sharing, ChangesNoMeanAndTakesTheNoiseOfWhatFewFind) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Scenes, Sharing,
+    Scenes, PathReuse,
     testing::Values(
         Case{"InTheSun", [](Scene&) {}},
         Case{"UnderALamp",
@@ -201,7 +201,7 @@ Picture frames(const Scene& s, int spp) {
     return p;
 }
 
-TEST(SharedPaths, TakeTheSunsLightOnLitSurfacesAsDirectLightDoes) {
+TEST(ReusedPaths, ReceiveDirectSunlightAsInDirectLighting) {
     Scene s = dish_and_block();
     const Picture quick = frames(s, 16);
     // Something shines: nothing is simple any more. Nobody sees it.
@@ -218,7 +218,7 @@ TEST(SharedPaths, TakeTheSunsLightOnLitSurfacesAsDirectLightDoes) {
     EXPECT_GT(lit, 100 * static_cast<double>(kPixels));
 }
 
-TEST(SharedPaths, AllocatesNothing) {
+TEST(ReusedPaths, AllocateNothing) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "this build's heap is the sanitizer's own";
     const Scene s = dish_and_block();
     const auto render_scene = RenderScene::create(s, 1);

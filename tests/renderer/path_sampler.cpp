@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kGroups[]{0, 1, 2, 7, 40, 81};
 
-TEST(PathSampler, TheFirstGroupIsThePixelsOwn) {
+TEST(PathSampler, TheFirstGroupBelongsToThePixel) {
     const PixelSampler sampler(5, 2, 77);
     for (std::uint32_t s = 0; s < 100; ++s) EXPECT_EQ(sampler.point(s, 0), sampler.point(s));
 }
@@ -41,7 +41,7 @@ TEST(PathSampler, EveryGroupIsStratifiedInEachDimensionAndInItsFirstTwo) {
     }
 }
 
-TEST(PathSampler, GroupsAndPixelsKnowNothingOfEachOther) {
+TEST(PathSampler, GroupsAndPixelsAreIndependent) {
     // Correlation of two independent even numbers over n samples has the standard deviation 1 / sqrt(n).
     constexpr std::uint32_t n = 4096;
     const PixelSampler sampler(5, 2, 77), neighbour(5, 2, 78);

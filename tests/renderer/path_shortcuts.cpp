@@ -18,7 +18,7 @@ Scene facing_plates(double sun_diameter_rad) {
     return s;
 }
 
-TEST(PathShortcuts, TheLastRayIsLeftOutOnlyWhereItWouldFindNothing) {
+TEST(PathShortcuts, TheLastRayIsSkippedOnlyWhereItFindsNothing) {
     for (const double diameter : {0.0, 0.0093}) {
         Scene dark = facing_plates(diameter), glimmering = dark;
         glimmering.ambient = {1e-20f, 1e-20f, 1e-20f};  // to be looked for, but too faint to count
@@ -49,7 +49,7 @@ TEST(PathShortcuts, TheLastRayIsLeftOutOnlyWhereItWouldFindNothing) {
     }
 }
 
-TEST(PathShortcuts, GuidingRaysFromAMeshToASmallBodyChangesNoMean) {
+TEST(PathShortcuts, SamplingASmallBodyFromAMeshKeepsTheMean) {
     // The Sun lights a ball that stands low over a plate, and not the plate itself, whose back is to it.
     Scene s;
     s.materials = {lambert(0.9f)};
@@ -69,7 +69,7 @@ TEST(PathShortcuts, GuidingRaysFromAMeshToASmallBodyChangesNoMean) {
     EXPECT_NEAR(with.mean.x, without.mean.x, kSigmas * std::hypot(with.error, without.error));
 }
 
-TEST(PathShortcuts, NobodyIsGuidedWhereNoBodyLooksSmall) {
+TEST(PathShortcuts, SmallBodiesAreNotSampledWhereThereAreNone) {
     Scene s;
     s.materials = {lambert(0.9f)};
     add_mesh(s, plate(4, 4));

@@ -294,7 +294,7 @@ Vec3 plain_path(const RenderScene& render_scene, const BodyPoses& at, Ray ray, i
     }
 }
 
-TEST(PathRadiance, IsThatOfPathsWhichFindAllLightByChance) {
+TEST(PathRadiance, EqualsThatOfBsdfSamplingAlone) {
     // A wide Sun, so that chance finds it; small bodies, so that some rays are guided; lamps of every shape.
     Scene s = workshop();
     s.lights.clear();
@@ -332,7 +332,7 @@ TEST(PathRadiance, IsThatOfPathsWhichFindAllLightByChance) {
     }
 }
 
-TEST(PathRadiance, MethodDirectIsTheQuickPathsLightAndTheLights) {
+TEST(PathRadiance, MethodDirectAddsTheLightsToSunOnlyDirectLighting) {
     // Plate and Sun as the quick path has them; even ambient; the body's own glow; one point light on top.
     Scene s;
     s.materials.push_back(shining(0.5f, {1, 2, 3}));

@@ -361,49 +361,4 @@ std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, c
     return impl_->find_occluded(at, leaving.rays(false), t_max, wanted);
 }
 
-namespace {
-
-/// The same of hits that do not lie side by side, and their directions.
-struct SideBySide {
-    SideBySide(std::span<const Hit> from, std::span<const Vec3> directions, std::uint32_t wanted) noexcept {
-        for_each_lane(wanted, [&](std::size_t i) {
-            points.put(i, from[i]);
-            direction.put(i, directions[i]);
-        });
-    }
-    SurfacePoints points;
-    Vec3Lanes direction;
-};
-
-}  // namespace
-
-void Tracer::intersect(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                       std::uint32_t wanted, std::span<Hit> hits) const noexcept {
-    wanted &= lanes_below(std::min({from.size(), directions.size(), hits.size(), kLanes}));
-    if (wanted == 0) return;
-    const SideBySide starts(from, directions, wanted);
-    HitBatch batch;
-    intersect(at, starts.points, starts.direction, wanted, batch);
-    for_each_lane(wanted & batch.met, [&](std::size_t i) { hits[i] = batch[i]; });
-    for_each_lane(wanted & ~batch.met, [&](std::size_t i) { hits[i].body = -1; });
-}
-
-std::uint32_t Tracer::occluded(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                               std::uint32_t wanted) const noexcept {
-    wanted &= lanes_below(std::min({from.size(), directions.size(), kLanes}));
-    const SideBySide starts(from, directions, wanted);
-    if (wanted == 0) return 0;
-    const Impl::LeavingRays leaving(*impl_, at, starts.points, starts.direction, wanted);
-    return impl_->find_occluded(at, leaving.rays(false), kNoEnd, wanted);
-}
-
-std::uint32_t Tracer::occluded(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                               std::span<const double> t_max, std::uint32_t wanted) const noexcept {
-    wanted &= lanes_below(std::min({from.size(), directions.size(), t_max.size(), kLanes}));
-    const SideBySide starts(from, directions, wanted);
-    Lanes<double> ends{};
-    for_each_lane(wanted, [&](std::size_t i) { ends[i] = t_max[i]; });
-    return occluded(at, starts.points, starts.direction, ends, wanted);
-}
-
 }  // namespace narpa

@@ -58,14 +58,6 @@ public:
     [[nodiscard]] bool occluded(const BodyPoses& at, const Hit& from, const Vec3& direction,
                                 double t_max) const noexcept;
 
-    void intersect(const BodyPoses& at, std::span<const Hit> from, std::span<const Vec3> directions,
-                   std::uint32_t wanted, std::span<Hit> hits) const noexcept;
-    [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, std::span<const Hit> from,
-                                         std::span<const Vec3> directions, std::uint32_t wanted) const noexcept;
-    [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, std::span<const Hit> from,
-                                         std::span<const Vec3> directions, std::span<const double> t_max,
-                                         std::uint32_t wanted) const noexcept;
-
     /// In world axes.
     [[nodiscard]] TextureFrame texture_frame(const BodyPoses& at, const Hit& hit) const noexcept;
 

@@ -11,6 +11,24 @@ namespace {
 
 using namespace test;
 
+HitBatch batch_of(const Lanes<Hit>& hits) {
+    HitBatch batch;
+    for (std::size_t i = 0; i < kLanes; ++i) batch.put(i, hits[i]);
+    return batch;
+}
+Vec3Lanes lanes_of(const Lanes<Vec3>& vectors) {
+    Vec3Lanes lanes;
+    for (std::size_t i = 0; i < kLanes; ++i) lanes.put(i, vectors[i]);
+    return lanes;
+}
+/// Writes the `wanted` lanes of `hits`.
+void trace(const Tracer& tracer, const BodyPoses& at, const Lanes<Hit>& from, const Lanes<Vec3>& directions,
+           std::uint32_t wanted, Lanes<Hit>& hits) {
+    HitBatch batch = batch_of(from);
+    tracer.intersect(at, batch, lanes_of(directions), wanted, batch);
+    for_each_lane(wanted, [&](std::size_t i) { hits[i] = batch[i]; });
+}
+
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr int kFewer = 20;  // the sanitizers are that much slower
 #else
@@ -83,17 +101,17 @@ TEST_P(LeavingAConvexBody, OutwardsMissesItAndInwardsMeetsItFromInside) {
                     in[i] = -leaving(from[i], random, k);
                 }
                 outward += std::popcount(seen);
-                tracer->intersect(at, from, out, seen, met);
+                trace(*tracer, at, from, out, seen, met);
                 for (std::size_t i = 0; i < kLanes; ++i) met_again += is_set(seen, i) && met[i].body >= 0;
-                dark += std::popcount(tracer->occluded(at, from, out, seen));
+                dark += std::popcount(tracer->occluded(at, batch_of(from), lanes_of(out), seen));
 
                 for (std::size_t i = 0; i < kLanes; ++i)
                     if (is_set(seen, i)) from[i] = other_side(from[i]);
                 inward += std::popcount(seen);
-                tracer->intersect(at, from, in, seen, met);
+                trace(*tracer, at, from, in, seen, met);
                 for (std::size_t i = 0; i < kLanes; ++i)
                     missed += is_set(seen, i) && (met[i].body != 0 || met[i].outside);
-                bright += std::popcount(seen & ~tracer->occluded(at, from, in, seen));
+                bright += std::popcount(seen & ~tracer->occluded(at, batch_of(from), lanes_of(in), seen));
             }
         }
     EXPECT_GE(outward, 500'000 / kFewer);
@@ -117,17 +135,18 @@ TEST(LeavingAPlate, ItsInnerSideIsAsFreeAsItsOuterSide) {
     std::uniform_real_distribution<double> within(-1.9, 1.9);
     int met = 0, dark = 0;
     for (int k = 0; k < 4000; ++k) {
-        Lanes<Hit> from, next;
-        Lanes<Vec3> directions;
+        HitBatch from, next;
+        Vec3Lanes directions;
         for (std::size_t i = 0; i < kLanes; ++i) {
             const Vec3 above{within(random), within(random), 1};
-            from[i] = other_side(tracer->intersect(at, {T * above, T.q * Vec3{0, 0, -1}}, kInfinity));
-            ASSERT_EQ(from[i].body, 0);
-            ASSERT_FALSE(from[i].outside);
-            directions[i] = leaving(from[i], random, k);  // every fourth packet within a milliradian of the plate
+            const Hit hit = other_side(tracer->intersect(at, {T * above, T.q * Vec3{0, 0, -1}}, kInfinity));
+            ASSERT_EQ(hit.body, 0);
+            ASSERT_FALSE(hit.outside);
+            from.put(i, hit);
+            directions.put(i, leaving(hit, random, k));  // every fourth batch within a milliradian of the plate
         }
         tracer->intersect(at, from, directions, kAll, next);
-        for (const Hit& h : next) met += h.body >= 0;
+        met += std::popcount(next.met);
         dark += std::popcount(tracer->occluded(at, from, directions, kAll));
     }
     EXPECT_EQ(met, 0);
@@ -152,7 +171,7 @@ Bounces bounce_inside(const Scene& s, const Vec3& offset, int wanted) {
     Lanes<Vec3> directions;
     while (b.bounces < wanted) {
         for (std::size_t i = 0; i < kLanes; ++i) directions[i] = leaving(hits[i], random, b.bounces);
-        tracer->intersect(at, hits, directions, kAll, hits);
+        trace(*tracer, at, hits, directions, kAll, hits);
         b.bounces += static_cast<int>(kLanes);
         for (Hit& h : hits)
             if (h.body < 0 || h.outside) {

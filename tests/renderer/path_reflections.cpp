@@ -137,7 +137,12 @@ Ray through_sphere(const RenderScene& render_scene, const BodyPoses& at, const R
         d = through.l;
         const Hit from = other_side(hit);
         if (surface == 1) return {hit.position, d};
-        render_scene.tracer().intersect(at, std::span(&from, 1), std::span(&d, 1), 1u, std::span(&hit, 1));
+        HitBatch batch;
+        batch.put(0, from);
+        Vec3Lanes directions{};
+        directions.put(0, d);
+        render_scene.tracer().intersect(at, batch, directions, 1u, batch);
+        hit = batch[0];
     }
     return {};
 }

@@ -1,4 +1,4 @@
-#include "scenes/generate/approach.h"
+#include "scenes/generate/scenes.h"
 
 #include <charconv>
 #include <fstream>

@@ -1,4 +1,4 @@
-#include "scenes/generate/chaser.h"
+#include "scenes/generate/scenes.h"
 
 #include "scenes/generate/modules.h"
 #include "scenes/generate/textures.h"

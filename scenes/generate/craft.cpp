@@ -1,4 +1,4 @@
-#include "scenes/generate/craft.h"
+#include "scenes/generate/scenes.h"
 
 #include "scenes/generate/noise.h"
 #include "scenes/generate/shapes.h"

@@ -1,11 +1,11 @@
 #include "scenes/generate/modules.h"
-#include "scenes/generate/station.h"
+#include "scenes/generate/scenes.h"
 #include "scenes/generate/textures.h"
 
 namespace narpa::scenes {
 namespace {
 
-constexpr double kHatchX = -0.45;     ///< the hatch stands this far behind the interface plane
+constexpr double kHatchX = -0.45;     ///< of the hatch, behind the interface plane
 constexpr double kStandOffX = -0.15;  ///< plane of the target's raised cross
 constexpr double kHullRadius = 0.92;  ///< of the port's forward rim
 
@@ -101,7 +101,7 @@ void rings(Mesh& mesh) {
     }
 }
 
-/// Three guide petals that lean inwards, and the capture latches between them. Nothing else stands before x = 0.
+/// Three guide petals that lean inwards, and the capture latches between them. Nothing else is before x = 0.
 void petals_and_latches(Mesh& mesh) {
     mesh.begin("port_petals", "aluminium");
     for (int k = 0; k < 3; ++k) {
@@ -183,7 +183,7 @@ void hatch_and_target(Mesh& mesh) {
     }
 }
 
-/// What stands around the port on the bulkhead: umbilical connectors, and corner-cube reflectors for a LiDAR to
+/// Around the port on the bulkhead: umbilical connectors, and corner-cube reflectors for a LiDAR to
 /// range on.
 void fittings(Mesh& mesh) {
     mesh.begin("port_fittings", "dark_grey");

@@ -1,34 +1,56 @@
-/// make_docking_scene OUTDIR - writes the meshes, textures and approach of the docking scene. The same bytes each
-/// time.
+/// make_scene docking|craft|descent|small_body OUTDIR - writes the meshes, textures and tables of a scene. The same
+/// bytes each time.
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
 
-#include "scenes/generate/approach.h"
-#include "scenes/generate/chaser.h"
-#include "scenes/generate/station.h"
+#include "scenes/generate/scenes.h"
 #include "scenes/generate/textures.h"
 
-int main(int argc, char** argv) {
-    using namespace narpa::scenes;
-    if (argc != 2) {
-        std::fputs("usage: make_docking_scene OUTDIR   (an existing folder)\n", stderr);
-        return 2;
+namespace narpa::scenes {
+namespace {
+
+struct Output {
+    std::string directory;
+
+    void mesh(const std::string& name, const Mesh& mesh, const std::vector<MaterialSpec>& materials,
+              ObjParts parts = ObjParts::all) const {
+        mesh.write_obj(directory + "/" + name + ".obj", name + ".mtl", parts);
+        write_mtl(directory + "/" + name + ".mtl", materials);
+        std::printf("%s: %zu triangles\n", name.c_str(), mesh.triangle_count());
     }
+};
+
+bool write_scene(std::string_view scene, const Output& out) {
+    if (scene == "docking") {
+        out.mesh("station", build_station(), scene_materials());
+        out.mesh("chaser", build_chaser(), scene_materials());
+        write_textures(out.directory);
+        write_approach(out.directory + "/approach.csv");
+    } else if (scene == "craft") {
+        out.mesh("craft", build_craft(), craft_materials(), ObjParts::positions);
+    } else if (scene == "descent") {
+        out.mesh("terrain", build_terrain(), terrain_materials());
+        write_ground_texture(out.directory);
+    } else if (scene == "small_body") {
+        out.mesh("small_body", build_small_body(), small_body_materials());
+    } else {
+        return false;
+    }
+    return true;
+}
+
+}  // namespace
+}  // namespace narpa::scenes
+
+int main(int argc, char** argv) {
     try {
-        const std::string directory = argv[1];
-        const Mesh station = build_station(), chaser = build_chaser();
-        station.write_obj(directory + "/station.obj", "station.mtl");
-        chaser.write_obj(directory + "/chaser.obj", "chaser.mtl");
-        write_mtl(directory + "/station.mtl", scene_materials());
-        write_mtl(directory + "/chaser.mtl", scene_materials());
-        write_textures(directory);
-        write_approach(directory + "/approach.csv");
-        std::printf("station %zu triangles, chaser %zu triangles\n", station.triangle_count(),
-                    chaser.triangle_count());
+        if (argc == 3 && narpa::scenes::write_scene(argv[1], {argv[2]})) return 0;
     } catch (const std::exception& e) {
-        std::fprintf(stderr, "make_docking_scene: %s\n", e.what());
+        std::fprintf(stderr, "make_scene: %s\n", e.what());
         return 1;
     }
-    return 0;
+    std::fputs("usage: make_scene docking|craft|descent|small_body OUTDIR   (an existing folder)\n", stderr);
+    return 2;
 }

@@ -135,42 +135,31 @@ void plate(Mesh& mesh, const Plate& p) {
         p.nu, p.nv, false, [&](int i, int j) { return top(step(i, p.nu), step(j, p.nv)); },
         [&](int i, int j) { return p.uv(inset(step(i, p.nu), p.bevel_u), inset(step(j, p.nv), p.bevel_v)); });
 
-    // The rim, counter-clockwise seen from the top, as four sides of n steps each.
-    struct Side {
-        int n;
-        std::function<Uv(int)> at;
+    // The rim, counter-clockwise seen from the top: sides 0 to 3 of n(side) steps.
+    const auto n = [&](int side) { return side % 2 == 0 ? p.nu : p.nv; };
+    const auto rim = [&](int side, int i) {
+        const double s = step(side < 2 ? i : n(side) - i, n(side));
+        return side % 2 == 0 ? Uv{s, side == 0 ? 0.0 : 1.0} : Uv{side == 1 ? 1.0 : 0.0, s};
     };
-    const std::array<Side, 4> sides{Side{p.nu,
-                                         [&](int i) {
-                                             return Uv{step(i, p.nu), 0};
-                                         }},
-                                    Side{p.nv,
-                                         [&](int i) {
-                                             return Uv{1, step(i, p.nv)};
-                                         }},
-                                    Side{p.nu,
-                                         [&](int i) {
-                                             return Uv{step(p.nu - i, p.nu), 1};
-                                         }},
-                                    Side{p.nv, [&](int i) {
-                                             return Uv{0, step(p.nv - i, p.nv)};
-                                         }}};
-    const Vec3 middle = p.shape(0.5, 0.5, 0);
-    for (const Side& side : sides) {
-        const auto uv = [&](int i, int) { return p.uv(side.at(i)[0], side.at(i)[1]); };
-        const auto low = [&](int i, double w) { return p.shape(side.at(i)[0], side.at(i)[1], w); };
+    const auto rim_uv = [&](int side, int i) { return p.uv(rim(side, i)[0], rim(side, i)[1]); };
+    const auto rim_point = [&](int side, int i, double w) { return p.shape(rim(side, i)[0], rim(side, i)[1], w); };
+    for (int side = 0; side < 4; ++side) {
+        const auto uv = [&](int i, int) { return rim_uv(side, i); };
         mesh.grid(
-            side.n, 1, false, [&](int i, int j) { return low(i, j == 0 ? 0 : chamfer); }, uv);
+            n(side), 1, false, [&](int i, int j) { return rim_point(side, i, j == 0 ? 0 : chamfer); }, uv);
         mesh.grid(
-            side.n, 1, false,
-            [&](int i, int j) { return j == 0 ? low(i, chamfer) : top(side.at(i)[0], side.at(i)[1]); }, uv);
+            n(side), 1, false,
+            [&](int i, int j) {
+                return j == 0 ? rim_point(side, i, chamfer) : top(rim(side, i)[0], rim(side, i)[1]);
+            },
+            uv);
     }
     if (!p.underside.empty()) mesh.material(p.underside);
-    for (const Side& side : sides)
+    const Vec3 centre = p.shape(0.5, 0.5, 0);
+    for (int side = 0; side < 4; ++side)
         mesh.grid(
-            side.n, 1, false,
-            [&](int i, int j) { return j == 0 ? middle : p.shape(side.at(i)[0], side.at(i)[1], 0); },
-            [&](int i, int j) { return j == 0 ? p.uv(0.5, 0.5) : p.uv(side.at(i)[0], side.at(i)[1]); });
+            n(side), 1, false, [&](int i, int j) { return j == 0 ? centre : rim_point(side, i, 0); },
+            [&](int i, int j) { return j == 0 ? p.uv(0.5, 0.5) : rim_uv(side, i); });
 }
 
 void truss(Mesh& mesh, const Vec3& p, const Vec3& q, const Vec3& up, double width, int bays, double tube_radius) {

@@ -1,4 +1,4 @@
-#include "scenes/generate/small_body.h"
+#include "scenes/generate/scenes.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "scenes/generate/station.h"
+#include "scenes/generate/scenes.h"
 
 #include "scenes/generate/modules.h"
 

@@ -1,4 +1,4 @@
-#include "scenes/generate/terrain.h"
+#include "scenes/generate/scenes.h"
 
 #include <cmath>
 

@@ -161,9 +161,9 @@ TEST(DockingScene, ReadsWithoutAWarning) {
 TEST(DockingScene, GeneratorWritesTheSameBytesAgain) {
     const fs::path again = fs::path(testing::TempDir()) / "narpa_docking_again";
     fs::create_directories(again);
-    const std::string program = (fs::path(NARPA_BUILD_DIR) / "bin" / "make_docking_scene").string();
+    const std::string program = (fs::path(NARPA_BUILD_DIR) / "bin" / "make_scene").string();
     // Another locale and another folder must change nothing.
-    const std::string command = "LC_ALL=de_DE.UTF-8 '" + program + "' '" + again.string() + "' >/dev/null";
+    const std::string command = "LC_ALL=de_DE.UTF-8 '" + program + "' docking '" + again.string() + "' >/dev/null";
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
     int compared = 0;
     for (const auto& entry : fs::directory_iterator(again)) {

@@ -1,0 +1,56 @@
+/// scenes/generate/scenes.h - the meshes and tables of the generated scenes. Metres; triangles face outwards.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "scenes/generate/mesh.h"
+
+namespace narpa::scenes {
+
+// --- Docking: axes of both ships have their origin at the centre of the docking interface plane, x out of the
+// port, z up ---
+
+/// Radius of the free opening of the docking ring, and the ring's outer radius, metres: both ships have them.
+inline constexpr double kRingInner = 0.60, kRingOuter = 0.74;
+
+std::vector<MaterialSpec> scene_materials();
+/// About 29 m across.
+Mesh build_station();
+/// The port alone: ring, guide petals, latches, hatch, target. Its hull reaches back to x = -2.5.
+void add_docking_port(Mesh& mesh);
+/// The visiting ship. Its nose is an open tunnel, and the camera is in its hatch.
+Mesh build_chaser();
+
+inline constexpr double kApproachDuration_s = 60, kApproachStep_s = 0.1;
+/// The chaser in the station's frame at a time in [0, 60] s: twice continuously differentiable, velocity and rate
+/// its exact derivatives. Contact (the pose of the port itself, rotated by half a turn about z) at 60 s.
+Motion approach_at(double t_s);
+/// Writes the table. Throws std::runtime_error where it cannot.
+void write_approach(const std::string& path);
+
+// --- Craft: 200,000 triangles to measure speed on. A bus in wrinkled blankets between two long solar wings,
+// trusses, dishes, antenna rods and a docking ring. Origin in the bus, wings along y, docking ring towards x, z up;
+// 16 m from tip to tip ---
+
+/// Without textures.
+std::vector<MaterialSpec> craft_materials();
+Mesh build_craft();
+
+// --- Descent: cratered ground. Hills of a few tens of metres, craters of 3 to 40 m, one metre between vertices.
+// Origin in the centre, z up ---
+
+/// Extent along x and along y; ground.png covers it once.
+inline constexpr double kTerrainSide = 360;
+std::vector<MaterialSpec> terrain_materials();
+/// An open sheet, facing up.
+Mesh build_terrain();
+
+// --- Small body: a triaxial ellipsoid of 56 x 40 x 34 m with craters of 1 to 18 m and boulders of half a metre to
+// 3 m. Origin in the centre, longest axis x, spin axis z ---
+
+std::vector<MaterialSpec> small_body_materials();
+/// Closed; about 0.4 m between vertices.
+Mesh build_small_body();
+
+}  // namespace narpa::scenes

@@ -10,9 +10,11 @@
 #include "apps/bench.h"
 #include "apps/bench_scene.h"
 #include "bench/approach.h"
-#include "bench/estimate_plots.h"
+#include "bench/filter.h"
+#include "bench/icp.h"
 #include "bench/pnp.h"
 #include "bench/stereo.h"
+#include "plot/plot.h"
 
 namespace narpa::cli {
 namespace {
@@ -27,13 +29,20 @@ CLI::Validator finite_number() {
 
 struct Options {
     std::vector<std::string> only;
-    std::string pictures;  ///< folder; empty: none
+    std::string plots;  ///< folder; empty: none
     std::string scene, camera, target;
     std::vector<double> along, up;
     bool quick = false;
     int threads = 0, size = 320;
     PnpBenchOptions pnp;
     ApproachOptions approach;
+};
+
+/// One estimator: what an estimate takes and how far off it is.
+struct TimeAndError {
+    std::string name, family;
+    double ms = 0;                 ///< an estimate, median
+    double position_of_range = 0;  ///< RMS error of the position, as a part of the range
 };
 
 /// What the parts put together: what is wrong, and what goes on the plot of all.
@@ -45,9 +54,11 @@ struct Findings {
 /// One estimator's part of the bench: says what it found and returns its document.
 using Part = Outcome (*)(const Options&, Findings&);
 
-Status picture(const Options& o, const std::string& name, const std::function<Status(const std::string&)>& write) {
-    if (o.pictures.empty()) return Ok{};
-    return write(o.pictures + "/" + name);
+/// Plots where plots are wanted. `document`: what the part found, without its kind and title.
+Status plot(const Options& o, const std::string& kind, const std::string& title, const char* key,
+            const nlohmann::json& found) {
+    if (o.plots.empty()) return Ok{};
+    return write_plot(fmt::format("{}/{}.png", o.plots, kind), {{"plot", kind}, {"title", title}, {key, found}});
 }
 
 Outcome bench_pnp(const Options& o, Findings& findings) {
@@ -127,16 +138,12 @@ Outcome bench_approach(const Options& o, Findings& findings) {
     say(in_words(*runs));
     const std::string title = fmt::format("{}: {} from {:g} m to {:g} m", scene.name, scene.bodies[target].name,
                                           options.from_m, options.to_m);
-    if (auto drawn =
-            picture(o, "approach.png", [&](const std::string& path) { return plot_approach(path, title, *runs); });
-        !drawn)
-        return drawn.error();
-    if (auto drawn = picture(o, "frames.png",
-                             [&](const std::string& path) {
-                                 return picture_of_frames(path, **world, *camera, target, options, threads);
-                             });
-        !drawn)
-        return drawn.error();
+    if (!o.plots.empty()) {
+        if (auto drawn = plot_approach(o.plots + "/approach.png", title, *runs); !drawn) return drawn.error();
+        if (auto drawn = plot_approach_frames(o.plots + "/frames.png", **world, *camera, target, options, threads);
+            !drawn)
+            return drawn.error();
+    }
     nlohmann::json document = nlohmann::json::array();
     for (const ApproachRun& run : *runs) {
         document.push_back(to_json(run));
@@ -168,9 +175,8 @@ Outcome bench_stereo(const Options& o, Findings& findings) {
     if (!o.quick)
         for (const std::string& fault : stereo_faults(*stereo, settings.points))
             findings.faults.push_back("stereo: " + fault);
-    if (auto drawn = picture(o, "stereo.png", [&](const std::string& path) { return write_plot(path, *stereo); });
-        !drawn)
-        return drawn.error();
+    if (!o.plots.empty())
+        if (auto drawn = plot_stereo(o.plots + "/stereo.png", *stereo); !drawn) return drawn.error();
     const double ms = 1e3 * stereo->match_s;
     findings.estimators.push_back({fmt::format("{} points, whole pixels", stereo->points.size()), "stereo", ms,
                                    stereo->errors(false, 2, true).rms});
@@ -193,17 +199,15 @@ Outcome bench_icp(const Options& o, Findings& findings) {
                               [&](int done, int of) { progress.tell(fmt::format("ICP: start {}/{}", done, of)); });
     if (!runs) return runs.error();
     say(in_words(*runs));
-    if (auto drawn = picture(o, "icp.png",
-                             [&](const std::string& path) {
-                                 return write_icp_plot(path, "VLP-16 sweeps of the docking station", *runs);
-                             });
-        !drawn)
-        return drawn.error();
     const double range_m = 0.5 * (settings.distance_min_m + settings.distance_max_m);
     findings.estimators.push_back({"ICP of a VLP-16 sweep", "LiDAR", 1e-3 * runs->front().microseconds_p50,
                                    runs->front().translation_rms_m / range_m});
     nlohmann::json document = nlohmann::json::array();
     for (const IcpRun& run : *runs) document.push_back(to_json(run));
+    if (auto drawn =
+            plot(o, "icp", "VLP-16 sweeps of the docking station: starts that found the pose", "runs", document);
+        !drawn)
+        return drawn.error();
     return document;
 }
 
@@ -213,12 +217,6 @@ Outcome bench_filter(const Options& o, Findings& findings) {
     const auto runs = run_filter(filter_cases(), settings);
     if (!runs) return runs.error();
     say(in_words(*runs));
-    if (auto drawn = picture(o, "filter.png",
-                             [&](const std::string& path) {
-                                 return write_filter_plot(path, "Kalman filter: NEES over time", *runs);
-                             });
-        !drawn)
-        return drawn.error();
     constexpr double kRange_m = 30;  // of the cases
     nlohmann::json document = nlohmann::json::array();
     for (const FilterRun& run : *runs) {
@@ -226,6 +224,8 @@ Outcome bench_filter(const Options& o, Findings& findings) {
         findings.estimators.push_back({"filter: " + run.name, "filter", 1e-3 * run.update_microseconds,
                                        run.times.back().position_rms_m / kRange_m});
     }
+    if (auto drawn = plot(o, "filter", "Kalman filter: NEES over time", "runs", document); !drawn)
+        return drawn.error();
     return document;
 }
 
@@ -237,10 +237,10 @@ constexpr std::pair<const char*, Part> kParts[] = {{"pnp", bench_pnp},
 
 Outcome bench(const Options& o) {
     stop_on_signals();
-    if (!o.pictures.empty()) {
+    if (!o.plots.empty()) {
         std::error_code error;
-        std::filesystem::create_directories(o.pictures, error);
-        if (error) return Error{"cannot be made a folder: " + error.message(), o.pictures};
+        std::filesystem::create_directories(o.plots, error);
+        if (error) return Error{"cannot be made a folder: " + error.message(), o.plots};
     }
     Findings findings;
     nlohmann::json document;
@@ -258,10 +258,10 @@ Outcome bench(const Options& o) {
                        {"ms", e.ms},
                        {"position_error_of_range", e.position_of_range}});
     document["time_and_error"] = all;
-    if (auto drawn = picture(o, "time_error.png",
-                             [&](const std::string& path) { return write_time_plot(path, findings.estimators); });
-        !drawn)
-        return drawn.error();
+    if (!o.plots.empty())
+        if (auto drawn = write_plot(o.plots + "/time_error.png", {{"plot", "estimators"}, {"estimators", all}});
+            !drawn)
+            return drawn.error();
     if (stop_flag()) findings.faults.emplace_back("interrupted before the end");
     for (const std::string& fault : findings.faults) say("failed: " + fault);
     document["passed"] = findings.faults.empty();
@@ -322,7 +322,7 @@ Command add_bench_estimate(CLI::App& bench_command) {
         ->check(finite_number());
     c->add_flag("--quick", o->quick, "Few draws of all, to see that it works");
     c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
-    c->add_option("-o,--output", o->pictures, "Folder for pictures: of each part, and of time against error");
+    c->add_option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error");
     c->footer(
         "Exit status 1 where points or stereo are less exact than they must be, or the bench was interrupted.");
     return [o] { return bench(*o); };

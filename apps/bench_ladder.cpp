@@ -8,9 +8,9 @@
 #include <memory>
 #include <utility>
 
-#include "bench/ladder_plot.h"
 #include "apps/bench_scene.h"
 #include "emulator/trajectory.h"
+#include "plot/plot.h"
 
 namespace narpa::cli {
 namespace {
@@ -145,8 +145,8 @@ Outcome bench_ladder(const LadderOptions& o) {
         return std::any_of(o.scenes.begin(), o.scenes.end(),
                            [&](const std::string& s) { return s == "all" || s == name; });
     };
-    if (!o.plot.empty())  // minutes before there is something to draw, a file that cannot be is told of
-        if (auto written = write_plot(o.plot, "", {}); !written) return written.error();
+    if (!o.plot.empty())
+        if (auto writable = can_write_plot(o.plot); !writable) return writable.error();
     TracingThreads threads(o.threads);
     std::optional<CraftRatios> ratios;
     if (wanted("craft")) {
@@ -172,17 +172,19 @@ Outcome bench_ladder(const LadderOptions& o) {
     for (const std::string& fault : faults) say((o.gates ? "failed: " : "not reached: ") + fault);
 
     const int n_threads = threads.arena.max_concurrency();
-    if (!o.plot.empty()) {
-        const std::string title = fmt::format("Error against time, {} threads; medians of {} frames", n_threads,
-                                              o.quick ? kQuick : kLadderFrames);
-        if (auto written = write_plot(o.plot, title, ladders); !written) return written.error();
-    }
     nlohmann::json document{{"passed", !o.gates || faults.empty()},
                             {"faults", faults},
                             {"threads", n_threads},
                             {"scenes", nlohmann::json::array()}};
     if (ratios) document["craft"] = describe(*ratios);
     for (const SceneLadder& l : ladders) document["scenes"].push_back(describe(l));
+    if (!o.plot.empty()) {
+        nlohmann::json plot = document;
+        plot["plot"] = "ladder";
+        plot["title"] = fmt::format("Error against time, {} threads; medians of {} frames", n_threads,
+                                    o.quick ? kQuick : kLadderFrames);
+        if (auto written = write_plot(o.plot, plot); !written) return written.error();
+    }
     return document;
 }
 

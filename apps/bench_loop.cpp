@@ -85,7 +85,7 @@ Outcome bench(Options o) {
     say(in_words(*runs));
     for (const std::string& fault : faults) say("failed: " + fault);
     if (!o.plot.empty())
-        if (auto written = write_plot(o.plot, title, *runs); !written) return written.error();
+        if (auto written = plot_loop(o.plot, title, *runs); !written) return written.error();
 
     nlohmann::json of_runs = nlohmann::json::array();
     for (const LoopRun& run : *runs) of_runs.push_back(to_json(run));

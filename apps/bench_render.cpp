@@ -12,10 +12,10 @@
 #include "apps/bench_ladder.h"
 #include "apps/bench_scene.h"
 #include "bench/convergence.h"
-#include "bench/convergence_plot.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
 #include "emulator/threads.h"
+#include "plot/plot.h"
 
 namespace narpa::cli {
 namespace {
@@ -197,27 +197,27 @@ Outcome bench(Options o) {
                     threads.arena.max_concurrency()));
     tell_table(*measured, camera);
     for (const std::string& fault : faults) say("failed: " + fault);
-    if (!o.plot.empty())
-        if (auto written =
-                write_plot(o.plot, {title, measured->rows, measured->seconds, measured->reference_level});
-            !written)
-            return written.error();
-
-    return nlohmann::json{{"passed", faults.empty()},
-                          {"faults", faults},
-                          {"scene", scene->file},
-                          {"camera", camera.name},
-                          {"width", camera.width},
-                          {"height", camera.height},
-                          {"threads", threads.arena.max_concurrency()},
-                          {"reference",
-                           {{"spp", o.reference_spp},
-                            {"mean", measured->reference_level},
-                            {"noise_rms", measured->reference_noise},
-                            {"render_s", measured->reference_seconds}}},
-                          {"rows", describe(*measured, camera)},
-                          {"slope", to_json(fit_slope(measured->rows))},
-                          {"relative_slope", to_json(fit_slope(measured->rows, &ErrorRow::relative_rmse))}};
+    nlohmann::json document{{"passed", faults.empty()},
+                            {"faults", faults},
+                            {"scene", scene->file},
+                            {"camera", camera.name},
+                            {"width", camera.width},
+                            {"height", camera.height},
+                            {"threads", threads.arena.max_concurrency()},
+                            {"reference",
+                             {{"spp", o.reference_spp},
+                              {"mean", measured->reference_level},
+                              {"noise_rms", measured->reference_noise},
+                              {"render_s", measured->reference_seconds}}},
+                            {"rows", describe(*measured, camera)},
+                            {"slope", to_json(fit_slope(measured->rows))},
+                            {"relative_slope", to_json(fit_slope(measured->rows, &ErrorRow::relative_rmse))}};
+    if (!o.plot.empty()) {
+        nlohmann::json plot = document;
+        plot.update({{"plot", "convergence"}, {"title", title}});
+        if (auto written = write_plot(o.plot, plot); !written) return written.error();
+    }
+    return document;
 }
 
 }  // namespace

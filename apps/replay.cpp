@@ -136,7 +136,7 @@ Outcome replay(const Options& o) {
         const std::string title = fmt::format("{}, camera {}: the frame farthest from {} samples per pixel",
                                               (*run)->world().scene().name, camera, o.reference);
         const auto written =
-            write_picture(o.picture, title, done.frames[done.worst], *done.worst_picture, *done.worst_reference);
+            plot_replay(o.picture, title, done.frames[done.worst], *done.worst_picture, *done.worst_reference);
         if (!written) return written.error();
     }
     return document;

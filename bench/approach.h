@@ -74,13 +74,13 @@ struct ApproachRun {
 [[nodiscard]] nlohmann::json to_json(const ApproachRun& run);
 /// A table for people.
 [[nodiscard]] std::string in_words(const std::vector<ApproachRun>& runs);
-/// Errors and bounds over range, and the basins, as a PNG.
+/// Plots (plot/plot.h) errors and bounds over the range, and how far off a start may be.
 [[nodiscard]] Status plot_approach(const std::string& path, const std::string& title,
                                    const std::vector<ApproachRun>& runs);
-
-/// The paper's figure: for five frames of the approach the frame, the render at the pose that the points lead to,
-/// and how far the matches lie apart before and after each solution, as a PNG.
-[[nodiscard]] Status picture_of_frames(const std::string& path, const World& world, std::size_t camera,
-                                       std::size_t target, const ApproachOptions& options, TracingThreads& threads);
+/// Plots five frames of the approach, the renders at the poses that the points lead to, and the distances of the
+/// matches before and after each solution (a figure of the paper).
+[[nodiscard]] Status plot_approach_frames(const std::string& path, const World& world, std::size_t camera,
+                                          std::size_t target, const ApproachOptions& options,
+                                          TracingThreads& threads);
 
 }  // namespace narpa

@@ -68,8 +68,7 @@ struct LoopRun {
 /// A table, a line for each camera and LiDAR.
 [[nodiscard]] std::string in_words(const std::vector<LoopRun>& runs);
 
-/// Writes a PNG: for each camera how many frames exceed a lateness, a latency, a distance from the deadline.
-[[nodiscard]] Status write_plot(const std::string& path, const std::string& title,
-                                const std::vector<LoopRun>& runs);
+/// Plots (plot/plot.h) for each camera how many frames exceed a wake-up latency, a latency, a lateness.
+[[nodiscard]] Status plot_loop(const std::string& path, const std::string& title, const std::vector<LoopRun>& runs);
 
 }  // namespace narpa

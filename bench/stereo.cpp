@@ -12,6 +12,7 @@
 
 #include "emulator/world.h"
 #include "estimator/pose/pose_estimate.h"
+#include "plot/plot.h"
 #include "renderer/camera/detector.h"
 #include "renderer/film/camera_image.h"
 
@@ -232,6 +233,25 @@ json to_json(const StereoBench& bench) {
                       {"off_line", n.off_line},
                       {"without_depth", n.without_depth}};
     return out;
+}
+
+Status plot_stereo(const std::string& path, const StereoBench& bench) {
+    json document = to_json(bench), matches = json::array();
+    const auto of = [](const auto& v) { return std::vector<double>(v.data(), v.data() + v.size()); };
+    for (const StereoBenchPoint& p : bench.points)
+        matches.push_back({{"left_px", of(p.left_px)},
+                           {"right_px", of(p.right_px)},
+                           {"truth_m", of(p.truth_m)},
+                           {"whole_pixels_error_m", of(p.whole_error_m)},
+                           {"between_pixels_error_m", of(p.fine_error_m)}});
+    std::vector<std::uint8_t> grey;  // the square root of the DN, so that dark parts can be seen
+    for (const float dn : bench.left.dn)
+        grey.push_back(
+            static_cast<std::uint8_t>(255 * std::sqrt(std::clamp(dn / bench.left_top_dn, 0.0, 1.0)) + 0.5));
+    document["plot"] = "stereo";
+    document["matches"] = matches;
+    document["left"] = plot_image(bench.left.width, bench.left.height, 1, grey);
+    return write_plot(path, document);
 }
 
 std::string in_words(const StereoBench& bench) {

@@ -77,8 +77,8 @@ inline constexpr double kLeastStereoGain = 5, kVarianceFactor = 1.5;
 [[nodiscard]] nlohmann::json to_json(const StereoBench& bench);
 /// A table.
 [[nodiscard]] std::string in_words(const StereoBench& bench);
-/// Writes a PNG: the matches over the left frame; boxes of the errors in x, y and z, absolute and over range, with
-/// whole pixels and between pixels side by side.
-[[nodiscard]] Status write_plot(const std::string& path, const StereoBench& bench);
+/// Plots (plot/plot.h) the matches over the left frame, and the errors in x, y and z both ways, absolute and over
+/// range.
+[[nodiscard]] Status plot_stereo(const std::string& path, const StereoBench& bench);
 
 }  // namespace narpa

@@ -157,7 +157,7 @@ void CameraSensor::log(const FrameLedger& l) noexcept {
     }
     // After the hand-over, which so never waits for it.
     ledger_log_->append({row.data(), format_ledger_row(row, l, image_crc32(unit_.bytes()))});
-    sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
+    sheet_->offer(l.frame, unit_.bytes());
 }
 
 Status CameraSensor::finish() {

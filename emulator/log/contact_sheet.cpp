@@ -1,7 +1,5 @@
 #include "emulator/log/contact_sheet.h"
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
@@ -46,15 +44,14 @@ ContactSheet::ContactSheet(const VideoFormat& format)
       width_(format.width / scale_),
       height_(std::max(1, format.height / scale_)),
       tiles_(kTiles) {
-    for (Tile& t : tiles_) t.bgr.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 3);
+    for (auto& tile : tiles_) tile.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 3);
 }
 
-void ContactSheet::offer(std::uint64_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes) noexcept {
+void ContactSheet::offer(std::uint64_t frame, std::span<const std::uint8_t> bytes) noexcept {
     if (frame % stride_ != 0) return;
     if (used_ == tiles_.size()) thin_out();
     if (frame % stride_ != 0) return;
-    tiles_[used_].t_ns = t_ns;
-    shrink(bytes, tiles_[used_].bgr);
+    shrink(bytes, tiles_[used_]);
     ++used_;
 }
 
@@ -88,10 +85,8 @@ Status ContactSheet::write(const std::string& path) const {
     for (std::size_t i = 0; i < used_; ++i) {
         const int x = gap + static_cast<int>(i % kColumns) * (width_ + gap);
         const int y = gap + static_cast<int>(i / kColumns) * (height_ + gap);
-        cv::Mat tile(height_, width_, CV_8UC3, const_cast<std::uint8_t*>(tiles_[i].bgr.data())), shown;
+        cv::Mat tile(height_, width_, CV_8UC3, const_cast<std::uint8_t*>(tiles_[i].data())), shown;
         cv::LUT(tile, srgb_curve(), shown);
-        cv::putText(shown, fmt::format("t = {:.1f} s", static_cast<double>(tiles_[i].t_ns) * 1e-9),
-                    {6, height_ - 8}, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar(80, 220, 255), 1, cv::LINE_AA);
         shown.copyTo(sheet(cv::Rect(x, y, width_, height_)));
     }
     try {

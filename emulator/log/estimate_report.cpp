@@ -7,9 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "emulator/log/plot.h"
-
-#include <opencv2/imgproc.hpp>
+#include "plot/plot.h"
 
 namespace narpa {
 namespace {
@@ -29,65 +27,6 @@ struct Squares {
     void add(double v) { sum += v * v, ++n; }
     [[nodiscard]] double rms() const { return n > 0 ? std::sqrt(sum / static_cast<double>(n)) : 0; }
 };
-
-/// One error over time, with the deviations that it is told beside.
-struct Curve {
-    std::string words;
-    double (*of_error)(const Vector6&);
-    double (*of_covariance)(const Matrix6&);
-    double scale;
-};
-
-void draw(cv::Mat& image, const Curve& curve, std::span<const TrackedFrame> frames, int top, int bottom) {
-    const cv::Scalar measured{180, 90, 20}, filtered{40, 120, 40}, deviation{150, 150, 240}, bound{60, 60, 200};
-    std::vector<double> times, values;
-    for (const TrackedFrame& f : frames) {
-        times.push_back(static_cast<double>(f.t_ns) * 1e-9);
-        if (f.state != EstimateState::lost)
-            values.push_back(curve.scale * curve.of_error(error_between(f.filtered, f.truth)));
-        if (!f.measured) continue;
-        values.push_back(curve.scale * curve.of_error(error_between(*f.measured, f.truth)));
-        values.push_back(3 * curve.scale * curve.of_covariance(f.covariance));
-        if (f.bound.trace() > 0) values.push_back(curve.scale * curve.of_covariance(f.bound));
-    }
-    std::erase_if(values, [](double v) { return !(v > 0) || !std::isfinite(v); });
-    if (values.empty()) return;
-    const plot::Axis x = plot::linear_axis(times, 90, image.cols - 30);
-    const plot::Axis y = plot::logarithmic_axis(values, bottom, top);
-    for (const double v : x.ticks()) plot::vertical_tick(image, x, y, v);
-    for (const double v : y.ticks()) plot::horizontal_tick(image, y, x, v, fmt::format("{:g}", v));
-    const auto at = [&](const TrackedFrame& f, double value) {
-        return cv::Point2d(x.at(static_cast<double>(f.t_ns) * 1e-9), y.at(curve.scale * value));
-    };
-    const auto follow = [&](auto value_of, const cv::Scalar& colour, int width) {
-        const TrackedFrame* last = nullptr;
-        for (const TrackedFrame& f : frames) {
-            if (!(value_of(f) > 0)) {
-                last = nullptr;
-                continue;
-            }
-            if (last != nullptr) plot::line(image, at(*last, value_of(*last)), at(f, value_of(f)), colour, width);
-            last = &f;
-        }
-    };
-    follow([&](const TrackedFrame& f) { return f.measured ? 3 * curve.of_covariance(f.covariance) : 0; }, deviation,
-           2);
-    follow([&](const TrackedFrame& f) { return f.measured ? curve.of_covariance(f.bound) : 0; }, bound, 1);
-    follow(
-        [&](const TrackedFrame& f) {
-            return f.state == EstimateState::lost ? 0 : curve.of_error(error_between(f.filtered, f.truth));
-        },
-        filtered, 1);
-    for (const TrackedFrame& f : frames)
-        if (f.measured) plot::dot(image, at(f, curve.of_error(error_between(*f.measured, f.truth))), 3, measured);
-    plot::text(image, curve.words, {90, top - 12}, plot::kTitleSize, 0, plot::kInk);
-    int right = image.cols - 30;
-    for (const auto& [name, colour] : {std::pair{"bound", bound}, std::pair{"3 sigma", deviation},
-                                       std::pair{"filtered", filtered}, std::pair{"a frame alone", measured}}) {
-        plot::text(image, name, {right, top - 12}, plot::kTextSize, 1, colour);
-        right -= 110;
-    }
-}
 
 }  // namespace
 
@@ -194,12 +133,27 @@ std::string in_words(const EstimateSummary& s) {
 }
 
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames) {
-    cv::Mat image(860, 1100, CV_8UC3, cv::Scalar(255, 255, 255));
-    plot::text(image, title, {90, 34}, plot::kTitleSize, 0, plot::kInk);
-    draw(image, {"attitude error, deg", rotation, rotation_sigma, 1 / kDegree}, frames, 90, 420);
-    draw(image, {"position error, m", position, position_sigma, 1}, frames, 490, 820);
-    plot::text(image, "simulation time, s", {image.cols / 2, 850}, plot::kTextSize, 0.5, plot::kInk);
-    return plot::write_png(path, image);
+    nlohmann::json rows = nlohmann::json::array();
+    for (const TrackedFrame& f : frames) {
+        nlohmann::json row{{"frame", f.frame}, {"t_s", static_cast<double>(f.t_ns) * 1e-9}};
+        for (const char* key :
+             {"rotation_error_rad", "position_error_m", "rotation_sigma_rad", "position_sigma_m",
+              "rotation_bound_rad", "position_bound_m", "rotation_filtered_rad", "position_filtered_m"})
+            row[key] = nullptr;
+        if (f.measured) {
+            const Vector6 error = error_between(*f.measured, f.truth);
+            row["rotation_error_rad"] = rotation(error), row["position_error_m"] = position(error);
+            row["rotation_sigma_rad"] = rotation_sigma(f.covariance);
+            row["position_sigma_m"] = position_sigma(f.covariance);
+            row["rotation_bound_rad"] = rotation_sigma(f.bound), row["position_bound_m"] = position_sigma(f.bound);
+        }
+        if (f.state != EstimateState::lost) {
+            const Vector6 error = error_between(f.filtered, f.truth);
+            row["rotation_filtered_rad"] = rotation(error), row["position_filtered_m"] = position(error);
+        }
+        rows.push_back(std::move(row));
+    }
+    return write_plot(path, {{"plot", "estimates"}, {"title", title}, {"frames", rows}});
 }
 
 }  // namespace narpa

@@ -33,8 +33,8 @@ struct EstimateSummary {
 [[nodiscard]] nlohmann::json to_json(const EstimateSummary& summary);
 [[nodiscard]] std::string in_words(const EstimateSummary& summary);
 
-/// Errors of every frame over time, in rotation and in position, within three standard deviations and above the
-/// bound, as a PNG.
+/// Plots (plot/plot.h) the errors of every frame over time, in rotation and in position, within three standard
+/// deviations and above the bound.
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames);
 
 }  // namespace narpa

@@ -43,8 +43,8 @@ struct BudgetCost {
 /// A line for each frame, and the cost over all.
 [[nodiscard]] std::string in_words(std::span<const ReplayedFrame> frames, const BudgetCost& cost);
 
-/// Writes a PNG of the frame, its reference and their difference, side by side.
-[[nodiscard]] Status write_picture(const std::string& path, const std::string& title, const ReplayedFrame& frame,
-                                   const RadianceImage& picture, const RadianceImage& reference);
+/// Plots (plot/plot.h) the frame, its reference and their difference, side by side.
+[[nodiscard]] Status plot_replay(const std::string& path, const std::string& title, const ReplayedFrame& frame,
+                                 const RadianceImage& picture, const RadianceImage& reference);
 
 }  // namespace narpa

@@ -32,10 +32,13 @@ struct RunResult {
 /// True where a run's folder has a result of this scenario and seed.
 [[nodiscard]] bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed);
 
+/// The "contact" objects of the runs that made contact.
+[[nodiscard]] std::vector<nlohmann::json> contacts_of(const std::vector<RunResult>& runs);
 /// Success rate with its interval, failures by gate and reason, contact conditions, navigation.
 [[nodiscard]] nlohmann::json summarise(const Scenario& scenario, const std::vector<RunResult>& runs);
+/// The charts of FOLDER/charts become part of it.
 [[nodiscard]] std::string campaign_page(const Scenario& scenario, const nlohmann::json& summary,
-                                        const std::vector<RunResult>& runs);
+                                        const std::string& folder);
 /// A test case for each run, by its first failed gate.
 [[nodiscard]] std::string campaign_junit(const std::string& suite, const std::vector<RunResult>& runs);
 

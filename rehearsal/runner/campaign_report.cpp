@@ -10,9 +10,17 @@
 #include "rehearsal/runner/report_page.h"
 
 namespace narpa::rehearsal {
-namespace {
 
 using nlohmann::json;
+
+std::vector<json> contacts_of(const std::vector<RunResult>& runs) {
+    std::vector<json> all;
+    for (const RunResult& run : runs)
+        if (run.result.is_object() && run.result["contact"].is_object()) all.push_back(run.result["contact"]);
+    return all;
+}
+
+namespace {
 
 /// The gate that a run failed at first; the trouble or the lack of a result where there is none.
 std::pair<std::string, std::string> cause(const RunResult& run) {
@@ -39,13 +47,6 @@ struct Condition {
     double min = 0, max = 0;
     std::vector<double> values;
 };
-std::vector<json> contacts_of(const std::vector<RunResult>& runs) {
-    std::vector<json> all;
-    for (const RunResult& run : runs)
-        if (run.result.is_object() && run.result["contact"].is_object()) all.push_back(run.result["contact"]);
-    return all;
-}
-
 std::vector<Condition> conditions_over(const std::vector<RunResult>& runs) {
     std::vector<Condition> all;
     for (const json& contact : contacts_of(runs)) {
@@ -133,7 +134,7 @@ std::string campaign_junit(const std::string& suite, const std::vector<RunResult
     return out + "  </testsuite>\n";
 }
 
-std::string campaign_page(const Scenario& scenario, const json& s, const std::vector<RunResult>& runs) {
+std::string campaign_page(const Scenario& scenario, const json& s, const std::string& folder) {
     const auto percent = [](const json& v) { return v.get<double>() * 100; };
     std::string body = fmt::format(
         "<h1>{}</h1>\n<p class=\"lead\">{} {} of {} runs succeeded: {:.1f} %, with 95 % confidence between {:.1f} "
@@ -146,7 +147,7 @@ std::string campaign_page(const Scenario& scenario, const json& s, const std::ve
         body += fmt::format("<p>{} of {} runs have no result yet.</p>\n",
                             s["runs"].get<int>() - s["judged"].get<int>(), s["runs"].get<int>());
     if (!s["contact"].empty()) {
-        body += "<h2>Contact</h2>\n" + campaign_contact_charts(contacts_of(runs)) +
+        body += "<h2>Contact</h2>\n" + campaign_contact_charts(folder) +
                 "<table><tr><th>condition</th><th class=\"n\">asked</th><th class=\"n\">mean</th><th "
                 "class=\"n\">sigma</th><th class=\"n\">least</th><th class=\"n\">p99</th><th "
                 "class=\"n\">most</th><th></th>"

@@ -1,10 +1,6 @@
 // What every page has.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-
 #include "rehearsal/runner/report_page.h"
 
 namespace narpa::rehearsal {
@@ -26,10 +22,11 @@ td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .good{background:var(--good)}.bad{background:var(--bad)}.none{background:#8a8f98}
 .charts{display:flex;flex-wrap:wrap;gap:14px 16px}
 figure{margin:0}figcaption{font-size:13px;color:var(--soft);max-width:360px}
-svg{display:block;max-width:100%;height:auto;font:11px system-ui,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;fill:#3c444f}
-svg .grid{stroke:#e6e9ed;stroke-width:1;fill:none}svg .title{font-size:13px;font-weight:650;fill:var(--ink)}
-svg .note{font-size:10.5px;fill:#3c444f}
 img{max-width:360px;width:100%;border:1px solid var(--rule);border-radius:3px;display:block}
+img.chart{max-width:100%;width:auto;border:0}
+table.bars{max-width:1000px}table.bars td.bar{position:relative;width:45%}
+td.bar i{position:absolute;left:0}i.asked{top:6px;height:20px;background:#009E7329;border-right:2px solid var(--ink)}
+i.value{top:11px;height:10px;background:#0072B2}i.beyond{background:#D55E00}
 code,pre{font:12.5px/1.5 ui-monospace,"DejaVu Sans Mono",monospace}
 pre{background:#f6f8fa;padding:10px 12px;border-radius:4px;white-space:pre-wrap;overflow-wrap:anywhere;margin:6px 0}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:3px 16px;margin:8px 0;font-size:14px}dt{color:var(--soft)}dd{margin:0}
@@ -47,19 +44,6 @@ std::string page_around(std::string_view title, std::string_view body) {
 
 std::string badge(bool good, std::string_view words) {
     return fmt::format("<span class=\"badge {}\">{}</span>", good ? "good" : "bad", escape(words));
-}
-
-std::string base64(std::string_view bytes) {
-    constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string out;
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        std::uint32_t group = 0;
-        const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
-        for (std::size_t k = 0; k < 3; ++k)
-            group = group << 8 | (k < n ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
-        for (std::size_t k = 0; k < 4; ++k) out += k <= n ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-    }
-    return out;
 }
 
 }  // namespace narpa::rehearsal

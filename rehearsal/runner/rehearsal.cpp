@@ -15,6 +15,7 @@
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/free_port.h"
+#include "rehearsal/runner/report_charts.h"
 #include "rehearsal/runner/report_page.h"
 
 namespace narpa::rehearsal {
@@ -364,6 +365,8 @@ private:
         if (o_.page) {
             record_["wall_s"] = done.wall_s;
             done.page = in("index.html");
+            if (Status good = draw_charts(o_.folder, rehearsal_plot({s_, judge_.bus(), v})); !good)
+                return good.error();
             if (Status good = write_text(done.page, rehearsal_page(s_, judge_.bus(), v, record_, o_.folder)); !good)
                 return good.error();
         }

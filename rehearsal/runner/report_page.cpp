@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/base64.h"
 #include "rehearsal/judge/gates.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/report_charts.h"
@@ -55,12 +56,12 @@ std::string approach(const Run& run) {
     return "<h2>Approach</h2>\n<p>The chaser's port in the target's port axes: x out of the docking interface. "
            "Scales "
            "differ across and along.</p>\n" +
-           approach_charts(run);
+           approach_charts(run.folder);
 }
 
 std::string motion(const Run& run) {
     return "<h2>Range and rates</h2>\n<p>Shaded: phase of the guidance and number of the leg.</p>\n" +
-           motion_charts(run);
+           motion_charts(run.folder);
 }
 
 std::string errors(const Run& run) {
@@ -74,7 +75,7 @@ std::string errors(const Run& run) {
                "exact "
                "covariance).</p>\n",
                n.estimates, n.share_within * 100, n.nees) +
-           (run.bus.estimates.empty() ? "<p>No estimates.</p>\n" : error_charts(run));
+           (run.bus.estimates.empty() ? "<p>No estimates.</p>\n" : error_charts(run.folder));
 }
 
 std::string contact(const Run& run) {
@@ -114,7 +115,7 @@ std::string ledger(const Run& run) {
     row("middle of the exposure to hand-over", l.exposure_to_hand_over_ms);
     row("rendering", l.render_ms);
     row("hand-over after its deadline (negative: before)", l.late_ms);
-    return out + "</table>\n" + latency_chart(run);
+    return out + "</table>\n" + latency_chart(run.folder);
 }
 
 std::string pictures(const Run& run) {

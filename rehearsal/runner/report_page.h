@@ -10,13 +10,13 @@
 
 namespace narpa::rehearsal {
 
-/// `record` as in rehearsal.json; pictures that stand in FOLDER/navigation and FOLDER/emulator become part of it.
+/// `record` as in rehearsal.json. The pictures of FOLDER/navigation and the charts of FOLDER/charts become part of
+/// it.
 [[nodiscard]] std::string rehearsal_page(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict,
                                          const nlohmann::json& record, const std::string& folder);
 
 /// Head with styles and title, and what closes it: for every page.
 [[nodiscard]] std::string page_around(std::string_view title, std::string_view body);
-[[nodiscard]] std::string base64(std::string_view bytes);
 /// "passed", "failed" as a coloured word.
 [[nodiscard]] std::string badge(bool good, std::string_view words);
 

@@ -59,7 +59,7 @@ TEST(BenchApproach, FindsTheDockingStationAllTheWay) {
     EXPECT_TRUE(plot_approach(plot, "approach", *runs));
     EXPECT_GT(std::filesystem::file_size(plot), 5000u);
     TracingThreads threads(0);
-    EXPECT_TRUE(picture_of_frames(frames, **world, 0, 0, options, threads));
+    EXPECT_TRUE(plot_approach_frames(frames, **world, 0, 0, options, threads));
     EXPECT_GT(std::filesystem::file_size(frames), 20000u);
     EXPECT_EQ(to_json(features)["bands"].back()["found"], all.found);
     EXPECT_NE(in_words(*runs).find("features"), std::string::npos);

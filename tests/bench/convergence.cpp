@@ -2,14 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <random>
 #include <vector>
 
 #include "bench/convergence.h"
-#include "bench/convergence_plot.h"
-#include "tests/support/temporary_folder.h"
 
 namespace narpa {
 namespace {
@@ -188,20 +185,6 @@ TEST(BenchConvergence, FitsAPowerLawExactlyAndKnowsWhereThereIsNone) {
     EXPECT_TRUE(convergence_faults(found).empty());  // one row has no slope to judge
     const std::vector<ErrorRow> without_noise{{4, 4, {}, {}, {}, {}}, {8, 4, {}, {}, {}, {}}};
     EXPECT_EQ(convergence_faults(without_noise).size(), 2u);  // of neither error
-}
-
-TEST(BenchConvergence, DrawsAPlotAndSaysWhereItCannot) {
-    const test::TemporaryFolder folder;
-    std::mt19937_64 random(7);
-    const PictureMean truth = reference(random);
-    const std::vector<ErrorRow> found = rows(random, truth);
-    const std::vector<double> seconds{0.1, 0.2, 0.4, 0.8};
-    const ConvergencePlot plot{"synthetic", found, seconds, 1.0};
-    ASSERT_TRUE(write_plot(folder / "plot.png", plot));
-    EXPECT_GT(std::filesystem::file_size(folder / "plot.png"), 5000u);
-    const Status status = write_plot("/nowhere/at/all.png", plot);
-    ASSERT_FALSE(status);
-    EXPECT_EQ(status.error().file, "/nowhere/at/all.png");
 }
 
 }  // namespace

@@ -1,11 +1,7 @@
-// What `narpa bench render --scenes` says of what it measured: speed-ups, gates, plot.
+// What `narpa bench render --scenes` concludes from its measurements: speed-ups, gates.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "bench/gates.h"
-#include "bench/ladder_plot.h"
-#include "tests/support/temporary_folder.h"
 
 namespace narpa {
 namespace {
@@ -131,24 +127,6 @@ TEST(BenchLadder, RatiosOfTheCraftMustHold) {
     CraftRatios bad = good;
     bad.cost.frame_s = 1.7, bad.space.edge_s = 0.05, bad.still_and_moved.second_s = 0.2, bad.load_s = 1;
     EXPECT_EQ(bench_faults(bad).size(), 4u);
-}
-
-TEST(BenchLadder, ThePlotHasAPanelForEachScene) {
-    const test::TemporaryFolder folder;
-    Rung unknown = adaptive(0.1, 0.4);
-    unknown.predicted = {};
-    Rung timed = adaptive(0.2, 0.3);
-    timed.phase_ns = {1, 2, 3, 4, 5, 6};
-    const std::vector<SceneLadder> scenes(5, beside_the_loop({rung("1 spp", 0.05, 0.9), unknown, timed}));
-    const auto size_of = [&](std::size_t n) {
-        const std::string file = folder / "plot.png";
-        const auto written = write_plot(file, "title", std::span(scenes).first(n));
-        EXPECT_TRUE(written) << written.error().text();
-        return std::filesystem::file_size(file);
-    };
-    EXPECT_GT(size_of(1), size_of(0) + 5000);
-    EXPECT_GT(size_of(5), 3 * size_of(1));
-    EXPECT_FALSE(write_plot("/nowhere/plot.png", "", {}));
 }
 
 }  // namespace

@@ -89,9 +89,9 @@ TEST(StereoBench, TellsWhatIsWrong) {
 TEST(StereoBench, DrawsWhatItFound) {
     const test::TemporaryFolder folder;
     const std::string path = folder / "stereo.png";
-    ASSERT_TRUE(write_plot(path, made_up(5, 0.5, 0.5)));
+    ASSERT_TRUE(plot_stereo(path, made_up(5, 0.5, 0.5)));
     EXPECT_FALSE(cv::imread(path).empty());
-    EXPECT_FALSE(write_plot(folder / "nowhere/stereo.png", made_up(5, 0.5, 0.5)));
+    EXPECT_FALSE(plot_stereo(folder / "nowhere/stereo.png", made_up(5, 0.5, 0.5)));
 }
 
 TEST(StereoBench, SaysWhatItCannotMeasure) {

@@ -27,7 +27,7 @@ TEST(ContactSheet, SpreadsAnyNumberOfFramesOverAtMostTwentyFourTiles) {
         const std::vector<std::uint8_t> frame(frame_bytes(format), 100);
         for (const int frames : {1, 5, 24, 25, 1000}) {
             ContactSheet sheet(format);
-            for (int k = 0; k < frames; ++k) sheet.offer(static_cast<std::uint64_t>(k), k * 100'000'000LL, frame);
+            for (int k = 0; k < frames; ++k) sheet.offer(static_cast<std::uint64_t>(k), frame);
             const std::string path = folder / "sheet.png";
             ASSERT_TRUE(sheet.write(path));
             const int tiles = frames <= 24 ? frames : frames == 25 ? 13 : 16;  // 1000 frames: stride 64
@@ -41,7 +41,7 @@ TEST(ContactSheet, SpreadsAnyNumberOfFramesOverAtMostTwentyFourTiles) {
 TEST(ContactSheet, SaysWhereItCannotWrite) {
     ContactSheet sheet({8, 8, PixelFormat::grey});
     EXPECT_TRUE(sheet.write("/nowhere/at/all.png"));  // nothing taken, nothing to write
-    sheet.offer(0, 0, std::vector<std::uint8_t>(64));
+    sheet.offer(0, std::vector<std::uint8_t>(64));
     const Status status = sheet.write("/nowhere/at/all.png");
     ASSERT_FALSE(status);
     EXPECT_EQ(status.error().file, "/nowhere/at/all.png");

@@ -4,7 +4,7 @@
 #include <fstream>
 
 #include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/chart.h"
+#include "rehearsal/runner/report_charts.h"
 #include "rehearsal/runner/report_page.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/rehearsal/markup.h"
@@ -38,6 +38,8 @@ TEST(Page, IsWellFormedAndNeedsNoNetwork) {
     const narpa::test::TemporaryFolder folder;
     std::filesystem::create_directory(folder / "navigation");
     std::ofstream(folder / "navigation/hold_far_nav.png") << "not looked at";
+    std::filesystem::create_directory(folder / "charts");
+    std::ofstream(folder / "charts/side.svg") << "<svg/>";
     const std::string page =
         page_of(s, docking(s, chaser_at(s, {}, {-0.2, 0, 0}), DynamicsPhase::captured, 4), folder / "");
     EXPECT_EQ(markup_error(page), "");
@@ -56,25 +58,43 @@ TEST(Page, OfARunThatNeverBeganIsOneToo) {
     EXPECT_NE(page.find("the emulator was never heard"), std::string::npos);
 }
 
-TEST(Page, Base64AsInRfc4648) {
-    EXPECT_EQ(base64(""), "");
-    EXPECT_EQ(base64("f"), "Zg==");
-    EXPECT_EQ(base64("fo"), "Zm8=");
-    EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+TEST(Page, WithoutMatplotlibIsWholeAndSaysWhatIsMissing) {
+    const Scenario s = full_scenario();
+    const std::string page = page_of(s, docking(s, chaser_at(s, {0, 0.02, 0}, {-0.07, 0, 0})), "/nowhere");
+    EXPECT_EQ(markup_error(page), "");
+    for (const char* there : {"python3-matplotlib is not installed", "<h2>Gates</h2>", "lateral misalignment"})
+        EXPECT_NE(page.find(there), std::string::npos) << there;
 }
 
-TEST(Chart, PutsDataWhereItBelongs) {
-    Chart chart("t", "x", "y", 158 + 14, 100 + 70);  // 100 px wide, 100 px high within its margins
-    chart.range_x(0, 10);
-    chart.range_y(0, 10);
-    chart.line({{0, 0}, {10, 10}}, kBlue);
-    const std::string svg = chart.svg();
-    EXPECT_NE(svg.find("M58.0,130.0 158.0,30.0"), std::string::npos) << svg;
-    EXPECT_EQ(markup_error(svg), "");
+TEST(Charts, HaveWhatWasOnTheBus) {
+    const Scenario s = full_scenario();
+    const Messages m = docking(s, chaser_at(s, {0, 0.02, 0}, {-0.07, 0, 0}));
+    Judge judge(s);
+    for (const CanFrame& f : m.frames) judge.accept(f, m.ns(0));
+    const Verdict v = judge.finish();
+    const nlohmann::json d = rehearsal_plot({s, judge.bus(), v});
+    EXPECT_EQ(d["plot"], "rehearsal");
+    const std::size_t poses = judge.bus().truth.size();
+    ASSERT_GT(poses, 0u);
+    for (const char* key : {"t_s", "position_m", "range_m", "closing_m_s", "lateral_m_s"})
+        EXPECT_EQ(d["truth"][key].size(), poses) << key;
+    EXPECT_EQ(d["truth"]["range_m"].back(), judge.bus().truth.back().range_m());
+    for (const char* key : {"t_s", "port_position_m", "position_error_m", "attitude_sigma_rad"})
+        EXPECT_EQ(d["estimates"][key].size(), judge.bus().estimates.size()) << key;
+    EXPECT_EQ(d["gates"]["corridor"]["radius_m"], s.gates.corridor->radius_m);
+    EXPECT_EQ(d["gates"]["keep_out_m"], 5);
+    EXPECT_TRUE(d["contact"]["captured"]);
 }
 
-TEST(Chart, OfNothingIsEmptyAxes) {
-    EXPECT_EQ(markup_error(Chart("t", "x", "y").svg()), "");
+TEST(Charts, BecomePartOfThePage) {
+    const narpa::test::TemporaryFolder folder;
+    EXPECT_NE(motion_charts(folder / "").find("narpa-plot charts.json"), std::string::npos);
+    std::filesystem::create_directory(folder / "charts");
+    std::ofstream(folder / "charts/range.svg") << "foobar";
+    const std::string html = motion_charts(folder / "");
+    EXPECT_EQ(markup_error(html), "");
+    EXPECT_NE(html.find("alt=\"Range over time\" src=\"data:image/svg+xml;base64,Zm9vYmFy\""), std::string::npos);
+    EXPECT_EQ(html.find("Rates"), std::string::npos) << "what was not drawn";
 }
 
 RunResult run_of(std::size_t k, const Scenario& s, const Messages& m) {
@@ -113,11 +133,12 @@ TEST(Campaign, PageAndTestReportAreWellFormed) {
     runs.push_back({5, 15, "runs/0005", nullptr});
     const nlohmann::json summary = summarise(s, runs);
     EXPECT_EQ(summary["judged"], 4);
-    EXPECT_EQ(markup_error(campaign_page(s, summary, runs)), "");
+    EXPECT_EQ(markup_error(campaign_page(s, summary, "/nowhere")), "");
+    EXPECT_EQ(campaign_plot(s, contacts_of(runs))["runs"].size(), 4u) << "the run without a result has no contact";
     const std::string xml = campaign_junit("a&b", runs);
     EXPECT_EQ(markup_error(xml), "");
     EXPECT_NE(xml.find("tests=\"5\" failures=\"2\" errors=\"0\" skipped=\"1\""), std::string::npos) << xml;
-    EXPECT_EQ(markup_error(campaign_page(s, summarise(s, {}), {})), "");
+    EXPECT_EQ(markup_error(campaign_page(s, summarise(s, {}), "/nowhere")), "");
 }
 
 TEST(Campaign, ARunWithItsResultIsNotRepeated) {

@@ -1,0 +1,99 @@
+#include "plot/plot.h"
+
+#include <sched.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "base/base64.h"
+
+namespace narpa {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Exit statuses of narpa-plot, and of a program that could not be started (posix_spawn(3)).
+constexpr int kMatplotlibMissing = 3, kNotStarted = 127;
+
+/// narpa-plot beside the running program, or else the one on PATH.
+std::string plot_program() {
+    std::error_code none;
+    const fs::path beside = fs::read_symlink("/proc/self/exe", none).parent_path() / "narpa-plot";
+    return fs::exists(beside, none) ? beside.string() : "narpa-plot";
+}
+
+/// Runs a program at the usual priority, its standard output on our standard error. Returns its exit status.
+int run_program(std::vector<std::string> arguments) {
+    std::vector<char*> argv;
+    for (std::string& a : arguments) argv.push_back(a.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t files;
+    posix_spawnattr_t attributes;
+    posix_spawn_file_actions_init(&files);
+    posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawnattr_init(&attributes);
+    const sched_param usual{};
+    sigset_t no_signals;
+    sigemptyset(&no_signals);
+    posix_spawnattr_setschedpolicy(&attributes, SCHED_OTHER);
+    posix_spawnattr_setschedparam(&attributes, &usual);
+    posix_spawnattr_setsigmask(&attributes, &no_signals);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSCHEDULER | POSIX_SPAWN_SETSIGMASK);
+    pid_t child = 0;
+    const int failed = posix_spawnp(&child, argv[0], &files, &attributes, argv.data(), environ);
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&files);
+    if (failed != 0) return kNotStarted;
+    int status = 0;
+    while (waitpid(child, &status, 0) < 0)
+        if (errno != EINTR) return kNotStarted;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+}
+
+std::string document_beside(const std::string& picture) {
+    return fs::path(picture).replace_extension(".json").string();
+}
+
+Error cannot_write(const std::string& picture) {
+    return {"cannot be written, expected a PNG file in a folder that exists", picture, 0, 0, ErrorKind::failed};
+}
+
+}  // namespace
+
+Status write_plot(const std::string& picture, const nlohmann::json& document) {
+    const std::string json_file = document_beside(picture);
+    if (json_file == picture) return cannot_write(picture);
+    std::ofstream out(json_file);
+    out << document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+    out.close();
+    if (!out) return cannot_write(picture);
+    const int status = run_program({plot_program(), json_file, "-o", picture});
+    if (status == 0 || status == kMatplotlibMissing) return Ok{};
+    if (status != kNotStarted) return cannot_write(picture);
+    std::fprintf(stderr, "%s is not drawn: narpa-plot is not installed beside narpa; %s has the data\n",
+                 picture.c_str(), json_file.c_str());
+    return Ok{};
+}
+
+Status can_write_plot(const std::string& picture) {
+    const std::string json_file = document_beside(picture);
+    if (json_file == picture || !std::ofstream(json_file, std::ios::app)) return cannot_write(picture);
+    return Ok{};
+}
+
+nlohmann::json plot_image(int width, int height, int channels, std::span<const std::uint8_t> pixels) {
+    return {{"width", width},
+            {"height", height},
+            {"channels", channels},
+            {"base64", base64({reinterpret_cast<const char*>(pixels.data()), pixels.size()})}};
+}
+
+}  // namespace narpa

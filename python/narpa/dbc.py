@@ -1,0 +1,95 @@
+"""Reads a DBC file as narpa writes it, and encodes and decodes the signals of its messages.
+
+Signals are little-endian integers times a factor, without offset: `narpa check --dbc` writes no others, and the reader
+refuses them. The most negative raw value of a signed signal means "not available" and is None here.
+"""
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+
+
+def shipped_dbc():
+    """The DBC file that belongs to narpa: one body "chaser" at 0x100, camera 0, and the messages of a closed loop."""
+    installed = HERE / "narpa.dbc"
+    return installed if installed.exists() else HERE.parents[1] / "protocols/can/narpa.dbc"
+
+
+@dataclass(frozen=True)
+class Signal:
+    name: str
+    start: int  # bit
+    length: int  # bits
+    signed: bool
+    factor: float
+    unit: str
+    choices: dict = field(default_factory=dict, compare=False)  # {raw value: word}
+
+    def encode(self, value):
+        """The raw value in two's complement. Words stand for their numbers; clocks are modulo their length."""
+        if isinstance(value, str):
+            numbers = [number for number, word in self.choices.items() if word == value]
+            if not numbers:
+                raise ValueError(f"{self.name}: {value!r}, expected one of {', '.join(self.choices.values())}")
+            raw = numbers[0]
+        elif value is None:
+            raw = -(1 << self.length - 1)
+        else:
+            raw = int(value) if self.factor == 1 and int(value) == value else round(value / self.factor)
+            is_clock = self.unit in ("ns", "us") and not self.signed
+            low, high = (1 - (1 << self.length - 1), (1 << self.length - 1) - 1) if self.signed else (0, (1 << self.length) - 1)
+            if not (is_clock or low <= raw <= high):
+                raise ValueError(f"{self.name}: {value} {self.unit}, expected {low * self.factor:g} to {high * self.factor:g}")
+        return raw % (1 << self.length)
+
+    def decode(self, payload):
+        """From the payload as one integer: the value in the signal's unit, its word, or None."""
+        raw = payload >> self.start & (1 << self.length) - 1
+        if self.signed and raw >> self.length - 1:
+            raw -= 1 << self.length
+            if raw == -(1 << self.length - 1):
+                return None
+        return self.choices.get(raw, raw if self.factor == 1 else raw * self.factor)
+
+
+@dataclass
+class Message:
+    identifier: int
+    name: str
+    size: int  # bytes
+    signals: dict = field(default_factory=dict)  # {name: Signal}
+
+    def encode(self, values):
+        """Bytes with these signals; the others are 0."""
+        payload = 0
+        for name, value in values.items():
+            payload |= self.signals[name].encode(value) << self.signals[name].start
+        return payload.to_bytes(self.size, "little")
+
+    def decode(self, data):
+        payload = int.from_bytes(data, "little")
+        return {name: signal.decode(payload) for name, signal in self.signals.items()}
+
+
+SIGNAL = re.compile(r'SG_ (\w+) : (\d+)\|(\d+)@(\d)([+-]) \(([^,]+),([^)]+)\) \[[^]]*\] "([^"]*)"')
+
+
+def read(path=None):
+    """{identifier: Message} of a DBC file, by default of the one that belongs to narpa."""
+    path = Path(path or shipped_dbc())
+    messages, message = {}, None
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if match := re.match(r"BO_ (\d+) (\w+): (\d+) ", line):
+            message = Message(int(match[1]), match[2], int(match[3]))
+            messages[message.identifier] = message
+        elif match := SIGNAL.match(line.strip()):
+            name, start, length, order, sign, factor, offset, unit = match.groups()
+            if order != "1" or float(offset) != 0:
+                raise ValueError(f"{path}:{number}: {name}: expected a little-endian signal without offset")
+            number_factor = int(factor) if factor.isdigit() else float(factor)
+            message.signals[name] = Signal(name, int(start), int(length), sign == "-", number_factor, unit)
+        elif match := re.match(r"VAL_ (\d+) (\w+) (.*);", line):
+            words = re.findall(r'(-?\d+) "([^"]*)"', match[3])
+            messages[int(match[1])].signals[match[2]].choices.update({int(raw): word for raw, word in words})
+    return messages

@@ -1,0 +1,100 @@
+"""Data packets of the Velodyne VLP-16 (User Manual 63-9243 Rev. D, chapter 9), as narpa sends and records them.
+
+Frame: x right, y forward, z up; azimuth clockwise from +y seen from above. A packet has 24 sequences of 16 lasers.
+"""
+import socket
+import struct
+
+import numpy as np
+
+PORT, PACKET_BYTES = 2368, 1206
+BLOCKS, LASERS = 12, 16
+LASER_PERIOD_S, SEQUENCE_PERIOD_S = 2.304e-6, 55.296e-6
+RANGE_STEP_M, AZIMUTH_STEP_DEG = 0.002, 0.01
+STRONGEST_RETURN, VLP_16 = 0x37, 0x22
+ELEVATION_DEG = np.array([-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15], float)
+# Height of each laser over the sensor's origin ("vertical correction", table 9-1).
+HEIGHT_M = 1e-3 * np.array([11.2, -0.7, 9.7, -2.2, 8.1, -3.7, 6.6, -5.1, 5.1, -6.6, 3.7, -8.1, 2.2, -9.7, 0.7, -11.2])
+
+POINT = np.dtype([("position_m", float, 3), ("range_m", float), ("azimuth_rad", float), ("reflectivity", np.uint8),
+                  ("laser", np.uint8), ("t_s", float)])  # fmt: skip
+BLOCK = np.dtype([("flag", "<u2"), ("azimuth_cdeg", "<u2"), ("returns", [("range", "<u2"), ("reflectivity", "u1")], 32)])
+FLAG = 0xEEFF  # bytes FF EE
+
+
+def decode(packet):
+    """The returns of a packet as an array of POINT, in firing order. t_s: seconds past the UTC hour."""
+    if len(packet) != PACKET_BYTES:
+        raise ValueError(f"a packet of {len(packet)} bytes, expected {PACKET_BYTES}")
+    blocks = np.frombuffer(packet, BLOCK, BLOCKS)
+    if (blocks["flag"] != FLAG).any():
+        raise ValueError("a block of the packet does not begin with FF EE")
+    stamp_us, mode, product = struct.unpack_from("<IBB", packet, BLOCKS * BLOCK.itemsize)
+    if product != VLP_16:
+        raise ValueError(f"a packet of product 0x{product:02X}, expected 0x{VLP_16:02X}, the VLP-16")
+    starts = blocks["azimuth_cdeg"] * AZIMUTH_STEP_DEG
+    turns = np.diff(starts) % 360  # from block to block; the last one turns as the one before
+    turns = np.append(turns, turns[-1])
+    sequence, laser = np.divmod(np.arange(32), LASERS)
+    offset_s = sequence * SEQUENCE_PERIOD_S + laser * LASER_PERIOD_S
+    azimuth_deg = starts[:, None] + turns[:, None] * offset_s / (2 * SEQUENCE_PERIOD_S)
+    points = np.zeros((BLOCKS, 32), POINT)
+    points["azimuth_rad"] = np.radians(azimuth_deg % 360)
+    points["range_m"] = blocks["returns"]["range"] * RANGE_STEP_M
+    points["reflectivity"] = blocks["returns"]["reflectivity"]
+    points["laser"] = laser
+    points["t_s"] = 1e-6 * stamp_us + np.arange(BLOCKS)[:, None] * 2 * SEQUENCE_PERIOD_S + offset_s
+    elevation, azimuth = np.radians(ELEVATION_DEG[laser]), points["azimuth_rad"]
+    points["position_m"] = points["range_m"][..., None] * np.stack(
+        [np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation) + 0 * azimuth], -1)  # fmt: skip
+    points["position_m"][..., 2] += HEIGHT_M[laser]
+    points = points.reshape(-1)
+    return points[points["range_m"] > 0]
+
+
+def encode(azimuths_deg, ranges_m, reflectivities=0, t_s=0.0):
+    """A packet: the azimuth of each block's first shot (12), ranges of 24 x 16 shots (0: no return)."""
+    blocks = np.zeros(BLOCKS, BLOCK)
+    blocks["flag"] = FLAG
+    blocks["azimuth_cdeg"] = np.round(np.asarray(azimuths_deg) / AZIMUTH_STEP_DEG).astype(int) % 36000
+    steps = np.round(np.asarray(ranges_m, float).reshape(BLOCKS, 32) / RANGE_STEP_M)
+    blocks["returns"]["range"] = np.where((steps > 0) & (steps < 65536), steps, 0)
+    blocks["returns"]["reflectivity"] = np.where(blocks["returns"]["range"] > 0, np.broadcast_to(reflectivities, (24, 16)).reshape(BLOCKS, 32), 0)
+    return blocks.tobytes() + struct.pack("<IBB", int(t_s * 1e6) % 3_600_000_000, STRONGEST_RETURN, VLP_16)
+
+
+def receive(port=PORT, host="", timeout_s=None):
+    """Packets as they arrive over UDP, until none has come for so many seconds."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind((host, port))
+        listener.settimeout(timeout_s)
+        while True:
+            try:
+                packet = listener.recv(2048)
+            except socket.timeout:
+                return
+            if len(packet) == PACKET_BYTES:
+                yield packet
+
+
+def read_pcap(path):
+    """The data packets of a capture of Ethernet frames, as `--lidar LIDAR=FILE.pcap` and tcpdump write it."""
+    with open(path, "rb") as file:
+        magic = file.read(4)
+        order = {b"\xd4\xc3\xb2\xa1": "<", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4": ">", b"\xa1\xb2\x3c\x4d": ">"}.get(magic)
+        if order is None:
+            raise ValueError(f"{path}: not a pcap file")
+        file.read(20)
+        while len(header := file.read(16)) == 16:
+            frame = file.read(struct.unpack(order + "4I", header)[2])
+            payload = udp_payload(frame)
+            if payload is not None and len(payload) == PACKET_BYTES:
+                yield payload
+
+
+def udp_payload(frame):
+    """Of an Ethernet frame with IPv4; None for other frames."""
+    if frame[12:14] != b"\x08\x00" or len(frame) < 42 or frame[23] != 17:
+        return None
+    start = 14 + 4 * (frame[14] & 15)
+    return frame[start + 8 : start + struct.unpack_from(">H", frame, start + 4)[0]]

@@ -80,7 +80,7 @@ endfunction()
 
 function(narpa_install_package)
   set(dir ${CMAKE_INSTALL_LIBDIR}/cmake/narpa)
-  foreach(component base protocols drivers renderer estimator rehearsal emulator)
+  foreach(component base plot protocols drivers renderer estimator rehearsal emulator)
     install(EXPORT narpa-${component} NAMESPACE narpa:: DESTINATION ${dir} FILE narpa-${component}.cmake)
   endforeach()
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/narpaConfig.cmake.in ${CMAKE_BINARY_DIR}/narpaConfig.cmake

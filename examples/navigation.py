@@ -1,59 +1,119 @@
 #!/usr/bin/python3
-"""navigation.py CHANNEL VIDEO [RATE]: holds station beside what its camera sees. The corners of its first frame are found
-again in every other: shift and scale say where the chaser has drifted, the star tracker's report on CAN how it is turned.
-Each control period a PD controller answers with impulses. CHANNEL: socket://127.0.0.1:29537, vcan0; VIDEO: FIFO, device"""
-import os, sys, can, cv2, numpy as np
-CHANNEL, VIDEO = sys.argv[1:3]
-PERIOD, MASS, INERTIA = 1.0, 9500.0, np.array([22000.0, 31000.0, 31000.0])  # s, kg, kg m2: scenes/rehearsal/docking.toml
-WIDTH, HEIGHT, FOCAL, RANGE = 320, 240, 386.3, 28.0  # px, px, px; m to what is seen, about
-CAMERA = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # camera axes to chaser axes
-TURN = np.array([0.0, float(sys.argv[3]) if sys.argv[3:] else 1.1313e-3, 0])  # rad/s: of the target, as the orbit
-def crc8(identifier, data, crc=0xFF):  # CRC-8/SAE-J1850
-    for byte in identifier.to_bytes(2, "little") + data:
-        crc ^= byte
-        for _ in range(8): crc = (crc << 1 ^ 0x1D) & 0xFF if crc & 0x80 else crc << 1
-    return crc ^ 0xFF
-def unpacked(data, step):
-    return [step * int.from_bytes(data[i:i + 3], "little", signed=True) for i in range(0, len(data), 3)]
-def matrix(w, *axis):  # of a unit quaternion
-    return cv2.Rodrigues(2 * np.arctan2(np.linalg.norm(axis), w) * np.array(axis) / max(np.linalg.norm(axis), 1e-12))[0]
-def pictures():  # opens with the first frame
-    if VIDEO.startswith("/dev/"):
-        camera = cv2.VideoCapture(VIDEO, cv2.CAP_V4L2)
-        while camera.set(cv2.CAP_PROP_CONVERT_RGB, 0) or True: yield camera.read()[1].reshape(HEIGHT, WIDTH)
-    stream = os.fdopen(os.open(VIDEO, os.O_RDWR), "rb")
-    stream.readline()  # of the stream; each frame has one of its own
-    while stream.readline(): yield np.frombuffer(stream.read(WIDTH * HEIGHT), np.uint8).reshape(HEIGHT, WIDTH)
-bus = can.Bus(CHANNEL, interface="slcan" if ":" in CHANNEL else "socketcan", sleep_after_open=0.1)
-video, first, fit, due, report, cycle, x, v = pictures(), None, np.eye(2, 3), None, {}, 0, np.zeros(3), np.zeros(3)
-print("ready", flush=True)
-for message in bus:
-    m, data = message.arbitration_id, bytes(message.data)
-    if len(data) != 8 or crc8(m, data[:7]) != data[7]: continue
-    if m == 0x752 and data[0] & 15 == 3: break  # dynamics: finished
-    if m == 0x609 and data[5] >> 2 & 3 != 1:  # ledger of camera 0: a frame was handed over
-        picture = next(video)
-        if first is None and (due is None or int.from_bytes(report[0x601], "little") < due): continue  # exposed too early
-        if first is None: first, corners = picture, cv2.goodFeaturesToTrack(picture, 200, 0.02, 6)
-        now, found, _ = cv2.calcOpticalFlowPyrLK(first, picture, corners, cv2.transform(corners, fit), winSize=(25, 25),
-                                                 maxLevel=2, flags=cv2.OPTFLOW_USE_INITIAL_FLOW)
-        fit, same = cv2.estimateAffinePartial2D(corners[found == 1], now[found == 1], ransacReprojThreshold=1.0)
-        centre = (fit @ [WIDTH / 2, HEIGHT / 2, 1] - [WIDTH / 2, HEIGHT / 2]) / FOCAL
-        seen = RANGE / np.hypot(fit[0, 0], fit[1, 0]) * np.append(centre, 1)  # the target, camera axes
-    if 0x740 <= m <= 0x744 or m == 0x601: report[m] = data[:6]  # attitude report, exposure
-    if m == 0x744: due = int.from_bytes(report[0x740], "little")
-    if m != 0x701 or due is None or first is None or data[5] & 15 == 0: continue
-    if int.from_bytes(data[:5], "little") * 1000 + 1000 <= due: continue  # the emulator is not there yet
-    R, rate = matrix(*unpacked(report[0x741] + report[0x742], 2**-22)), unpacked(report[0x743] + report[0x744][:3], 1e-6)
-    R0, t0 = (R, due) if cycle == 0 else (R0, t0)
-    wanted = cv2.Rodrigues(TURN * (due - t0) * 1e-9)[0] @ R0
-    turned = cv2.Rodrigues(wanted.T @ R)[0].ravel()  # off the attitude that it should have
-    missed = wanted.T @ R @ CAMERA @ seen - [RANGE, 0, 0] - (x + v * PERIOD)  # of where it was foreseen
-    x, v = x + v * PERIOD + 0.6 * missed, v + 0.3 * missed / PERIOD
-    impulse = np.clip(MASS * PERIOD * (0.12**2 * x + 2 * 0.9 * 0.12 * v), -300, 300)
-    torque = np.clip(-INERTIA * PERIOD * (0.25**2 * turned + 2 * 0.9 * 0.25 * (rate - R.T @ TURN)), -300, 300)
-    codes = b"".join(round(1e3 * n).to_bytes(3, "little", signed=True) for n in (*impulse, *torque)) + b"\0\1\0\0\0\0"
-    for i, part in enumerate((due.to_bytes(6, "little") + codes)[k:k + 6] + bytes([cycle % 256]) for k in range(0, 30, 6)):
-        bus.send(can.Message(arbitration_id=0x720 + i, is_extended_id=False, data=part + bytes([crc8(0x720 + i, part)])))
-    print(f"{cycle:4d}: off by {np.round(x, 3)} m, {np.round(np.degrees(turned), 2)} deg, {same.sum()} corners", flush=True)
-    v, cycle, due = v - impulse / MASS, cycle + 1, None
+"""Holds station beside what the camera sees, without a model of it.
+
+Usage: navigation.py BUS VIDEO [RATE]      BUS: as `narpa run --can`; VIDEO: a FIFO or /dev/videoN
+                                           RATE: of the target about its y axis, rad/s (default: that of the orbit)
+
+The corners of the first frame are followed through all others: their shift and scale give how far the chaser has drifted.
+The star tracker's report on CAN gives how it is turned. Once each control period a PD controller commands impulses.
+"""
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+from narpa import rotation, y4m
+from narpa.can import Bus
+
+PERIOD_S, MASS_KG, INERTIA_KG_M2 = 1.0, 9500.0, np.array([22000.0, 31000.0, 31000.0])  # scenes/rehearsal/docking.toml
+WIDTH, HEIGHT, FOCAL_PX = 320, 240, 386.3
+RANGE_M = 28.0  # to what the camera sees, about
+R_CHASER_CAMERA = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+ORBIT_RATE_RAD_S = 1.1313e-3
+MOST = 300.0  # N s and N m s that the thrusters deliver in a period
+
+
+def frames_of(video):
+    """Grey frames, one after another; the stream begins with the first one."""
+    if not video.startswith("/dev/"):
+        yield from y4m.Reader(video)
+    device = cv2.VideoCapture(video, cv2.CAP_V4L2)
+    device.set(cv2.CAP_PROP_CONVERT_RGB, 0)
+    while True:
+        yield device.read()[1].reshape(HEIGHT, WIDTH)
+
+
+class CornerTracker:
+    """Where the target is in the camera's axes, from the shift and scale of the first frame's corners."""
+
+    def __init__(self, first):
+        self.first, self.corners = first, cv2.goodFeaturesToTrack(first, maxCorners=200, qualityLevel=0.02, minDistance=6)
+        self.fit = np.eye(2, 3)  # first frame to newest frame
+        self.matched = 0
+
+    def target(self, frame):
+        expected = cv2.transform(self.corners, self.fit)
+        now, found, _ = cv2.calcOpticalFlowPyrLK(self.first, frame, self.corners, expected, winSize=(25, 25), maxLevel=2,
+                                                 flags=cv2.OPTFLOW_USE_INITIAL_FLOW)  # fmt: skip
+        self.fit, same = cv2.estimateAffinePartial2D(self.corners[found == 1], now[found == 1], ransacReprojThreshold=1.0)
+        self.matched = int(same.sum())
+        centre = np.array([WIDTH / 2, HEIGHT / 2])
+        shift = (self.fit @ np.append(centre, 1) - centre) / FOCAL_PX
+        scale = np.hypot(self.fit[0, 0], self.fit[1, 0])
+        return RANGE_M / scale * np.append(shift, 1)
+
+
+class StationKeeper:
+    """Filters the drift, and computes the impulses that undo it. The wanted attitude turns with the target."""
+
+    def __init__(self, attitude, t_ns, target_rate):
+        self.first_attitude, self.first_ns, self.target_rate = attitude, t_ns, np.array([0.0, target_rate, 0.0])
+        self.drift, self.drift_rate = np.zeros(3), np.zeros(3)  # of the target, m and m/s, wanted axes
+
+    def command(self, t_ns, attitude, rate, target_camera):
+        """Impulse and angular impulse in body axes, and the angle off the wanted attitude, rad."""
+        turned = rotation.from_vector(self.target_rate * (t_ns - self.first_ns) * 1e-9)
+        wanted = rotation.product(turned, self.first_attitude)
+        off = rotation.product(rotation.conjugate(wanted), attitude)
+        measured = rotation.rotate(off, R_CHASER_CAMERA @ target_camera) - [RANGE_M, 0, 0]
+        predicted = self.drift + self.drift_rate * PERIOD_S
+        innovation = measured - predicted
+        self.drift = predicted + 0.6 * innovation
+        self.drift_rate = self.drift_rate + 0.3 * innovation / PERIOD_S
+
+        angle = rotation.to_vector(off)
+        rate_off = rate - rotation.rotate(rotation.conjugate(attitude), self.target_rate)
+        impulse = MASS_KG * PERIOD_S * pd(self.drift, self.drift_rate, bandwidth=0.12)
+        angular_impulse = -INERTIA_KG_M2 * PERIOD_S * pd(angle, rate_off, bandwidth=0.25)
+        impulse, angular_impulse = np.clip(impulse, -MOST, MOST), np.clip(angular_impulse, -MOST, MOST)
+        self.drift_rate = self.drift_rate - impulse / MASS_KG
+        return impulse, angular_impulse, angle
+
+
+def pd(error, error_rate, bandwidth, damping=0.9):
+    """The acceleration of a proportional-derivative controller; bandwidth in rad/s."""
+    return bandwidth**2 * error + 2 * damping * bandwidth * error_rate
+
+
+def main(bus_name, video, target_rate=ORBIT_RATE_RAD_S):
+    frames, tracker, keeper, target, report, cycle = frames_of(video), None, None, None, None, 0
+    with Bus(bus_name) as bus:
+        print("ready", flush=True)
+        for message in bus:
+            if message.name == "Dynamics" and message["Phase"] == "finished":
+                break
+            if message.name == "Attitude":
+                report = message  # a command is due for its time
+            if message.name == "Ledger" and message["Delivery"] != "nothing":
+                frame = next(frames)
+                if tracker is None and report and message["ExposureMid"] >= report["Time"]:
+                    tracker = CornerTracker(frame)
+                if tracker:
+                    target = tracker.target(frame)
+            emulator_is_there = (message.name == "Heartbeat" and message["State"] != "starting" and report is not None
+                                 and message["Time"] * 1000 + 1000 > report["Time"])  # fmt: skip
+            if not (emulator_is_there and tracker):
+                continue
+            t_ns, attitude, rate = report["Time"], report.quaternion(), np.array(report.vector("Rate"))
+            keeper = keeper or StationKeeper(attitude, t_ns, float(target_rate))
+            impulse, angular_impulse, angle = keeper.command(t_ns, attitude, rate, target)
+            bus.send("Actuator", Time=t_ns, Impulse=impulse, AngularImpulse=angular_impulse, Leg=0, Phase="holding", Abort="none")
+            print(f"{cycle:4d}: off by {np.round(keeper.drift, 3)} m, {np.round(np.degrees(angle), 2)} deg, "
+                  f"{tracker.matched} corners", flush=True)  # fmt: skip
+            cycle, report = cycle + 1, None
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -36,7 +36,7 @@ def command_and_compare(bus_spec, bus_settings, fd):
     print(f"{name}: {told}")
     expect(told["commands_taken"] == len(POSES) and told["commands_missed"] == 0, f"{name}: all commands taken, none missed")
     expect(not any(told["rejected"].values()), f"{name}: nothing rejected")
-    _, frames = support.read_y4m(video, support.WIDTH * support.HEIGHT)
+    frames = support.read_y4m(video)
     wanted = [support.render(support.SCENE, FIRST_FRAME + i, pose, folder) for i, pose in enumerate(POSES)]
     support.expect_frames(frames, wanted, name)
     elsewhere = support.render(support.SCENE, FIRST_FRAME, POSES[-1], folder)  # the same frame's noise, another pose

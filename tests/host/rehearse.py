@@ -68,7 +68,7 @@ name = "hold"
 duration_s = 10.0
 """)
     example = Path(__file__).resolve().parents[2] / "examples/navigation.py"
-    command = f"{sys.executable} {example} socket://127.0.0.1:${{BUS#slcan:}} ${{VIDEO#nav=}}"
+    command = f"{sys.executable} {example} $BUS ${{VIDEO#nav=}}"
     _, verdict = rehearse(folder / "hold.toml", folder / "out", "--navigation", command)
     expect(verdict["bus"]["commands"] == 10, f"each period has its thruster command: {verdict['bus']}")
     reasons = failed_gates(verdict)

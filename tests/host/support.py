@@ -1,10 +1,9 @@
-"""What the scripts of the host and kernel tiers share: running narpa, speaking its CAN protocol, reading its files.
+"""What the host and kernel tests share: running narpa, commanding it over CAN, reading its files.
 
-Poses are encoded here from the DBC file by canmatrix and from the documented checksums, not by narpa's own code, so
-that a mistake in that code does not cancel out.
+Messages are encoded and decoded by the Python package (python/narpa, checked by tests/python) from the DBC file that narpa
+writes, so that a mistake in narpa's own encoder does not cancel out.
 """
 import json
-import logging
 import os
 import re
 import signal
@@ -13,8 +12,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from decimal import Decimal
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
 
 NARPA = os.environ["NARPA_BIN"]
 SCENE = Path(__file__).resolve().parent / "scene/bench.toml"
@@ -139,113 +139,64 @@ def render(scene, frame, pose, folder):
 
 
 class Pose:
-    """A pose as the wire can carry it: what is given, rounded to the DBC's factors. World frame, metres; (w, x, y, z)."""
+    """A pose as CAN carries it: the given values, rounded to the steps of the DBC. World frame, metres; (w, x, y, z)."""
 
-    POSITION, ATTITUDE, VELOCITY, RATE = Decimal("1e-6"), Decimal(2) ** -22, Decimal("2e-5"), Decimal("2e-5")
+    STEPS = {"Position": 1e-6, "Attitude": 2.0**-22, "Velocity": 2e-5, "Rate": 2e-5}
 
     def __init__(self, position, attitude, velocity=(0, 0, 0), rate=(0, 0, 0)):
         norm = sum(v * v for v in attitude) ** 0.5
-        self.raw = {}
-        for name, axes, values, factor in (
-            ("Position", "XYZ", position, self.POSITION),
-            ("Attitude", "WXYZ", [v / norm for v in attitude], self.ATTITUDE),
-            ("Velocity", "XYZ", velocity, self.VELOCITY),
-            ("Rate", "XYZ", rate, self.RATE),
-        ):
-            for axis, value in zip(axes, values):
-                self.raw[name + axis] = round(value / float(factor))
-        self.position = tuple(self.raw["Position" + a] * 1e-6 for a in "XYZ")
-        q = [self.raw["Attitude" + a] * 2.0**-22 for a in "WXYZ"]
+        given = {"Position": position, "Attitude": [v / norm for v in attitude], "Velocity": velocity, "Rate": rate}
+        self.signals = {name: [round(v / self.STEPS[name]) * self.STEPS[name] for v in values] for name, values in given.items()}
+        self.position = tuple(self.signals["Position"])
+        q = self.signals["Attitude"]
         scale = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) ** 0.5
         self.attitude = tuple(v * scale for v in q)
 
-    def physical(self):
-        factors = {"P": self.POSITION, "A": self.ATTITUDE, "V": self.VELOCITY, "R": self.RATE}
-        return {name: raw * factors[name[0]] for name, raw in self.raw.items()}
-
 
 def flight(count):
-    """Ten or so poses of a chaser that drifts and turns before the scene's bodies."""
+    """Poses of a chaser that drifts and turns before the scene's bodies."""
     return [
         Pose((0.05 * i, -0.03 * i, 0.08 * i), (1, 0.004 * i, -0.01 * i, 0.006 * i), (0.5, -0.3, 0.8), (0.08, -0.2, 0.12))
         for i in range(count)
     ]
 
 
-def crc8_j1850(data):
-    crc = 0xFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x1D if crc & 0x80 else crc << 1) & 0xFF
-    return crc ^ 0xFF
-
-
-def crc16_ccitt_false(data):
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
-
-
 class Wire:
-    """Pose commands and telemetry of the scene as python-can messages, laid out by its DBC."""
+    """Pose commands and telemetry of the scene as python-can messages, by the DBC file that narpa writes for it."""
 
     def __init__(self):
-        logging.getLogger("canmatrix").setLevel(logging.CRITICAL)  # of the formats that it would read, too
-        import canmatrix.formats
+        from narpa.can import Catalogue, Decoder
 
         dbc = work_folder() / "bench.dbc"
         narpa("check", SCENE, "--dbc", dbc)
-        database = canmatrix.formats.loadp_flat(str(dbc))
-        self.frames = {frame.arbitration_id.id: frame for frame in database.frames}
-
-    def _encode(self, identifier, values):
-        frame = self.frames[identifier]
-        return bytearray(frame.encode({s.name: s.phys2raw(values[s.name]) for s in frame.signals if s.name in values}))
+        self.catalogue = Catalogue(dbc)
+        self.decoder = Decoder(self.catalogue)
 
     def command(self, pose, t_ns, counter, fd=False):
         """The messages of one pose command: nine classic ones, or one of CAN FD."""
         import can
 
-        values = pose.physical() | {"Time": Decimal(t_ns), "Counter": Decimal(counter % 256)}
-        messages = []
-        for offset in [15] if fd else range(9):
-            identifier = CAN_ID + offset
-            data = self._encode(identifier, values)
-            id_bytes = identifier.to_bytes(2, "little")
-            if fd:
-                data[62:] = crc16_ccitt_false(id_bytes + data[:62]).to_bytes(2, "little")
-            else:
-                data[7] = crc8_j1850(id_bytes + data[:7])
-            messages.append(can.Message(arbitration_id=identifier, is_extended_id=False, data=data, is_fd=fd))
-        return messages
+        frames = self.catalogue.at("Pose", CAN_ID).encode({"Time": t_ns, **pose.signals}, counter, fd)
+        return [can.Message(arbitration_id=i, is_extended_id=False, data=data, is_fd=fd) for i, data in frames]
 
-    def decode(self, message):
-        """{signal: value} of a message of narpa's, or nothing for an identifier that the DBC does not have."""
-        frame = self.frames.get(message.arbitration_id)
-        return {k: v.phys_value for k, v in frame.decode(bytearray(message.data)).items()} if frame else {}
-
-
-LEDGER_FRAME, LEDGER_FD, HEARTBEAT = 0x600, 0x60F, 0x701
+    def accept(self, message):
+        """The set of signals that this message completes, or None."""
+        return self.decoder.accept(message.arbitration_id, message.data)
 
 
 def await_ledger(bus, wire, frame, seconds=30):
-    """Reads the bus until narpa tells that it has handed over `frame`; returns the signals of that message."""
+    """Reads the bus until the ledger of `frame` arrives, and returns it."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         message = bus.recv(0.2)
-        if message and message.arbitration_id in (LEDGER_FRAME, LEDGER_FD):
-            signals = wire.decode(message)
-            if signals["Frame"] == frame:
-                return signals
-    expect(False, f"the ledger of frame {frame} comes within {seconds} s")
+        received = message and wire.accept(message)
+        if received and received.name == "Ledger" and received["Frame"] == frame:
+            return received
+    expect(False, f"the ledger of frame {frame} arrives within {seconds} s")
 
 
 def open_bus(run, seconds=30, **settings):
-    """A python-can bus, as soon as narpa listens: on a bus without a server, nobody would notice a command too early."""
+    """A python-can bus, once narpa listens: on a bus without a server, a command sent earlier would be lost."""
     import can
 
     run.wait_for("commands: ")
@@ -263,17 +214,11 @@ def open_bus(run, seconds=30, **settings):
 # --- files ----------------------------------------------------------------------------------------------------------
 
 
-def read_y4m(path_or_bytes, frame_bytes):
-    """(header, [frames]) of a YUV4MPEG2 file; every frame must be whole."""
-    data = path_or_bytes if isinstance(path_or_bytes, bytes) else Path(path_or_bytes).read_bytes()
-    header, _, rest = data.partition(b"\n")
-    frames = []
-    while rest:
-        line, _, rest = rest.partition(b"\n")
-        assert line.startswith(b"FRAME") and len(rest) >= frame_bytes, "a broken frame in the Y4M file"
-        frames.append(rest[:frame_bytes])
-        rest = rest[frame_bytes:]
-    return header.decode(), frames
+def read_y4m(path):
+    """The samples of every frame of a Y4M file."""
+    from narpa import y4m
+
+    return list(iter(y4m.Reader(path).read_bytes, None))
 
 
 def expect_frames(got, wanted, what):

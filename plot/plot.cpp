@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -23,8 +24,9 @@ namespace fs = std::filesystem;
 /// Exit statuses of narpa-plot, and of a program that could not be started (posix_spawn(3)).
 constexpr int kMatplotlibMissing = 3, kNotStarted = 127;
 
-/// narpa-plot beside the running program, or else the one on PATH.
+/// What the environment variable NARPA_PLOT names, or narpa-plot beside the running program, or the one on PATH.
 std::string plot_program() {
+    if (const char* named = std::getenv("NARPA_PLOT")) return named;
     std::error_code none;
     const fs::path beside = fs::read_symlink("/proc/self/exe", none).parent_path() / "narpa-plot";
     return fs::exists(beside, none) ? beside.string() : "narpa-plot";

@@ -15,7 +15,8 @@ namespace narpa {
 
 /// Writes the document beside `picture`, with the extension .json, and starts narpa-plot to draw it. `picture` is a
 /// PNG, SVG or PDF file, or a folder for a document of several charts. Where narpa-plot or matplotlib is missing, a
-/// sentence on standard error says so and only the JSON is written: no error. Starts a process: not for the loop.
+/// sentence on standard error says so and only the JSON is written: no error. The environment variable NARPA_PLOT
+/// names another program; NARPA_PLOT=true draws nothing. Starts a process: not for the loop.
 [[nodiscard]] Status write_plot(const std::string& picture, const nlohmann::json& document);
 
 /// An Error where write_plot could not write: for commands that measure for minutes first.

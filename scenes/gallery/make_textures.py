@@ -1,7 +1,7 @@
-"""The pictures that the gallery's scenes put on their surfaces.
+"""The textures of the gallery's scenes.
 
-With a folder of real maps (earth-blue-marble.jpg, 2k_mars.jpg, lunar_surface_4096x2048.jpg; longitude across, latitude
-up) these are taken; a map that is not there is made up.
+Maps come from a folder of real ones (earth-blue-marble.jpg, 2k_mars.jpg, lunar_surface_4096x2048.jpg; longitude across,
+latitude up); a missing map is generated.
 """
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def checker(squares):
 
 
 def graticule():
-    """A made-up map: parallels and meridians every 15 degrees, a colour for each octant, and names."""
+    """A generated map: parallels and meridians every 15 degrees, a colour for each octant, and names."""
     width, height = 2 * SIZE[0], 2 * SIZE[1]
     y, x = np.indices((height, width))
     image = np.empty((height, width, 3), np.uint8)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The command line as a script sees it: --help, one JSON document on standard output, exit codes, errors with places."""
+"""The command line for scripts: --help, one JSON document on standard output, exit codes, errors with file and line."""
 import json
 import re
 
@@ -18,12 +18,12 @@ folder = support.work_folder()
 
 def check_help():
     general = narpa("--help").stdout.decode()
-    expect("--json" in general, "--help tells of --json")
+    expect("--json" in general, "--help lists --json")
     for name, options in SUBCOMMANDS.items():
         expect(name in general, f"--help names {name}")
         text = narpa(name, "--help").stdout.decode()
         missing = [option for option in options if option not in text]
-        expect(not missing, f"{name} --help tells of {' '.join(options)}" + (f", but not of {missing}" if missing else ""))
+        expect(not missing, f"{name} --help lists {' '.join(options)}" + (f", but not {missing}" if missing else ""))
 
 
 def check_json():
@@ -39,10 +39,10 @@ def check_json():
 
 
 def expect_refusal(status, pattern, *arguments):
-    """The status, and a message for people on standard error alone."""
+    """The exit status, a message on standard error, and nothing on standard output."""
     done = narpa(*arguments, status=status)
-    said = done.stderr.decode()
-    expect(re.search(pattern, said), f"exit {status}, standard error has /{pattern}/: {said.strip()}")
+    error = done.stderr.decode()
+    expect(re.search(pattern, error), f"exit {status}, standard error has /{pattern}/: {error.strip()}")
     expect(not done.stdout, "and standard output has nothing")
 
 

@@ -21,7 +21,7 @@ def command_and_compare(bus_spec, bus_settings, fd):
     wire = support.Wire()
     video = folder / "nav.y4m"
     with support.Run(support.SCENE, "--can", bus_spec, "--video", f"{support.CAMERA}={video}", "--lockstep") as run:
-        run.wait_for("commands: ")  # from now on it hears
+        run.wait_for("commands: ")  # it receives from now on
         bus = support.open_bus(run, **bus_settings)
         for i, pose in enumerate(POSES):
             frame = FIRST_FRAME + i
@@ -32,10 +32,10 @@ def command_and_compare(bus_spec, bus_settings, fd):
             expect(ledger["PoseCounter"] == (250 + i) % 256, f"{name}: ledger of frame {frame} names its command")
         summary = run.stop()
         bus.shutdown()
-    told = summary["can"]
-    print(f"{name}: {told}")
-    expect(told["commands_taken"] == len(POSES) and told["commands_missed"] == 0, f"{name}: all commands taken, none missed")
-    expect(not any(told["rejected"].values()), f"{name}: nothing rejected")
+    counts = summary["can"]
+    print(f"{name}: {counts}")
+    expect(counts["commands_taken"] == len(POSES) and counts["commands_missed"] == 0, f"{name}: all commands taken, none missed")
+    expect(not any(counts["rejected"].values()), f"{name}: nothing rejected")
     frames = support.read_y4m(video)
     wanted = [support.render(support.SCENE, FIRST_FRAME + i, pose, folder) for i, pose in enumerate(POSES)]
     support.expect_frames(frames, wanted, name)

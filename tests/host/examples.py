@@ -20,7 +20,7 @@ folder = support.work_folder()
 
 
 def started(name, *command):
-    """A program in the background that has said that it is ready, and the file with what it says."""
+    """A program in the background that has printed "ready", and the file with its output."""
     out = folder / f"{name}.out"
     process = subprocess.Popen([str(c) for c in command], stdout=open(out, "wb"), stderr=subprocess.STDOUT)
     for _ in range(600):
@@ -30,7 +30,7 @@ def started(name, *command):
             break
         support.time.sleep(0.1)
     process.kill()
-    expect(False, f"{name} says ready; it says: {out.read_text(errors='replace')}")
+    expect(False, f"{name} prints ready; its output: {out.read_text(errors='replace')}")
 
 
 def finished(name, process, out):
@@ -55,8 +55,8 @@ def check_dynamics_and_navigation(seconds):
                               text=True, timeout=120)
         expect(done.returncode == 0, f"dynamics.py ends well: {done.returncode} {done.stderr[-500:]}")
         expect(len(done.stdout.splitlines()) == seconds, f"it was commanded {seconds} times: {done.stdout[-300:]}")
-        said = finished("navigation.py", *navigation)
-        expect(f"{seconds - 1}: off by" in said, "it answered to the last")
+        output = finished("navigation.py", *navigation)
+        expect(f"{seconds - 1}: off by" in output, "it commanded every period")
         run.stop()
 
 
@@ -72,8 +72,8 @@ scene = "{SCENES}/scene.toml"\nduration_s = {seconds}.0\n""")
                           text=True, timeout=120)
     expect(done.returncode == 0, f"narpa-dynamics ends well: {done.returncode} {done.stderr[-500:]}")
     finished("narpa-navigation", *navigation)
-    said = finished("emulator.py", *emulator)
-    expect(f"{seconds}.00 s, {seconds + 1} frames" in said, f"{seconds + 1} frames were handed over")
+    output = finished("emulator.py", *emulator)
+    expect(f"{seconds}.00 s, {seconds + 1} frames" in output, f"{seconds + 1} frames were handed over")
 
 
 check_dynamics_and_navigation(8)

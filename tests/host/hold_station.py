@@ -71,7 +71,7 @@ def await_line(run, path, word):
 
 
 def fly(folder):
-    """Returns what the navigation said."""
+    """Returns the output of the navigation."""
     fifo, scenario = folder / "nav", folder / "hold.toml"
     os.mkfifo(fifo)
     scenario.write_text(SCENARIO)
@@ -86,9 +86,9 @@ def fly(folder):
             dynamics = start(folder, "dynamics.out", [BUILD / "bin/narpa-dynamics", scenario, "--can", f"slcan:{port}",
                                                       "--patience", "60", *mode])
             ended = dynamics.wait(timeout=150)
-            said = (folder / "navigation.out").read_text()
+            output = (folder / "navigation.out").read_text()
             if ended != 0:
-                print((folder / "dynamics.out").read_text(), said)
+                print((folder / "dynamics.out").read_text(), output)
             expect(ended == 0, "narpa-dynamics flies to the end")
             expect(navigation.wait(timeout=30) == 0, "examples/navigation.py ends with it")
         finally:
@@ -100,7 +100,7 @@ def fly(folder):
 
 
 folder = support.work_folder()
-said = fly(folder)
+output = fly(folder)
 found = poses(folder / "emulator/can.log")
 target, chaser = found[TARGET], found[CHASER]
 track = [beside(target[t], chaser[t]) for t in sorted(chaser) if t in target]
@@ -108,6 +108,6 @@ expect(len(track) > 4.5 * SECONDS, f"{len(track)} poses of both bodies on CAN")
 drift_m = max(math.dist(p, track[0][0]) for p, _ in track)
 turn_deg = max(math.degrees(rotation.angle(q, track[0][1])) for _, q in track)
 if drift_m >= DRIFT_M or turn_deg >= ATTITUDE_DEG:
-    print(said)
+    print(output)
 expect(drift_m < DRIFT_M, f"the chaser drifts by {drift_m:.3f} m, less than {DRIFT_M} m")
 expect(turn_deg < ATTITUDE_DEG, f"it turns by {turn_deg:.2f} degrees, less than {ATTITUDE_DEG}")

@@ -2,9 +2,9 @@
 """PCL's unmodified VLP grabber decodes a moving LiDAR's packets, live over UDP and from the capture of the same run;
 every point of a whole sweep lies within 3 mm of the ray-traced hit at its own shot time, none is missing, none extra.
 
-What PCL 1.13 ignores of the instrument (its vlp_grabber.cpp): a laser's own firing time within a sequence of 16, so
+What PCL 1.13 neglects (its vlp_grabber.cpp): a laser's own firing time within a sequence of 16, so
 that all 16 get the azimuth of the sequence's start; the height at which a beam crosses the axis; fractions of 0.01 deg.
-The first two are put right here before points are compared; the third is 1 mm at 6 m and stays in the 3 mm.
+The first two are corrected here before points are compared; the third is 1 mm at 6 m, part of the 3 mm.
 """
 import csv
 import math
@@ -46,7 +46,7 @@ def read_truth(trajectory, folder):
 
 
 def split_as_pcl_does(truth):
-    """Whole sweeps of hits, each with the azimuth (0.01 deg) that PCL reckons with: a sweep ends where it falls."""
+    """Whole sweeps of hits, each with the azimuth (0.01 deg) that PCL uses: a sweep ends where it decreases."""
     sweeps, last = [[]], -1.0
     for at in range(0, len(truth) - 383, 384):
         packet = truth[at : at + 384]
@@ -94,7 +94,7 @@ write_trajectory(trajectory)
 truth = read_truth(trajectory, folder)
 sweeps = split_as_pcl_does(truth)
 ranges = [shot["range_m"] for shot, _, _ in sweeps[SWEEP]]
-expect(len(truth) > 4 * 28000, f"narpa scan tells the truth of {len(truth)} shots")
+expect(len(truth) > 4 * 28000, f"narpa scan lists {len(truth)} shots")
 expect(len(ranges) > 5000 and max(ranges) < 6.5, f"sweep {SWEEP} has {len(ranges)} hits up to {max(ranges):.2f} m")
 
 can_port, udp_port = support.free_port(), support.free_port()

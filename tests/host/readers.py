@@ -19,7 +19,7 @@ FFMPEG_RAW = {"GREY": "gray", "Y16": "gray16le", "YUYV": "yuyv422"}
 
 
 def await_open(process, path):
-    """Returns when the process has opened the path; a reader of a FIFO gets there when its writer has as well."""
+    """Returns when the process has opened the path; opening a FIFO waits for its writer."""
     files = Path(f"/proc/{process.pid}/fd")
     for _ in range(600):
         if any(os.path.realpath(file) == str(path) for file in files.iterdir()):
@@ -54,7 +54,7 @@ def split(data, size):
 
 
 def start_ffmpeg(path, pixel_format, out):
-    """ffmpeg, told nothing but the file's name, repacking to the layout of narpa's raw frames."""
+    """ffmpeg, given only the file's name, repacking to the layout of narpa's raw frames."""
     command = ["ffmpeg", "-v", "error", "-nostdin", "-i", path, "-f", "rawvideo", "-fps_mode", "passthrough"]
     return subprocess.Popen([*command, "-pix_fmt", FFMPEG_RAW[pixel_format], out])
 

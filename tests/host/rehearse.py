@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Whole rehearsals, judged.
+"""Whole rehearsals and their verdicts.
 
-Usage: rehearse.py docks       the last ten metres: docks inside the docking standard's box, on 1 and 2 threads byte for byte, and replay agrees
-       rehearse.py fails       the three scenarios that must fail do, each at its gate
+Usage: rehearse.py docks       the last ten metres: docks within the docking standard's limits, byte for byte the same on 1 and 2 threads
+       rehearse.py fails       the three scenarios that must fail do so, each at its gate
        rehearse.py another     with the Python navigation of examples/ in place of narpa's, as docs/interfaces.md says
-       rehearse.py flies       around a real small body (the shape of Itokawa), where ../shared/assets has it"""
+       rehearse.py flies       around the shape of Itokawa, where ../shared/assets has it"""
 import json
 import os
 import subprocess
@@ -19,7 +19,7 @@ MESH = Path(__file__).resolve().parents[3] / "shared/assets/smallbody/itokawa/It
 
 
 def rehearse(scenario, folder, *options):
-    """Exit status and verdict."""
+    """Returns exit status and verdict."""
     done = subprocess.run([support.NARPA, "rehearse", scenario, "-o", folder, "--json", *options], capture_output=True, text=True)
     if done.returncode not in (0, 1):
         print(done.stderr)
@@ -40,7 +40,7 @@ def docks():
     rehearse(SCENARIOS / "dispersions.toml", folder / "two", "--threads", "2")
     for file in ["emulator/can.log", "emulator/nav.ledger.csv", "dynamics/truth.csv", "navigation/navigation.csv"]:
         one, two = ((folder / run / file).read_bytes() for run in ("one", "two"))
-        if file.endswith("ledger.csv"):  # its times of making are those of the wall
+        if file.endswith("ledger.csv"):  # its render times are wall times
             one, two = ([line.split(b",")[-1] for line in text.splitlines()] for text in (one, two))
         expect(one == two, f"{file} is the same on 1 and on 2 threads")
 

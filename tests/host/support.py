@@ -36,7 +36,7 @@ def expect(condition, what):
 
 
 def work_folder():
-    """A folder that is gone when the script ends."""
+    """A temporary folder, deleted when the script ends."""
     folder = tempfile.TemporaryDirectory(prefix="narpa-test-")
     work_folder.kept.append(folder)
     return Path(folder.name)
@@ -66,7 +66,7 @@ def scene_with(folder, pixel_format):
 
 
 def narpa(*arguments, status=0):
-    """Runs narpa to its end; fails unless it ends with `status`. Returns what it did and said."""
+    """Runs narpa to its end; fails unless it ends with `status`. Returns its CompletedProcess."""
     done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=120)
     if done.returncode != status:
         print(done.stderr.decode(errors="replace"))
@@ -92,31 +92,31 @@ class Run:
             self.process.kill()
             self.process.wait()
         if trouble:
-            print(f"--- narpa run ({'still there' if status is None else f'ended with {status}'}) said:\n{self.said()}")
+            print(f"--- narpa run ({'still there' if status is None else f'ended with {status}'}) wrote to standard error:\n{self.stderr()}")
 
-    def said(self):
+    def stderr(self):
         return self.log.read_text(errors="replace")
 
     def expect_alive(self):
         if self.process.poll() is not None:
-            print(self.said())
+            print(self.stderr())
             expect(False, f"narpa run is still running (it ended with {self.process.returncode})")
 
     def wait_for(self, pattern, seconds=60):
-        """The first match of the pattern in what narpa says."""
+        """Waits for the pattern in narpa's standard error; returns the first match."""
         for _ in range(int(seconds * 20)):
-            if match := re.search(pattern, self.said()):
+            if match := re.search(pattern, self.stderr()):
                 return match
             self.expect_alive()
             time.sleep(0.05)
-        print(self.said())
+        print(self.stderr())
         expect(False, f"narpa run says {pattern} within {seconds} s")
 
     def finish(self, seconds=60):
         """Waits until it ends by itself."""
         out, _ = self.process.communicate(timeout=seconds)
         if self.process.returncode != 0:
-            print(self.said())
+            print(self.stderr())
             expect(False, f"narpa run exits with 0, not {self.process.returncode}")
         return json.loads(out)
 
@@ -127,7 +127,7 @@ class Run:
 
 
 def render(scene, frame, pose, folder):
-    """The bytes that a video device gets for a frame at the time frame * period, the body being at `pose`."""
+    """The bytes that a video device gets for the frame at time frame * period with the body at `pose`."""
     path = folder / f"frame_{frame}.raw"
     numbers = ",".join(repr(v) for v in (*pose.position, *pose.attitude))
     narpa("render", scene, "--camera", CAMERA, "--frame", frame, "--time", repr(frame * PERIOD_NS * 1e-9),

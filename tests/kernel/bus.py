@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""In the rig: can-utils commands poses on vcan0; vcan0 goes down and comes up, and commands are taken again; the
-kernel's slcan driver makes a CAN interface of narpa's pseudo-terminal."""
+"""In the rig: cansend commands poses on vcan0, before and after vcan0 has been down; slcand makes a CAN interface of
+narpa's pseudo-terminal."""
 import subprocess
 import sys
 import time

@@ -1,7 +1,6 @@
 #!/usr/bin/python3
-"""In the rig: poses on vcan0, frames on /dev/video10, read by v4l2-ctl, ffmpeg, GStreamer and OpenCV one after the
-other; what each of them gets is byte-identical to `narpa render`, in every pixel format. In between a reader is killed,
-and the next one finds the stream going on."""
+"""In the rig: poses on vcan0, frames on /dev/video10, read by v4l2-ctl, ffmpeg, GStreamer and OpenCV in turn. Each gets
+frames byte-identical to `narpa render`, in every pixel format. A reader that is killed does not stop the stream."""
 import subprocess
 import sys
 import threading
@@ -12,15 +11,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "host"))
 import support
 from support import expect
 
-import cv2  # here and once: an emulated processor takes ten seconds for it
+import cv2  # once, at the start: an emulated processor takes ten seconds for it
 
 DEVICE = "/dev/video10"
 FRAMES_PER_READER = 3
-# A frame is written a little after its ledger is told, and a reader has its turn on an emulated processor.
+# A frame is written shortly after its ledger is sent, and a reader needs time on an emulated processor.
 PACE_S = 0.15
 POSES = support.flight(60)
 
-# Each is told nothing of the format.
+# None of them is given the format.
 COMMANDS = {
     "v4l2-ctl": f"v4l2-ctl -d {DEVICE} --stream-mmap --stream-count={FRAMES_PER_READER} --stream-to=OUT",
     "ffmpeg": f"ffmpeg -v error -nostdin -f v4l2 -i {DEVICE} -frames:v {FRAMES_PER_READER} -c:v copy -f rawvideo OUT",

@@ -62,7 +62,7 @@ TEST(Page, WithoutMatplotlibIsWholeAndSaysWhatIsMissing) {
     const Scenario s = full_scenario();
     const std::string page = page_of(s, docking(s, chaser_at(s, {0, 0.02, 0}, {-0.07, 0, 0})), "/nowhere");
     EXPECT_EQ(markup_error(page), "");
-    for (const char* there : {"python3-matplotlib is not installed", "<h2>Gates</h2>", "lateral misalignment"})
+    for (const char* there : {"needs python3-matplotlib", "<h2>Gates</h2>", "lateral misalignment"})
         EXPECT_NE(page.find(there), std::string::npos) << there;
 }
 

@@ -5,6 +5,7 @@ Frames are NumPy arrays: height x width of uint8 (Cmono) or uint16 (Cmono16). St
 """
 import os
 import re
+import stat
 
 import numpy as np
 
@@ -53,6 +54,9 @@ class Reader:
         while (frame := self.read()) is not None:
             yield frame
 
+    def close(self):
+        self.file.close()
+
 
 class Writer:
     """Writes grey frames to a file, or to a FIFO, where it waits for a reader."""
@@ -80,6 +84,4 @@ class Writer:
 
 
 def is_fifo(path):
-    import stat
-
     return stat.S_ISFIFO(os.stat(path).st_mode)

@@ -8,8 +8,8 @@
 namespace narpa {
 namespace {
 
-// Lanes from the packet's `n` on are computed along with the others from what stands there: nobody looks at them.
-// Results are gathered in arrays of the functions' own, which the compiler knows to overlap with nothing.
+// Lanes from the batch's `n` on are computed along with the others and not read. Results are gathered in local arrays, of
+// which the compiler knows that they do not overlap with anything.
 
 using Points = BatchSampler::Points;
 
@@ -17,7 +17,7 @@ BatchSampler sampler_of(const Frame& f, const CameraSamples& s) noexcept {
     return {f.settings.seed, f.settings.frame, s.n, s.number, s.sample};
 }
 
-NARPA_EACH_ISA void aim_at_middles(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
+NARPA_EACH_ISA void aim_at_centres(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
     Vec3Lanes direction;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const Vec3 d = camera_ray(f.camera, f.T_world_camera, s.x[i], s.y[i]).direction;
@@ -30,7 +30,7 @@ NARPA_EACH_ISA void aim_at_middles(const Frame& f, const CameraSamples& s, RayBa
 /// Where in its pixel each passes, and two coordinates more.
 inline void points_of_pixels(const Frame& f, const CameraSamples& s, Points& u) noexcept {
     sampler_of(f, s).points(u);
-    if (!s.middle) return;
+    if (!s.centre) return;
     u[0].fill(0.5);
     u[1].fill(0.5);
 }
@@ -78,16 +78,16 @@ NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const
     to_sun = direction;
 }
 
-/// Random numbers with which a path would choose its point of the Sun from the first surface: free where that is
-/// chosen here.
+/// The random numbers with which a path would choose its point of the Sun from the first surface: unused where that
+/// point is chosen here.
 constexpr std::uint32_t kPathsOwn = 2;
 
 /// Most paths choose their own points of the Sun.
 void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
     const bool sun = f.sun && (f.quick || f.sun_first);
     p.rays.n = s.n;
-    if (s.middle && f.one_sample()) {
-        aim_at_middles(f, s, p.rays);
+    if (s.centre && f.one_sample()) {
+        aim_at_centres(f, s, p.rays);
         if (f.quick && sun) p.to_sun.fill(f.sun->centre());
         if (f.quick || !sun) return;
         Points u;
@@ -109,17 +109,11 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
 
 }  // namespace
 
-void trace_samples(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p,
-                   RgbLanes& radiance) {
-    trace_rays(f, s, bodies, p);
-    f.integrator.radiance(f, p, radiance);
-}
-
 void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p) {
     PhaseClock clock(p.times);
     aim(f, s, p);
     p.number = s.number;
-    p.sample = s.sample;
+    p.sample = s.path;
     clock.ends(Phase::aim);
     f.tracer.intersect(f.at, p.rays, bodies, p.hits);
     p.rays_traced += s.n;
@@ -128,9 +122,9 @@ void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uin
     clock.ends(Phase::rays);
 }
 
-void trace_middles(const Frame& f, const CameraSamples& s, Packet& p) {
+void trace_centres(const Frame& f, const CameraSamples& s, Packet& p) {
     p.rays.n = s.n;
-    aim_at_middles(f, s, p.rays);
+    aim_at_centres(f, s, p.rays);
     f.tracer.intersect(f.at, p.rays, f.tracer.all_bodies(), p.hits);
     p.rays_traced += s.n;
 }

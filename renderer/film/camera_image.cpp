@@ -12,21 +12,21 @@
 namespace narpa {
 namespace {
 
-/// The rays through the pixels' middles: what the outputs beside the radiance show.
+/// The outputs beside the radiance come from the rays through the pixels' centres.
 void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
     tbb::parallel_for(0, (height + kTile - 1) / kTile, [&](int row) {
         const FlushDenormals flush;
         Packet p;
         CameraSamples s;
-        s.middle = true;
+        s.centre = true;
         s.sample.fill(0);
         const auto store = [&] {
-            trace_middles(f, s, p);
+            trace_centres(f, s, p);
             for (std::size_t i = 0; i < s.n; ++i) store_first_hit(f, p.rays[i], p.hits[i], s.number[i], aovs);
             s.n = 0;
         };
         const int y_end = std::min((row + 1) * kTile, height);
-        for (int x_first = 0; x_first < width; x_first += 2) {  // packets of 2 x 8 pixels
+        for (int x_first = 0; x_first < width; x_first += 2) {  // batches of 2 x 8 pixels
             for (int y = row * kTile; y < y_end; ++y)
                 for (int x = x_first; x < std::min(x_first + 2, width); ++x) {
                     s.x[s.n] = x, s.y[s.n] = y;

@@ -7,11 +7,11 @@
 namespace narpa {
 namespace {
 
-/// Ratios of the variances of twice as many samples that are believed: from that of edges to that of independent
+/// Limits of the ratio of variances from one doubling to the next: from that of edges to that of independent
 /// samples. Smooth pixels do better, but leave no error that counts; and where many edges have the same place in
 /// their pixels, steps fall by chance faster than the error does.
 constexpr double kLeastRatio = 0.353553, kMostRatio = 0.5;
-/// Where only one doubling was seen: between edges and noise.
+/// After a single doubling: between edges and noise.
 constexpr double kRatioOfTwo = 0.42;
 
 double left_after(double step, double ratio) {
@@ -20,10 +20,10 @@ double left_after(double step, double ratio) {
 
 }  // namespace
 
-void FrameError::add_middles(const TileContrast& contrast, double tiles) noexcept {
+void FrameError::add_centres(const TileContrast& contrast, double tiles) noexcept {
     float sum = 0;
-    for (const float m : contrast.middle) sum += m;
-    middles_ += tiles * static_cast<double>(sum);
+    for (const float m : contrast.centre) sum += m;
+    from_contrasts_ += tiles * static_cast<double>(sum);
 }
 
 void FrameError::Part::add(const PixelMean& mean) noexcept {
@@ -40,12 +40,14 @@ void FrameError::add(const PixelMeans& means) noexcept {
     if (means.by_paths.count() > 0) by_paths_.add(means.by_paths);
 }
 
-void FrameError::add_tile(const TileContrast& contrast, const PerPixel<PixelMeans>& means) noexcept {
-    for (std::size_t i = 0; i < kTilePixels; ++i)
-        if (means[i].any())
+void FrameError::add_tile(const TileContrast* contrast, const PerPixel<PixelMeans>& means) noexcept {
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+        const std::uint32_t samples = means[i].count();
+        if (samples > 1)
             add(means[i]);
-        else
-            middles_ += static_cast<double>(contrast.middle[i]);
+        else if (contrast != nullptr)
+            from_contrasts_ += static_cast<double>(samples == 0 ? contrast->centre[i] : contrast->of_sample(i));
+    }
 }
 
 FrameError::Part& FrameError::Part::operator+=(const Part& b) noexcept {
@@ -59,7 +61,7 @@ FrameError::Part& FrameError::Part::operator+=(const Part& b) noexcept {
 }
 
 FrameError& FrameError::operator+=(const FrameError& b) noexcept {
-    middles_ += b.middles_;
+    from_contrasts_ += b.from_contrasts_;
     first_ += b.first_;
     by_paths_ += b.by_paths_;
     return *this;
@@ -78,7 +80,7 @@ double FrameError::Part::squared_error() const noexcept {
 }
 
 double FrameError::standard_error(std::size_t pixels) const noexcept {
-    const double sum = middles_ + first_.squared_error() + by_paths_.squared_error();
+    const double sum = from_contrasts_ + first_.squared_error() + by_paths_.squared_error();
     return std::sqrt(sum / static_cast<double>(pixels));
 }
 

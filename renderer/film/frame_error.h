@@ -1,12 +1,12 @@
-/// renderer/film/frame_error.h - how far a frame is from the truth, told by the frame itself.
+/// renderer/film/frame_error.h - the standard error of a frame, estimated from its own samples.
 ///
-/// Sums over all pixels, by how each was made: its middle (pixel_looks.h says what that costs), or a power of two
-/// of samples. Of these, each doubling of the samples moves the mean by a step whose mean square
-/// is v(n/2) - v(n), v(n) being the variance of the mean of n: the halves of an Owen-scrambled sequence are each as
-/// good as the first, and the whole is their mean (A. Owen, "Scrambled net variance for integrals of smooth
-/// functions", Ann. Stat. 25, 1997). If v falls by the same ratio q each time, what is left after the last step is
-/// q / (1 - q) of it: all of it for independent samples (q = 1/2), 0.55 of it for edges (q = 2^-1.5). The last two
-/// steps, squared and summed over the pixels, tell the ratio.
+/// Sums over all pixels, by how each was made: its centre, one random sample (g_buffer.h estimates the error of both), or
+/// two samples and more. Of the latter, each doubling of the samples moves the mean by a step whose mean square is
+/// v(n/2) - v(n), v(n) being the variance of the mean of n: the halves of an Owen-scrambled sequence are each as good as
+/// the first, and the whole is their mean (A. Owen, "Scrambled net variance for integrals of smooth functions", Ann.
+/// Stat. 25, 1997). If v falls by the same ratio q each time, what is left after the last step is q / (1 - q) of it: all
+/// of it for independent samples (q = 1/2), 0.55 of it for edges (q = 2^-1.5). The last two steps, squared and summed
+/// over the pixels, give the ratio.
 #pragma once
 
 #include <array>
@@ -20,10 +20,11 @@ namespace narpa {
 
 class FrameError {
 public:
-    /// A tile whose pixels show their middles, and that stands for so many.
-    void add_middles(const TileContrast& contrast, double tiles = 1) noexcept;
-    /// A tile whose pixels have samples, as many as each has; where it has none, it shows its middle.
-    void add_tile(const TileContrast& contrast, const PerPixel<PixelMeans>& means) noexcept;
+    /// A tile whose pixels show their centres, and that stands for so many.
+    void add_centres(const TileContrast& contrast, double tiles = 1) noexcept;
+    /// A tile whose pixels have samples, as many as each has; a pixel without any shows its centre. `contrast`: null
+    /// where all have two samples or more.
+    void add_tile(const TileContrast* contrast, const PerPixel<PixelMeans>& means) noexcept;
     /// A pixel of two samples or more.
     void add(const PixelMeans& means) noexcept;
     FrameError& operator+=(const FrameError& b) noexcept;
@@ -48,7 +49,7 @@ private:
         [[nodiscard]] double squared_error() const noexcept;
     };
 
-    double middles_ = 0;  ///< squared errors
+    double from_contrasts_ = 0;  ///< squared errors
     Part first_, by_paths_;
 };
 

@@ -1,7 +1,7 @@
-/// renderer/film/frame_passes.h - one after another, the passes of which a frame is made.
+/// renderer/film/frame_passes.h - the passes of which a frame is made.
 ///
-/// A pass goes over the tiles in which something may be seen; the others show the background. It comes to its end
-/// or is thrown away: what it made is shown by `show_...`, afterwards.
+/// A pass goes over the tiles in which something may be seen; the others show the background. It comes to its end or is
+/// discarded whole; its result goes to the image by `show_...`, afterwards.
 #pragma once
 
 #include <atomic>
@@ -47,26 +47,28 @@ public:
 
     /// Which tiles a pass goes over: a sixteenth lie spread evenly.
     enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
-    /// Middles of the pixels that stand for squares of `stride` (1, 2 or 4) pixels, but for those that a pass of
-    /// stride `made` has seen to (0: none has).
-    PassCount middles(const Frame& f, int stride, int made, const PassLimit& limit, Tiles which = Tiles::all);
-    void show_middles(const Frame& f, int stride, RadianceImage& out);
+    /// Centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, but for those of an earlier pass of
+    /// stride `made` (0: there was none).
+    PassCount centres(const Frame& f, int stride, int made, const PassLimit& limit);
+    void show_centres(const Frame& f, int stride, RadianceImage& out);
 
-    /// Chooses where samples go; after all middles.
-    void make_plan(const Frame& f);
+    /// Adaptive, from the contrasts of the centres; else uniform.
+    void make_plan(const Frame& f, bool adaptive);
     [[nodiscard]] const SamplePlan& plan() const noexcept { return *plan_; }
     /// The samples that stage `to` has beyond stage `from`.
-    PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit);
-    void show_means(const Frame& f, RadianceImage& out, std::vector<float>* variance);
+    PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
+                     Tiles which = Tiles::all);
+    /// Shows the pixels' means at a stage.
+    void show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out, std::vector<float>* variance);
 
-    /// Of the picture that `uniform` or `show_means` has shown last, or of the middles that were planned from.
+    /// Of the image that `uniform` or `show_means` has shown last, or of the centres that were planned from.
     [[nodiscard]] double standard_error() const noexcept;
 
-    /// Where the time went since this was last asked, where the frames' settings want to know.
+    /// Returns where the time went since the last call, where the frames' settings ask for it.
     [[nodiscard]] PhaseTimes times() noexcept;
 
 private:
-    struct Worker;
+    class Worker;
     struct Tile;
     enum class Sums : std::uint8_t { counts, errors };
     template <class Work>
@@ -75,13 +77,14 @@ private:
     void find_background(const Frame& f);
     void fill_background(RadianceImage& out);
     void show_one_sample(Worker& w, const Tile& t, RadianceImage& out);
+    void show_samples(Worker& w, const Tile& t, RadianceImage& out, std::vector<float>* variance);
     [[nodiscard]] bool estimates(std::uint32_t tile) const noexcept;
-    [[nodiscard]] bool looks_serve(std::uint32_t tile) const noexcept;
-    void estimate_middles(const Frame& f);
+    [[nodiscard]] bool fills_g_buffer(std::uint32_t tile) const noexcept;
+    void estimate_centres(const Frame& f);
 
     const Camera& camera_;
-    TileCulling cover_;
-    GBuffer looks_;
+    TileCulling culling_;
+    GBuffer g_buffer_;
     std::vector<std::uint32_t> tiles_;  ///< in which something may be seen
     std::uint64_t pixels_ = 0;
     Rgb background_{};                ///< of the others

@@ -11,21 +11,21 @@ namespace {
 constexpr int kSide = kTile + 2;  // with a rim of neighbours
 constexpr int kRow = 16;          // values from row to row: more than there are, as many as a vector holds
 
-/// Two middles show one surface if their normals are less than 6 degrees apart and the line between them less than
+/// Two pixels show one surface if their normals are less than 6 degrees apart and the line between them less than
 /// 12 degrees off the tangent plane.
 constexpr float kSameNormal = 0.9945f;
 constexpr float kOffPlane2 = 0.0432f;  // squared sine
 
 constexpr float kMostContrast = 2e9f;  // W m^-2 sr^-1
 
-/// What a detail that one middle has met stands for, of all scales together.
-constexpr float kDetailInMiddles = 0.230f, kDetailInSamples = 0.200f;
+/// What a detail that one centre has met stands for, of all scales together.
+constexpr float kDetailInCentres = 0.230f, kDetailInSamples = 0.200f;
 
 /// Rows one after another, and what a step to the right or down from the last needs.
 template <class T>
 using Grid = std::array<T, (kSide + 2) * kRow>;
 
-/// What neighbours say of each other: this one's and the next's, to the right or below.
+/// Comparisons of each pixel with the next, to the right or below.
 struct Pairs {
     Grid<float> difference, edge;  // edge: 1 or 0
 };
@@ -45,8 +45,8 @@ GBuffer::GBuffer(int width, int height)
       height_(height),
       tiles_x_((width + kTile - 1) / kTile),
       tiles_y_((height + kTile - 1) / kTile),
-      looks_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
-      known_(looks_.size(), Known::nothing) {}
+      tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
+      known_(tiles_.size(), Known::nothing) {}
 
 void GBuffer::begin_frame(const Rgb& background) {
     background_ = background;
@@ -55,15 +55,15 @@ void GBuffer::begin_frame(const Rgb& background) {
 
 namespace {
 
-/// What is kept of a packet, lane by lane.
-struct alignas(64) LooksPerRay {
+/// What is kept of a batch, lane by lane.
+struct alignas(64) LaneSurfaces {
     Lanes<float> nx, ny, nz, depth_m;
     Lanes<std::uint32_t> surface;
 };
 
-NARPA_EACH_ISA void look(const Packet& p, const Vec3& axis, std::uint32_t lit, LooksPerRay& out) noexcept {
+NARPA_EACH_ISA void store_surfaces(const Packet& p, const Vec3& axis, std::uint32_t lit, LaneSurfaces& out) noexcept {
     const Lanes<int> shone = masks_of(lit), met = masks_of(p.hits.met);
-    LooksPerRay seen;
+    LaneSurfaces seen;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const bool is = met[i] != 0;
         const auto body = static_cast<std::uint32_t>(p.hits.body[i] + 1);
@@ -91,14 +91,14 @@ bool GBuffer::shows_background(const Frame& f, const Packet& p, const PacketLigh
 
 void GBuffer::store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
                        std::size_t tile_index) noexcept {
-    GBufferTile& tile = looks_[tile_index];
+    GBufferTile& tile = tiles_[tile_index];
     if (!shows_background(f, p, light)) known_[tile_index] = Known::something;
-    LooksPerRay seen;
+    LaneSurfaces seen;
     if (p.hits.met != 0)
-        look(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.quick ? p.lit : 0, seen);
+        store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.quick ? p.lit : 0, seen);
     else
         seen = {};
-    // The packets of a tile's middles are its blocks, all but a few.
+    // The batches of a whole tile are its blocks of 4 x 4 pixels.
     const bool block = p.rays.n == kLanes && place[kLanes - 1] == place[0] + kLanes - 1;
     const auto put = [&](const auto& from, auto& to) {
         if (block)
@@ -112,19 +112,17 @@ void GBuffer::store(const Frame& f, const Packet& p, const PacketLight& light, c
         RgbLanes whole;
         for (std::size_t i = 0; i < p.rays.n; ++i) whole.put(i, light(f, i));
         put(whole.r, tile.r), put(whole.g, tile.g), put(whole.b, tile.b);
-        const RgbLanes& of_paths = light.by_paths;
-        put(of_paths.r, tile.paths_r), put(of_paths.g, tile.paths_g), put(of_paths.b, tile.paths_b);
     }
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
-    if (!f.quick) put(p.variance, tile.shared);
+    if (!f.quick) put(p.variance, tile.reused);
 }
 
 namespace {
 
 /// `n` pixels of a tile, from `place` on.
 template <std::size_t n, class Around>
-void copy_looks(const GBufferTile& t, std::size_t place, Around& a, std::size_t at) {
+void copy_pixels(const GBufferTile& t, std::size_t place, Around& a, std::size_t at) {
     for (std::size_t i = 0; i < n; ++i) {
         const float r = t.r[place + i], g = t.g[place + i], b = t.b[place + i];
         a.radiance[at + i] = (r + g + b) / 3;
@@ -157,15 +155,15 @@ void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept
     a.x_first = tx * kTile - 1, a.y_first = ty * kTile - 1;
     a.x_last = width_ - 1, a.y_last = height_ - 1;
     const int columns = std::min(kTile, width_ - tx * kTile), rows = std::min(kTile, height_ - ty * kTile);
-    const GBufferTile& own = looks_[tile];
+    const GBufferTile& own = tiles_[tile];
     const float background = mean_band(background_);
     for (int row = 0; row < kTile; ++row) {
-        copy_looks<4>(own, place_in_tile(0, row), a, cell(row, 0));
-        copy_looks<4>(own, place_in_tile(4, row), a, cell(row, 4));
+        copy_pixels<4>(own, place_in_tile(0, row), a, cell(row, 0));
+        copy_pixels<4>(own, place_in_tile(4, row), a, cell(row, 4));
     }
     const auto pixel_of = [&](std::size_t other, int x, int y, std::size_t at) {
-        if (looked_at(other))
-            copy_looks<1>(looks_[other], place_in_tile(x, y), a, at);
+        if (is_traced(other))
+            copy_pixels<1>(tiles_[other], place_in_tile(x, y), a, at);
         else
             a.radiance[at] = background;
     };
@@ -229,7 +227,7 @@ template <class Around>
     }
 }
 
-/// What the two pairs of a pixel along one axis say.
+/// Of the two pairs of a pixel along one axis.
 struct AlongAxis {
     float edges, slopes;  ///< squared contrasts
     float detail;         ///< of a peak or a hollow between two edges
@@ -249,13 +247,13 @@ struct AlongAxis {
             known};
 }
 
-NARPA_EACH_ISA void judge(const GBuffer::Around& a, TileContrast& out) noexcept {
+NARPA_EACH_ISA void measure_contrasts(const GBuffer::Around& a, TileContrast& out) noexcept {
     Positions positions;
     Pairs across, down;
     locate(a, positions);
     compare(a, positions, 1, across);
     compare(a, positions, kRow, down);
-    Grid<float> breaks, edge, noise, middle;
+    Grid<float> breaks, edge, noise, centre;
     for (std::size_t at = kRow; at < (kSide - 1) * kRow; ++at) {
         const AlongAxis h = along_axis(across, at, 1), v = along_axis(down, at, kRow);
         const float known = h.known + v.known, bend = (h.bend + v.bend) / (6 * std::max(known, 1.0f));
@@ -265,7 +263,7 @@ NARPA_EACH_ISA void judge(const GBuffer::Around& a, TileContrast& out) noexcept 
         const float edges = std::sqrt(h.edges * h.edges + v.edges * v.edges);
         const float detail = std::max(h.detail, v.detail);
         edge[at] = edges * (1 / 12.0f) + detail * kDetailInSamples + (h.slopes + v.slopes) * (1 / 24.0f);
-        middle[at] = edges * (1 / 24.0f) + detail * kDetailInMiddles + std::max(noise[at], 0.0f);
+        centre[at] = edges * (1 / 24.0f) + detail * kDetailInCentres + std::max(noise[at], 0.0f);
     }
     for (int row = 0; row < kTile; ++row)
         for (int column = 0; column < kTile; column += 4) {
@@ -273,7 +271,7 @@ NARPA_EACH_ISA void judge(const GBuffer::Around& a, TileContrast& out) noexcept 
             std::copy_n(&breaks[at], 4, &out.breaks[place]);
             std::copy_n(&edge[at], 4, &out.edge[place]);
             std::copy_n(&noise[at], 4, &out.noise[place]);
-            std::copy_n(&middle[at], 4, &out.middle[place]);
+            std::copy_n(&centre[at], 4, &out.centre[place]);
         }
 }
 
@@ -295,11 +293,11 @@ void GBuffer::contrast(const Frame& f, std::size_t tile, TileContrast& out) cons
     }
     Around a;
     gather(f, tile, a);
-    judge(a, out);
-    const bool shares = !f.quick && !f.path.direct;
+    measure_contrasts(a, out);
+    const bool reuses = !f.quick && !f.path.direct && f.settings.mechanisms.shared_variance;
     for (std::size_t i = 0; i < kTilePixels; ++i) {
-        out.shared[i] = shares && looks_[tile].surface[i] != 0 ? looks_[tile].shared[i] : 0;
-        out.middle[i] += out.shared[i];
+        out.reused[i] = reuses && tiles_[tile].surface[i] != 0 ? tiles_[tile].reused[i] : 0;
+        out.centre[i] += out.reused[i];
     }
     const int x_end = width_ - static_cast<int>(tile) % tiles_x_ * kTile;
     const int y_end = height_ - static_cast<int>(tile) / tiles_x_ * kTile;
@@ -309,7 +307,7 @@ void GBuffer::contrast(const Frame& f, std::size_t tile, TileContrast& out) cons
             if (x >= x_end || y >= y_end) {
                 const std::size_t place = place_in_tile(x, y);
                 out.breaks[place] = 0;
-                out.edge[place] = out.noise[place] = out.middle[place] = out.shared[place] = 0;
+                out.edge[place] = out.noise[place] = out.centre[place] = out.reused[place] = 0;
             }
 }
 

@@ -1,40 +1,40 @@
-/// renderer/film/g_buffer.h - what the rays through the pixels' middles show, kept for planning and for the
-/// error of the frame, and what it says of each pixel: how far off is its middle, and how much do samples of it
-/// vary?
+/// renderer/film/g_buffer.h - what one sample of each pixel shows: radiance, normal, depth, surface. Its contrasts give
+/// the variance of a pixel's samples and the error of its centre, for adaptive sampling and for the frame's own error.
 ///
 /// Neighbours show the same surface if body, material and sunlight agree, their normals do, and the one lies in the
-/// other's tangent plane. Where they do not, an edge passes between them. One between two middles at a random place
-/// leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is told by its middle, and of
+/// other's tangent plane. Where they do not, an edge passes between them. An edge at a random place between two centres
+/// leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is represented by its centre, and of
 /// contrast^2 / 6 if by a random point.
 ///
-/// What stands out from both its neighbours is a detail, a bar of width w in pixels, with two such edges; but where
-/// w is less than 1 the middles meet it now and then only, and see nothing of it in between. Averaged over its
-/// place, it leaves in each row of pixels that it crosses contrast^2 times
-///     w - w^2 - w^3 / 3          to the middles, w <= 1/2,
-///     1/2 - w + w^2 - w^3 / 3    to the middles, 1/2 <= w <= 1,
-///     w - w^2 + w^3 / 3          to random points, w <= 1,
-/// and from w = 1 on what its two edges do, 1/6 and 1/3. One middle alone meets it in w of the rows up to w = 1, in
-/// 2 - w up to w = 2. With all scales equally frequent, that is w distributed as dw / w, each such meeting stands
-/// for 0.230 contrast^2 beyond the edges' in middles and 0.200 contrast^2 in random points.
+/// What differs from both its neighbours is a detail, a bar of width w in pixels, with two such edges; but where w is
+/// less than 1 the centres meet it only now and then. Averaged over its place, it leaves in each row of pixels that it
+/// crosses contrast^2 times
+///     w - w^2 - w^3 / 3          for centres, w <= 1/2,
+///     1/2 - w + w^2 - w^3 / 3    for centres, 1/2 <= w <= 1,
+///     w - w^2 + w^3 / 3          for random points, w <= 1,
+/// and from w = 1 on what its two edges leave, 1/6 and 1/3. One centre alone meets it in w of the rows up to w = 1, in
+/// 2 - w up to w = 2. With all scales equally frequent, that is w distributed as dw / w, each such meeting stands for
+/// 0.230 contrast^2 beyond the edges' for centres and 0.200 contrast^2 for random points.
 ///
-/// What varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture: second differences
-/// of independent values of variance v have the mean square 6 v.
+/// What varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture: second differences of
+/// independent values of variance v have the mean square 6 v.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "renderer/film/tile_culling.h"
 #include "renderer/integrator/integrator.h"
+#include "renderer/film/tile_culling.h"
 
 namespace narpa {
 
-inline constexpr int kTile = kTileSize;                    ///< pixels a side
-inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four packets of 4 x 4, one after another
+inline constexpr int kTile = kTileSize;                   ///< pixels a side
+inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four batches of 4 x 4, one after another
 
-/// Place of a pixel of a tile, in the order of the packets.
+/// Place of a pixel of a tile, in the order of the batches.
 constexpr std::size_t place_in_tile(int x, int y) noexcept {
     return static_cast<std::size_t>(((y >> 2) * 2 + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3));
 }
@@ -42,13 +42,12 @@ constexpr std::size_t place_in_tile(int x, int y) noexcept {
 template <class T>
 using PerPixel = std::array<T, kTilePixels>;
 
-/// The middles of a tile.
+/// One sample of each pixel of a tile.
 struct alignas(64) GBufferTile {
-    PerPixel<float> r, g, b;                    ///< radiance
-    PerPixel<float> paths_r, paths_g, paths_b;  ///< of it what paths brought, where the light has two parts
-    PerPixel<float> nx, ny, nz;                 ///< normal, world
+    PerPixel<float> r, g, b;     ///< radiance
+    PerPixel<float> nx, ny, nz;  ///< normal, world
     PerPixel<float> depth_m;
-    PerPixel<float> shared;           ///< variance of light that paths share, which neighbours do not show
+    PerPixel<float> reused;           ///< variance of light from reused paths, which neighbours have in common
     PerPixel<std::uint32_t> surface;  ///< of body, material and sunlight; 0: background
 };
 
@@ -57,11 +56,15 @@ struct alignas(64) TileContrast {
     PerPixel<float> breaks;  ///< edges between it and its four neighbours
     PerPixel<float> edge;    ///< of one random sample of the pixel, for edges, details and slopes
     PerPixel<float> noise;   ///< of one sample, for all else; negative: not known
-    PerPixel<float> shared;  ///< of one sample, for light that the tile's paths share: neighbours are off alike
-    PerPixel<float> middle;  ///< expected squared error of the middle
+    PerPixel<float> reused;  ///< of one sample, for light from reused paths: neighbours are off alike
+    PerPixel<float> centre;  ///< expected squared error of the centre
+
+    /// Variance of one random sample of a pixel.
+    [[nodiscard]] float of_sample(std::size_t place) const noexcept {
+        return edge[place] + std::max(noise[place], 0.0f) + reused[place];
+    }
 };
 
-/// Looks of all tiles of an image.
 class GBuffer {
 public:
     GBuffer(int width, int height);
@@ -70,20 +73,20 @@ public:
     [[nodiscard]] int height() const noexcept { return height_; }
     [[nodiscard]] int tiles_x() const noexcept { return tiles_x_; }
     [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
-    [[nodiscard]] std::size_t tiles() const noexcept { return looks_.size(); }
-    [[nodiscard]] GBufferTile& tile(std::size_t i) noexcept { return looks_[i]; }
-    [[nodiscard]] const GBufferTile& tile(std::size_t i) const noexcept { return looks_[i]; }
+    [[nodiscard]] std::size_t tiles() const noexcept { return tiles_.size(); }
+    [[nodiscard]] GBufferTile& tile(std::size_t i) noexcept { return tiles_[i]; }
+    [[nodiscard]] const GBufferTile& tile(std::size_t i) const noexcept { return tiles_[i]; }
 
-    /// Which tiles have looks in this frame; the others show this background.
+    /// Which tiles are traced in this frame; the others show this background.
     void begin_frame(const Rgb& background);
-    void set_looked_at(std::size_t tile) noexcept { known_[tile] = Known::background; }
-    [[nodiscard]] bool looked_at(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
+    void set_traced(std::size_t tile) noexcept { known_[tile] = Known::background; }
+    [[nodiscard]] bool is_traced(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
 
-    /// Puts down what a packet of middles has met. `place`: of each lane in the tile.
+    /// Stores one sample of each of a batch's pixels. `place`: of each lane in the tile.
     void store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
                std::size_t tile) noexcept;
 
-    /// What a tile and its neighbours say of its pixels.
+    /// From a tile and its neighbours.
     void contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
 
     /// A tile with a rim of its neighbours.
@@ -96,8 +99,8 @@ private:
 
     int width_, height_, tiles_x_, tiles_y_;
     Rgb background_{};
-    std::vector<GBufferTile> looks_;
-    /// Of a tile: not looked at; no more than the background so far; something.
+    std::vector<GBufferTile> tiles_;
+    /// Of a tile: not traced; no more than the background so far; something.
     enum class Known : std::uint8_t { nothing, background, something };
     std::vector<Known> known_;
 };

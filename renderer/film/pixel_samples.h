@@ -1,4 +1,4 @@
-/// renderer/film/pixel_samples.h - the mean of a pixel's samples, and how far it may be from the truth.
+/// renderer/film/pixel_samples.h - the mean of a pixel's samples and its variance.
 #pragma once
 
 #include <algorithm>
@@ -33,8 +33,8 @@ private:
     int n_ = 0;
 };
 
-/// The mean alone, and by how much its mean band moved when the number of samples last reached a power of two: a
-/// low-discrepancy sequence is at its best there, and what its doublings change tells how fast it converges.
+/// The mean, and by how much its mean band moved when the number of samples last reached a power of two: a
+/// low-discrepancy sequence is at its best there, and the steps give how fast it converges (frame_error.h).
 class PixelMean {
 public:
     void add(const Rgb& radiance) {
@@ -58,11 +58,11 @@ private:
     float at_power_ = 0, step_ = 0, step_before_ = 0;
 };
 
-/// Of light in two parts (PacketLight), each with samples of its own number.
+/// Of light in two parts, each with samples of its own number.
 struct PixelMeans {
     PixelMean first, by_paths;
 
-    [[nodiscard]] bool any() const { return first.count() > 0 || by_paths.count() > 0; }
+    [[nodiscard]] std::uint32_t count() const { return std::max(first.count(), by_paths.count()); }
     [[nodiscard]] Vec3 mean() const {
         if (by_paths.count() == 0) return first.mean();
         return first.count() == 0 ? by_paths.mean() : first.mean() + by_paths.mean();
@@ -74,12 +74,12 @@ inline constexpr double kPriorCount = 64;
 
 /// Variance of each pixel's mean, for pixels side by side with equally many samples, at least two.
 ///
-/// A pixel's own sample variance is no guide below about 64 samples: most pixels with a small bright spot have not
+/// A pixel's own sample variance is unreliable below about 64 samples: most pixels with a small bright spot have not
 /// met it yet and report zero; where the radiance is spread over decades, the 95 % interval holds the truth in 65 %
 /// (4 samples) to 83 % (64) of pixels. So the neighbours' pooled variance enters as kPriorCount samples more, and
-/// as the neighbours may be smoother than the pixel itself, its own variance is a lower bound. Rather too large
-/// than too small: by 0.4 in 4 samples, 0.1 in 64 where all pixels are alike; and low-discrepancy samples do better
-/// than their variance says.
+/// as the neighbours may be smoother than the pixel itself, its own variance is a lower bound. The result is rather too
+/// large than too small: by 0.4 in 4 samples, 0.1 in 64 where all pixels are alike; and low-discrepancy samples do
+/// better than their variance.
 inline void variances_of_means(std::span<const PixelSamples> pixels, std::span<double> variances) {
     double pooled = 0;
     for (const PixelSamples& p : pixels) pooled += p.squared_deviations() / (p.count() - 1);

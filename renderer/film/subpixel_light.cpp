@@ -11,15 +11,15 @@
 namespace narpa {
 namespace {
 
-/// Random numbers of tiny bodies' paths: none that a pixel takes.
+/// First random sequence of subpixel bodies: none of a pixel's own.
 constexpr std::uint32_t kFirstNumber = 0x80000000u;
 
-/// A point of the unit disc and the area that it stands for.
+/// A point of the unit disc and the area that it represents.
 struct DiscPoint {
     double x, y, area;
 };
 
-/// One of n points even in the disc: a lattice by the golden section, whose error over outlines of bodies is half
+/// One of n evenly spread points of the disc: a lattice by the golden section, whose error over outlines of bodies is half
 /// of that of a Sobol set as large (measured, 1024 points: 0.7 % of a rectangle's area).
 DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
     const double turns = i / std::numbers::phi;
@@ -27,8 +27,8 @@ DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
     return {x, y, std::numbers::pi / n};
 }
 
-/// The part of the disc that the Sun can light gets half of the samples, however thin its crescent, the rest the
-/// other half. Either part is the disc, squeezed along x.
+/// The part of the disc that the Sun can light gets half of the samples, however thin its crescent; the rest gets the
+/// other half. Each part is the disc, compressed along x.
 DiscPoint disc_point(double lit, std::uint32_t s, std::uint32_t samples) {
     constexpr double kMostlyLit = 0.75;
     const std::uint32_t half = samples / 2;
@@ -39,14 +39,14 @@ DiscPoint disc_point(double lit, std::uint32_t s, std::uint32_t samples) {
     return {(1 - lit) * a - lit * half_chord, y, (1 - lit) * area};
 }
 
-/// As many as pixels of this many samples each would take, within limits; even.
+/// As many as its pixels would take, within limits; even.
 std::uint32_t samples_of(const SubpixelDisc& disc, int spp) {
     const double as_pixels = spp * std::numbers::pi * disc.radius_px * disc.radius_px;
-    const double samples = std::clamp<double>(as_pixels, kTinySamplesLeast, kTinySamplesMost);
+    const double samples = std::clamp<double>(as_pixels, kSubpixelSamplesLeast, kSubpixelSamplesMost);
     return 2 * static_cast<std::uint32_t>(samples / 2);
 }
 
-/// Collects what the samples bring to the pixels of a block.
+/// Sums the samples' light in the pixels of a block.
 class Collector {
 public:
     Collector(const Frame& f, const PixelBlock& block) : f_(f), block_(block) {}
@@ -103,7 +103,7 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
     pixel_[i] = pixel;
     area_px2_[i] = solid_angle * c.fx * c.fy / (seen.z * seen.z * seen.z);
     packet_.rays.put(i, {f_.T_world_camera.t + start, direction});
-    packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kTinySamplesMost + s;
+    packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kSubpixelSamplesMost + s;
     if (!f_.sun) return;
     const SamplePoint u = numbers.point(s, 1);
     packet_.to_sun.put(i, f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]));
@@ -147,7 +147,7 @@ std::size_t PixelBlock::holding(double image_x, double image_y) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
 }
 
-void add_tiny_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance) {
+void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance) {
     Collector collector(f, block);
     bool met = false;
     for (std::size_t body = 0; body < f.at.T_world_body.size(); ++body) {

@@ -421,6 +421,10 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
     }
 }
 
+void TileCulling::list_all() noexcept {
+    std::fill(listed_.begin(), listed_.end(), static_cast<std::uint8_t>(most_listed_ + 1));
+}
+
 void TileCulling::list(std::uint32_t body) noexcept {
     mask_.drain([&](int tile_x, int tile_y) {
         const std::size_t tile = index(tile_x, tile_y);

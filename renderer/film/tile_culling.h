@@ -1,7 +1,7 @@
-/// renderer/film/tile_culling.h - which bodies a part of the image can show at all.
+/// renderer/film/tile_culling.h - which bodies each tile of the image may show.
 ///
-/// Rays are sent only through tiles of the image that some body's surface may cover, and are tried against those
-/// bodies alone: what a frame costs goes with the pixels that bodies cover, not with the sensor's size.
+/// Rays are traced only through tiles that some body's surface may cover, and against those bodies alone: the cost of a
+/// frame is proportional to the pixels that bodies cover, not to the sensor's size.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +17,18 @@ inline constexpr int kTileSize = 8;  ///< pixels a side
 
 class TileCulling {
 public:
-    /// Both outlive it. All memory is taken here: about 80 bytes a tile, whatever the number of bodies.
+    /// Both outlive it. Allocates here alone: about 80 bytes a tile, whatever the number of bodies.
     TileCulling(const Tracer& tracer, const Camera& camera);
 
     /// For the bodies at these places. Conservative: a ray through any point of a tile, and through any point of
     /// the lens (null: a pinhole), that meets a body finds it in the tile's list, also where the body is as near as
     /// the camera, behind it in part, or around it. Allocates nothing.
     void update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept;
+    /// Lists all bodies in every tile: what frames cost without culling.
+    void list_all() noexcept;
 
-    /// Bodies that rays through any of the tile's pixels may meet, in ascending order; empty: nothing is there.
-    /// Where more than kMostListed crowd in one tile, its list is of all bodies.
+    /// Bodies that rays through any of the tile's pixels may meet, in ascending order. All bodies where they are more than
+    /// kMostListed.
     [[nodiscard]] std::span<const std::uint32_t> bodies(int tile_x, int tile_y) const noexcept;
     static constexpr std::size_t kMostListed = 16;
 

@@ -1,5 +1,5 @@
-/// renderer/film/tile_worker.h - a tile's samples on their way through the renderer: gathered into packets,
-/// traced, lit together, handed on. Inside frame_passes.cpp alone.
+/// renderer/film/tile_worker.h - takes a tile's samples through the renderer: gathers them into ray batches, traces them,
+/// lights several batches together and hands them to a sink. Inside frame_passes.cpp alone.
 #pragma once
 
 #include <array>
@@ -13,15 +13,15 @@
 
 namespace narpa {
 
-/// So many packets go between two looks at the clock.
-inline constexpr std::uint32_t kPacketsPerLook = 16;
-/// Random numbers of middles that samples may follow: none that a pixel's samples take, as those would not be
-/// independent of their own number.
-inline constexpr std::uint32_t kFirstMiddle = 0x40000000u;
+/// Batches between two readings of the clock.
+inline constexpr std::uint32_t kBatchesPerClockRead = 16;
+/// First random sequence of centres in frames that add samples: none of a pixel's own, as the centres decide how many
+/// samples a pixel gets.
+inline constexpr std::uint32_t kFirstCentre = 0x40000000u;
 inline constexpr int kBlock = 4;
 
-/// The first pixel but one stands for the others of a square of `stride`; at the image's edges the last one.
-inline bool stands_for(int x, int width, int stride) {
+/// Where one pixel represents a square of `stride` pixels: the first but one, at the image's edges the last.
+inline bool represents(int x, int width, int stride) {
     return stride == 1 || x % stride == 1 || (x % stride == 0 && x == width - 1);
 }
 
@@ -42,141 +42,179 @@ struct FramePasses::Tile {
     }
 };
 
-/// What a thread needs: large, so made once for several tiles.
-struct FramePasses::Worker {
-    /// Samples that have been traced together.
-    struct Batch {
-        CameraSamples samples;
-        Lanes<std::uint8_t> place;              ///< of each sample's pixel in the tile
-        std::uint32_t first = 0, by_paths = 0;  ///< those that count for this part of the light (PacketLight)
+/// Samples that have been traced together.
+struct SampleBatch {
+    CameraSamples samples;
+    Lanes<std::uint8_t> place;              ///< of each sample's pixel in the tile
+    std::uint32_t first = 0, by_paths = 0;  ///< the lanes that count for this part of the light (PacketLight)
 
-        void clear() { samples.n = 0, first = by_paths = 0; }
-    };
-    /// For packets that are lit together.
+    void clear() { samples.n = 0, first = by_paths = 0; }
+};
+
+/// Of a thread, for several tiles: large.
+class FramePasses::Worker {
+public:
+    /// Memory for batches that are lit together.
     template <std::size_t N>
-    struct Room {
+    struct Storage {
         std::array<Packet, N> packets;
-        std::array<Batch, N> batches;
+        std::array<SampleBatch, N> batches;
     };
 
     template <std::size_t N>
-    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& pass_given_up, Room<N>& room)
+    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& stop, PhaseTimes* times, Storage<N>& storage)
         : f(frame),
-          until_ns(limit.until_ns),
-          given_up(pass_given_up),
-          packets(room.packets),
-          batches(room.batches) {}
-
-    const Frame& f;
-    const std::int64_t until_ns;
-    std::atomic<bool>& given_up;  ///< the pass: looked at often, as a tile may hold many samples
-    const std::span<Packet> packets;
-    const std::span<Batch> batches;
-    std::size_t full = 0;                    ///< of these
-    std::uint64_t traced = 0, followed = 0;  ///< samples
-    std::uint32_t lit = 0;                   ///< packets
-    FrameError error;
-
-    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t Packet::*of = &Packet::rays_traced) const {
-        std::uint64_t sum = 0;
-        for (const Packet& p : packets) sum += p.*of;
-        return sum;
+          until_ns_(limit.until_ns),
+          stop_(stop),
+          packets_(storage.packets),
+          batches_(storage.batches) {
+        for (Packet& p : packets_) p.times = times;
     }
 
-    /// For which parts of the light a sample counts.
-    struct Counts {
+    const Frame& f;
+    FrameError error;
+
+    [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
+    [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
+    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t Packet::*of = &Packet::rays_traced) const {
+        std::uint64_t sum = 0;
+        for (const Packet& p : packets_) sum += p.*of;
+        return sum;
+    }
+    void read_clock() {
+        if (until_ns_ != PassLimit{}.until_ns && now_ns() >= until_ns_) stop_.store(true, std::memory_order_relaxed);
+    }
+
+    /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: its place in the tile. Paths are traced
+    /// together up to kOfAPixel samples a pixel, so that neighbours can reuse them. Calls `sink(batch, packet, light)`
+    /// for the samples in order.
+    template <class Begin, class End, class Sink>
+    void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
+        set_centres(false);
+        const std::uint32_t most = f.quick ? PixelRange::kAll : kOfAPixel;
+        bool left = true;
+        for (std::uint32_t done = 0; left; done += most) {
+            left = false;
+            tile.each_pixel([&](int x, int y, std::size_t at) {
+                const PixelRange range{begin(at), end(at)};
+                const auto number = static_cast<std::uint32_t>(y * image_width + x);
+                left = left || range.size() > done + most;
+                for (std::uint32_t s = range.from(done); s < range.from(done + most); ++s) {
+                    const bool by_path = !f.quick && (!f.sun_first || has_path(s));
+                    const std::uint32_t path = f.sun_first ? paths_of(s) : s;
+                    add(tile, x, y, at, number, s, path, {f.quick || f.sun_first, by_path}, sink);
+                }
+            });
+            finish(tile, sink);
+        }
+    }
+
+    /// Traces the centres of the pixels that represent squares of `stride` pixels, but for those of a pass of stride
+    /// `made` (0: none has been made).
+    template <class Sink>
+    void centres(const Tile& tile, int width, int height, int stride, int made, Sink&& sink) {
+        set_centres(true);
+        const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstCentre;
+        if (stride == 1 && made == 0 && tile.whole()) {
+            for (int block = 0; block < 4; ++block) {
+                put_block(tile, block, first, width, batches_[full_]);
+                trace(tile);
+                if (full_ == packets_.size()) light(sink);
+            }
+            light(sink);
+            return;
+        }
+        tile.each_pixel([&](int x, int y, std::size_t at) {
+            if (!represents(x, width, stride) || !represents(y, height, stride)) return;
+            if (made > 0 && represents(x, width, made) && represents(y, height, made)) return;
+            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, 0, {true, true}, sink);
+        });
+        finish(tile, sink);
+    }
+    /// The same, stored in the G-buffer.
+    void centres(const Tile& tile, int width, int height, int stride, int made, GBuffer& g_buffer) {
+        centres(tile, width, height, stride, made, [&](const SampleBatch& b, const Packet& p, const PacketLight& l) {
+            g_buffer.store(f, p, l, b.place, tile.index);
+        });
+    }
+
+private:
+    /// Samples of a pixel's sequence.
+    struct PixelRange {
+        static constexpr std::uint32_t kAll = ~0u;
+        std::uint32_t begin, end;
+        [[nodiscard]] std::uint32_t size() const { return end - begin; }
+        [[nodiscard]] std::uint32_t from(std::uint32_t n) const { return begin + std::min(n, size()); }
+    };
+    /// The parts of the light that a sample counts for.
+    struct Parts {
         bool first, by_paths;
     };
-    /// `sink(batch, packet, light)` is told of the samples, in order.
     template <class Sink>
     void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
-             Counts counts, Sink&& sink) {
-        Batch& b = batches[full];
+             std::uint32_t path, Parts parts, Sink&& sink) {
+        SampleBatch& b = batches_[full_];
         const std::size_t i = b.samples.n++;
-        b.first |= static_cast<std::uint32_t>(counts.first) << i;
-        b.by_paths |= static_cast<std::uint32_t>(counts.by_paths) << i;
+        b.first |= static_cast<std::uint32_t>(parts.first) << i;
+        b.by_paths |= static_cast<std::uint32_t>(parts.by_paths) << i;
         b.samples.x[i] = x, b.samples.y[i] = y;
-        b.samples.number[i] = number, b.samples.sample[i] = sample;
+        b.samples.number[i] = number, b.samples.sample[i] = sample, b.samples.path[i] = path;
         b.place[i] = static_cast<std::uint8_t>(at);
         if (b.samples.n < kLanes) return;
         trace(tile);
-        if (full == packets.size()) light(sink);
+        if (full_ == packets_.size()) light(sink);
     }
     void trace(const Tile& tile) {
-        Batch& b = batches[full];
-        if (given_up.load(std::memory_order_relaxed)) b.clear();
+        SampleBatch& b = batches_[full_];
+        if (stop_.load(std::memory_order_relaxed)) b.clear();
         if (b.samples.n == 0) return;
-        trace_rays(f, b.samples, tile.bodies, packets[full]);
-        packets[full].by_paths = b.by_paths;
-        ++full;
+        trace_rays(f, b.samples, tile.bodies, packets_[full_]);
+        packets_[full_].by_paths = b.by_paths;
+        ++full_;
     }
     template <class Sink>
     void light(Sink&& sink) {
         std::array<PacketLight, kTogether> lights;
-        if (full > 0) f.integrator.radiance(f, packets.first(full), lights);
-        for (std::size_t k = 0; k < full; ++k) {
-            sink(batches[k], packets[k], lights[k]);
-            traced += batches[k].samples.n;
-            followed += static_cast<std::uint64_t>(std::popcount(batches[k].by_paths));
-            batches[k].clear();
-            if (++lit % kPacketsPerLook == 0) look_at_clock();
+        if (full_ > 0) f.integrator.radiance(f, packets_.first(full_), lights);
+        for (std::size_t k = 0; k < full_; ++k) {
+            sink(batches_[k], packets_[k], lights[k]);
+            samples_ += batches_[k].samples.n;
+            paths_ += static_cast<std::uint64_t>(std::popcount(batches_[k].by_paths));
+            batches_[k].clear();
+            if (++lit_ % kBatchesPerClockRead == 0) read_clock();
         }
-        full = 0;
+        full_ = 0;
     }
-    /// The samples that are left.
     template <class Sink>
     void finish(const Tile& tile, Sink&& sink) {
         trace(tile);
         light(sink);
     }
-    void begin(bool middles) {
-        for (Batch& b : batches) b.samples.middle = middles;
+    void set_centres(bool centres) {
+        for (SampleBatch& b : batches_) b.samples.centre = centres;
     }
-    void look_at_clock() {
-        if (until_ns != PassLimit{}.until_ns && now_ns() >= until_ns)
-            given_up.store(true, std::memory_order_relaxed);
-    }
-    void middles(const Tile& tile, int width, int height, int stride, int made, GBuffer& looks) {
-        middles(tile, width, height, stride, made, [&](const Batch& b, const Packet& p, const PacketLight& light_) {
-            looks.store(f, p, light_, b.place, tile.index);
-        });
-    }
-    template <class Store>
-    void middles(const Tile& tile, int width, int height, int stride, int made, Store&& store) {
-        begin(true);
-        const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstMiddle;
-        if (stride == 1 && made == 0 && tile.whole()) {
-            for (int block = 0; block < 4; ++block) {
-                put_block(tile, block, first, width, batches[full]);
-                trace(tile);
-                if (full == packets.size()) light(store);
-            }
-            light(store);
-            return;
-        }
-        tile.each_pixel([&](int x, int y, std::size_t at) {
-            if (!stands_for(x, width, stride) || !stands_for(y, height, stride)) return;
-            if (made > 0 && stands_for(x, width, made) && stands_for(y, height, made)) return;
-            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, {true, true}, store);
-        });
-        finish(tile, store);
-    }
-
-private:
-    /// The middles of 4 x 4 pixels, a whole packet.
-    static void put_block(const Tile& tile, int block, std::uint32_t first, int width, Batch& b) {
+    /// The centres of 4 x 4 pixels, a whole batch.
+    static void put_block(const Tile& tile, int block, std::uint32_t first, int width, SampleBatch& b) {
         const int x = tile.x + block % 2 * kBlock, y = tile.y + block / 2 * kBlock;
         for (int i = 0; i < static_cast<int>(kLanes); ++i) {
             const auto lane = static_cast<std::size_t>(i);
             b.samples.x[lane] = x + i % kBlock, b.samples.y[lane] = y + i / kBlock;
             b.samples.number[lane] =
                 first + static_cast<std::uint32_t>(b.samples.y[lane] * width + b.samples.x[lane]);
-            b.samples.sample[lane] = 0;
+            b.samples.sample[lane] = b.samples.path[lane] = 0;
             b.place[lane] = static_cast<std::uint8_t>(block * static_cast<int>(kLanes) + i);
         }
         b.samples.n = kLanes;
         b.first = b.by_paths = lanes_below(kLanes);
     }
+
+    const std::int64_t until_ns_;
+    std::atomic<bool>& stop_;  ///< the pass; read often, as a tile may hold many samples
+    const std::span<Packet> packets_;
+    const std::span<SampleBatch> batches_;
+    std::size_t full_ = 0;                 ///< of these
+    std::uint64_t samples_ = 0, paths_ = 0;
+    std::uint32_t lit_ = 0;  ///< batches
 };
 
 }  // namespace narpa

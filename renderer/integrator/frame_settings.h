@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "renderer/integrator/frame_budget.h"
+#include "renderer/integrator/mechanisms.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -19,6 +20,7 @@ struct FrameSettings {
     std::atomic<std::size_t>* pixels_done = nullptr;  ///< counted up while the frame is rendered; may be null
     FrameBudget budget{};                             ///< kind samples: spp
     bool times = false;                               ///< measure where the time goes: FrameAccount::phase_ns
+    Mechanisms mechanisms{};
 };
 
 }  // namespace narpa

@@ -25,9 +25,11 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     // One sample passes the lens at its centre, as through a pinhole.
     const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
-    const bool small_bodies = !direct && SmallBodySampling::may_help(tracer, at);
+    const Mechanisms& on = settings.mechanisms;
+    const bool small_bodies = !direct && on.small_body_sampling && SmallBodySampling::may_help(tracer, at);
     const bool sun_only = direct && SunDirectLighting::suffices(render_scene);
-    const bool sun_first = !direct && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
+    const bool sun_first =
+        !direct && on.sun_first && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
     const Integrator& by_waves = direct ? static_cast<const Integrator&>(kDirectIntegrator) : kPathIntegrator;
     return {render_scene,
             tracer,
@@ -41,7 +43,7 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
             sun_only,
             sun_first,
             {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, small_bodies,
-             sun_first && settings.spp > 1 ? 1 : kFewSurvive},
+             sun_first && settings.spp > 1 ? 1 : kFewSurvive, on.path_reuse},
             SubpixelBodies(tracer, at, camera, T_world_camera, lens)};
 }
 

@@ -160,24 +160,20 @@ private:
     double sum_ = 0, squares_ = 0;
 };
 
-// math.md H20, H21: what is chosen by the samples that count has another mean than they have. When pixels were
-// chosen by what their own middles showed, these frames were too bright by 2.6 %, 20 standard errors and more. What
-// is left comes from paths that share: the middles beside a pixel hold some of what its own path has found.
+// Samples that are chosen by samples that count have another mean (math.md H20, H21): frames of paths choose none.
 TEST(BudgetError, FramesOfPathsHaveTheMeanOfTheReference) {
     const BudgetView v = slatted_court();
     // Four times as many samples as eighty frames': what is not known of the mean grows by 12 %.
     const std::vector<double> truth = truth_of(v, 512, Method::path);
-    const double mean = std::accumulate(truth.begin(), truth.end(), 0.0) / static_cast<double>(truth.size());
     CameraRenderer renderer(v.render_scene, v.camera);
     for (const double rays : {14.0, 20.0}) {
         Bias bias;
         for (std::uint32_t k = 0; k < 80; ++k) {
             const Shown shown = render(renderer, v, rays_a_pixel(v, rays, k, Method::path));
-            ASSERT_EQ(shown.account.step, FrameStep::refined);
-            ASSERT_LT(shown.account.samples, 2 * v.pixels());  // some show middles, some samples
+            ASSERT_LE(shown.account.step, FrameStep::one_sample);
             bias.add(misses_of(shown.image, truth).mean);
         }
-        EXPECT_LT(std::abs(bias.mean()), 0.01 * mean + 3 * 1.12 * bias.sigma()) << rays;
+        EXPECT_LT(std::abs(bias.mean()), 4 * 1.12 * bias.sigma()) << rays;
     }
 }
 

@@ -147,16 +147,15 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
         auto p = std::make_unique<Packet>();
         for (int round = 0; round < 200; ++round) {
             CameraSamples s = some_samples(1 + random() % kLanes, c, 40, random);
-            s.middle = round % 4 == 0;
-            RgbLanes radiance;
-            trace_samples(f, s, stage.render_scene.tracer().all_bodies(), *p, radiance);
+            s.centre = round % 4 == 0;
+            trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
             ASSERT_EQ(p->rays.n, s.n);
             for (std::size_t i = 0; i < s.n; ++i) {
                 const PixelSampler sampler(stage.settings.seed, stage.settings.frame, s.number[i]);
                 const SamplePoint u = sampler.point(s.sample[i]);
-                // Middles of a frame of several samples still have their own points of the lens and of the Sun.
-                const double x = s.middle ? s.x[i] : s.x[i] + u[0] - 0.5;
-                const double y = s.middle ? s.y[i] : s.y[i] + u[1] - 0.5;
+                // Centres of a frame of several samples still have their own points of the lens and of the Sun.
+                const double x = s.centre ? s.x[i] : s.x[i] + u[0] - 0.5;
+                const double y = s.centre ? s.y[i] : s.y[i] + u[1] - 0.5;
                 Ray ray = camera_ray(c, stage.T, x, y);
                 Vec3 sun = f.sun->sample(u[2], u[3]);
                 if (c.lens) {
@@ -181,9 +180,8 @@ TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     auto p = std::make_unique<Packet>();
     CameraSamples s = some_samples(kLanes, c, 1, random);
-    s.middle = true;
-    RgbLanes radiance;
-    trace_samples(f, s, stage.render_scene.tracer().all_bodies(), *p, radiance);
+    s.centre = true;
+    trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
     for (std::size_t i = 0; i < s.n; ++i) {
         const Ray ray = camera_ray(c, stage.T, s.x[i], s.y[i]);
         ASSERT_EQ(p->rays[i].origin, ray.origin);
@@ -203,7 +201,8 @@ TEST(PacketLight, IsThatOfOneRayAtATime) {
         const CameraSamples s = some_samples(1 + random() % kLanes, stage.view, 16, random);
         RgbLanes radiance;
         const std::uint64_t rays_before = p->rays_traced;
-        trace_samples(f, s, stage.render_scene.tracer().all_bodies(), *p, radiance);
+        trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
+        f.integrator.radiance(f, *p, radiance);
         std::uint64_t rays = s.n;
         for (std::size_t i = 0; i < s.n; ++i) {
             const Hit hit = p->hits[i];
@@ -241,7 +240,7 @@ TEST(PacketLight, IsThatOfOneRayAtATime) {
     EXPECT_GT(background, 1000);
 }
 
-TEST(PacketLight, TimesOfThePhasesAddUpWhereSomebodyLooks) {
+TEST(PacketLight, TimesOfThePhasesAddUpWhereTheyAreMeasured) {
     std::mt19937_64 random(6);
     const Stage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
@@ -249,9 +248,10 @@ TEST(PacketLight, TimesOfThePhasesAddUpWhereSomebodyLooks) {
     PhaseTimes times{};
     p->times = &times;
     RgbLanes radiance;
-    for (int round = 0; round < 300; ++round)
-        trace_samples(f, some_samples(kLanes, stage.view, 16, random), stage.render_scene.tracer().all_bodies(), *p,
-                      radiance);
+    for (int round = 0; round < 300; ++round) {
+        trace_rays(f, some_samples(kLanes, stage.view, 16, random), stage.render_scene.tracer().all_bodies(), *p);
+        f.integrator.radiance(f, *p, radiance);
+    }
     for (const Phase phase : {Phase::aim, Phase::rays, Phase::shading, Phase::shadow_rays})
         EXPECT_GT(times[static_cast<std::size_t>(phase)], 0);
     EXPECT_EQ(times[static_cast<std::size_t>(Phase::indirect)], 0);

@@ -5,7 +5,7 @@
 
 namespace narpa::cli {
 
-Command add_bench_render(CLI::App& bench);
+Command add_bench_render(Parser bench);
 Command add_bench_loop(Parser bench);
 Command add_bench_estimate(CLI::App& bench);
 

@@ -1,4 +1,4 @@
-// narpa bench render --scenes - the standing scenes, one after another.
+// narpa bench render --scenes - the standing scenes, one after another; --ablation - what each mechanism earns on them.
 #include "apps/bench_ladder.h"
 
 #include <fmt/format.h>
@@ -19,28 +19,30 @@ struct Standing {
     const char *name, *file, *camera;
     RenderSettings::Method method;
     int max_depth;          ///< of paths
-    double at_s;            ///< on the approach; negative: no approach
-    bool loop;              ///< can the plain loop render it?
+    double at_s;            ///< time on the approach; negative: no approach
+    bool loop;              ///< the plain loop can render it
     double speed_up_least;  ///< over the plain loop at equal error; 0: not judged
     double speed_up_from;   ///< judged from so many rays a pixel on
     int size;               ///< px, the longer side
-    bool far = false;       ///< on to 64 samples a pixel, as pictures converge
+    bool far = false;       ///< on to 64 samples a pixel, as images converge
 };
 using Method = RenderSettings::Method;
-constexpr std::array<Standing, 5> kStanding{{
+constexpr std::array<Standing, 6> kStanding{{
     {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, true, 2, 0, 512},
     {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 16, 256, true},  // four bounces
     {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, false, 0, 0, 320},
     {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, false, 0, 0, 320},
     {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, true, 0, 0, 128},
+    // Nothing was tuned on it.
+    {"craft-and-ball", "craft/craft-and-ball.toml", "chase", Method::path, 5, -1, false, 0, 0, 128},
 }};
 
 constexpr int kReferenceSpp = 4096, kFarReferenceSpp = 16384;
-/// Medians of times are of so many frames; quick: to see that all runs.
+/// Frames whose times give a median; quick: to see that everything runs.
 constexpr int kLadderFrames = 9, kRatioFrames = 15, kLoads = 7, kQuick = 2;
 static_assert(std::min({kLadderFrames, kRatioFrames, kLoads}) >= 7);
 
-/// The scene as the ladder looks at it; a monochrome ideal sensor, as radiance is what counts.
+/// The scene with the camera and method that are measured.
 Result<std::unique_ptr<World>> world_of(const Standing& s, int size, std::size_t& camera) {
     auto file = shipped_scene(s.file);
     if (!file) return file.error();
@@ -76,13 +78,20 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     settings.reference_spp = l.reference_spp;
     settings.t_ns = static_cast<std::int64_t>(std::max(0.0, s.at_s) * 1e9);
     settings.frames = o.quick ? kQuick : kLadderFrames;
-    if (s.far && !o.quick) {
+    if (o.ablation) {
+        settings.loop_spp.clear();
+        if (s.method == Method::path)
+            settings.spp = {8, 16, 32}, settings.rays_per_pixel.clear();
+        else
+            settings.rays_per_pixel = {4, 8, 16}, settings.spp.clear();
+        for (const NamedMechanism& m : kMechanisms) settings.without.emplace_back(m.name);
+    } else if (s.far && !o.quick) {
         settings.spp.push_back(64);
         settings.rays_per_pixel.push_back(64);
         settings.loop_spp.push_back(1024);
     }
     std::optional<ReferenceLoop> loop;
-    if (s.loop) {
+    if (s.loop && !o.ablation) {
         BodyPoses at((*world)->scene().bodies.size());
         (*world)->place(settings.t_ns, -1, at);
         auto made = ReferenceLoop::create((*world)->scene(), at);
@@ -90,7 +99,7 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
         loop.emplace(*std::move(made));
     }
     const Progress progress;
-    l.ladder = climb(**world, camera, settings, loop ? &*loop : nullptr, threads,
+    l.ladder = measure_ladder(**world, camera, settings, loop ? &*loop : nullptr, threads,
                      [&](const std::string& step) { progress.tell(std::string(s.name) + ": " + step); });
     return l;
 }
@@ -149,18 +158,18 @@ Outcome bench_ladder(const LadderOptions& o) {
         if (auto writable = can_write_plot(o.plot); !writable) return writable.error();
     TracingThreads threads(o.threads);
     std::optional<CraftRatios> ratios;
-    if (wanted("craft")) {
+    if (wanted("craft") && !o.ablation) {
         auto measured = measure_ratios(o, threads);
         if (!measured) return measured.error();
         ratios = *measured;
-        tell_ratios(*ratios);
+        print_ratios(*ratios);
     }
     std::vector<SceneLadder> ladders;
     for (const Standing& s : kStanding) {
         if (!wanted(s.name)) continue;
         auto measured = measure(s, o, threads);
         if (!measured) return measured.error();
-        tell_ladder(*measured);
+        o.ablation ? print_ablation(*measured) : print_ladder(*measured);
         ladders.push_back(*std::move(measured));
     }
     std::vector<std::string> faults;
@@ -168,7 +177,8 @@ Outcome bench_ladder(const LadderOptions& o) {
         for (std::string& fault : bench_faults(measured)) faults.push_back(std::move(fault));
     };
     if (ratios) judge(*ratios);
-    for (const SceneLadder& l : ladders) judge(l);
+    for (const SceneLadder& l : ladders)
+        if (!o.ablation) judge(l);
     for (const std::string& fault : faults) say((o.gates ? "failed: " : "not reached: ") + fault);
 
     const int n_threads = threads.arena.max_concurrency();

@@ -1,5 +1,5 @@
-/// apps/bench_ladder.h - `narpa bench render --scenes`: what budgets buy on the standing scenes, and the
-/// ratios that frames are judged by.
+/// apps/bench_ladder.h - `narpa bench render --scenes`: time and error at several budgets on the standing scenes, and the
+/// ratios that frames are judged by; --ablation: what each mechanism earns.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ struct LadderOptions {
     std::vector<std::string> scenes;
     std::string plot;  ///< PNG; empty: none
     int threads = 0;
-    bool quick = false, gates = false;
+    bool quick = false, gates = false, ablation = false;
 };
 
 /// The names that --scenes takes.
@@ -22,8 +22,9 @@ struct LadderOptions {
 
 Outcome bench_ladder(const LadderOptions& options);
 
-void tell_ladder(const SceneLadder& l);
-void tell_ratios(const CraftRatios& r);
+void print_ladder(const SceneLadder& l);
+void print_ablation(const SceneLadder& l);
+void print_ratios(const CraftRatios& r);
 [[nodiscard]] nlohmann::json describe(const SceneLadder& l);
 [[nodiscard]] nlohmann::json describe(const CraftRatios& r);
 

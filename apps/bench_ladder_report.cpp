@@ -1,4 +1,4 @@
-// What the ladder of budgets found, in words and as JSON.
+// Tables and JSON of the ladder of budgets.
 #include <fmt/format.h>
 
 #include <array>
@@ -15,7 +15,7 @@ nlohmann::json describe(const PhaseTimes& times) {
     return out;
 }
 
-/// "rays 41 %, shading 20 %", the largest of all that was timed first to last as they come.
+/// "rays 41 %, shading 20 %", in the order of the phases.
 std::string shares(const PhaseTimes& times) {
     double sum = 0;
     for (const std::int64_t t : times) sum += static_cast<double>(t);
@@ -33,7 +33,7 @@ nlohmann::json to_json(const Estimate& e) {
 
 }  // namespace
 
-void tell_ratios(const CraftRatios& r) {
+void print_ratios(const CraftRatios& r) {
     const FrameCost& c = r.cost;
     const auto ms = [](double s) { return 1e3 * s; };
     say(fmt::format("craft, {} px, {:.1f} % of them covered, direct, 1 spp", c.raw.primaries,
@@ -54,9 +54,9 @@ void tell_ratios(const CraftRatios& r) {
     say(fmt::format("  load to first frame   {:>9.3f} s", r.load_s));
 }
 
-void tell_ladder(const SceneLadder& l) {
+void print_ladder(const SceneLadder& l) {
     say(
-        fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (taken out); detector and "
+        fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (subtracted); detector and "
                     "conversion {:.3f} ms",
                     l.scene, l.width, l.height, l.reference_spp, l.ladder.level, l.ladder.reference_noise,
                     1e3 * l.ladder.detector_s));
@@ -67,8 +67,8 @@ void tell_ladder(const SceneLadder& l) {
         // Frames without random numbers differ by nothing but what their sum rounds to.
         const double error = r.rmse.standard_error < 1e-9 * r.rmse.value ? 0 : r.rmse.standard_error;
         const std::string predicted = r.loop        ? ""
-                                      : r.predicted ? fmt::format("x {:.2f}", r.honesty())
-                                                    : "not known";
+                                      : r.predicted ? fmt::format("x {:.2f}", r.predicted_to_measured())
+                                                    : "unknown";
         say(fmt::format("  {:<14} {:>10.3f} {:>10.3f} {:>12.0f} {:>10.4g} +- {:<6.1g} {:>+9.3f} {:>10} {:>9}  {}",
                         r.name, 1e3 * r.median_s(), 1e3 * r.median_cpu_s(), r.rays, r.rmse.value, error,
                         100 * r.bias.value / l.ladder.level, predicted,
@@ -84,6 +84,22 @@ void tell_ladder(const SceneLadder& l) {
             "  at equal error {:.2f} times as fast as the plain loop: {}, median of {} ({:.2f} to {:.2f}); "
             "by CPU time {:.2f}",
             s->median, adaptive ? "budgets in rays" : "fixed spp", s->budgets, s->least, s->most, cpu->median));
+    }
+}
+
+void print_ablation(const SceneLadder& l) {
+    say(fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr)", l.scene, l.width, l.height,
+                    l.reference_spp, l.ladder.level));
+    say(fmt::format("  {:<14} {:<20} {:>10} {:>20} {:>18} {:>9} {:>14}", "budget", "without", "CPU ms", "RMSE", "bias, %",
+                    "predicted", "at equal error"));
+    for (const Rung& r : l.ladder.rungs) {
+        const auto cost = r.without.empty() ? std::nullopt : cost_at_equal_error(l.ladder, r);
+        const double percent = 100 / l.ladder.level;
+        say(fmt::format("  {:<14} {:<20} {:>10.3f} {:>10.4g} +- {:<6.1g} {:>+9.3f} +- {:<5.2g} {:>9} {:>14}", r.name,
+                        r.without, 1e3 * r.median_cpu_s(), r.rmse.value, r.rmse.standard_error, percent * r.bias.value,
+                        percent * r.bias.standard_error,
+                        r.predicted ? fmt::format("x {:.2f}", r.predicted_to_measured()) : "unknown",
+                        cost ? fmt::format("x {:.2f}", *cost) : ""));
     }
 }
 
@@ -124,6 +140,10 @@ nlohmann::json describe(const SceneLadder& l) {
             rung["predicted"] = r.predicted ? nlohmann::json(*r.predicted) : nlohmann::json(nullptr);
             rung["phase_s"] = describe(r.phase_ns);
             if (const auto s = speed_up(l.ladder, r)) rung["speed_up"] = *s;
+            if (!r.without.empty()) {
+                rung["without"] = r.without;
+                if (const auto cost = cost_at_equal_error(l.ladder, r)) rung["cost_at_equal_error"] = *cost;
+            }
         }
         rungs.push_back(std::move(rung));
     }

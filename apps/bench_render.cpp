@@ -1,6 +1,5 @@
-// narpa bench render - how fast the error of a picture falls: RMSE, bias and time at several numbers of samples.
+// narpa bench render - how fast the error of a image falls: RMSE, bias and time at several numbers of samples.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -20,7 +19,7 @@
 namespace narpa::cli {
 namespace {
 
-constexpr std::uint32_t kReferencePictures = 16;  // their scatter tells the reference's own noise
+constexpr std::uint32_t kReferenceImages = 16;  // their scatter tells the reference's own noise
 constexpr int kDefaultSize = 64;                  // px, the longer side
 
 struct Options {
@@ -43,28 +42,28 @@ Status choose_size(const std::string& text, Camera& camera) {
     return Ok{};
 }
 
-/// The camera's pictures at one number of samples, each with random numbers of its own: frame k has those of k.
-class Pictures {
+/// The camera's images at one number of samples, each with random numbers of its own: frame k has those of k.
+class ImageSeries {
 public:
-    static Result<Pictures> create(Scene scene, std::size_t camera, int spp, std::uint64_t seed) {
+    static Result<ImageSeries> create(Scene scene, std::size_t camera, int spp, std::uint64_t seed) {
         scene.render.spp = spp;
         scene.render.seed = seed;
         auto world = World::create(std::move(scene));
         if (!world) return world.error();
-        return Pictures(*std::move(world), camera);
+        return ImageSeries(*std::move(world), camera);
     }
-    /// All pictures show the scene at its beginning. The first call takes memory, so it is not one to measure.
+    /// All images show the scene at its beginning. The first call takes memory, so it is not one to measure.
     std::span<const Rgb> render(TracingThreads& threads, std::uint32_t frame) {
         const std::int64_t start_ns = monotonic_ns();
         threads.arena.execute([&] { unit_->expose(frame, 0); });
         seconds_ = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
         return unit_->radiance().pixels;
     }
-    /// Of the last picture.
+    /// Of the last image.
     [[nodiscard]] double seconds() const noexcept { return seconds_; }
 
 private:
-    Pictures(std::unique_ptr<World> world, std::size_t camera)
+    ImageSeries(std::unique_ptr<World> world, std::size_t camera)
         : world_(std::move(world)), unit_(std::make_unique<CameraUnit>(*world_, camera)) {}
     std::unique_ptr<World> world_;
     std::unique_ptr<CameraUnit> unit_;
@@ -73,7 +72,7 @@ private:
 
 struct Measured {
     std::vector<ErrorRow> rows;
-    std::vector<double> seconds;  ///< a picture, mean
+    std::vector<double> seconds;  ///< a image, mean
     double reference_level = 0, reference_noise = 0, reference_seconds = 0;
 };
 
@@ -83,29 +82,29 @@ Result<Measured> measure(const Options& o, const Scene& scene, std::size_t camer
     const auto pixels = static_cast<std::size_t>(scene.cameras[camera].width) *
                         static_cast<std::size_t>(scene.cameras[camera].height);
 
-    PictureMean reference(pixels);
-    const int reference_spp = o.reference_spp / static_cast<int>(kReferencePictures);
-    auto many = Pictures::create(scene, camera, reference_spp, scene.render.seed + 1);
+    ImageMean reference(pixels);
+    const int reference_spp = o.reference_spp / static_cast<int>(kReferenceImages);
+    auto many = ImageSeries::create(scene, camera, reference_spp, scene.render.seed + 1);
     if (!many) return many.error();
-    for (std::uint32_t k = 0; k < kReferencePictures; ++k) {
-        progress.tell(fmt::format("reference {}/{}", k, kReferencePictures));
+    for (std::uint32_t k = 0; k < kReferenceImages; ++k) {
+        progress.tell(fmt::format("reference {}/{}", k, kReferenceImages));
         reference.add(many->render(threads, k));
         m.reference_seconds += many->seconds();
     }
     m.reference_level = reference.level().value;
     m.reference_noise = std::sqrt(reference.variance_of_mean());
 
-    std::uint32_t frame = 0;  // goes on from row to row: no two pictures share random numbers
+    std::uint32_t frame = 0;  // goes on from row to row: no two images share random numbers
     for (const int spp : o.spp) {
-        auto pictures = Pictures::create(scene, camera, spp, scene.render.seed);
-        if (!pictures) return pictures.error();
+        auto images = ImageSeries::create(scene, camera, spp, scene.render.seed);
+        if (!images) return images.error();
         ErrorAgainst error(reference);
         double seconds = 0;
-        pictures->render(threads, frame);
+        images->render(threads, frame);
         for (int k = 0; k < o.seeds; ++k) {
             progress.tell(fmt::format("{} spp {}/{}", spp, k, o.seeds));
-            error.add(pictures->render(threads, frame++));
-            seconds += pictures->seconds();
+            error.add(images->render(threads, frame++));
+            seconds += images->seconds();
         }
         m.rows.push_back(error.row(spp));
         m.seconds.push_back(seconds / o.seeds);
@@ -126,7 +125,7 @@ nlohmann::json describe(const Measured& m, const Camera& c) {
     for (std::size_t i = 0; i < m.rows.size(); ++i) {
         const ErrorRow& r = m.rows[i];
         rows.push_back({{"spp", r.spp},
-                        {"seeds", r.pictures},
+                        {"seeds", r.images},
                         {"rmse", to_json(r.rmse)},
                         {"relative_rmse", to_json(r.relative_rmse)},
                         {"bias", to_json(r.bias)},
@@ -143,7 +142,7 @@ std::string text(const Estimate& e, int digits) {
 
 void tell_table(const Measured& m, const Camera& c) {
     say(fmt::format("{:>6} {:>24} {:>8} {:>18} {:>20} {:>6} {:>10} {:>10}", "spp", "RMSE, W/(m^2 sr)", "of mean",
-                    "relative, %", "mean error, sigmas", "pixels", "s/picture", "Msample/s"));
+                    "relative, %", "mean error, sigmas", "pixels", "s/image", "Msample/s"));
     for (std::size_t i = 0; i < m.rows.size(); ++i) {
         const ErrorRow& r = m.rows[i];
         const Estimate relative{100 * r.relative_rmse.value, 100 * r.relative_rmse.standard_error};
@@ -158,6 +157,8 @@ void tell_table(const Measured& m, const Camera& c) {
 }
 
 Outcome bench(Options o) {
+    if (o.ladder.ablation && o.ladder.scenes.empty()) o.ladder.scenes = {"all"};
+    if (o.ladder.quick && o.ladder.scenes.empty()) return Error{"--quick needs --scenes or --ablation"};
     if (!o.ladder.scenes.empty()) {
         o.ladder.threads = o.threads;
         o.ladder.plot = o.plot;
@@ -222,41 +223,42 @@ Outcome bench(Options o) {
 
 }  // namespace
 
-Command add_bench_render(CLI::App& bench_command) {
+Command add_bench_render(Parser bench_command) {
     auto o = std::make_shared<Options>();
-    CLI::App* c = bench_command.add_subcommand(
-        "render", "Error of a picture against samples and time, set beside a reference of many samples");
+    const Parser c = bench_command.subcommand(
+        "render", "Error of an image against samples and time, beside a reference of many samples");
     const std::array of_one_scene{
-        c->add_option("SCENE", o->scene, "Scene file (TOML; default: the Cornell box that narpa brings along)"),
-        c->add_option("--camera", o->camera, "Name of the camera (default: the first)"),
-        c->add_option("--spp", o->spp, "Samples per pixel to measure at")->delimiter(',')->capture_default_str(),
-        c->add_option("--reference-spp", o->reference_spp, "Samples per pixel of the reference, a multiple of 16")
-            ->check(CLI::Range(32, 16 * 65535))
-            ->check([](const std::string& text) {
-                return std::stoll(text) % kReferencePictures == 0 ? "" : "expected a multiple of 16";
+        c.option("SCENE", o->scene, "Scene file (TOML; default: the Cornell box that comes with narpa)"),
+        c.option("--camera", o->camera, "Name of the camera (default: the first)"),
+        c.option("--spp", o->spp, "Samples per pixel to measure at").comma_separated().shows_default(),
+        c.option("--reference-spp", o->reference_spp, "Samples per pixel of the reference, a multiple of 16")
+            .range(32, 16 * 65535)
+            .check([](const std::string& text) {
+                return std::stoll(text) % kReferenceImages == 0 ? "" : "expected a multiple of 16";
             })
-            ->capture_default_str(),
-        c->add_option("--size", o->size,
-                      fmt::format("WxH: the camera's view with so many pixels (default: the longer side has {})",
-                                  kDefaultSize)),
-        c->add_option("--seeds", o->seeds, "Independent pictures at each number of samples")
-            ->check(CLI::Range(2, 65535))
-            ->capture_default_str()};
-    c->add_option("--threads", o->threads, "Threads (default: all cores)")->check(CLI::Range(0, 1024));
-    CLI::Option* scenes =
-        c->add_option("--scenes", o->ladder.scenes,
-                      "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, "
-                      "craft-paths, docking, docking-contact, cornell")
-            ->delimiter(',')
-            ->check(CLI::IsMember(standing_scenes()));
-    for (CLI::Option* option : of_one_scene) scenes->excludes(option);
-    c->add_flag("--quick", o->ladder.quick, "With --scenes: small pictures and few of them, to see that it works")
-        ->needs(scenes);
-    c->add_flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be")
-        ->needs(scenes);
-    c->add_option("-o,--output", o->plot,
-                  "FILE.png: error over samples and over time; with --scenes error over time, and where time goes");
-    c->footer(
+            .shows_default(),
+        c.option("--size", o->size,
+                 fmt::format("WxH: the camera's view with so many pixels (default: the longer side has {})",
+                             kDefaultSize)),
+        c.option("--seeds", o->seeds, "Independent images at each number of samples").range(2, 65535).shows_default()};
+    c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
+    const Option scenes = c.option("--scenes", o->ladder.scenes,
+                                   "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, "
+                                   "craft-paths, docking, docking-contact, cornell, craft-and-ball")
+                              .comma_separated()
+                              .one_of(standing_scenes());
+    const Option ablation = c.flag("--ablation", o->ladder.ablation,
+                                   "Instead: each adaptive mechanism switched off in turn, with time and error beside the "
+                                   "full renderer's, on the scenes of --scenes (default: all)");
+    for (const Option& option : of_one_scene) {
+        scenes.excludes(option);
+        ablation.excludes(option);
+    }
+    c.flag("--quick", o->ladder.quick, "With --scenes or --ablation: small images and few of them, to see that it works");
+    c.flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be").needs(scenes);
+    c.option("-o,--output", o->plot,
+             "FILE.png: error over samples and over time; with --scenes error over time, and where time goes");
+    c.footer(
         "Without --scenes, exit status 1 where a bias is beyond three standard errors, or an error falls more "
         "slowly than spp^-0.47.");
     return [o] { return bench(*o); };

@@ -1,9 +1,8 @@
-/// bench/budget_ladder.h - what a budget buys: time and error of one camera's frames at several budgets,
-/// beside those of the plain loop of reference_loop.h, in one run.
+/// bench/budget_ladder.h - time and error of one camera's frames at several budgets, beside those of the plain loop of
+/// reference_loop.h and of the renderer with one mechanism switched off, in one run.
 ///
-/// Errors are those of the mean of the three bands, W m^-2 sr^-1, against a reference of many samples whose own
-/// noise is taken out (convergence.h). Budgets and loop take turns, so that whatever else the machine does hits all
-/// alike.
+/// Errors are those of the mean of the three bands, W m^-2 sr^-1, against a reference of many samples whose own noise is
+/// subtracted (convergence.h). All candidates take turns, so that other load on the machine affects all alike.
 #pragma once
 
 #include <array>
@@ -20,7 +19,7 @@
 
 namespace narpa {
 
-/// Of a frame's phases, as table, JSON and plot call them.
+/// Names of a frame's phases in table and JSON.
 inline constexpr std::array<const char*, kPhases> kPhaseNames{"aim",         "rays",     "shading",
                                                               "shadow_rays", "indirect", "passes"};
 
@@ -28,29 +27,45 @@ struct LadderSettings {
     std::vector<int> spp{1, 4, 16};
     std::vector<double> rays_per_pixel{2, 4, 8, 16};  ///< as FrameBudget::rays
     std::vector<int> loop_spp{1, 4, 16, 64, 256};     ///< of the plain loop, where there is one
-    int frames = 9;                                   ///< at each budget, each with random numbers of its own; >= 2
-    int reference_spp = 4096;                         ///< in sixteen pictures
-    std::int64_t t_ns = 0;                            ///< what the scene shows
+    /// Mechanisms to switch off one at a time, by name (kMechanisms), at the middle one of `spp` or `rays_per_pixel`.
+    std::vector<std::string> without{};
+    int frames = 9;            ///< at each budget, each with random numbers of its own; >= 2
+    int reference_spp = 4096;  ///< in sixteen images
+    std::int64_t t_ns = 0;     ///< the moment that the scene shows
 };
+
+/// The mechanisms that an ablation switches off.
+struct NamedMechanism {
+    const char* name;
+    bool Mechanisms::*on;
+};
+inline constexpr std::array<NamedMechanism, 8> kMechanisms{{{"sample plan", &Mechanisms::sample_plan},
+                                                            {"edge classes", &Mechanisms::edge_classes},
+                                                            {"path reuse", &Mechanisms::path_reuse},
+                                                            {"small-body sampling", &Mechanisms::small_body_sampling},
+                                                            {"sun first", &Mechanisms::sun_first},
+                                                            {"shared variance", &Mechanisms::shared_variance},
+                                                            {"tile culling", &Mechanisms::tile_culling},
+                                                            {"coarse steps", &Mechanisms::coarse_steps}}};
 
 /// One budget, or one number of samples of the plain loop.
 struct Rung {
     std::string name;
+    std::string without;  ///< the mechanism that is off; empty: none
     bool loop = false, adaptive = false;
     std::vector<double> seconds;          ///< of each frame's radiance
-    std::vector<double> cpu_seconds;      ///< the same, summed over the threads: what other load disturbs least
+    std::vector<double> cpu_seconds;      ///< the same, summed over the threads; least sensitive to other load
     double rays = 0, samples = 0;         ///< a frame, mean
-    FrameStep step = FrameStep::refined;  ///< of the frame that got least far
+    FrameStep step = FrameStep::refined;  ///< the coarsest of all frames
     Estimate rmse, bias;
-    std::optional<double> predicted;  ///< the frames' own standard error, RMS; none: a frame did not tell
+    std::optional<double> predicted;  ///< the frames' own standard error, RMS; none: a frame has no estimate
     PhaseTimes phase_ns{};            ///< a frame, mean, of all threads
 
     [[nodiscard]] double median_s() const;
     [[nodiscard]] double median_cpu_s() const;
-    /// Frames that leave out indirect light or pixels cannot know what that costs.
-    [[nodiscard]] bool knows_its_error() const { return step <= FrameStep::one_sample; }
-    /// What the frames say of their error, in parts of what it is.
-    [[nodiscard]] double honesty() const { return predicted.value_or(0) / rmse.value; }
+    /// Frames that leave out indirect light or pixels cannot estimate their error.
+    [[nodiscard]] bool estimates_error() const { return step <= FrameStep::one_sample; }
+    [[nodiscard]] double predicted_to_measured() const { return predicted.value_or(0) / rmse.value; }
 };
 
 struct Ladder {
@@ -61,19 +76,22 @@ struct Ladder {
 
 double median(std::vector<double> values);
 
-/// `loop`: null where the scene is beyond it. `tell` hears how far it is.
-[[nodiscard]] Ladder climb(const World& world, std::size_t camera, const LadderSettings& settings,
+/// `loop`: null where it cannot render the scene. `progress` is called with a line of text.
+[[nodiscard]] Ladder measure_ladder(const World& world, std::size_t camera, const LadderSettings& settings,
                            const ReferenceLoop* loop, TracingThreads& threads,
-                           const std::function<void(const std::string&)>& tell);
+                           const std::function<void(const std::string&)>& progress);
 
-/// By the clock on the wall, or by the time that the threads computed.
+/// Wall time, or CPU time of all threads.
 enum class TimeBy : std::uint8_t { wall, cpu };
 
-/// How long the plain loop takes to the error of this rung, in parts of what the rung takes: along straight lines
-/// between the loop's rungs in the logarithms of time and error. None where its errors do not enclose it.
+/// Time of the plain loop to the error of this rung, over that of the rung: along straight lines between the loop's rungs
+/// in the logarithms of time and error. None where its errors do not enclose the rung's.
 [[nodiscard]] std::optional<double> speed_up(const Ladder& ladder, const Rung& rung, TimeBy by = TimeBy::wall);
+/// CPU time of a rung without some mechanism over that of the full renderer to the same error; the outer lines go on
+/// beyond its rungs. Above 1: the mechanism earns the difference.
+[[nodiscard]] std::optional<double> cost_at_equal_error(const Ladder& ladder, const Rung& rung);
 
-/// Over the budgets that have one, but for those whose frames left something out.
+/// Over the budgets that have one, without those whose frames left something out.
 struct SpeedUps {
     double median = 0, least = 0, most = 0;
     std::size_t budgets = 0;

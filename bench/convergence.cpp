@@ -26,8 +26,8 @@ Estimate root(const Estimate& squares) {
     return {value, squares.standard_error / (2 * value)};
 }
 
-double band(std::span<const Rgb> picture, std::size_t value) {
-    return static_cast<double>(picture[value / 3][static_cast<int>(value % 3)]);
+double band(std::span<const Rgb> image, std::size_t value) {
+    return static_cast<double>(image[value / 3][static_cast<int>(value % 3)]);
 }
 
 }  // namespace
@@ -38,45 +38,45 @@ double Estimate::sigmas() const noexcept {
                               : std::copysign(std::numeric_limits<double>::infinity(), value);
 }
 
-void PictureMean::add(std::span<const Rgb> picture) {
+void ImageMean::add(std::span<const Rgb> image) {
     std::vector<double>& mean = halves_[count() % 2];
     const double n = static_cast<double>(count() / 2 + 1);
     double sum = 0;
     for (std::size_t i = 0; i < mean.size(); ++i) {
-        const double x = band(picture, i);
+        const double x = band(image, i);
         mean[i] += (x - mean[i]) / n;
         sum += x;
     }
     levels_.push_back(sum / static_cast<double>(mean.size()));
 }
 
-/// Of all pictures.
-double PictureMean::share(std::size_t half) const noexcept {
+/// Of all images.
+double ImageMean::share(std::size_t half) const noexcept {
     return static_cast<double>((count() + 1 - half) / 2) / static_cast<double>(count());
 }
 
-double PictureMean::mean(std::size_t value) const noexcept {
+double ImageMean::mean(std::size_t value) const noexcept {
     return share(0) * halves_[0][value] + share(1) * halves_[1][value];
 }
 
-double PictureMean::variance_of_mean(std::size_t value) const noexcept {
-    // A difference of means of n0 and n1 pictures has the variance s^2 (1 / n0 + 1 / n1), the mean of all s^2 / n.
+double ImageMean::variance_of_mean(std::size_t value) const noexcept {
+    // A difference of means of n0 and n1 images has the variance s^2 (1 / n0 + 1 / n1), the mean of all s^2 / n.
     const double difference = halves_[0][value] - halves_[1][value];
     return share(0) * share(1) * difference * difference;
 }
 
-double PictureMean::variance_of_mean() const noexcept {
+double ImageMean::variance_of_mean() const noexcept {
     double sum = 0;
     for (std::size_t i = 0; i < halves_[0].size(); ++i) sum += variance_of_mean(i);
     return sum / static_cast<double>(halves_[0].size());
 }
 
-Estimate PictureMean::level() const noexcept {
+Estimate ImageMean::level() const noexcept {
     return mean_of(levels_);
 }
 
-ErrorAgainst::ErrorAgainst(const PictureMean& reference)
-    : reference_(reference), weights_(3 * reference.pixels()), pictures_(reference.pixels()) {
+ErrorAgainst::ErrorAgainst(const ImageMean& reference)
+    : reference_(reference), weights_(3 * reference.pixels()), images_(reference.pixels()) {
     const double least = 0.01 * reference.level().value;
     for (std::size_t i = 0; i < weights_.size(); ++i) {
         const double radiance = std::max(reference.mean(i), least);
@@ -84,11 +84,11 @@ ErrorAgainst::ErrorAgainst(const PictureMean& reference)
     }
 }
 
-void ErrorAgainst::add(std::span<const Rgb> picture) {
-    pictures_.add(picture);
+void ErrorAgainst::add(std::span<const Rgb> image) {
+    images_.add(image);
     double sum = 0, relative = 0;
     for (std::size_t i = 0; i < weights_.size(); ++i) {
-        const double error = band(picture, i) - reference_.mean(i);
+        const double error = band(image, i) - reference_.mean(i);
         const double squared = error * error - reference_.variance_of_mean(i);
         sum += squared;
         relative += weights_[i] * squared;
@@ -98,15 +98,15 @@ void ErrorAgainst::add(std::span<const Rgb> picture) {
 }
 
 ErrorRow ErrorAgainst::row(int spp) const {
-    ErrorRow row{spp, pictures_.count(), root(mean_of(squared_)), root(mean_of(squared_relative_)), {}, {}};
+    ErrorRow row{spp, images_.count(), root(mean_of(squared_)), root(mean_of(squared_relative_)), {}, {}};
 
-    const Estimate level = pictures_.level(), truth = reference_.level();
+    const Estimate level = images_.level(), truth = reference_.level();
     row.bias = {level.value - truth.value, std::hypot(level.standard_error, truth.standard_error)};
 
     std::vector<double> bias_squared(reference_.pixels());
     for (std::size_t i = 0; i < 3 * bias_squared.size(); ++i) {
         const auto error = [&](std::size_t half) {
-            return pictures_.mean_of_half(half, i) - reference_.mean_of_half(half, i);
+            return images_.mean_of_half(half, i) - reference_.mean_of_half(half, i);
         };
         bias_squared[i / 3] += error(0) * error(1) / 3;
     }

@@ -1,7 +1,7 @@
-/// bench/convergence.h - how the error of a Monte Carlo picture falls with the number of samples: its
+/// bench/convergence.h - how the error of a Monte Carlo image falls with the number of samples: its
 /// statistics.
 ///
-/// Pictures of one view, made with independent random numbers, are set beside a reference that was made the same
+/// ImageSeries of one view, made with independent random numbers, are set beside a reference that was made the same
 /// way with many more samples. Sums are double. Values are radiances, W m^-2 sr^-1, every band of every pixel for
 /// itself.
 #pragma once
@@ -21,64 +21,64 @@ struct Estimate {
     [[nodiscard]] double sigmas() const noexcept;
 };
 
-/// Mean of independent pictures of the same size, of all and of every other one: what two such halves do not share
+/// Mean of independent images of the same size, of all and of every other one: the difference of the halves
 /// is noise.
-class PictureMean {
+class ImageMean {
 public:
-    explicit PictureMean(std::size_t pixels)
+    explicit ImageMean(std::size_t pixels)
         : halves_{std::vector<double>(3 * pixels), std::vector<double>(3 * pixels)} {}
-    void add(std::span<const Rgb> picture);
+    void add(std::span<const Rgb> image);
 
     [[nodiscard]] std::size_t pixels() const noexcept { return halves_[0].size() / 3; }
     [[nodiscard]] std::size_t count() const noexcept { return levels_.size(); }
     [[nodiscard]] double mean(std::size_t value) const noexcept;
-    /// Of the first, third ... picture (0) or of the others (1).
+    /// Of the first, third ... image (0) or of the others (1).
     [[nodiscard]] double mean_of_half(std::size_t half, std::size_t value) const noexcept {
         return halves_[half][value];
     }
     /// An estimate of the variance of `mean`, without bias but with a single degree of freedom; at least two
-    /// pictures.
+    /// images.
     [[nodiscard]] double variance_of_mean(std::size_t value) const noexcept;
     /// Averaged over the values.
     [[nodiscard]] double variance_of_mean() const noexcept;
-    /// Mean of all values; its standard error from the scatter of the pictures' own means.
+    /// Mean of all values; its standard error from the scatter of the images' own means.
     [[nodiscard]] Estimate level() const noexcept;
 
 private:
     [[nodiscard]] double share(std::size_t half) const noexcept;
 
     std::array<std::vector<double>, 2> halves_;
-    std::vector<double> levels_;  ///< mean of each picture
+    std::vector<double> levels_;  ///< mean of each image
 };
 
 /// The error at one number of samples a pixel.
 struct ErrorRow {
     int spp = 0;
-    std::size_t pictures = 0;
+    std::size_t images = 0;
     Estimate rmse;  ///< over pixels and bands, the reference's own noise taken out
     /// The same of errors in parts of the pixel's own radiance (or of a hundredth of the mean level, where that is
-    /// more): RMSE tells of the brightest edges, this of the picture as the eye sees it.
+    /// more): RMSE tells of the brightest edges, this of the image as the eye sees it.
     Estimate relative_rmse;
-    Estimate bias;  ///< mean error over pixels, bands and pictures; the reference's own error is part of its own
-    /// Mean over pixels of the squared bias of each, which finds what cancels over the picture: the product of the
-    /// errors of two halves of the pictures, so it has no bias of its own and may be negative. Its standard error
+    Estimate bias;  ///< mean error over pixels, bands and images; the reference's own error is part of its own
+    /// Mean over pixels of the squared bias of each, which finds what cancels over the image: the product of the
+    /// errors of two halves of the images, so it has no bias of its own and may be negative. Its standard error
     /// takes pixels as independent.
     Estimate pixel_bias_squared;
 };
 
-/// Sets pictures beside a reference (of at least two pictures), which must outlive it.
+/// Sets images beside a reference (of at least two images), which must outlive it.
 class ErrorAgainst {
 public:
-    explicit ErrorAgainst(const PictureMean& reference);
-    void add(std::span<const Rgb> picture);
-    /// At least two pictures.
+    explicit ErrorAgainst(const ImageMean& reference);
+    void add(std::span<const Rgb> image);
+    /// At least two images.
     [[nodiscard]] ErrorRow row(int spp) const;
 
 private:
-    const PictureMean& reference_;
+    const ImageMean& reference_;
     std::vector<double> weights_;  ///< of the squared relative error
-    PictureMean pictures_;
-    std::vector<double> squared_, squared_relative_;  ///< mean of each picture, the reference's variance taken out
+    ImageMean images_;
+    std::vector<double> squared_, squared_relative_;  ///< mean of each image, the reference's variance taken out
 };
 
 /// Slope of log(error) against log(spp): -1/2 for independent samples, steeper for low-discrepancy ones. Least

@@ -5,22 +5,22 @@
 namespace narpa {
 namespace {
 
-/// None: all is well.
-std::optional<std::string> honesty_fault(const Rung& rung) {
+/// None: no fault.
+std::optional<std::string> prediction_fault(const Rung& rung) {
     if (rung.rmse.value <= 0)
         return "its error does not stand out from the reference's noise: take a better reference";
     if (!rung.predicted)
-        return rung.knows_its_error() ? std::optional<std::string>("its frames say nothing of their error")
+        return rung.estimates_error() ? std::optional<std::string>("its frames have no error estimate")
                                       : std::nullopt;
-    if (rung.honesty() >= kHonestyLeast && rung.honesty() <= kHonestyMost) return {};
-    return fmt::format("the predicted error is {:.2f} of the measured, expected {} to {}", rung.honesty(),
-                       kHonestyLeast, kHonestyMost);
+    if (rung.predicted_to_measured() >= kPredictedLeast && rung.predicted_to_measured() <= kPredictedMost) return {};
+    return fmt::format("the predicted error is {:.2f} of the measured, expected {} to {}", rung.predicted_to_measured(),
+                       kPredictedLeast, kPredictedMost);
 }
 
 std::optional<std::string> speed_fault(const SceneLadder& scene) {
     if (scene.speed_up_least <= 0) return {};
-    constexpr double kButForATenth = 0.9;  // a budget is not used up to the last ray
-    const double rays_least = kButForATenth * scene.speed_up_from * scene.width * scene.height;
+    constexpr double kUsed = 0.9;  // a budget is not used up to the last ray
+    const double rays_least = kUsed * scene.speed_up_from * scene.width * scene.height;
     const auto s = speed_ups(scene.ladder, true, TimeBy::wall, rays_least);
     if (!s) return "no budget's error lies between those of the plain loop";
     if (s->median >= scene.speed_up_least) return {};
@@ -36,7 +36,7 @@ std::vector<std::string> bench_faults(const SceneLadder& scene) {
     std::vector<std::string> faults;
     for (const Rung& rung : scene.ladder.rungs)
         if (!rung.loop)
-            if (const auto fault = honesty_fault(rung))
+            if (const auto fault = prediction_fault(rung))
                 faults.push_back(fmt::format("{}, {}: {}", scene.scene, rung.name, *fault));
     if (const auto fault = speed_fault(scene)) faults.push_back(scene.scene + ": " + *fault);
     return faults;

@@ -1,4 +1,4 @@
-/// bench/gates.h - what `narpa bench render --scenes` measures, and what it must be.
+/// bench/gates.h - results of `narpa bench render --scenes` and their bounds.
 #pragma once
 
 #include <optional>
@@ -14,8 +14,8 @@ namespace narpa {
 struct SceneLadder {
     std::string scene;
     int width = 0, height = 0, reference_spp = 0;
-    double speed_up_least = 0;  ///< over the plain loop that the scene must reach; 0: it is not judged by that
-    double speed_up_from = 0;   ///< judged over budgets of so many rays a pixel and more, but for a tenth
+    double speed_up_least = 0;  ///< required over the plain loop; 0: not judged
+    double speed_up_from = 0;   ///< judged over budgets of at least so many rays a pixel
     Ladder ladder;
 };
 /// Frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at its edge, and
@@ -34,10 +34,10 @@ struct CraftRatios {
 /// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover, triangles as
 /// large; seconds that moved bodies cost; seconds to the first frame; predicted to measured error.
 inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
-inline constexpr double kHonestyLeast = 0.85, kHonestyMost = 1.40;
+inline constexpr double kPredictedLeast = 0.85, kPredictedMost = 1.40;
 
-/// What is not as it must be, one sentence each. A rung without a predicted error is one of them, unless its frames
-/// left out what they cannot know of.
+/// Bounds that are missed, one sentence each. A rung without a predicted error is one of them, unless its frames left out
+/// pixels or indirect light.
 [[nodiscard]] std::vector<std::string> bench_faults(const SceneLadder& scene);
 [[nodiscard]] std::vector<std::string> bench_faults(const CraftRatios& ratios);
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
-/// What a pixel's ray meets, as Embree tells it.
+/// The hit of a pixel's ray.
 struct RawHit {
     float depth;   ///< infinite: nothing
     Vec3f normal;  ///< not unit
@@ -56,7 +56,7 @@ struct ShadowRays {
     alignas(64) RTCRay16 q{};
     alignas(64) std::array<int, 16> valid{};
     int n = 0;
-    std::uint64_t asked = 0, shadowed = 0;
+    std::uint64_t traced = 0, shadowed = 0;
 
     explicit ShadowRays(const Vec3f& to_sun) {
         for (int i = 0; i < 16; ++i)
@@ -67,11 +67,11 @@ struct ShadowRays {
         q.tnear[n] = 1e-4f, q.tfar[n] = kFar;
         ++n;
     }
-    void ask(RTCScene scene) {
+    void trace(RTCScene scene) {
         for (int i = 0; i < 16; ++i) valid[static_cast<std::size_t>(i)] = i < n ? -1 : 0;
         embree::occluded(scene, valid.data(), q, embree::Run::together);
         for (int i = 0; i < n; ++i) shadowed += q.tfar[i] < 0;
-        asked += static_cast<std::uint64_t>(n);
+        traced += static_cast<std::uint64_t>(n);
         n = 0;
     }
 };
@@ -93,8 +93,8 @@ RawEmbree::~RawEmbree() = default;
 
 namespace {
 
-/// The middles' rays of a tile; what they meet goes to `hits`, row by row.
-std::uint64_t ask_camera(const RawAim& a, RTCScene scene, const Region& tile, TileHits& hits) {
+/// Traces the rays through a tile's pixel centres. `hits`: out, row by row.
+std::uint64_t trace_primary(const RawAim& a, RTCScene scene, const Region& tile, TileHits& hits) {
     alignas(64) RTCRayHit16 q{};
     alignas(64) std::array<int, 16> valid{};
     std::uint64_t met = 0;
@@ -117,8 +117,8 @@ std::uint64_t ask_camera(const RawAim& a, RTCScene scene, const Region& tile, Ti
     return met;
 }
 
-/// Rays to the Sun from all hits of a tile that face it, 4 x 4 pixels after 4 x 4 pixels.
-void ask_sun(const RawAim& a, RTCScene scene, const Region& tile, const TileHits& hits, const Vec3f& sun,
+/// Traces shadow rays from all hits of a tile that face the Sun, 4 x 4 pixels after 4 x 4 pixels.
+void trace_shadows(const RawAim& a, RTCScene scene, const Region& tile, const TileHits& hits, const Vec3f& sun,
              ShadowRays& shadows) {
     const int width = static_cast<int>(tile.cols().size()), height = static_cast<int>(tile.rows().size());
     for (int y0 = 0; y0 < height; y0 += 4)
@@ -131,9 +131,9 @@ void ask_sun(const RawAim& a, RTCScene scene, const Region& tile, const TileHits
                                     static_cast<float>(y + tile.rows().begin()) * a.down;
                     if ((dot(h.normal, sun) > 0) == (dot(h.normal, d) > 0)) continue;  // the Sun is behind it
                     shadows.add(a.origin + h.depth * d);
-                    if (shadows.n == 16) shadows.ask(scene);
+                    if (shadows.n == 16) shadows.trace(scene);
                 }
-    if (shadows.n > 0) shadows.ask(scene);
+    if (shadows.n > 0) shadows.trace(scene);
 }
 
 }  // namespace
@@ -142,25 +142,25 @@ RawCost RawEmbree::trace(const Camera& camera, const Rigid3& T_world_camera, con
     const RawAim a(camera, T_world_camera);
     const RTCScene scene = impl_->raw.scene.get();
     const Vec3f sun = vec_cast<float>(to_sun);
-    std::atomic<std::uint64_t> met{0}, asked{0}, shadowed{0};
+    std::atomic<std::uint64_t> met{0}, traced{0}, shadowed{0};
     std::atomic<std::int64_t> primary_ns{0}, shadow_ns{0};
     const std::int64_t start_ns = monotonic_ns();
     over_tiles(camera, [&](const Region& tile) {
-        const std::int64_t begun_ns = monotonic_ns();
+        const std::int64_t tile_start_ns = monotonic_ns();
         TileHits hits;
-        met += ask_camera(a, scene, tile, hits);
-        const std::int64_t middle_ns = monotonic_ns();
+        met += trace_primary(a, scene, tile, hits);
+        const std::int64_t primary_end_ns = monotonic_ns();
         ShadowRays shadows(sun);
-        ask_sun(a, scene, tile, hits, sun, shadows);
-        asked += shadows.asked, shadowed += shadows.shadowed;
-        primary_ns += middle_ns - begun_ns, shadow_ns += monotonic_ns() - middle_ns;
+        trace_shadows(a, scene, tile, hits, sun, shadows);
+        traced += shadows.traced, shadowed += shadows.shadowed;
+        primary_ns += primary_end_ns - tile_start_ns, shadow_ns += monotonic_ns() - primary_end_ns;
     });
     RawCost cost;
     const double wall_s = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
     cost.primary_s = wall_s * static_cast<double>(primary_ns) / static_cast<double>(primary_ns + shadow_ns);
     cost.shadow_s = wall_s - cost.primary_s;
     cost.primaries = static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
-    cost.hits = met, cost.shadow_rays = asked, cost.shadowed = shadowed;
+    cost.hits = met, cost.shadow_rays = traced, cost.shadowed = shadowed;
     return cost;
 }
 

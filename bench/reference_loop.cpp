@@ -67,7 +67,7 @@ Rgb brdf(const Point& p, const Vec3f& l) {
 struct Paths {
     alignas(64) RTCRayHit16 q{};
     alignas(64) RTCRay16 shadow{};
-    alignas(64) std::array<int, 16> valid{}, asked{};
+    alignas(64) std::array<int, 16> valid{}, shadow_valid{};
     std::array<std::size_t, 16> pixel{};
     std::array<Counter, 16> random{};
     std::array<Rgb, 16> throughput{}, light{}, incident{};
@@ -81,7 +81,7 @@ struct Paths {
     }
 };
 
-/// Light that a point is asked for: what comes from `direction` (unit) if nothing stands in the way before `far_m`.
+/// Direct light at a point: what comes from `direction` (unit) if nothing stands in the way before `far_m`.
 struct Incident {
     Vec3f direction;
     float far_m;
@@ -189,12 +189,12 @@ template <class Source>
 std::uint64_t ReferenceLoop::Impl::ask(Paths& p, const Source& source) const {
     std::uint64_t rays = 0;
     for (std::size_t i = 0; i < 16; ++i) {
-        p.asked[i] = 0;
+        p.shadow_valid[i] = 0;
         if (p.valid[i] == 0) continue;
         const auto [l, far_m, irradiance] = source(p.point[i], p.random[i]);
         const float cosine = dot(p.point[i].normal, l);
         if (cosine <= 0) continue;
-        p.asked[i] = -1;
+        p.shadow_valid[i] = -1;
         ++rays;
         p.incident[i] = (cosine * irradiance) * brdf(p.point[i], l);
         const Vec3f& o = p.point[i].position;
@@ -203,9 +203,9 @@ std::uint64_t ReferenceLoop::Impl::ask(Paths& p, const Source& source) const {
         p.shadow.tnear[i] = 0, p.shadow.tfar[i] = far_m, p.shadow.mask[i] = ~0u;
     }
     if (rays == 0) return 0;
-    embree::occluded(raw.scene.get(), p.asked.data(), p.shadow, embree::Run::apart);
+    embree::occluded(raw.scene.get(), p.shadow_valid.data(), p.shadow, embree::Run::apart);
     for (std::size_t i = 0; i < 16; ++i)
-        if (p.asked[i] != 0 && p.shadow.tfar[i] >= 0) p.light[i] += p.throughput[i] * p.incident[i];
+        if (p.shadow_valid[i] != 0 && p.shadow.tfar[i] >= 0) p.light[i] += p.throughput[i] * p.incident[i];
     return rays;
 }
 
@@ -237,7 +237,7 @@ std::uint64_t ReferenceLoop::Impl::trace(Paths& p, const FrameSettings& s) const
             }
             p.point[i] = point_of(p, k);
             const Material& m = *p.point[i].material;
-            if (depth == 0) p.light[i] += p.throughput[i] * m.emission;  // later it is asked for
+            if (depth == 0) p.light[i] += p.throughput[i] * m.emission;  // later next-event estimation finds it
             if (direct) p.light[i] += scene.ambient * (m.diffuse + m.specular);
             any = true;
         }

@@ -1,8 +1,7 @@
-/// bench/reference_loop.h - a renderer without ideas, to measure narpa's against: the loop that one writes
-/// over Embree in an afternoon. Sixteen rays to a packet; so many samples for each pixel of the frame, jittered in
-/// strata; random numbers by a counter; Lambert and Phong; Sun with shadows; by paths: directions by the cosine,
-/// the Sun and one of the surfaces that shine asked at each point. Nothing in it knows where samples are needed,
-/// and no number knows of another.
+/// bench/reference_loop.h - a plain renderer to measure narpa's against: the loop that one writes over Embree
+/// in an afternoon. Sixteen rays at a time; the same number of samples for each pixel, jittered in strata; counter-based
+/// random numbers; Lambert and Phong; Sun with shadows; paths with cosine-distributed directions and next-event
+/// estimation of the Sun and one emissive surface. No adaptive sampling, no low-discrepancy points.
 ///
 /// It converges to narpa's image of the same scene, which is what makes their times at equal error comparable.
 #pragma once

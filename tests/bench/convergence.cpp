@@ -1,4 +1,4 @@
-// The statistics of `narpa bench render`, on pictures whose noise and bias are known.
+// The statistics of `narpa bench render`, on images whose noise and bias are known.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace narpa {
 namespace {
 
 constexpr std::size_t kPixels = 32 * 32;
-constexpr int kPictures = 16;
+constexpr int kImages = 16;
 const std::vector<int> kSpp{4, 8, 16, 32};
 
 /// Noise of one sample in a pixel: from pixel to pixel it differs by three.
@@ -20,9 +20,9 @@ float sigma(std::size_t pixel) {
     return 0.5f * (1 + 2 * static_cast<float>(pixel) / kPixels);
 }
 
-/// A picture whose values are 1 in each band, plus noise that falls as 1/sqrt(spp), plus what the test adds.
+/// A image whose values are 1 in each band, plus noise that falls as 1/sqrt(spp), plus what the test adds.
 using Extra = std::function<float(std::size_t pixel)>;
-std::vector<Rgb> picture(std::mt19937_64& random, double spp, const Extra& extra = {}) {
+std::vector<Rgb> image(std::mt19937_64& random, double spp, const Extra& extra = {}) {
     std::normal_distribution<float> normal;
     std::vector<Rgb> p(kPixels);
     for (std::size_t i = 0; i < kPixels; ++i) {
@@ -32,18 +32,18 @@ std::vector<Rgb> picture(std::mt19937_64& random, double spp, const Extra& extra
     return p;
 }
 
-PictureMean reference(std::mt19937_64& random, double spp_each = 256) {
-    PictureMean mean(kPixels);
-    for (int k = 0; k < kPictures; ++k) mean.add(picture(random, spp_each));
+ImageMean reference(std::mt19937_64& random, double spp_each = 256) {
+    ImageMean mean(kPixels);
+    for (int k = 0; k < kImages; ++k) mean.add(image(random, spp_each));
     return mean;
 }
 
-std::vector<ErrorRow> rows(std::mt19937_64& random, const PictureMean& truth, double power = 1,
+std::vector<ErrorRow> rows(std::mt19937_64& random, const ImageMean& truth, double power = 1,
                            const Extra& extra = {}) {
     std::vector<ErrorRow> rows;
     for (const int spp : kSpp) {
         ErrorAgainst error(truth);
-        for (int k = 0; k < kPictures; ++k) error.add(picture(random, std::pow(spp, power), extra));
+        for (int k = 0; k < kImages; ++k) error.add(image(random, std::pow(spp, power), extra));
         rows.push_back(error.row(spp));
     }
     return rows;
@@ -57,10 +57,10 @@ double true_rmse(double spp) {
 
 TEST(BenchConvergence, IndependentNoiseFallsWithSlopeMinusOneHalfAndHasNoBias) {
     std::mt19937_64 random(1);
-    const PictureMean truth = reference(random);
+    const ImageMean truth = reference(random);
     const std::vector<ErrorRow> found = rows(random, truth);
     for (const ErrorRow& r : found) {
-        EXPECT_EQ(r.pictures, static_cast<std::size_t>(kPictures));
+        EXPECT_EQ(r.images, static_cast<std::size_t>(kImages));
         // 49,152 squares of normal numbers a row: their mean is known to sqrt(2 / 49152) = 0.6 %, the root to 0.3
         // %.
         EXPECT_NEAR(r.rmse.value, true_rmse(r.spp), 4 * 0.0035 * true_rmse(r.spp)) << r.spp;
@@ -77,11 +77,11 @@ TEST(BenchConvergence, IndependentNoiseFallsWithSlopeMinusOneHalfAndHasNoBias) {
 
 TEST(BenchConvergence, TheReferencesOwnNoiseIsTakenOut) {
     std::mt19937_64 random(2);
-    const PictureMean poor = reference(random, 2);  // 32 spp in all: as noisy as the pictures
+    const ImageMean poor = reference(random, 2);  // 32 spp in all: as noisy as the images
     // 3072 squared differences: their mean is known to sqrt(2 / 3072) = 2.6 %, the root to 1.3 %.
     EXPECT_NEAR(std::sqrt(poor.variance_of_mean()), true_rmse(32), 4 * 0.014 * true_rmse(32));
     ErrorAgainst error(poor);
-    for (int k = 0; k < kPictures; ++k) error.add(picture(random, 32));
+    for (int k = 0; k < kImages; ++k) error.add(image(random, 32));
     EXPECT_NEAR(error.row(32).rmse.value, true_rmse(32), 0.06 * true_rmse(32));  // left in: 41 % more
 }
 
@@ -89,14 +89,14 @@ TEST(BenchConvergence, DarkPixelsCountInTheRelativeErrorAsBrightOnesDo) {
     // Half the pixels a hundred times as bright and as noisy: the RMSE is theirs, the relative error everyone's.
     std::mt19937_64 random(9);
     const auto bright_half = [&](double spp) {
-        std::vector<Rgb> p = picture(random, spp);
+        std::vector<Rgb> p = image(random, spp);
         for (std::size_t i = 0; i < kPixels; i += 2) p[i] = 100.0f * p[i];
         return p;
     };
-    PictureMean truth(kPixels);
-    for (int k = 0; k < kPictures; ++k) truth.add(bright_half(1024));
+    ImageMean truth(kPixels);
+    for (int k = 0; k < kImages; ++k) truth.add(bright_half(1024));
     ErrorAgainst error(truth);
-    for (int k = 0; k < kPictures; ++k) error.add(bright_half(4));
+    for (int k = 0; k < kImages; ++k) error.add(bright_half(4));
     const ErrorRow row = error.row(4);
     EXPECT_NEAR(row.rmse.value, 100 * true_rmse(4) / std::sqrt(2), 0.02 * 100 * true_rmse(4));
     EXPECT_NEAR(row.relative_rmse.value, true_rmse(4), 0.02 * true_rmse(4));
@@ -104,7 +104,7 @@ TEST(BenchConvergence, DarkPixelsCountInTheRelativeErrorAsBrightOnesDo) {
 
 TEST(BenchConvergence, AMeanErrorOfAHundredthIsFound) {
     std::mt19937_64 random(3);
-    const PictureMean truth = reference(random);
+    const ImageMean truth = reference(random);
     const std::vector<ErrorRow> found = rows(random, truth, 1, [](std::size_t) { return 0.01f; });
     for (const ErrorRow& r : found) EXPECT_NEAR(r.bias.value, 0.01, 4 * r.bias.standard_error) << r.spp;
     const std::vector<std::string> faults = convergence_faults(found);
@@ -112,9 +112,9 @@ TEST(BenchConvergence, AMeanErrorOfAHundredthIsFound) {
     EXPECT_NE(faults.back().find("mean error"), std::string::npos) << faults.back();
 }
 
-TEST(BenchConvergence, ErrorsThatCancelOverThePictureAreFoundInItsPixels) {
+TEST(BenchConvergence, ErrorsThatCancelOverTheImageAreFoundInItsPixels) {
     std::mt19937_64 random(4);
-    const PictureMean truth = reference(random);
+    const ImageMean truth = reference(random);
     const auto to_and_fro = [](std::size_t i) { return i % 2 == 0 ? 0.05f : -0.05f; };
     const std::vector<ErrorRow> found = rows(random, truth, 1, to_and_fro);
     for (const ErrorRow& r : found) {
@@ -128,7 +128,7 @@ TEST(BenchConvergence, ErrorsThatCancelOverThePictureAreFoundInItsPixels) {
 
 TEST(BenchConvergence, AnErrorThatFallsTooSlowlyIsFound) {
     std::mt19937_64 random(5);
-    const PictureMean truth = reference(random);
+    const ImageMean truth = reference(random);
     const std::vector<ErrorRow> found = rows(random, truth, 0.9);
     const Estimate slope = fit_slope(found);
     EXPECT_NEAR(slope.value, -0.45, 4 * slope.standard_error);
@@ -144,10 +144,10 @@ TEST(BenchConvergence, StandardErrorsAreNeitherTooSmallNorTooLarge) {
     double squares = 0, pixel = 0;
     std::mt19937_64 random(6);
     for (int i = 0; i < kTrials; ++i) {
-        PictureMean truth(kPixels);
-        for (int k = 0; k < kPictures; ++k) truth.add(picture(random, 8));
+        ImageMean truth(kPixels);
+        for (int k = 0; k < kImages; ++k) truth.add(image(random, 8));
         ErrorAgainst error(truth);
-        for (int k = 0; k < kPictures; ++k) error.add(picture(random, 4));
+        for (int k = 0; k < kImages; ++k) error.add(image(random, 4));
         const ErrorRow row = error.row(4);
         squares += row.bias.sigmas() * row.bias.sigmas();
         pixel += row.pixel_bias_squared.sigmas() * row.pixel_bias_squared.sigmas();
@@ -156,10 +156,10 @@ TEST(BenchConvergence, StandardErrorsAreNeitherTooSmallNorTooLarge) {
     EXPECT_NEAR(std::sqrt(pixel / kTrials), 1.0, 4 * 0.05);
 }
 
-TEST(BenchConvergence, AMeanOfManyPicturesLosesNothingWhateverTheirNumber) {
+TEST(BenchConvergence, AMeanOfManyImagesLosesNothingWhateverTheirNumber) {
     const std::vector<Rgb> p{{0.1f, 1e6f, 1e-6f}};
     for (const int count : {1, 2, 3, 100'000}) {
-        PictureMean mean(1);
+        ImageMean mean(1);
         for (int k = 0; k < count; ++k) mean.add(p);
         for (std::size_t band = 0; band < 3; ++band) {
             const auto x = static_cast<double>(p[0][static_cast<int>(band)]);
@@ -168,10 +168,10 @@ TEST(BenchConvergence, AMeanOfManyPicturesLosesNothingWhateverTheirNumber) {
     }
 }
 
-TEST(BenchConvergence, AnOddNumberOfPicturesHasTheRightVariance) {
+TEST(BenchConvergence, AnOddNumberOfImagesHasTheRightVariance) {
     std::mt19937_64 random(8);
-    PictureMean mean(kPixels);
-    for (int k = 0; k < 3; ++k) mean.add(picture(random, 4));
+    ImageMean mean(kPixels);
+    for (int k = 0; k < 3; ++k) mean.add(image(random, 4));
     EXPECT_NEAR(std::sqrt(mean.variance_of_mean()), true_rmse(3 * 4), 4 * 0.014 * true_rmse(3 * 4));
 }
 

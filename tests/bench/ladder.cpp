@@ -47,6 +47,18 @@ TEST(BenchLadder, SpeedUpIsReadBetweenTheLoopsRungs) {
     EXPECT_EQ(median({4, 1, 2, 3}), 2.5);
 }
 
+TEST(BenchLadder, AMechanismEarnsWhatItsAbsenceCostsAtEqualError) {
+    // The full renderer's error falls with the root of its CPU time: 1 at 3 s, 0.5 at 12 s, 0.25 at 48 s.
+    Rung off = rung("8 spp", 12, 0.5), far_off = rung("8 spp", 4, 0.125);
+    off.without = far_off.without = "path reuse";
+    const Ladder ladder{
+        10, 0.01, 1e-3, {rung("16 spp", 16, 0.25), rung("4 spp", 1, 1), rung("8 spp", 4, 0.5), off, loop_rung(1, 0.5)}};
+    ASSERT_TRUE(cost_at_equal_error(ladder, off));
+    EXPECT_NEAR(*cost_at_equal_error(ladder, off), 3, 1e-12);
+    EXPECT_NEAR(*cost_at_equal_error(ladder, far_off), 12.0 / 192, 1e-12);  // beyond the line
+    EXPECT_FALSE(cost_at_equal_error({10, 0.01, 1e-3, {off}}, off));
+}
+
 TEST(BenchLadder, SpeedUpsAreOfOneKindOfBudgets) {
     Rung coarse = adaptive(0.001, 0.9);
     coarse.step = FrameStep::coarse_2;
@@ -81,7 +93,7 @@ TEST(BenchLadder, AMissingPredictionIsAFaultUnlessTheFrameLeftSomethingOut) {
     r.predicted = {};
     for (const FrameStep step : {FrameStep::refined, FrameStep::one_sample}) {
         r.step = step;
-        EXPECT_NE(only_fault(beside_the_loop({r})).find("say nothing of their error"), std::string::npos);
+        EXPECT_NE(only_fault(beside_the_loop({r})).find("have no error estimate"), std::string::npos);
     }
     for (const FrameStep step : {FrameStep::no_indirect, FrameStep::coarse_2, FrameStep::coarse_4}) {
         r.step = step;

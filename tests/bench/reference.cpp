@@ -90,7 +90,7 @@ void expect_same_image(const World& world, int spp, double precision) {
     settings.max_depth = 5;
     settings.spp = spp;
     RadianceImage image(c.width, c.height);
-    PictureMean narpas(image.pixels.size());
+    ImageMean narpas(image.pixels.size());
     for (settings.frame = 0; settings.frame < 16; ++settings.frame) {
         render_radiance(world.render_scene(), v.at, c, v.T_world_camera, settings, image);
         narpas.add(image.pixels);

@@ -69,6 +69,25 @@ TEST(BenchRender, AFailedComparisonEndsWithStatusOneAndSaysSo) {
     EXPECT_NE(document["faults"][0].get<std::string>().find("no slope"), std::string::npos) << document["faults"];
 }
 
+TEST(BenchRender, TheAblationSwitchesOffEachMechanism) {
+    const Done done = bench("--ablation --scenes craft-and-ball --quick --json", " 2>/dev/null");
+    EXPECT_EQ(done.status, 0);
+    const auto document = nlohmann::json::parse(done.out);
+    SCOPED_TRACE(document.dump(2));
+    std::size_t off = 0, full = 0;
+    for (const auto& rung : document["scenes"][0]["rungs"]) {
+        EXPECT_GT(rung["rmse"]["value"], 0);
+        if (!rung.contains("without")) {
+            ++full;
+            continue;
+        }
+        EXPECT_GT(rung["cost_at_equal_error"], 0);
+        ++off;
+    }
+    EXPECT_EQ(full, 3U);
+    EXPECT_EQ(off, 8U);
+}
+
 TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {
     const test::TemporaryFolder folder;
     const Done done = bench("--scenes craft --quick --json -o " + (folder / "ladder.png"), " 2>/dev/null");

@@ -15,7 +15,6 @@ namespace narpa::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using rehearsal::RehearsalResult;
 
 struct Options {
     rehearsal::RehearsalOptions run;
@@ -121,10 +120,10 @@ Command add_rehearse(Parser app) {
         "--dynamics", r.dynamics,
         "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it, "
         "last");
-    c.option(
-        "--navigation", r.navigation,
-        "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
-        "set; says \"ready\" when it listens, or has 10 s; none: you start it, and press Enter when it listens");
+    c.option("--navigation", r.navigation,
+             "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
+             "set; writes READY=1 to descriptor READY_FD or prints \"ready\" when it listens, or has 10 s; none: "
+             "you start it and press Enter");
     c.option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)").range(0, 1024);
     c.option("--patience", r.patience_s, "Seconds without progress after which it is given up")
         .range(1.0, 86400.0)

@@ -7,6 +7,7 @@
 #include "apps/budget_options.h"
 #include "apps/cli.h"
 #include "apps/tracker_options.h"
+#include "base/ready.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/report.h"
@@ -22,6 +23,7 @@ struct Options {
     bool estimates = false;
     TrackerFlags estimator;
     RunOptions run;
+    int ready_fd = -1;
 };
 
 Status split_outputs(const std::vector<std::string>& texts, std::string_view expected,
@@ -32,6 +34,14 @@ Status split_outputs(const std::vector<std::string>& texts, std::string_view exp
         out.push_back(*std::move(pair));
     }
     return Ok{};
+}
+
+/// Lines for whoever waits on --ready-fd.
+std::string addresses(const std::string& bus, CanNode* can) {
+    if (!can) return {};
+    const CanAddress a = can->bus().address();
+    return fmt::format("CAN={}\n{}", a.bus.empty() ? bus : a.bus,
+                       a.pty.empty() ? "" : fmt::format("CAN_PTY={}\n", a.pty));
 }
 
 /// One line that is written over once a second, for a person who watches.
@@ -45,6 +55,7 @@ void show_progress(const Emulator& emulator, const StopFlag& done) {
 }
 
 Outcome run(const Options& options) {
+    if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     RunOptions o = options.run;
     if (auto good = split_outputs(options.video, "CAMERA=SINK, like nav=/dev/video10", o.video); !good)
         return good.error();
@@ -75,6 +86,7 @@ Outcome run(const Options& options) {
     if (const OnlineEstimator* estimator = (*emulator)->estimator())
         say(fmt::format("pose of {} from camera {}", estimator->target(), estimator->camera().name));
 
+    notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
     StopFlag done{false};
     std::thread progress([&] { show_progress(**emulator, done); });
     const Status status = (*emulator)->run(stop_flag());
@@ -114,6 +126,8 @@ Command add_run(Parser app) {
     c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
         .excludes(lockstep);
     c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
+    c.option("--ready-fd", o->ready_fd,
+             "Descriptor that gets the lines CAN=BUS and READY=1 once the emulator can be reached");
     return [o, estimate] {
         o->estimates = estimate.given();
         return run(*o);

@@ -32,6 +32,12 @@ struct ReceivedFrame {
     std::int64_t t_received_ns = 0;
 };
 
+/// How a client reaches a bus, for programs.
+struct CanAddress {
+    std::string bus;  ///< BUS of open_can_bus; empty: the one with which this side opened it
+    std::string pty;  ///< pseudo-terminal; empty: none
+};
+
 class CanBus {
 public:
     virtual ~CanBus() = default;
@@ -49,6 +55,7 @@ public:
     [[nodiscard]] virtual bool carries_fd() const noexcept = 0;
     /// How a client connects to this bus, for messages: "slcan: 127.0.0.1:29537 and /dev/pts/3".
     [[nodiscard]] virtual std::string description() const = 0;
+    [[nodiscard]] virtual CanAddress address() const { return {}; }
     [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 
 protected:

@@ -97,6 +97,7 @@ public:
     [[nodiscard]] std::string description() const override {
         return "slcan: 127.0.0.1:" + std::to_string(port_) + " and " + pty_path_;
     }
+    [[nodiscard]] CanAddress address() const override { return {"slcan:" + std::to_string(port_), pty_path_}; }
 
 private:
     struct Delivery {

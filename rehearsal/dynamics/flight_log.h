@@ -1,9 +1,9 @@
-/// rehearsal/dynamics/flight_log.h - what really happened, in files: truth.csv and dynamics.json.
+/// rehearsal/dynamics/flight_log.h - the truth in files: truth.csv and dynamics.json.
 #pragma once
 
 #include <cstdint>
 #include <fstream>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "base/result.h"
@@ -11,8 +11,8 @@
 
 namespace narpa::rehearsal {
 
-/// truth.csv: a row at each pose command. Ports as in PortState, but degrees; impulses: fired since the row
-/// before, chaser's body axes.
+/// truth.csv: a row at each pose command. Port state with angles in degrees; impulses since the row before,
+/// chaser's body axes.
 class TruthLog {
 public:
     static Result<TruthLog> create(const std::string& folder);
@@ -28,7 +28,7 @@ private:
     Loads fired_{};
 };
 
-/// What was drawn, and how it ended: of dynamics.json.
+/// Random draws and ending, for dynamics.json.
 [[nodiscard]] nlohmann::json summary(const Simulation& simulation, const Scenario& scenario, std::uint64_t seed);
 
 }  // namespace narpa::rehearsal

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
@@ -17,23 +19,23 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr std::int64_t kShortWaitNs = 20'000'000;
-/// In real time poses are on the bus so long before they hold, so that a frame of that instant is of that pose.
+/// In real time poses are sent so long before their time of validity: a frame of that time then has that pose.
 constexpr std::int64_t kLeadNs = 5'000'000;
 constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
 
-/// One body's commands on the wire.
+/// A body's pose commands.
 struct Body {
     std::string name;
     std::uint32_t base_id = 0;
     std::uint8_t counter = 0;
 };
 
-/// Of actuator commands.
+/// Actuator commands by outcome.
 struct CommandCounts {
     std::uint64_t applied = 0;
     std::uint64_t lost = 0;     ///< by the scenario's fault
     std::uint64_t late = 0;     ///< came more than a period after their time
-    std::uint64_t refused = 0;  ///< another time than the one that is asked for, or not newer than the last
+    std::uint64_t refused = 0;  ///< of an unexpected time, or not newer than the last
 };
 
 class Node {
@@ -63,13 +65,13 @@ private:
     // --- Lockstep ---
     Status run_in_lockstep() {
         for (;;) {
-            if (auto said = say_period(); !said || over_) return said ? wait_for_emulator() : said;
+            if (auto sent = send_period(); !sent || over_) return sent ? wait_for_emulator() : sent;
             if (auto commanded = wait_for_command(); !commanded || stop_) return commanded;
             const std::int64_t next_ns = simulation_.t_ns() + scenario_.period_ns();
             while (simulation_.t_ns() < next_ns) {
                 if (auto moved = advance_to(next_pose_ns()); !moved) return moved;
                 if (simulation_.t_ns() == next_ns) break;  // its poses come after the report
-                if (auto said = send_poses(); !said) return said;
+                if (auto sent = send_poses(); !sent) return sent;
             }
         }
     }
@@ -87,7 +89,7 @@ private:
     Status wait(const Done& done, const What& what) {
         const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.patience_s * 1e9);
         for (;;) {
-            if (auto listened = listen(); !listened) return listened;
+            if (auto received = receive(); !received) return received;
             if (done() || stop_) return Ok{};
             if (emulator_has_stopped()) return failed(what() + ": the emulator has stopped");
             if (monotonic_ns() > deadline_ns) return failed(what() + fmt::format(" in {} s", options_.patience_s));
@@ -97,17 +99,17 @@ private:
 
     // --- Real time ---
     Status run_in_real_time() {
-        if (auto ready = synchronise(); !ready || stop_) return ready;
+        if (auto ready = synchronize(); !ready || stop_) return ready;
         for (;; next_ns_ += scenario_.pose_period_ns()) {
             if (auto waited = wait_until(t_start_ns_ + next_ns_ - kLeadNs); !waited || stop_) return waited;
             if (auto moved = advance_to(next_ns_); !moved) return moved;
             const bool period = next_ns_ % scenario_.period_ns() == 0;
-            if (auto said = period ? say_period() : send_poses(); !said || over_) return said;
+            if (auto sent = period ? send_period() : send_poses(); !sent || over_) return sent;
         }
     }
 
-    /// Time 0 is a whole second of the emulator's clock.
-    Status synchronise() {
+    /// Sets time 0 to a whole second of the emulator's clock.
+    Status synchronize() {
         const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.wait_s * 1e9);
         while (!clock_.synchronized() && !stop_) {
             if (monotonic_ns() > deadline_ns)
@@ -119,10 +121,10 @@ private:
         return Ok{};
     }
 
-    /// Commands that come meanwhile hold from their arrival on. Ends early when stopped.
+    /// Commands that arrive meanwhile act at once. Returns early when stopped.
     Status wait_until(std::int64_t t_ns) {
         for (;;) {
-            if (auto listened = listen(); !listened) return listened;
+            if (auto received = receive(); !received) return received;
             const std::int64_t left_ns = t_ns - clock_.now_ns();
             if (left_ns <= 0 || stop_) return Ok{};
             if (emulator_has_stopped())
@@ -132,7 +134,7 @@ private:
     }
 
     // --- Commands in ---
-    Status listen() {
+    Status receive() {
         for (ReceivedFrame received; bus_.receive(received);) {
             if (clock_.accept(received)) continue;
             ActuatorCommand command;
@@ -145,7 +147,7 @@ private:
     Status take(const ActuatorCommand& command) {
         if (over_) return Ok{};
         const std::int64_t now_ns = options_.lockstep ? clock_time_ns() : clock_.now_ns();
-        if (!asked_for(command.t_ns, now_ns)) {
+        if (!is_expected(command.t_ns, now_ns)) {
             ++counts_.refused;
         } else if (now_ns - command.t_ns > scenario_.period_ns()) {
             ++counts_.late;
@@ -158,8 +160,8 @@ private:
         return Ok{};
     }
 
-    /// In lockstep: for this very time, once. In real time: newer than the last, and not of a time far ahead.
-    bool asked_for(std::int64_t t_ns, std::int64_t now_ns) const {
+    /// In lockstep: of this time, once. In real time: newer than the last, and at most a period ahead.
+    bool is_expected(std::int64_t t_ns, std::int64_t now_ns) const {
         if (commanded_ns_ && t_ns <= *commanded_ns_) return false;
         if (options_.lockstep) return t_ns == now_ns;
         return t_ns >= t_start_ns_ && t_ns <= now_ns + scenario_.period_ns();
@@ -169,24 +171,24 @@ private:
         return clock_.synchronized() && clock_.newest().state == RunState::stopping;
     }
 
-    // --- Motion, and what is said of it ---
+    // --- Motion and its messages ---
     std::int64_t next_pose_ns() const {
         return (simulation_.t_ns() / scenario_.pose_period_ns() + 1) * scenario_.pose_period_ns();
     }
 
-    /// Contact on the way is told at its own time.
+    /// Reports a contact on the way at its own time.
     Status advance_to(std::int64_t t_ns) {
         while (simulation_.t_ns() < t_ns) {
             const DynamicsPhase before = simulation_.phase();
             simulation_.advance_to(t_ns);
             if (simulation_.phase() == before) continue;
-            if (auto said = send_report(simulation_.phase()); !said) return said;
-            if (auto said = send_poses(); !said) return said;
+            if (auto sent = send_report(simulation_.phase()); !sent) return sent;
+            if (auto sent = send_poses(); !sent) return sent;
         }
         return Ok{};
     }
 
-    Status say_period() {
+    Status send_period() {
         over_ = simulation_.ending() != Ending::not_yet;
         if (auto sent = send_report(over_ ? DynamicsPhase::finished : simulation_.phase()); !sent) return sent;
         AttitudeReport attitude = simulation_.measure_attitude();
@@ -200,7 +202,7 @@ private:
         return send(encode(DynamicsReport{report_counter_++, clock_time_ns(), t_start_ns_, phase}, fd_));
     }
 
-    /// The chaser last: with its command the emulator may go on to this time.
+    /// The chaser last: its command lets the emulator advance to this time.
     Status send_poses() {
         const Truth truth = simulation_.truth();
         if (attractor_)
@@ -220,7 +222,7 @@ private:
         return send(frames);
     }
 
-    /// In real time what does not go is dropped, and the bus counts it; in lockstep it must go.
+    /// In real time a frame that the bus does not take is dropped and counted; in lockstep it is repeated.
     Status send(const FrameSet& frames) {
         const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.patience_s * 1e9);
         for (const CanFrame& frame : frames)
@@ -228,7 +230,7 @@ private:
                 if (monotonic_ns() > deadline_ns)
                     return failed(fmt::format("the bus takes no frame for {} s", options_.patience_s));
                 bus_.wait(kShortWaitNs);
-                if (auto listened = listen(); !listened) return listened;
+                if (auto received = receive(); !received) return received;
             }
         return Ok{};
     }
@@ -295,6 +297,32 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
     const nlohmann::json document = node.report();
     if (!flown) return flown.error();
     return document;
+}
+
+Result<std::string> fly_and_log(const Scenario& scenario, const DynamicsOptions& options,
+                                const std::string& version, CanBus& bus, const StopFlag& stop) {
+    auto flown = run_dynamics(scenario, options, bus, stop);
+    if (!flown) return flown.error();
+    nlohmann::json& document = *flown;
+    document["version"] = version;
+    if (!options.log_folder.empty()) {
+        const std::string path = options.log_folder + "/dynamics.json";
+        std::ofstream file(path);
+        file << document.dump(2) << '\n';
+        if (!file.flush()) return Error{"cannot be written", path, 0, 0, ErrorKind::failed};
+    }
+    const auto count = [&](const char* group, const char* key) {
+        return document[group][key].get<std::uint64_t>();
+    };
+    return fmt::format(
+        "{}: seed {}, {:.3f} s, {}; {} actuator commands applied, {} lost, {} late, {} refused, {} bad frames; {} "
+        "CAN "
+        "frames dropped",
+        scenario.name, options.seed, document["end_s"].get<double>(),
+        document["stopped"].get<bool>() ? "stopped" : document["ending"].get<std::string>(),
+        count("actuator_commands", "applied"), count("actuator_commands", "lost"),
+        count("actuator_commands", "late"), count("actuator_commands", "refused"),
+        count("actuator_commands", "bad_frames"), count("bus", "frames_dropped"));
 }
 
 }  // namespace narpa::rehearsal

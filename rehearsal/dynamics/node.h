@@ -1,11 +1,12 @@
-/// rehearsal/dynamics/node.h - the dynamics on a bus: poses, attitude and what happens out, actuator commands in.
+/// rehearsal/dynamics/node.h - the dynamics as a program on the bus: poses, attitude reports and phases out,
+/// thruster commands in.
 ///
-/// In lockstep the time stands still at every control period until the command for it has come; in real time the
-/// clock is the emulator's, and a command holds from its arrival on.
+/// In lockstep the time waits at every control period for its command. In real time the clock is the emulator's,
+/// and a command acts from its arrival on.
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "base/result.h"
@@ -23,10 +24,15 @@ struct DynamicsOptions {
     double patience_s = 300;  ///< lockstep: for a command, and at the end for the emulator
 };
 
-/// Flies the scenario to its end. What comes back is dynamics.json: what was drawn, how it ended (`stopped` where a
-/// signal ended it), and what was counted. Errors: a scenario that cannot be simulated, a pose that does not fit
-/// the wire, silence on the bus, a log that cannot be written.
+/// Runs the scenario to its end. Returns dynamics.json: random draws, ending (`stopped` after a signal), counts.
+/// Errors: a scenario that cannot be simulated, a pose outside the range of its message, no messages for too long,
+/// a log that cannot be written.
 Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
                                     const StopFlag& stop);
+
+/// run_dynamics for a program: writes the document as dynamics.json into the log folder, with the version, and
+/// returns a line for people.
+Result<std::string> fly_and_log(const Scenario& scenario, const DynamicsOptions& options,
+                                const std::string& version, CanBus& bus, const StopFlag& stop);
 
 }  // namespace narpa::rehearsal

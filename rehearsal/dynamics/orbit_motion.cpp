@@ -13,7 +13,7 @@ Translation free_motion(double dt, const Vec3& a, const Translation& x) {
     return {x.position_m + dt * x.velocity_m_s + (0.5 * dt * dt) * a, x.velocity_m_s + dt * a};
 }
 
-/// From rest at the origin, pushed by a, LVLH axes.
+/// From rest at the origin under the acceleration a, LVLH axes.
 Translation clohessy_wiltshire_push(double n, double t, const Vec3& a) {
     const double nt = n * t, s = std::sin(nt), half = std::sin(0.5 * nt);
     const double versine = 2 * half * half;  // 1 - cos
@@ -39,7 +39,7 @@ Translation clohessy_wiltshire(const Orbit& orbit, double t, double dt, const Ve
     return {q_world_lvlh * position_then, q_world_lvlh * (velocity_then + cross(rate, position_then))};
 }
 
-/// Gravity at the chaser less gravity at the target, which is R from the attractor.
+/// Gravity at the chaser minus gravity at the target, which is at R from the attractor.
 Vec3 gravity_difference(double mu, const Vec3& R, const Vec3& r) {
     const double square = dot(R, R);
     const double q = dot(r, r + 2.0 * R) / square;
@@ -72,8 +72,8 @@ Translation two_body(const Orbit& orbit, double t, double dt, const Vec3& a, Tra
 
 }  // namespace
 
-Translation coasted(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
-                    const Translation& from) {
+Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
+                       const Translation& from) {
     switch (orbit.model) {
         case Orbit::Model::free: break;
         case Orbit::Model::clohessy_wiltshire: return clohessy_wiltshire(orbit, t_s, dt_s, acceleration_m_s2, from);

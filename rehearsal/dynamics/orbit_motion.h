@@ -1,5 +1,5 @@
-/// rehearsal/dynamics/orbit_motion.h - how the chaser's centre of mass moves beside the target's, which flies on a
-/// circular orbit.
+/// rehearsal/dynamics/orbit_motion.h - relative motion of the chaser's centre of mass about the target's, which is
+/// on a circular orbit.
 #pragma once
 
 #include "base/pose.h"
@@ -7,21 +7,20 @@
 
 namespace narpa::rehearsal {
 
-/// Of the chaser's centre of mass from the target's, world axes (inertial).
+/// The chaser's centre of mass relative to the target's, world axes (inertial).
 struct Translation {
     Vec3 position_m{}, velocity_m_s{};
 };
 
-/// dt_s later. `acceleration_m_s2`: what the thrusters do, world axes, constant; of Clohessy and Wiltshire's
-/// equations constant in LVLH, as it is in the middle of the time. Free and Clohessy-Wiltshire: exact, in closed
-/// form. Two bodies: the target's circle is exact, the difference of gravity is in the form of R. Battin ("An
-/// Introduction to the Mathematics and Methods of Astrodynamics", 1999, section 8.5), which loses no digits to the
-/// orbit's radius, and is integrated by Runge and Kutta in steps of a second at most: 1e-12 of the distance in an
-/// orbit at 400 km.
-[[nodiscard]] Translation coasted(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
-                                  const Translation& from);
+/// The state dt_s later. `acceleration_m_s2`: of the thrusters, world axes, constant (Clohessy-Wiltshire: constant
+/// in LVLH, with the value of mid-step). Free and Clohessy-Wiltshire: exact, in closed form. Two bodies: the
+/// target's circle is exact; the gravity difference has the form of R. Battin ("An Introduction to the Mathematics
+/// and Methods of Astrodynamics", 1999, section 8.5), which does not cancel against the orbit's radius, and is
+/// integrated by RK4 in steps of at most a second: error 1e-12 of the distance after an orbit at 400 km.
+[[nodiscard]] Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
+                                     const Translation& from);
 
-/// The attractor beside the target, world axes; it does not turn.
+/// The attractor relative to the target, world axes; it does not rotate.
 [[nodiscard]] Motion attractor_motion(const Orbit& orbit, const Quat& q_world_attractor, double t_s);
 
 }  // namespace narpa::rehearsal

@@ -1,5 +1,5 @@
-/// rehearsal/dynamics/random_streams.h - what is drawn at random in a run: each from an engine of its own, so that
-/// one does not shift the others.
+/// rehearsal/dynamics/random_streams.h - random numbers of a run: an engine for each purpose, so that draws for one
+/// do not shift the others.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-/// rehearsal/dynamics/rigid_body.h - how a rigid body turns: Euler's equations.
+/// rehearsal/dynamics/rigid_body.h - rotation of a rigid body by Euler's equations.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,9 +17,9 @@ public:
     /// About the centre of mass, body axes; symmetric and positive definite.
     explicit RigidBody(const Eigen::Matrix3d& inertia_kg_m2);
 
-    /// dt_s later; the torque is about the centre of mass, constant in body axes. Rates by Runge and Kutta, the
-    /// attitude by the fourth-order Magnus expansion (A. Iserles, S. Norsett, 1999), in steps of 0.005 rad at
-    /// most: a tumbling body keeps energy and momentum to 1e-10 over a hundred turns.
+    /// The state dt_s later; the torque is about the centre of mass, constant in body axes. Rates by RK4, attitude
+    /// by the fourth-order Magnus expansion (A. Iserles, S. Norsett, 1999), in steps of at most 0.005 rad: a
+    /// tumbling body keeps energy and momentum to 1e-10 over a hundred turns.
     [[nodiscard]] Attitude turned(Attitude from, const Vec3& torque_n_m, double dt_s) const;
 
 private:

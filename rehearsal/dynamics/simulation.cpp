@@ -11,8 +11,8 @@
 namespace narpa::rehearsal {
 namespace {
 
-constexpr std::int64_t kLongestPieceNs = 50'000'000;  // forces turn with the body: by its rate times half of this
-constexpr double kPortRadiusM = 1;                    // farther aside, ports pass each other
+constexpr std::int64_t kLongestStepNs = 50'000'000;  // error: forces rotate with the body
+constexpr double kPortRadiusM = 1;                   // with more lateral distance the ports pass each other
 constexpr double kRestitution = 0.3;
 constexpr std::int64_t kAfterCaptureNs = 2'000'000'000, kAfterBounceNs = 10'000'000'000;
 constexpr double kLeftDistances = 2;  // of the start's distance
@@ -23,9 +23,10 @@ double seconds(std::int64_t ns) {
 
 /// A motion in the steps of a pose command; as it is where it does not fit one.
 Motion as_transmitted(const Motion& motion) {
-    CanFrame frame;
     PoseCommand command{0, 0, motion};
-    if (encode_fd(command, 0, frame)) (void)PoseDecoder(0).accept(frame, 0, command);
+    PoseDecoder decoder(0);
+    if (FrameSet frames; encode(command, 0, true, frames))
+        for (const CanFrame& frame : frames) (void)decoder.accept(frame, 0, command);
     return command.motion;
 }
 
@@ -65,7 +66,7 @@ Simulation::Simulation(const Scenario& scenario, std::uint64_t seed)
     place_bodies(seed);
 }
 
-/// The target as the scene has it, the chaser off the nominal start by what is drawn.
+/// The target as in the scene, the chaser at the nominal start plus its dispersion.
 void Simulation::place_bodies(std::uint64_t seed) {
     std::mt19937_64 draws = engine(seed, Stream::start);
     draws_.position = draw_normal(draws);
@@ -109,13 +110,13 @@ bool Simulation::apply(const ActuatorCommand& command) {
     return true;
 }
 
-/// In pieces over which forces are constant.
+/// In steps over which forces are constant.
 void Simulation::advance_to(std::int64_t t_ns) {
-    if (touching_) part_or_hold();
+    if (at_contact_) part_or_hold();
     while (state_.t_ns < t_ns) {
         const std::int64_t from_ns = state_.t_ns;
         const std::int64_t until_ns =
-            std::min({t_ns, from_ns + kLongestPieceNs, next_fault_ns(from_ns), thrusters_.next_change_ns(from_ns)});
+            std::min({t_ns, from_ns + kLongestStepNs, next_fault_ns(from_ns), thrusters_.next_change_ns(from_ns)});
         const Loads loads = thrusters_.loads(from_ns);
         State next = after(state_, loads, until_ns - from_ns);
         if (phase_ == DynamicsPhase::flying && passes_plane(state_, next)) {
@@ -132,7 +133,7 @@ void Simulation::advance_to(std::int64_t t_ns) {
     }
 }
 
-/// The next fault's beginning or end that the thrusters do not know of.
+/// Next start or end of a fault that is not a thruster's.
 std::int64_t Simulation::next_fault_ns(std::int64_t t_ns) const {
     std::int64_t next = std::numeric_limits<std::int64_t>::max();
     for (const Fault& f : scenario_.faults)
@@ -141,7 +142,7 @@ std::int64_t Simulation::next_fault_ns(std::int64_t t_ns) const {
     return next;
 }
 
-/// By the faults that begin or end after the one time and not after the other. When one ends, the change is undone.
+/// By the faults that start or end in (after_ns, until_ns]. The end of a fault undoes its change.
 void Simulation::change_target_rate(std::int64_t after_ns, std::int64_t until_ns) {
     for (const Fault& f : scenario_.faults) {
         if (f.kind != Fault::Kind::target_rate) continue;
@@ -176,11 +177,11 @@ Simulation::State Simulation::after(const State& from, const Loads& loads, std::
         const Attitude middle = chaser_body_.turned(from.chaser, loads.torque_n_m, 0.5 * dt_s);
         acceleration_m_s2 = middle.q_world_body * loads.force_n / scenario_.chaser.mass_kg;
     }
-    to.translation = coasted(scenario_.orbit, seconds(from.t_ns), dt_s, acceleration_m_s2, from.translation);
+    to.translation = propagated(scenario_.orbit, seconds(from.t_ns), dt_s, acceleration_m_s2, from.translation);
     return to;
 }
 
-/// Held in LVLH it turns beside LVLH at a steady rate, otherwise it tumbles.
+/// With LVLH: constant rate relative to LVLH; otherwise free rotation.
 Attitude Simulation::target_after(const State& from, double dt_s) const {
     if (!scenario_.target_motion.with_lvlh) return target_body_.turned(from.target, {}, dt_s);
     const Vec3 orbit_rate{0, 0, scenario_.orbit.rate_rad_s()};
@@ -215,8 +216,7 @@ bool Simulation::passes_plane(const State& before, const State& then) const {
     return port(before).position_m().x > 0 && port(then).position_m().x <= 0;
 }
 
-/// The first nanosecond at which the chaser's port has reached the plane; before `before_ns`, so that what stands
-/// at that time comes after it.
+/// The first nanosecond at which the chaser's port has reached the plane, and before `before_ns`.
 Simulation::State Simulation::at_plane(const Loads& loads, std::int64_t dt_ns, std::int64_t before_ns) const {
     std::int64_t not_yet = 0, reached = dt_ns;
     while (reached - not_yet > 1) {
@@ -241,23 +241,23 @@ void Simulation::touch(const State& met, const Loads& loads) {
     const bool captured = within(scenario_.gates.contact.value_or(CaptureEnvelope{}), on_bus);
     contact_ = ContactEvent{met.t_ns, port(), captured};
     phase_ = captured ? DynamicsPhase::captured : DynamicsPhase::bounced;
-    touching_ = true;
+    at_contact_ = true;
 }
 
 void Simulation::part_or_hold() {
-    touching_ = false;
+    at_contact_ = false;
     if (phase_ != DynamicsPhase::captured) return rebound(state_);
     const Quat q_target_world = conjugate(state_.target.q_world_body);
     T_held_ = Rigid3{q_target_world * state_.chaser.q_world_body, q_target_world * state_.translation.position_m};
 }
 
-/// The port's speed along the target port's axis turns round, by an impulse at the chaser's centre of mass.
+/// Reverses the port's velocity along the target port's axis, by an impulse at the chaser's centre of mass.
 void Simulation::rebound(State& state) const {
     const Vec3 axis_world = state.target.q_world_body * scenario_.target.T_body_port.q * Vec3{1, 0, 0};
     state.translation.velocity_m_s -= (1 + kRestitution) * port(state).velocity_m_s.x * axis_world;
 }
 
-// --- What is seen of it -----------------------------------------------------------------------------------------
+// --- Outputs -----------------------------------------------------------------------------------------
 
 AttitudeReport Simulation::measure_attitude() {
     const AttitudeSensor& s = scenario_.attitude_sensor;

@@ -1,9 +1,9 @@
-/// rehearsal/dynamics/simulation.h - two bodies near each other, from a scenario's time 0 to its end: how they
-/// move, what the chaser's thrusters do, and what happens when the ports meet. No clock, no bus; the same scenario,
-/// seed and commands give the same numbers.
+/// rehearsal/dynamics/simulation.h - the motion of two bodies near each other from a scenario's time 0 to its end:
+/// orbit, attitude, thrusters, contact. No clock and no bus; the same scenario, seed and commands give the same
+/// numbers.
 ///
-/// The target is not moved by contact: its centre of mass is the world's origin, and what counts is the motion
-/// relative to it.
+/// Contact does not move the target: its centre of mass is the world's origin, and only the relative motion
+/// matters.
 #pragma once
 
 #include <array>
@@ -21,13 +21,13 @@
 
 namespace narpa::rehearsal {
 
-/// As on CAN: motions of the bodies' origins, as the scene has them.
+/// Motions of the bodies' axes, as in the scene and on CAN.
 struct Truth {
     Motion attractor, target, chaser;
 };
 
-/// Draws of unit variance, in the order in which they are made; times the scenario's deviations they are what the
-/// start is off.
+/// Random draws of unit variance, in this order; multiplied by the scenario's standard deviations they are the
+/// start's dispersion.
 struct StartDraws {
     Vec3 position, velocity, attitude, rate;
 };
@@ -45,18 +45,17 @@ inline constexpr std::array<std::string_view, 6> kEndings{"not_yet",  "captured"
 
 class Simulation {
 public:
-    /// Errors: a vehicle without mass or with an impossible inertia, a fault of a thruster that is none, periods
-    /// that are none.
+    /// Errors: an invalid mass, inertia or period; a fault of an unknown thruster group.
     static Result<Simulation> create(const Scenario& scenario, std::uint64_t seed);
 
     /// The scenario's time.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return state_.t_ns; }
-    /// What the thrusters do from now on; false: a fault has it lost.
+    /// The thruster command from now on; false: lost by a fault.
     bool apply(const ActuatorCommand& command);
-    /// On to t_ns, or to the instant at which the ports meet, if that is before: then phase() has changed and the
-    /// motion is the one just before they touch. The next call goes on from there.
+    /// Advances to t_ns, or to contact if that is before: then phase() has changed, and the motion is the one just
+    /// before contact. The next call continues from there.
     void advance_to(std::int64_t t_ns);
-    /// Star tracker and gyroscope now. Draws their noise.
+    /// Star tracker and gyroscope, with noise.
     [[nodiscard]] AttitudeReport measure_attitude();
 
     [[nodiscard]] Truth truth() const;
@@ -66,11 +65,11 @@ public:
     [[nodiscard]] const std::optional<ContactEvent>& contact() const noexcept { return contact_; }
     [[nodiscard]] Ending ending() const;
 
-    /// Fired since the start, body axes: force and torque times time.
+    /// Impulse and angular impulse since the start, body axes.
     [[nodiscard]] const Loads& fired() const noexcept { return fired_; }
     [[nodiscard]] const StartDraws& start_draws() const noexcept { return draws_; }
     [[nodiscard]] const ThrusterModel& thrusters() const noexcept { return thrusters_; }
-    /// The last that got through.
+    /// The last one that was not lost.
     [[nodiscard]] const ActuatorCommand& command() const noexcept { return command_; }
 
 private:
@@ -104,7 +103,7 @@ private:
     StartDraws draws_{};
     State state_;
     DynamicsPhase phase_ = DynamicsPhase::flying;
-    bool touching_ = false;         // stands at a contact that advance_to has yet to go on from
+    bool at_contact_ = false;       // at a contact from which advance_to has yet to continue
     std::optional<Rigid3> T_held_;  // captured: chaser's body at its centre of mass, in the target's
     std::optional<ContactEvent> contact_;
     Loads fired_{};

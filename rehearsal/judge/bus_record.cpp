@@ -36,39 +36,39 @@ BusRecord::BusRecord(const Scenario& scenario)
     for (std::uint8_t camera = 0; camera < kMaxTelemetryCameras; ++camera) ledger_decoders_.emplace_back(camera);
 }
 
-BusRecord::News BusRecord::accept(const CanFrame& frame, std::int64_t t_reference_ns) {
-    News news;
+BusRecord::Update BusRecord::accept(const CanFrame& frame, std::int64_t t_reference_ns) {
+    Update update;
     if (take_pose(frame, t_reference_ns, target_decoder_, target_)) {
-        news.truth = compare_with_truth();
+        update.truth = compare_with_truth();
     } else if (take_pose(frame, t_reference_ns, chaser_decoder_, chaser_)) {
         t_pose_ns = chaser_.newest_ns();
         chaser_times_.push_back(t_pose_ns);
-        news.truth = compare_with_truth();
+        update.truth = compare_with_truth();
     } else if (DynamicsReport report; take(report_decoder_, frame, t_reference_ns, report)) {
         reports.push_back(report);
-        news.report = true;
+        update.report = true;
     } else if (ActuatorCommand command; take(command_decoder_, frame, t_reference_ns, command)) {
-        if (!commands.empty() && command.t_ns <= commands.back().t_ns) return ++late, news;
+        if (!commands.empty() && command.t_ns <= commands.back().t_ns) return ++late, update;
         commands.push_back(command);
-        news.command = true;
+        update.command = true;
     } else if (NavigationEstimate estimate; take(estimate_decoder_, frame, t_reference_ns, estimate)) {
-        if (estimate.t_ns <= t_estimate_ns_) return ++late, news;
+        if (estimate.t_ns <= t_estimate_ns_) return ++late, update;
         t_estimate_ns_ = estimate.t_ns;
         waiting_.push_back(estimate);
     } else if (Heartbeat beat; decode(frame, t_reference_ns, beat) == DecodeStatus::complete) {
         t_heartbeat_ns = std::max(t_heartbeat_ns, beat.t_ns);
-        ++heartbeats.heard;
+        ++heartbeats.received;
         heartbeats.stale += beat.stale;
         heartbeats.deadline_missed += beat.deadline_missed;
         heartbeats.output_dropped += beat.output_dropped;
         heartbeats.lockstep |= beat.state == RunState::lockstep;
-        news.heartbeat = true;
+        update.heartbeat = true;
     } else if (const auto camera = ledger_camera(frame.id)) {
         FrameLedger ledger;
         if (take(ledger_decoders_[*camera], frame, t_reference_ns, ledger)) ledgers.push_back(ledger);
     }
-    news.estimates = judge_waiting();
-    return news;
+    update.estimates = judge_waiting();
+    return update;
 }
 
 bool BusRecord::take_pose(const CanFrame& frame, std::int64_t t_reference_ns, PoseDecoder& decoder,
@@ -86,7 +86,7 @@ bool BusRecord::take(MessageDecoder<Message>& decoder, const CanFrame& frame, st
     return count(decoder.accept(frame, t_reference_ns, out));
 }
 
-/// True for a whole message; what is neither that nor on the way to it is told.
+/// True for a complete message; counts what is neither that nor a part of one.
 bool BusRecord::count(DecodeStatus status) {
     refused += status != DecodeStatus::not_mine && status != DecodeStatus::partial &&
                status != DecodeStatus::complete && status != DecodeStatus::duplicate;
@@ -99,7 +99,7 @@ std::optional<TruthState> BusRecord::truth_at(std::int64_t t_ns) const {
     return TruthState{port_state(scenario_.target, *target, scenario_.chaser, *chaser), t_ns};
 }
 
-/// Where both bodies are known by now; times before the target's first command stay without.
+/// At the chaser's times for which the target's pose is known; there is none before the target's first command.
 std::size_t BusRecord::compare_with_truth() {
     std::size_t n = 0;
     while (!target_.empty() && !chaser_times_.empty() && chaser_times_.front() <= target_.newest_ns()) {

@@ -1,8 +1,8 @@
-/// rehearsal/judge/bus_record.h - what was on the bus of a rehearsal: the three programs' messages, decoded, and
-/// the navigation's estimates beside the truth.
+/// rehearsal/judge/bus_record.h - the decoded messages of the three programs, and the navigation's estimates with
+/// the truth of the same time.
 ///
-/// Each stream is kept by its own times, so that two observers of a bus, who see messages of different senders in
-/// different orders, end with the same record.
+/// Each stream is ordered by its own times: two receivers that get the messages of different senders in different
+/// orders make the same record.
 #pragma once
 
 #include <array>
@@ -26,7 +26,8 @@ struct TruthState : PortState {
     std::int64_t t_ns = 0;  ///< simulation clock
 };
 
-/// An estimate beside the truth of the same time. Errors and deviations: the target in the chaser's body axes.
+/// An estimate with the truth of the same time. Errors and standard deviations: the target in the chaser's body
+/// axes.
 struct JudgedEstimate {
     std::int64_t t_ns = 0;
     Vec3 position_error_m{}, rotation_error_rad{};
@@ -40,24 +41,24 @@ struct JudgedEstimate {
     [[nodiscard]] double nees() const;
 };
 
-/// What the heartbeats told.
+/// Flags of the heartbeats, counted.
 struct HeartbeatCount {
-    std::uint64_t heard = 0, stale = 0, deadline_missed = 0, output_dropped = 0;
+    std::uint64_t received = 0, stale = 0, deadline_missed = 0, output_dropped = 0;
     bool lockstep = false;
 };
 
 class BusRecord {
 public:
-    /// What one frame of the bus has brought.
-    struct News {
-        std::size_t truth = 0, estimates = 0;  ///< new ones at the ends of their series
+    /// What one frame has completed.
+    struct Update {
+        std::size_t truth = 0, estimates = 0;  ///< new elements at the ends of their series
         bool report = false, command = false, heartbeat = false;
     };
 
     explicit BusRecord(const Scenario& scenario);
 
     /// `t_reference_ns`: within 39 h of the simulation clock.
-    News accept(const CanFrame& frame, std::int64_t t_reference_ns);
+    Update accept(const CanFrame& frame, std::int64_t t_reference_ns);
 
     std::vector<TruthState> truth;
     std::vector<JudgedEstimate> estimates;
@@ -65,19 +66,19 @@ public:
     std::vector<DynamicsReport> reports;
     std::vector<FrameLedger> ledgers;
     HeartbeatCount heartbeats;
-    std::uint64_t refused = 0;  ///< frames of a known message that could not be used
+    std::uint64_t refused = 0;  ///< frames of a known message that could not be decoded
     std::uint64_t late = 0;     ///< messages that were not newer than the last of their kind
 
-    /// The scenario's time 0 on the simulation clock; the first pose's time before it was told.
+    /// The scenario's time 0 on the simulation clock; the first pose's time until a report has come.
     [[nodiscard]] std::int64_t t_start_ns() const;
     [[nodiscard]] double seconds(std::int64_t t_ns) const {
         return static_cast<double>(t_ns - t_start_ns()) * 1e-9;
     }
-    /// Estimates whose truth has not come.
+    /// Estimates without a truth of their time so far.
     [[nodiscard]] std::size_t unjudged() const { return waiting_.size(); }
-    /// Both bodies at a time that the commands cover.
+    /// At a time that the pose commands of both bodies cover.
     [[nodiscard]] std::optional<TruthState> truth_at(std::int64_t t_ns) const;
-    /// The navigation's command that held at that time: the last one before it.
+    /// The navigation's command that was valid at that time.
     [[nodiscard]] const ActuatorCommand* command_before(std::int64_t t_ns) const;
     [[nodiscard]] const DynamicsReport* first_report(DynamicsPhase phase) const;
 
@@ -96,7 +97,7 @@ private:
     const Scenario& scenario_;
     PoseDecoder target_decoder_, chaser_decoder_;
     MotionTrack target_, chaser_;
-    std::deque<std::int64_t> chaser_times_;  ///< for which the target's command has not come
+    std::deque<std::int64_t> chaser_times_;  ///< without the target's command of that time so far
     MessageDecoder<ActuatorCommand> command_decoder_;
     MessageDecoder<NavigationEstimate> estimate_decoder_;
     MessageDecoder<DynamicsReport> report_decoder_;

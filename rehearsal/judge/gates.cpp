@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kDeg = 180 / std::numbers::pi;
 
-std::string said_last(const BusRecord& bus, std::int64_t t_ns) {
+std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
     return t_ns == BusRecord::kNever ? "never" : fmt::format("at t = {:.3f} s", bus.seconds(t_ns));
 }
 
@@ -35,19 +35,19 @@ std::string when(const Scenario& scenario, const BusRecord& bus, std::int64_t t_
     return text + fmt::format(" ({}, {})", leg_text(scenario, command->leg), phase);
 }
 
-/// In lockstep each waits for the one before: poses, then the emulator's heartbeat of their time, then the command.
-/// In real time nobody waits, and who stopped before the others is the one.
-std::string who_fell_silent(const Scenario& scenario, const BusRecord& bus) {
+/// In lockstep each program waits for the one before: poses, the emulator's heartbeat of their time, the command.
+/// In real time none waits: it is the one that stopped first.
+std::string missing_sender(const Scenario& scenario, const BusRecord& bus) {
     const std::int64_t slack = bus.heartbeats.lockstep ? 1'000'000 : 2 * scenario.period_ns();
     const std::int64_t t_report = bus.reports.empty() ? BusRecord::kNever : bus.reports.back().t_ns;
     const std::int64_t t_command = bus.commands.empty() ? BusRecord::kNever : bus.commands.back().t_ns;
     const std::string last =
-        fmt::format("last heard: poses {}, heartbeat {}, thruster command {}", said_last(bus, bus.t_pose_ns),
-                    said_last(bus, bus.t_heartbeat_ns), said_last(bus, t_command));
+        fmt::format("last heard: poses {}, heartbeat {}, thruster command {}", last_message(bus, bus.t_pose_ns),
+                    last_message(bus, bus.t_heartbeat_ns), last_message(bus, t_command));
     const auto behind = [&](std::int64_t t, std::int64_t other) {
         return other != BusRecord::kNever && (t == BusRecord::kNever || t < other - slack);
     };
-    if (bus.heartbeats.heard == 0) return "the emulator was never heard; " + last;
+    if (bus.heartbeats.received == 0) return "the emulator was never heard; " + last;
     if (bus.t_pose_ns == BusRecord::kNever) return "the dynamics were never heard; " + last;
     if (behind(bus.t_heartbeat_ns, bus.t_pose_ns)) return "the emulator fell silent; " + last;
     if (bus.heartbeats.lockstep ? behind(t_command, t_report) : behind(t_command, bus.t_pose_ns))

@@ -1,4 +1,4 @@
-/// rehearsal/judge/gates.h - each gate: what it has seen so far, and what it says of it.
+/// rehearsal/judge/gates.h - helpers of the gates: clearance of the corridor, limit monitors, texts for reasons.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,19 @@
 
 namespace narpa::rehearsal {
 
-/// Metres from the wall of the corridor, positive inside. Before the port a cone about its x axis; behind the
-/// port's plane it closes with half a sphere.
+/// Distance to the wall of the approach corridor in metres, positive inside. Before the port a cone about its x
+/// axis; behind the port's plane a half sphere.
 [[nodiscard]] double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& position_m);
 
-/// A gate on every instant of a series: the first one that violated it, and the worst (or the nearest to it).
+/// A limit on every sample of a series: the first violation, and the worst (or the closest approach to the limit).
 template <class Sample>
-struct Watch {
+struct LimitMonitor {
     std::size_t seen = 0;
     std::optional<Sample> first, worst;
     double margin = std::numeric_limits<double>::infinity();
 
-    /// Negative margins violate. True for the first that does.
-    bool see(const Sample& sample, double margin_now) {
+    /// A negative margin is a violation. True for the first one.
+    bool check(const Sample& sample, double margin_now) {
         ++seen;
         if (margin_now < margin) margin = margin_now, worst = sample;
         if (margin_now >= 0 || first) return false;
@@ -36,7 +36,7 @@ struct Watch {
 /// "leg 2 \"hold\"", of an index as the commands carry it.
 [[nodiscard]] std::string leg_text(const Scenario& scenario, std::size_t leg);
 
-/// Who was to speak next and did not: why a run broke off.
-[[nodiscard]] std::string who_fell_silent(const Scenario& scenario, const BusRecord& bus);
+/// The program whose message was due next and did not come: why a run broke off.
+[[nodiscard]] std::string missing_sender(const Scenario& scenario, const BusRecord& bus);
 
 }  // namespace narpa::rehearsal

@@ -19,59 +19,60 @@ Judge::Judge(const Scenario& scenario, Failure on_failure)
     : scenario_(scenario), on_failure_(std::move(on_failure)) {}
 
 void Judge::accept(const CanFrame& frame, std::int64_t t_reference_ns) {
-    const BusRecord::News news = bus_.accept(frame, t_reference_ns);
-    if (news.report) see(bus_.reports.back());
-    for (std::size_t i = bus_.truth.size() - news.truth; i < bus_.truth.size(); ++i) see(bus_.truth[i]);
-    for (std::size_t i = bus_.estimates.size() - news.estimates; i < bus_.estimates.size(); ++i)
-        see(bus_.estimates[i]);
-    if (news.command && bus_.commands.back().abort != AbortReason::none && !abort_told_) {
-        abort_told_ = true;
-        if (scenario_.gates.complete) tell(complete());
+    const BusRecord::Update update = bus_.accept(frame, t_reference_ns);
+    if (update.report) check(bus_.reports.back());
+    for (std::size_t i = bus_.truth.size() - update.truth; i < bus_.truth.size(); ++i) check(bus_.truth[i]);
+    for (std::size_t i = bus_.estimates.size() - update.estimates; i < bus_.estimates.size(); ++i)
+        check(bus_.estimates[i]);
+    if (update.command && bus_.commands.back().abort != AbortReason::none && !abort_reported_) {
+        abort_reported_ = true;
+        if (scenario_.gates.complete) report(complete());
     }
 }
 
-void Judge::tell(const GateResult& result) {
+void Judge::report(const GateResult& result) {
     ++failures_;
     if (on_failure_) on_failure_(result);
 }
 
-void Judge::see(const DynamicsReport& report) {
+void Judge::check(const DynamicsReport& report) {
     if (report.phase != DynamicsPhase::captured && report.phase != DynamicsPhase::bounced) return;
     if (!t_contact_ns_) t_contact_ns_ = report.t_ns;
     if (report.phase == DynamicsPhase::captured && !t_captured_ns_) t_captured_ns_ = report.t_ns;
 }
 
-void Judge::see(const TruthState& state) {
+void Judge::check(const TruthState& state) {
     if (t_contact_ns_ && !contact_judged_ && state.t_ns >= *t_contact_ns_) {
         contact_judged_ = true;
         const GateResult result = contact();
-        if (result.state == GateState::failed) tell(result);
+        if (result.state == GateState::failed) report(result);
     }
     if (t_captured_ns_ && state.t_ns > *t_captured_ns_) return;
     const Gates& gates = scenario_.gates;
     const double wall_m = gates.corridor ? corridor_clearance_m(*gates.corridor, state.position_m())
                                          : -std::numeric_limits<double>::infinity();
-    if (gates.corridor && state.range_m() < gates.corridor->from_m && corridor_.see(state, wall_m))
-        tell(corridor());
-    // Inside the corridor the sphere asks for nothing, however far the wall is.
-    if (gates.keep_out_m && keep_out_.see(state, std::max(wall_m, state.range_m() - *gates.keep_out_m)))
-        tell(keep_out());
+    if (gates.corridor && state.range_m() < gates.corridor->from_m && corridor_.check(state, wall_m))
+        report(corridor());
+    // Inside the corridor the keep-out sphere does not apply.
+    if (gates.keep_out_m && keep_out_.check(state, std::max(wall_m, state.range_m() - *gates.keep_out_m)))
+        report(keep_out());
     if (gates.distance_m) {
         const auto [least, most] = *gates.distance_m;
-        if (distance_.see(state, std::min(state.range_m() - least, most - state.range_m()))) tell(distance());
+        if (distance_.check(state, std::min(state.range_m() - least, most - state.range_m()))) report(distance());
     }
 }
 
-void Judge::see(const JudgedEstimate& estimate) {
+void Judge::check(const JudgedEstimate& estimate) {
     if (t_captured_ns_ && estimate.t_ns > *t_captured_ns_) return;
     const Gates::NavigationError limits = scenario_.gates.navigation.value_or(Gates::NavigationError{});
-    const bool told = position_.first || attitude_.first;
-    sigmas_.see(estimate, limits.sigmas - estimate.largest_in_sigmas());
+    const bool reported = position_.first || attitude_.first;
+    sigmas_.check(estimate, limits.sigmas - estimate.largest_in_sigmas());
     measured_ |= estimate.frames + estimate.sweeps > 0;
-    if (!measured_) return;  // it knows what the scenario tells
-    const bool too_far = position_.see(estimate, limits.position_m - norm(estimate.position_error_m));
-    const bool too_turned = attitude_.see(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDeg);
-    if (scenario_.gates.navigation && (too_far || too_turned) && !told) tell(navigation());
+    if (!measured_) return;  // until then the estimate is the scenario's start
+    const bool too_far = position_.check(estimate, limits.position_m - norm(estimate.position_error_m));
+    const bool too_turned =
+        attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDeg);
+    if (scenario_.gates.navigation && (too_far || too_turned) && !reported) report(navigation());
 }
 
 // --- The verdict ----------------------------------------------------------------------------------------------
@@ -115,7 +116,7 @@ LedgerStatistics Judge::ledger_statistics() const {
         render.push_back(static_cast<double>(l.t_render_end_ns - l.t_render_start_ns) * 1e-6);
         if (l.t_hand_over_ns == 0 || l.delivery == Delivery::nothing) continue;
         ++s.handed_over;
-        // Before the first pose and after the last there is none to be late for.
+        // Before the first pose and after the last, no pose belongs to the frame.
         if (l.t_pose_ns >= bus_.t_start_ns() && (!finished || l.t_exposure_mid_ns <= finished->t_ns))
             latency.push_back(static_cast<double>(l.t_hand_over_ns - l.t_pose_ns) * 1e-6);
         exposed.push_back(static_cast<double>(l.t_hand_over_ns - l.t_exposure_mid_ns) * 1e-6);
@@ -135,7 +136,7 @@ std::string Judge::headline(const Verdict& v, const std::string& trouble) const 
                                             : fmt::format("Flown for {:.1f} s", v.t_end_s);
     if (!trouble.empty()) return fmt::format("{}, but {}", what, trouble);
     if (failed == v.gates.end()) return what + ", all gates passed";
-    // What is left undone is the consequence more often than the cause: the gate that failed first comes first.
+    // The gate that failed first is the likely cause; an unfinished run is usually its consequence.
     auto cause = failed;
     for (auto g = failed; g != v.gates.end(); ++g)
         if (g->state == GateState::failed && g->t_first_s.value_or(1e30) < cause->t_first_s.value_or(1e30))
@@ -167,7 +168,7 @@ Verdict Judge::finish(const std::string& trouble) const {
     v.poses = bus_.truth.size();
     v.estimates = bus_.estimates.size();
     v.commands = bus_.commands.size();
-    v.heartbeats = bus_.heartbeats.heard;
+    v.heartbeats = bus_.heartbeats.received;
     v.refused = bus_.refused;
     v.late = bus_.late;
     v.headline = headline(v, trouble);

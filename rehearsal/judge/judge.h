@@ -1,4 +1,4 @@
-/// rehearsal/judge/judge.h - listens to the bus of a rehearsal and says whether it was good.
+/// rehearsal/judge/judge.h - judges a rehearsal by the messages on its bus.
 #pragma once
 
 #include <functional>
@@ -11,34 +11,34 @@
 
 namespace narpa::rehearsal {
 
-/// Pure: frames in, a verdict out. Knows the scenario and what is on the bus, nothing else; a log read afterwards
-/// gives the verdict that listening gave.
+/// Frames in, a verdict out. Its only inputs are the scenario and the bus: a log gives the same verdict as the live
+/// bus.
 ///
 /// After capture the two are one body: corridor, distances and estimates are judged up to that instant.
 class Judge {
 public:
     using Failure = std::function<void(const GateResult&)>;
 
-    /// `on_failure` is told of each gate as soon as it has failed.
+    /// `on_failure` is called for each gate as soon as it has failed.
     explicit Judge(const Scenario& scenario, Failure on_failure = {});
 
     /// `t_reference_ns`: a time within 39 h of the simulation clock, as a log's stamp.
     void accept(const CanFrame& frame, std::int64_t t_reference_ns);
-    /// The verdict on what has been heard; the run is taken to be over. `trouble`: why it is, where something went
-    /// wrong that the bus does not tell; it fails the run.
+    /// The verdict on all frames so far. `trouble`: what ended the run, where that is not on the bus; it fails the
+    /// run.
     [[nodiscard]] Verdict finish(const std::string& trouble = {}) const;
 
     [[nodiscard]] const BusRecord& bus() const { return bus_; }
-    /// The dynamics have said that the run is over.
+    /// The dynamics have reported the end.
     [[nodiscard]] bool finished() const { return bus_.first_report(DynamicsPhase::finished) != nullptr; }
     /// Gates that have failed so far.
     [[nodiscard]] std::size_t failures() const { return failures_; }
 
 private:
-    void see(const TruthState& state);
-    void see(const JudgedEstimate& estimate);
-    void see(const DynamicsReport& report);
-    void tell(const GateResult& result);
+    void check(const TruthState& state);
+    void check(const JudgedEstimate& estimate);
+    void check(const DynamicsReport& report);
+    void report(const GateResult& result);
 
     [[nodiscard]] GateResult corridor() const;
     [[nodiscard]] GateResult keep_out() const;
@@ -58,10 +58,11 @@ private:
     std::size_t failures_ = 0;
     std::optional<std::int64_t> t_captured_ns_;
     std::optional<std::int64_t> t_contact_ns_;  ///< captured or bounced, whichever came first
-    bool abort_told_ = false, contact_judged_ = false, measured_ = false;
+    bool abort_reported_ = false, contact_judged_ = false, measured_ = false;
 
-    Watch<TruthState> corridor_, keep_out_, distance_;
-    Watch<JudgedEstimate> position_, attitude_, sigmas_;  ///< largest errors, and those beyond the gate's sigmas
+    LimitMonitor<TruthState> corridor_, keep_out_, distance_;
+    LimitMonitor<JudgedEstimate> position_, attitude_,
+        sigmas_;  ///< largest errors, and those beyond the gate's sigmas
 };
 
 /// Of a candump log.

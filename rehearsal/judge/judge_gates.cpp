@@ -1,4 +1,4 @@
-// What each gate says of what the judge has seen.
+// The results of the gates.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,29 +12,30 @@ namespace {
 
 constexpr double kDeg = 180 / std::numbers::pi;
 
-/// State, margin and times from what a watch has seen; the words are the caller's.
+/// State, margin and times from a monitor; the caller adds the reason.
 template <class Sample>
-void conclude(GateResult& gate, const Watch<Sample>& watch, const BusRecord& bus, const std::string& unit) {
-    if (watch.seen == 0) return;
-    gate.state = watch.first ? GateState::failed : GateState::passed;
-    gate.margin = watch.margin;
+void conclude(GateResult& gate, const LimitMonitor<Sample>& monitor, const BusRecord& bus,
+              const std::string& unit) {
+    if (monitor.seen == 0) return;
+    gate.state = monitor.first ? GateState::failed : GateState::passed;
+    gate.margin = monitor.margin;
     gate.unit = unit;
-    if (watch.first) gate.t_first_s = bus.seconds(watch.first->t_ns);
-    if (watch.worst) gate.t_worst_s = bus.seconds(watch.worst->t_ns);
+    if (monitor.first) gate.t_first_s = bus.seconds(monitor.first->t_ns);
+    if (monitor.worst) gate.t_worst_s = bus.seconds(monitor.worst->t_ns);
 }
 
 /// "at t = .. s: WORDS; worst at t = .. s: WORDS" or "nearest to it at ..".
 template <class Sample, class Words>
-std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, const Watch<Sample>& watch,
+std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, const LimitMonitor<Sample>& monitor,
                             Words words) {
-    if (watch.seen == 0) return "";
-    if (!watch.first) {
-        if (!watch.worst) return "never near it";
-        return "nearest to the limit " + when(scenario, bus, watch.worst->t_ns) + ": " + words(*watch.worst);
+    if (monitor.seen == 0) return "";
+    if (!monitor.first) {
+        if (!monitor.worst) return "never near it";
+        return "nearest to the limit " + when(scenario, bus, monitor.worst->t_ns) + ": " + words(*monitor.worst);
     }
-    std::string text = when(scenario, bus, watch.first->t_ns) + ": " + words(*watch.first);
-    if (watch.worst->t_ns != watch.first->t_ns)
-        text += "; worst " + when(scenario, bus, watch.worst->t_ns) + ": " + words(*watch.worst);
+    std::string text = when(scenario, bus, monitor.first->t_ns) + ": " + words(*monitor.first);
+    if (monitor.worst->t_ns != monitor.first->t_ns)
+        text += "; worst " + when(scenario, bus, monitor.worst->t_ns) + ": " + words(*monitor.worst);
     return text;
 }
 
@@ -117,9 +118,9 @@ GateResult Judge::navigation() const {
     gate.margin = (s.share_within - limits.share) * 100;
     gate.unit = "%";
     if (sigmas_.worst) gate.t_worst_s = bus_.seconds(sigmas_.worst->t_ns);
-    for (const auto* watch : {&position_, &attitude_})
-        if (watch->first && (!gate.t_first_s || bus_.seconds(watch->first->t_ns) < *gate.t_first_s))
-            gate.t_first_s = bus_.seconds(watch->first->t_ns);
+    for (const auto* monitor : {&position_, &attitude_})
+        if (monitor->first && (!gate.t_first_s || bus_.seconds(monitor->first->t_ns) < *gate.t_first_s))
+            gate.t_first_s = bus_.seconds(monitor->first->t_ns);
     gate.reason = fmt::format("{:.2f} % of {} estimates are within {:g} standard deviations", s.share_within * 100,
                               s.estimates, limits.sigmas);
     if (!enough && sigmas_.first) {
@@ -205,7 +206,7 @@ GateResult Judge::complete() const {
     const DynamicsReport* finished = bus_.first_report(DynamicsPhase::finished);
     if (!finished) {
         gate.reason +=
-            (gave_up ? "; the run broke off: " : "the run broke off: ") + who_fell_silent(scenario_, bus_);
+            (gave_up ? "; the run broke off: " : "the run broke off: ") + missing_sender(scenario_, bus_);
         return gate;
     }
     const double t_end_s = bus_.seconds(finished->t_ns);

@@ -1,4 +1,4 @@
-/// rehearsal/judge/statistics.h - what many numbers come to.
+/// rehearsal/judge/statistics.h - percentiles, and the confidence interval of a success rate.
 #pragma once
 
 #include <cstddef>

@@ -1,9 +1,9 @@
-/// rehearsal/judge/verdict.h - what a rehearsal has come to: gates, contact, numbers.
+/// rehearsal/judge/verdict.h - the result of a rehearsal: gates, contact, statistics.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,13 +19,12 @@ inline constexpr std::array<std::string_view, 3> kGateStates{"passed", "failed",
 
 struct GateResult {
     std::string name{};   ///< "corridor", for machines
-    std::string asked{};  ///< what it asks, in words
+    std::string asked{};  ///< the requirement, for people
     GateState state = GateState::not_judged;
-    std::string reason{};            ///< in plain words, with times and numbers
-    std::optional<double> margin{};  ///< what was left at the worst; negative: missing
-    std::string unit{};              ///< of the margin
-    std::optional<double> t_first_s{},
-        t_worst_s{};  ///< of the first violation and of the worst (or nearest to one)
+    std::string reason{};                            ///< for people, with times and numbers
+    std::optional<double> margin{};                  ///< at the worst sample; negative: violated by so much
+    std::string unit{};                              ///< of the margin
+    std::optional<double> t_first_s{}, t_worst_s{};  ///< of the first violation; of the worst sample
 };
 
 struct Contact {
@@ -35,18 +34,18 @@ struct Contact {
     ContactConditions conditions;
 };
 
-/// How the navigation's errors compare with what it told of them.
+/// The navigation's errors against its covariances.
 struct NavigationStatistics {
     std::size_t estimates = 0, with_frames = 0, with_sweeps = 0, unjudged = 0;
     double share_within = 0;                ///< of the estimates, all six components within the gate's sigmas
-    double nees = 0;                        ///< mean; 6 is what the covariance promises
+    double nees = 0;                        ///< mean; 6 for an exact covariance
     Distribution position_m, attitude_deg;  ///< lengths of the errors
 };
 
 struct LedgerStatistics {
     std::size_t frames = 0, handed_over = 0, deadlines_met = 0, stale = 0;
     Distribution latency_ms;                ///< from the pose command's time to the hand-over
-    Distribution exposure_to_hand_over_ms;  ///< from the middle of the exposure
+    Distribution exposure_to_hand_over_ms;  ///< from mid-exposure
     Distribution render_ms;
     Distribution late_ms;  ///< hand-over after its deadline; negative: before
 };

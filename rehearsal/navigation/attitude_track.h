@@ -1,4 +1,4 @@
-/// rehearsal/navigation/attitude_track.h - the chaser's attitude between and a little after the sensor's reports.
+/// rehearsal/navigation/attitude_track.h - the chaser's attitude, interpolated between the sensor's reports.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace narpa::rehearsal {
 
 class AttitudeTrack {
 public:
-    /// Times grow; one that does not is left out, false.
+    /// False: not newer than the last report, and dropped.
     bool take(const AttitudeReport& report) noexcept;
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
     [[nodiscard]] const AttitudeReport& newest() const noexcept { return reports_[count_ - 1]; }
@@ -19,7 +19,8 @@ public:
         Quat q_world_chaser{};
         Vec3 rate_rad_s{};  ///< body axes, against inertial space
     };
-    /// Between two reports along the shortest arc; outside of them at the rate of the nearest one. Not when empty.
+    /// Between two reports along the shortest arc; outside them extrapolated at the nearest one's rate. Not when
+    /// empty.
     [[nodiscard]] At at(std::int64_t t_ns) const noexcept;
 
 private:

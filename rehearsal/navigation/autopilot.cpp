@@ -52,33 +52,33 @@ void Autopilot::take(DynamicsPhase phase, std::int64_t t_ns) {
     if (phase == dynamics_) return;
     dynamics_ = phase;
     if (phase == DynamicsPhase::captured || phase == DynamicsPhase::bounced)
-        estimator_->met(t_ns, phase == DynamicsPhase::captured);
+        estimator_->on_contact(t_ns, phase == DynamicsPhase::captured);
 }
 
-Autopilot::Before Autopilot::before(std::int64_t t_ns) {
+Autopilot::Prediction Autopilot::predict(std::int64_t t_ns) {
     const std::lock_guard lock(mutex_);
     if (t_ns > estimator_->t_ns()) estimator_->advance(t_ns);
     const TargetEstimate known = estimator_->estimate();
     return {estimator_->t_s(t_ns),
             estimator_->attitude(t_ns).q_world_chaser,
-            estimator_->guess(t_ns),
+            estimator_->predicted(t_ns),
             estimator_->motion_in_chaser(),
             position_sigma(known.covariance),
             rotation_sigma(known.covariance)};
 }
 
 void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
-    const Before b = before(t_ns);
+    const Prediction p = predict(t_ns);
     CameraPoseEstimator& estimator = cameras_[camera];
-    take(estimator.camera().name, t_ns, estimator.look(bytes, t_ns, b.t_s, b.q_world_chaser, b.T_chaser_target),
+    take(estimator.camera().name, t_ns, estimator.measure(bytes, t_ns, p.t_s, p.q_world_chaser, p.T_chaser_target),
          frames_);
 }
 
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {
-    const Before b = before(t_ns);
+    const Prediction p = predict(t_ns);
     LidarPoseEstimator& estimator = lidars_[lidar];
     take(estimator.lidar().name, t_ns,
-         estimator.look(points, t_ns, b.motion, b.T_chaser_target, b.position_sigma_m, b.rotation_sigma_rad),
+         estimator.measure(points, t_ns, p.motion, p.T_chaser_target, p.position_sigma_m, p.rotation_sigma_rad),
          sweeps_);
 }
 
@@ -113,7 +113,7 @@ CycleRecord Autopilot::cycle(std::int64_t t_ns) {
     out.reference = guidance_->reference(out.t_s);
     Impulses impulses;
     if (guidance_->thrusters_off()) {
-        control_->rest();
+        control_->reset();
     } else {
         impulses = control_->step(out.t_s, motion, out.reference);
     }

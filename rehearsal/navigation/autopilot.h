@@ -1,8 +1,8 @@
-/// rehearsal/navigation/autopilot.h - the chaser's computer without its wires: measurements in, estimates and
-/// commands out.
+/// rehearsal/navigation/autopilot.h - the chaser's flight computer without input and output: measurements in,
+/// estimates and commands out.
 ///
-/// Sightings may be taken by one thread while another runs the cycles. One after the other, what comes out depends
-/// on what went in and in what order alone.
+/// One thread may add measurements while another runs the cycles. Called in sequence, the output depends on the
+/// inputs and their order alone.
 #pragma once
 
 #include <deque>
@@ -15,14 +15,14 @@
 
 namespace narpa::rehearsal {
 
-/// What became of a frame or a sweep.
+/// The outcome of a frame or a sweep.
 struct MeasurementRecord {
     enum class Outcome : std::uint8_t { taken, gated, too_late, bad, no_pose };
     std::string sensor;
     std::int64_t t_ns = 0;
     Outcome outcome = Outcome::no_pose;
     double nis = 0;   ///< normalised innovation squared; 0 where it was not formed
-    std::string why;  ///< where it was not taken
+    std::string why;  ///< empty where it was taken
     int points = 0;
     double ms = 0;
 };
@@ -48,31 +48,31 @@ public:
     [[nodiscard]] const Scenario& scenario() const noexcept { return scenario_; }
     [[nodiscard]] const SceneModel& model() const noexcept { return *model_; }
 
-    /// The scenario's time 0 is t_start_ns; that is the chaser's attitude then. Errors: the filter's.
+    /// `t_start_ns`: the scenario's time 0; `attitude`: the chaser's at that time. Errors: the filter's.
     Status start(std::int64_t t_start_ns, const AttitudeReport& attitude);
     [[nodiscard]] bool started() const noexcept { return estimator_.has_value(); }
 
-    // What follows needs a start.
+    // The following need start().
 
     void take(const AttitudeReport& report);
-    /// What the dynamics are doing at t_ns; before the measurements of that time.
+    /// Phase of the dynamics at t_ns; before the measurements of that time.
     void take(DynamicsPhase phase, std::int64_t t_ns);
     /// `camera`, `lidar`: indices in the scenario's lists. A frame: its bytes and mid-exposure. Returns of a turn:
     /// their times count from t_ns, its end.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
     void take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points);
-    /// What any other sensor saw at t_ns; counts as a frame.
+    /// A measurement of any other sensor; counts as a frame.
     void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement) {
         take(sensor, t_ns, measurement, frames_);
     }
-    /// Where it stands at t_ns, and what is to be done from then on; times grow by control periods.
+    /// Estimate at t_ns and command for the control period that follows; t_ns grows by control periods.
     CycleRecord cycle(std::int64_t t_ns);
 
     [[nodiscard]] std::uint64_t restarts() const noexcept { return estimator_ ? estimator_->restarts() : 0; }
 
 private:
-    /// What a measurement starts from.
-    struct Before {
+    /// The filter's state, from which a measurement starts.
+    struct Prediction {
         double t_s = 0;
         Quat q_world_chaser{};
         Rigid3 T_chaser_target{};
@@ -80,16 +80,16 @@ private:
         double position_sigma_m = 0, rotation_sigma_rad = 0;
     };
     Autopilot() = default;
-    [[nodiscard]] Before before(std::int64_t t_ns);
+    [[nodiscard]] Prediction predict(std::int64_t t_ns);
     void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,
               std::uint8_t& count);
 
     Scenario scenario_;
     std::unique_ptr<SceneModel> model_;
-    std::deque<CameraPoseEstimator> cameras_;  ///< they do not move
+    std::deque<CameraPoseEstimator> cameras_;  ///< a deque: elements stay in place
     std::vector<LidarPoseEstimator> lidars_;
 
-    std::mutex mutex_;  ///< of what follows
+    std::mutex mutex_;  ///< guards what follows
     std::optional<StateEstimator> estimator_;
     std::optional<Guidance> guidance_;
     std::optional<FlightControl> control_;

@@ -8,7 +8,7 @@ BusLink::BusLink(std::unique_ptr<CanBus> bus) : bus_(std::move(bus)) {
     for (std::uint8_t camera = 0; camera < kMaxTelemetryCameras; ++camera) ledger_decoders_.emplace_back(camera);
 }
 
-void BusLink::listen(std::int64_t timeout_ns) {
+void BusLink::receive(std::int64_t timeout_ns) {
     if (timeout_ns > 0) bus_->wait(timeout_ns);
     for (ReceivedFrame received; bus_->receive(received);) {
         const CanFrame& frame = received.frame;

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/bus_link.h - what the navigation hears and says on CAN. It does not listen to pose
-/// commands, nor to what ledgers know of them.
+/// rehearsal/navigation/bus_link.h - the navigation's messages on CAN. Pose commands, and what ledgers repeat of
+/// them, are not read: they are the truth.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace narpa::rehearsal {
 
-/// That a camera handed over a frame.
+/// A camera has handed over a frame.
 struct FrameNotice {
     std::uint8_t camera = 0;  ///< index in the scene
     std::int64_t t_mid_ns = 0, t_hand_over_ns = 0;
@@ -25,21 +25,21 @@ class BusLink {
 public:
     explicit BusLink(std::unique_ptr<CanBus> bus);
 
-    /// Takes in what has arrived; waits for it, at most so long.
-    void listen(std::int64_t timeout_ns);
+    /// Decodes all waiting messages; waits for the first one at most so long.
+    void receive(std::int64_t timeout_ns);
 
     [[nodiscard]] const RemoteClock& clock() const noexcept { return clock_; }
     [[nodiscard]] const std::optional<DynamicsReport>& dynamics() const noexcept { return dynamics_; }
     /// The newest one.
     [[nodiscard]] const std::optional<AttitudeReport>& attitude() const noexcept { return attitude_; }
-    /// What was handed over since this was asked last, in the order of the bus.
+    /// Frames handed over since the last call, in the order of the bus.
     [[nodiscard]] std::vector<FrameNotice> take_notices();
 
-    /// False: the bus did not take all of it.
+    /// False: dropped, in part or as a whole.
     template <class Message>
     bool send(const Message& message);
 
-    /// Messages that could not be read.
+    /// Messages that could not be decoded.
     [[nodiscard]] std::uint64_t bad_messages() const noexcept;
     [[nodiscard]] const CanCounters& counters() const noexcept { return bus_->counters(); }
     [[nodiscard]] std::string description() const { return bus_->description(); }

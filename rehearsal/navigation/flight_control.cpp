@@ -7,7 +7,7 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr double kTurnMost_rad_s = 1 * kDegree;
-/// Of the torque, so much may go into stopping a turn.
+/// Share of the torque that may go into stopping a rotation.
 constexpr double kShareToStop = 0.5;
 
 std::array<PulseAxis, 3> axes(double strength, const Thrusters& thrusters, double period_s) {
@@ -15,12 +15,12 @@ std::array<PulseAxis, 3> axes(double strength, const Thrusters& thrusters, doubl
     return {axis, axis, axis};
 }
 
-Vec3 give(std::array<PulseAxis, 3>& axes, const Vec3& wanted) {
-    return {axes[0].give(wanted.x), axes[1].give(wanted.y), axes[2].give(wanted.z)};
+Vec3 modulate(std::array<PulseAxis, 3>& axes, const Vec3& wanted) {
+    return {axes[0].modulate(wanted.x), axes[1].modulate(wanted.y), axes[2].modulate(wanted.z)};
 }
 
-/// A push that is as good as over before the period is leaves a body ahead of one that was pushed evenly: so much
-/// slower it is when the push begins. `steady`: the mean acceleration that is given; `most`: while pushing.
+/// A pulse at the start of the period moves a body further than the same impulse spread over the period: the
+/// initial velocity is reduced by this. `steady`: mean acceleration; `most`: acceleration during the pulse.
 Vec3 push_lag(const Vec3& steady, double most, double period_s) {
     const double on = std::min(1.0, norm(steady) / most);
     return (0.5 * (1 - on) * period_s) * steady;
@@ -42,13 +42,13 @@ SampledGains SampledGains::of(double bandwidth_rad_s, double damping, double per
     return {(1 + determinant - trace) / (period_s * period_s), (1 - determinant) / period_s};
 }
 
-double PulseAxis::give(double wanted) noexcept {
+double PulseAxis::modulate(double wanted) noexcept {
     const double all = wanted + saved_;
     if (std::abs(all) < least_) {
         saved_ = all;
         return 0;
     }
-    saved_ = 0;  // what is beyond the most is not made up for later: the loop asks again
+    saved_ = 0;  // saturation is not carried over: feedback corrects it
     return std::clamp(all, -most_, most_);
 }
 
@@ -65,7 +65,7 @@ FlightControl::FlightControl(const Scenario& s)
       force_(axes(s.thrusters.force_n, s.thrusters, period_s_)),
       torque_(axes(s.thrusters.torque_n_m, s.thrusters, period_s_)) {}
 
-void FlightControl::rest() noexcept {
+void FlightControl::reset() noexcept {
     for (PulseAxis& a : force_) a.reset();
     for (PulseAxis& a : torque_) a.reset();
 }
@@ -75,7 +75,7 @@ Impulses FlightControl::step(double t_s, const RelativeMotion& m, const Referenc
     const Vec3 push = conjugate(m.q_world_chaser) * acceleration(t_s, m, reference, turn);
     const Vec3 momentum = to_vec3(chaser_.inertia_kg_m2 * to_eigen(m.chaser_rate_rad_s));
     const Vec3 torque = to_vec3(chaser_.inertia_kg_m2 * to_eigen(turn)) + cross(m.chaser_rate_rad_s, momentum);
-    return {give(force_, chaser_.mass_kg * period_s_ * push), give(torque_, period_s_ * torque)};
+    return {modulate(force_, chaser_.mass_kg * period_s_ * push), modulate(torque_, period_s_ * torque)};
 }
 
 /// Chaser's body axes.
@@ -100,7 +100,7 @@ Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Referenc
 /// Of the centre of mass by thrust, world axes.
 Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Reference& reference,
                                  const Vec3& angular_acceleration_rad_s2) const {
-    // The port as it should move, from the target's centre of mass in inertial axes.
+    // Reference motion of the port, from the target's centre of mass in inertial axes.
     const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target_);
     const Vec3 w = m.q_world_target * m.target_rate_rad_s;
     const Vec3 wanted = T_world_port * reference.position_m;
@@ -108,7 +108,7 @@ Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Refe
     const Vec3 wanted_velocity = wanted_along + cross(w, wanted);
     const Vec3 wanted_acceleration =
         T_world_port.q * reference.acceleration_m_s2 + 2 * cross(w, wanted_along) + cross(w, cross(w, wanted));
-    // The port as it does move with the chaser.
+    // Actual motion of the port with the chaser.
     const Vec3 arm = m.q_world_chaser * port_from_mass(chaser_).t;
     const Vec3 turn = m.q_world_chaser * m.chaser_rate_rad_s;
     const Vec3 by_turning =

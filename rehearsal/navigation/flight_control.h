@@ -1,4 +1,5 @@
-/// rehearsal/navigation/flight_control.h - what the thrusters do so that the chaser's port goes where it should.
+/// rehearsal/navigation/flight_control.h - feedback control of the chaser's port to the reference, and thrust
+/// allocation.
 #pragma once
 
 #include <array>
@@ -7,20 +8,21 @@
 
 namespace narpa::rehearsal {
 
-/// Of a double integrator that is pushed at the beginning of each period: a = position (r - x) + velocity (r' -
-/// x'), given as a dv of a * period_s, has the sampled poles of the continuous ones of this bandwidth and damping.
+/// Gains of a sampled double integrator with an impulse at the start of each period: a = position (r - x) +
+/// velocity (r' - x'), applied as dv = a * period_s, has the discretised poles of a continuous loop of this
+/// bandwidth and damping.
 struct SampledGains {
     double position_s2 = 0, velocity_s = 0;  ///< s^-2, s^-1
 
     static SampledGains of(double bandwidth_rad_s, double damping, double period_s);
 };
 
-/// One thruster axis: nothing below the least pulse, nothing above the most; what is too little is saved up, so
-/// that small forces are given in the mean.
+/// Pulse modulation of one thruster axis: no pulse below the smallest, none above the largest. Impulses that are
+/// too small accumulate, so that the mean is right.
 class PulseAxis {
 public:
     PulseAxis(double least, double most) : least_(least), most_(most) {}
-    [[nodiscard]] double give(double wanted) noexcept;
+    [[nodiscard]] double modulate(double wanted) noexcept;
     void reset() noexcept { saved_ = 0; }
 
 private:
@@ -36,12 +38,12 @@ class FlightControl {
 public:
     explicit FlightControl(const Scenario& scenario);
 
-    /// For one period from t_s on. The centre of mass is steered so that the port follows: what the port does as
-    /// the chaser turns about its centre of mass is allowed for. Known accelerations are fed forward: gravity's
-    /// and the turning port's.
+    /// For one period from t_s on. Controls the port's position through the centre of mass, with the port's motion
+    /// from the chaser's rotation compensated. Feeds forward gravity and the acceleration of the rotating port
+    /// axes.
     [[nodiscard]] Impulses step(double t_s, const RelativeMotion& motion, const Reference& reference);
-    /// Nothing is fired, nothing saved up.
-    void rest() noexcept;
+    /// Clears the accumulated impulses.
+    void reset() noexcept;
 
 private:
     [[nodiscard]] Vec3 angular_acceleration(const RelativeMotion& m, const Reference& reference) const;
@@ -53,7 +55,7 @@ private:
     double period_s_;
     SampledGains position_, attitude_;
     double acceleration_most_m_s2_, turn_acceleration_most_rad_s2_;
-    double turn_most_rad_s_;  ///< rate at which an error of attitude is taken back
+    double turn_most_rad_s_;  ///< largest rate of attitude corrections
     std::array<PulseAxis, 3> force_, torque_;
 };
 

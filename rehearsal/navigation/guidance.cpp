@@ -5,13 +5,13 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// Of what the thrusters can do, so much for the reference: the rest is the controller's. A retreat has to come to
-/// a stop before the port.
+/// Shares of the thrusters' acceleration that the reference uses; the rest is left to the controller. A retreat
+/// must stop before the port.
 constexpr double kShareOfThrust = 0.2, kShareToRetreat = 0.6;
-/// Half of the stretch of time over which a reference attitude's rate is taken.
+/// Half step of the central difference for the reference's angular rate.
 constexpr double kRateStep_s = 0.05;
 
-/// x towards the origin, z as near z as may be.
+/// x towards the origin, z as close to the port's z as possible.
 Quat looking_at_origin(const Vec3& position_m) {
     if (norm(position_m) < 1e-6) return T_port_docked().q;
     const Vec3 x = -normalized(position_m);
@@ -61,8 +61,8 @@ AbortReason Guidance::reason_to_abort(const GuidanceInput& input) const {
     return AbortReason::none;
 }
 
-/// Out along the port's axis from contact and from within the cone about it; from beside the port straight away.
-/// From contact it begins at rest: what carried it in is gone.
+/// After contact and within the 45 degree cone before the port: along the port's axis; otherwise radially away.
+/// After contact the retreat starts at rest.
 void Guidance::retreat(const GuidanceInput& input, AbortReason reason) {
     const Vec3& r = input.port_m;
     const bool bounced = reason == AbortReason::bounced;

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/guidance.h - where the chaser's port should be and how it should point: along the
-/// scenario's legs, to contact, or away again.
+/// rehearsal/navigation/guidance.h - the reference trajectory of the chaser's port: along the scenario's legs, to
+/// contact, or in retreat.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace narpa::rehearsal {
 
-/// The chaser's port beside the target's as it should be; target's port axes, which may turn.
+/// Reference state of the chaser's port, in the (rotating) axes of the target's port.
 struct Reference {
     Vec3 position_m{}, velocity_m_s{};
     Quat q_port_chaser_port{};
@@ -19,12 +19,11 @@ struct Reference {
     Vec3 acceleration_m_s2{}, angular_acceleration_rad_s2{};
 };
 
-/// What guidance goes by.
 struct GuidanceInput {
     double t_s = 0;
     Vec3 port_m{}, port_velocity_m_s{};  ///< estimate of the chaser's port origin, target's port axes
     double position_sigma_m = 0;         ///< root of the summed variances
-    double unmeasured_s = 0;             ///< since a measurement was taken last
+    double unmeasured_s = 0;             ///< since the last accepted measurement
     DynamicsPhase dynamics = DynamicsPhase::flying;
 };
 
@@ -33,16 +32,16 @@ public:
     /// Legs begin at t_s from the nominal start.
     Guidance(const Scenario& scenario, double t_s);
 
-    /// Once each control period, with times that grow: moves on from leg to leg, gives up, lets go. A contact that
-    /// does not hold is a reason to retreat.
+    /// Once each control period: switches legs, aborts, ends at capture. A contact without capture is a reason to
+    /// retreat.
     void step(const GuidanceInput& input);
 
     [[nodiscard]] GuidancePhase phase() const noexcept { return phase_; }
     [[nodiscard]] std::size_t leg() const noexcept { return leg_; }
     [[nodiscard]] AbortReason abort() const noexcept { return abort_; }
-    /// Thrusters rest: the docking system holds.
+    /// After capture.
     [[nodiscard]] bool thrusters_off() const noexcept { return phase_ == GuidancePhase::docked; }
-    /// At any time of the leg that is being flown.
+    /// At any time of the current leg.
     [[nodiscard]] Reference reference(double t_s) const;
 
 private:

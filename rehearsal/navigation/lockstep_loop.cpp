@@ -1,10 +1,9 @@
-#include "rehearsal/navigation/lockstep_loop.h"
-
 #include <fmt/format.h>
 
 #include <optional>
 
 #include "drivers/can/descriptor.h"
+#include "rehearsal/navigation/loop.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -43,7 +42,7 @@ private:
     Status wait_for(const Condition& met, const std::string& what) {
         const std::int64_t deadline = monotonic_ns() + kPatience_ns;
         while (!met() && !loop_.over()) {
-            loop_.link.listen(20 * kMs);
+            loop_.link.receive(20 * kMs);
             if (auto read = read_frames(); !read) return read;
             read_packets();
             if (monotonic_ns() > deadline)
@@ -54,7 +53,7 @@ private:
         return Ok{};
     }
 
-    /// Every frame that was announced is read, at once: the emulator waits for room before it goes on.
+    /// Reads every announced frame at once: the emulator waits for room in the FIFO.
     Status read_frames() {
         for (const FrameNotice& notice : loop_.link.take_notices()) {
             if (notice.delivery == Delivery::nothing) continue;
@@ -92,11 +91,11 @@ private:
             newest_[i].reset();
         }
         if (!first)  // no packet has been completed yet
-            for (std::size_t i = 0; i < loop_.inputs.lidars.size(); ++i) look_at_turn(i, t_ns);
-        loop_.say(loop_.autopilot.cycle(t_ns));
+            for (std::size_t i = 0; i < loop_.inputs.lidars.size(); ++i) measure_sweep(i, t_ns);
+        loop_.publish(loop_.autopilot.cycle(t_ns));
     }
 
-    void look_at_turn(std::size_t i, std::int64_t t_ns) {
+    void measure_sweep(std::size_t i, std::int64_t t_ns) {
         LidarInput& input = loop_.inputs.lidars[i];
         const std::int64_t deadline = monotonic_ns() + kPacketWait_ns;
         while (!input.buffer.complete_to(t_ns)) {

@@ -1,4 +1,4 @@
-/// rehearsal/navigation/loop.h - what both loops of the node work with.
+/// rehearsal/navigation/loop.h - what the lockstep and the real-time loop have in common.
 #pragma once
 
 #include "base/stop.h"
@@ -21,13 +21,22 @@ struct Loop {
         const auto& dynamics = link.dynamics();
         return stop.load(std::memory_order_relaxed) || (dynamics && dynamics->phase == DynamicsPhase::finished);
     }
-    /// Sends what a cycle says, and keeps it.
-    void say(const CycleRecord& record) const {
+    /// Sends and logs the results of a cycle.
+    void publish(const CycleRecord& record) const {
         link.send(record.estimate);
         link.send(record.command);
         if (log) log->cycle(record);
         ++counts.cycles;
     }
 };
+
+/// On simulation time alone. Errors: no messages on the bus for too long, a video source that has failed.
+Status fly_in_lockstep(const Loop& loop);
+
+/// On the emulator's clock. The calling thread receives from the bus and runs a cycle each period. Each source has
+/// a thread that reads it. One more thread measures: once the chaser's attitude at t_k has come, from the newest
+/// frame of each camera and the newest sweep of each LiDAR that end by t_k. Errors: no heartbeat, at the start or
+/// for too long.
+Status fly_in_real_time(const Loop& loop);
 
 }  // namespace narpa::rehearsal

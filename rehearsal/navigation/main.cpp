@@ -1,14 +1,11 @@
-// narpa-navigation - the chaser's navigation and control: frames, LiDAR packets and attitude in, estimates and
+// narpa-navigation - navigation and control of the chaser: frames, LiDAR packets and attitude in, estimates and
 // thruster commands out on CAN.
-#include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
-#include <iostream>
+#include <optional>
 
 #include "rehearsal/navigation/node.h"
+#include "rehearsal/program_main.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -16,7 +13,7 @@ namespace {
 struct Arguments {
     std::string scenario;
     std::vector<std::string> video, lidar;
-    int threads = 0;
+    int threads = 0, ready_fd = -1;
     NodeOptions node;
 };
 
@@ -32,6 +29,7 @@ Result<SourceList> pairs(const std::vector<std::string>& texts, const char* flag
 }
 
 Status run(Arguments& a) {
+    if (auto good = check_ready_fd(a.ready_fd); !good) return good;
     auto video = pairs(a.video, "--video", "CAMERA=SOURCE, like nav=/dev/video10");
     if (!video) return video.error();
     auto lidar = pairs(a.lidar, "--lidar", "LIDAR=SOURCE, like top=udp:2368");
@@ -43,19 +41,23 @@ Status run(Arguments& a) {
     if (a.threads > 0)
         limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(a.threads));
     stop_on_signals();
-    return navigate(*scenario, a.node, stop_flag(), [] {
+    return navigate(*scenario, a.node, stop_flag(), [&] {
         fmt::print("ready\n");
         std::fflush(stdout);
+        notify_ready(a.ready_fd);
     });
 }
 
-int main_of(int argc, char** argv) {
+}  // namespace
+}  // namespace narpa::rehearsal
+
+int main(int argc, char** argv) {
+    using namespace narpa::rehearsal;
     CLI::App app{
-        "narpa-navigation is the chaser's computer in a rehearsal: it finds the target in frames and sweeps, and "
-        "steers the chaser along the scenario's legs."};
-    app.set_version_flag("--version", NARPA_VERSION);
-    app.footer(
-        "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.");
+        "narpa-navigation is the chaser's flight computer in a rehearsal: it estimates the target's pose from "
+        "frames "
+        "and sweeps and controls the chaser along the scenario's legs.",
+        "narpa-navigation"};
     Arguments a;
     a.node.version = NARPA_VERSION;
     app.add_option("SCENARIO", a.scenario, "Scenario file (TOML)")->required();
@@ -65,7 +67,7 @@ int main_of(int argc, char** argv) {
     app.add_option("--lidar", a.lidar, "LIDAR=SOURCE: udp:PORT, for each of the scenario's")
         ->allow_extra_args(false);
     app.add_flag("--lockstep", a.node.lockstep, "Wait for the emulator's clock; nothing depends on wall time");
-    app.add_option("--seed", a.node.seed, "Of the samples of its own renders")->capture_default_str();
+    app.add_option("--seed", a.node.seed, "Of the samples of its renders")->capture_default_str();
     app.add_option("--threads", a.threads, "Threads that render (default: as many as there are processors)")
         ->check(CLI::Range(0, 1024));
     app.add_option("--wait", a.node.wait_s, "Seconds to wait for the bus")
@@ -73,27 +75,6 @@ int main_of(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--log", a.node.log,
                    "Folder for navigation.csv, measurements.csv, navigation.json and pictures");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& e) {
-        const int asked_for_help = app.exit(e, std::cout, std::cerr);
-        return asked_for_help == 0 ? 0 : exit_status(ErrorKind::bad_input);
-    }
-    if (const Status done = run(a); !done) {
-        fmt::print(stderr, "narpa-navigation: {}\n", done.error().text());
-        return exit_status(done.error().kind);
-    }
-    return 0;
-}
-
-}  // namespace
-}  // namespace narpa::rehearsal
-
-int main(int argc, char** argv) {
-    try {
-        return narpa::rehearsal::main_of(argc, argv);
-    } catch (const std::exception& e) {  // out of memory and the like: nothing of ours throws
-        fmt::print(stderr, "narpa-navigation: {}\n", e.what());
-        return 1;
-    }
+    add_ready_fd(app, a.ready_fd);
+    return run_program(app, argc, argv, [&] { return run(a); });
 }

@@ -21,18 +21,18 @@ FeatureSettings feature_settings(std::uint64_t seed) {
     FeatureSettings f;
     f.seed = ~seed;  // not the random numbers of the frames, whose seed may be the same
     f.renders_max = 4;
-    f.settled_px = 0.1;  // the filter's guess is mostly so near that one view is enough
+    f.settled_px = 0.1;  // the filter's prediction is usually so near that one render is enough
     return f;
 }
 
-/// What matches scatter by, the estimator knows from what it sees in one frame. Edges of a frame of one sample a
-/// pixel are off alike from match to match (measured in closed loop: innovations of 9.3 where six are due), and in
-/// the last metre neighbouring frames show the same points with the same errors: with 2, estimates of one run in
-/// five were beyond four standard deviations there.
+/// Factor on the estimator's covariance. The estimator takes the errors of matches for independent, but edges in a
+/// frame of one sample a pixel have correlated errors (measured in closed loop: normalised innovations squared
+/// of 9.3 where 6 are expected), and in the last metre consecutive frames have the same ones: with a factor of 2,
+/// one run in five had estimates beyond four standard deviations there.
 constexpr double kMatchVariance = 3;
-/// Standard deviations beyond which a guess is not looked for.
-constexpr double kReach = 4;
-/// A search costs much more than an alignment from near by: none where the guess is this good.
+/// Radius of the search around the prediction, in standard deviations.
+constexpr double kSearchSigmas = 4;
+/// No search where the prediction is this good: a search costs much more than an alignment.
 constexpr double kNear_m = 0.3;
 
 }  // namespace
@@ -43,8 +43,8 @@ CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, 
       alignment_(model.render_scene(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
                  feature_settings(seed)) {}
 
-MeasurementResult CameraPoseEstimator::look(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
-                                            const Quat& q_world_chaser, const Rigid3& T_chaser_target) {
+MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
+                                               const Quat& q_world_chaser, const Rigid3& T_chaser_target) {
     const auto start = Clock::now();
     MeasurementResult out;
     const auto image = measured_image(camera_, bytes);
@@ -71,8 +71,8 @@ Result<LidarPoseEstimator> LidarPoseEstimator::create(SceneModel& model, std::si
     return LidarPoseEstimator(model, lidar, *std::move(icp));
 }
 
-/// Beams that end on the chaser itself say nothing of the target.
-void LidarPoseEstimator::leave_out_own_body(std::span<const RangePoint> points) {
+/// Drops returns from the chaser itself.
+void LidarPoseEstimator::remove_own_body(std::span<const RangePoint> points) {
     BodyPoses at(model_->scene().bodies.size());
     const auto own = static_cast<std::uint32_t>(model_->chaser());
     points_.clear();
@@ -89,16 +89,16 @@ void LidarPoseEstimator::leave_out_own_body(std::span<const RangePoint> points) 
     }
 }
 
-MeasurementResult LidarPoseEstimator::look(std::span<const RangePoint> points, std::int64_t t_ns,
-                                           const SweepMotion& motion, const Rigid3& T_chaser_target,
-                                           double position_sigma_m, double rotation_sigma_rad) {
+MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points, std::int64_t t_ns,
+                                              const SweepMotion& motion, const Rigid3& T_chaser_target,
+                                              double position_sigma_m, double rotation_sigma_rad) {
     const auto start = Clock::now();
     MeasurementResult out;
-    leave_out_own_body(points);
+    remove_own_body(points);
     const Quat q_lidar_chaser = conjugate(lidar_.T_mount_lidar.q);
     const SweepMotion in_lidar{q_lidar_chaser * motion.velocity_m_s, q_lidar_chaser * motion.rate_rad_s};
     const double reach_m = model_->tracer().bounding_radius_m(model_->target());
-    const double off_m = kReach * (position_sigma_m + rotation_sigma_rad * reach_m);
+    const double off_m = kSearchSigmas * (position_sigma_m + rotation_sigma_rad * reach_m);
     const auto e =
         icp_.align(points_, in_lidar, inverse(lidar_.T_mount_lidar) * T_chaser_target, off_m > kNear_m ? off_m : 0);
     out.ms = ms_since(start);

@@ -1,4 +1,4 @@
-/// rehearsal/navigation/measurements.h - from what a sensor put out to where the target stands.
+/// rehearsal/navigation/measurements.h - pose measurements of the target from camera frames and LiDAR sweeps.
 #pragma once
 
 #include <optional>
@@ -13,15 +13,15 @@
 
 namespace narpa::rehearsal {
 
-/// Nothing, and why, where the sensor told no pose that can be trusted.
+/// The pose; or none, and why, where no reliable one was found.
 struct MeasurementResult {
     std::optional<TargetMeasurement> pose;
     std::string why;
-    int points = 0;  ///< matches that agree, or beams that were used
-    double ms = 0;   ///< wall time that it took
+    int points = 0;  ///< feature matches that agree, or returns used
+    double ms = 0;   ///< wall time
 };
 
-/// Frames of one camera: the model is rendered where the target should be, and its points are found in the frame.
+/// Frames of one camera: renders the model at the predicted pose and matches its features with the frame.
 class CameraPoseEstimator {
 public:
     /// `model` outlives it. `camera`: index in the scene.
@@ -29,9 +29,9 @@ public:
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     /// `bytes`: in the camera's format. `t_ns`: mid-exposure, t_s after the scenario's time 0. `T_chaser_target`:
-    /// where the target should be, body axes. Runs on the calling thread's TBB arena.
-    [[nodiscard]] MeasurementResult look(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
-                                         const Quat& q_world_chaser, const Rigid3& T_chaser_target);
+    /// predicted, body axes. Runs on the calling thread's TBB arena.
+    [[nodiscard]] MeasurementResult measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
+                                            const Quat& q_world_chaser, const Rigid3& T_chaser_target);
 
 private:
     SceneModel& model_;
@@ -39,7 +39,7 @@ private:
     FeatureAlignment alignment_;
 };
 
-/// Sweeps of one LiDAR: the last turn's returns, moved to the time of its end.
+/// Sweeps of one LiDAR: ICP of the last turn's returns, corrected for the motion to the time of its end.
 class LidarPoseEstimator {
 public:
     /// `model` outlives it. `lidar`: index in the scene. Errors: ICP's.
@@ -47,15 +47,15 @@ public:
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
     /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
-    /// `position_sigma_m`, `rotation_sigma_rad`: how far off `T_chaser_target` may be.
-    [[nodiscard]] MeasurementResult look(std::span<const RangePoint> points, std::int64_t t_ns,
-                                         const SweepMotion& motion, const Rigid3& T_chaser_target,
-                                         double position_sigma_m, double rotation_sigma_rad);
+    /// `position_sigma_m`, `rotation_sigma_rad`: standard deviations of `T_chaser_target`.
+    [[nodiscard]] MeasurementResult measure(std::span<const RangePoint> points, std::int64_t t_ns,
+                                            const SweepMotion& motion, const Rigid3& T_chaser_target,
+                                            double position_sigma_m, double rotation_sigma_rad);
 
 private:
     LidarPoseEstimator(SceneModel& model, std::size_t lidar, CloudIcp icp)
         : model_(&model), lidar_(model.scene().lidars[lidar]), icp_(std::move(icp)) {}
-    void leave_out_own_body(std::span<const RangePoint> points);
+    void remove_own_body(std::span<const RangePoint> points);
 
     SceneModel* model_;
     Lidar lidar_;

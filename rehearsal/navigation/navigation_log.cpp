@@ -1,7 +1,6 @@
 #include "rehearsal/navigation/navigation_log.h"
 
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -22,8 +21,8 @@ std::string numbers(const Vec3& v, const char* form = "{:.6g}") {
     return fmt::format(fmt::runtime(fmt::format("{0},{0},{0}", form)), v.x, v.y, v.z);
 }
 
-/// A leg's name as part of a file's.
-std::string plain(std::string name) {
+/// A leg's name as part of a file name.
+std::string file_name_part(std::string name) {
     for (char& c : name)
         if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
     return name;
@@ -56,7 +55,7 @@ Result<std::unique_ptr<NavigationLog>> NavigationLog::create(const std::string& 
 
 void NavigationLog::frame(const Camera& camera, std::span<const std::uint8_t> bytes) {
     const std::lock_guard lock(mutex_);
-    Seen& seen = seen_[camera.name];
+    LastFrame& seen = seen_[camera.name];
     seen.camera = camera;
     seen.bytes.assign(bytes.begin(), bytes.end());
 }
@@ -65,24 +64,24 @@ void NavigationLog::cycle(const CycleRecord& r) {
     for (const MeasurementRecord& s : r.measurements) {
         const auto outcome = static_cast<std::size_t>(s.outcome);
         ++outcomes_[s.sensor][outcome];
-        fmt::print(measurements_, "{},{},{},{:.3f},{},{:.2f},\"{}\"\n", s.t_ns, s.sensor,
-                   kMeasurementOutcomes[outcome], s.nis, s.points, s.ms, s.why);
+        measurements_ << fmt::format("{},{},{},{:.3f},{},{:.2f},\"{}\"\n", s.t_ns, s.sensor,
+                                     kMeasurementOutcomes[outcome], s.nis, s.points, s.ms, s.why);
     }
     const Rigid3& port = r.port.T_port_chaser_port;
     const auto phase = static_cast<std::size_t>(r.command.phase), abort = static_cast<std::size_t>(r.command.abort);
-    fmt::print(cycles_, "{},{},{:.6f},{},{},{},{},{},{},{},{:.5f},{:.6g},{},{},{},{},{},{}\n", r.estimate.cycle,
-               r.estimate.t_ns, r.t_s, kGuidancePhases[phase], r.command.leg, kAbortReasons[abort],
-               numbers(port.t, "{:.5f}"), numbers(r.port.velocity_m_s), numbers(r.reference.position_m, "{:.5f}"),
-               numbers(port.t - r.reference.position_m),
-               angle_between(port.q, r.reference.q_port_chaser_port) / kDegree, r.position_sigma_m,
-               numbers(r.estimate.sigma_position_m), numbers(r.estimate.sigma_rotation_rad / kDegree),
-               numbers(r.command.impulse_n_s), numbers(r.command.angular_impulse_n_m_s), r.estimate.frames,
-               r.estimate.sweeps);
+    cycles_ << fmt::format("{},{},{:.6f},{},{},{},{},{},{},{},{:.5f},{:.6g},{},{},{},{},{},{}\n", r.estimate.cycle,
+                           r.estimate.t_ns, r.t_s, kGuidancePhases[phase], r.command.leg, kAbortReasons[abort],
+                           numbers(port.t, "{:.5f}"), numbers(r.port.velocity_m_s),
+                           numbers(r.reference.position_m, "{:.5f}"), numbers(port.t - r.reference.position_m),
+                           angle_between(port.q, r.reference.q_port_chaser_port) / kDegree, r.position_sigma_m,
+                           numbers(r.estimate.sigma_position_m), numbers(r.estimate.sigma_rotation_rad / kDegree),
+                           numbers(r.command.impulse_n_s), numbers(r.command.angular_impulse_n_m_s),
+                           r.estimate.frames, r.estimate.sweeps);
 
-    const bool news = r.command.phase != phase_ || r.command.abort != abort_;
+    const bool changed = r.command.phase != phase_ || r.command.abort != abort_;
     phase_ = r.command.phase, abort_ = r.command.abort;
-    if (!news) return;
-    if (phase_ == GuidancePhase::holding) pictures("hold_" + plain(legs_[r.command.leg]));
+    if (!changed) return;
+    if (phase_ == GuidancePhase::holding) pictures("hold_" + file_name_part(legs_[r.command.leg]));
     if (phase_ == GuidancePhase::docked) pictures("contact");
     if (abort_ != AbortReason::none) pictures("abort");
 }

@@ -1,6 +1,6 @@
-/// rehearsal/navigation/navigation_log.h - what the navigation leaves behind: navigation.csv (a line for each
-/// cycle), measurements.csv (one for each frame and sweep), pictures of what the cameras saw as holds began and at
-/// last before contact, navigation.json (counts). Frames may come from another thread than the rest.
+/// rehearsal/navigation/navigation_log.h - the files that the navigation writes: navigation.csv (a line a control
+/// period), measurements.csv (a line a frame or sweep), camera pictures at the start of each hold and at contact,
+/// navigation.json (counts). Frames may come from another thread than the rest.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@
 
 namespace narpa::rehearsal {
 
-/// What was met on the wires.
+/// Traffic on the inputs and the bus.
 struct NodeCounts {
-    std::uint64_t cycles = 0, cycles_late = 0;  ///< late: begun more than a tenth of a period after their time
+    std::uint64_t cycles = 0, cycles_late = 0;  ///< late: started more than a tenth of a period late
     std::uint64_t cycles_passed_over = 0;
-    std::uint64_t frames = 0, frames_missing = 0;  ///< read; announced on the bus, but not to be had
+    std::uint64_t frames = 0, frames_missing = 0;  ///< read; announced on the bus but not received
     std::uint64_t packets = 0, packets_bad = 0, turns_incomplete = 0;
     std::uint64_t bad_messages = 0, send_drops = 0;
 };
@@ -29,7 +29,7 @@ public:
     /// Makes the folder. Errors: it cannot be written to.
     static Result<std::unique_ptr<NavigationLog>> create(const std::string& folder, const Scenario& scenario);
 
-    /// What this camera saw last.
+    /// The newest frame of this camera.
     void frame(const Camera& camera, std::span<const std::uint8_t> bytes);
     void cycle(const CycleRecord& record);
     Status finish(const NodeCounts& counts, std::uint64_t restarts, const std::string& version);
@@ -38,15 +38,15 @@ private:
     NavigationLog() = default;
     void pictures(const std::string& name);
 
-    struct Seen {
+    struct LastFrame {
         Camera camera;
         std::vector<std::uint8_t> bytes;
     };
     std::string folder_;
     std::vector<std::string> legs_;
     std::ofstream cycles_, measurements_;
-    std::mutex mutex_;  ///< of what was seen
-    std::map<std::string, Seen> seen_;
+    std::mutex mutex_;  ///< guards seen_
+    std::map<std::string, LastFrame> seen_;
     std::map<std::string, std::array<std::uint64_t, kMeasurementOutcomes.size()>> outcomes_;
     GuidancePhase phase_ = GuidancePhase::moving;
     AbortReason abort_ = AbortReason::none;

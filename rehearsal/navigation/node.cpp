@@ -1,7 +1,6 @@
 #include "rehearsal/navigation/node.h"
 
-#include "rehearsal/navigation/lockstep_loop.h"
-#include "rehearsal/navigation/real_time_loop.h"
+#include "rehearsal/navigation/loop.h"
 
 namespace narpa::rehearsal {
 

@@ -1,32 +1,37 @@
-/// rehearsal/navigation/node.h - the navigation on its wires: frames and packets in, CAN both ways.
+/// rehearsal/navigation/node.h - the navigation as a program: frames and packets in, CAN in and out.
 ///
-/// In lockstep each cycle waits for the emulator's clock and for every frame and packet that falls due; nothing
-/// depends on wall time. In real time the cycle runs on the emulator's clock whatever the measurements do, which
-/// have a thread of their own and take the newest frame and turn there is.
+/// In lockstep each control cycle waits for the emulator's clock and for every frame and packet that is due;
+/// nothing depends on wall time. In real time the cycle runs on the emulator's clock; a thread of its own measures
+/// from the newest frames and sweeps.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "base/result.h"
 #include "base/stop.h"
-#include "rehearsal/navigation/navigation_log.h"
-#include "rehearsal/navigation/sensor_inputs.h"
+#include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
+
+/// NAME=SOURCE, as on the command line.
+using SourceList = std::vector<std::pair<std::string, std::string>>;
 
 struct NodeOptions {
     std::string bus;
     SourceList video, lidar;
     bool lockstep = false;
     std::uint64_t seed = 1;
-    double wait_s = 30;  ///< for the bus to be there
+    double wait_s = 30;  ///< for the bus
     std::string log;     ///< folder; empty: none
     std::string version;
 };
 
-/// Until the dynamics say that they have finished, or it is stopped. `ready` is called once everything is open.
-/// Errors: scenario, scene, sources, bus; a bus that falls silent (failed).
+/// Runs until the dynamics report the end, or until stopped. `ready` is called once all inputs and the bus are
+/// open. Errors: of scenario, scene, sources, bus; a bus without messages for too long (failed).
 Status navigate(const Scenario& scenario, const NodeOptions& options, const StopFlag& stop,
                 const std::function<void()>& ready);
 

@@ -1,5 +1,3 @@
-#include "rehearsal/navigation/real_time_loop.h"
-
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
@@ -7,15 +5,16 @@
 
 #include "drivers/can/descriptor.h"
 #include "estimator/features/feature_matcher.h"
+#include "rehearsal/navigation/loop.h"
 #include "rehearsal/navigation/sensor_receiver.h"
 
 namespace narpa::rehearsal {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
-/// The clock's first heartbeat, the dynamics' first report; and how long the emulator may fall silent.
+/// Limits on the wait for the first heartbeat and report, and for each heartbeat after.
 constexpr std::int64_t kPatience_ns = 60 * kSecond_ns, kSilence_ns = 10 * kSecond_ns;
-/// The report of t_k, and what was exposed at t_k, may come so much later.
+/// Delays allowed after t_k: of its attitude report, of frames and packets that end at t_k.
 constexpr std::int64_t kReportWait_ns = 50 * kMs, kSensorWait_ns = 60 * kMs;
 
 class RealTimeLoop {
@@ -29,30 +28,30 @@ public:
         if (auto began = wait_for_the_start(); !began || loop_.over()) return began;
         t_start_ns_ = loop_.link.dynamics()->t_start_ns;
         if (auto started = loop_.autopilot.start(t_start_ns_, *loop_.link.attitude()); !started) return started;
-        std::thread looking([this] { look(); });
+        std::thread measuring([this] { measure(); });
         Status flown = run_cycles();
         {
             const std::lock_guard lock(mutex_);
             over_ = true;
         }
         changed_.notify_all();
-        looking.join();
+        measuring.join();
         loop_.counts.frames = receiver_.frames();
         return flown;
     }
 
 private:
-    void listen(std::int64_t timeout_ns) {
+    void receive(std::int64_t timeout_ns) {
         const std::int64_t heard_ns = loop_.link.clock().newest().t_ns;
-        loop_.link.listen(timeout_ns);
-        if (loop_.link.clock().newest().t_ns != heard_ns) t_heard_ns_ = monotonic_ns();
-        receiver_.hear(loop_.link.take_notices(), loop_.link.clock().now_ns() - monotonic_ns());
+        loop_.link.receive(timeout_ns);
+        if (loop_.link.clock().newest().t_ns != heard_ns) t_received_ns_ = monotonic_ns();
+        receiver_.update(loop_.link.take_notices(), loop_.link.clock().now_ns() - monotonic_ns());
     }
 
     Status wait_for_the_start() {
         const std::int64_t deadline = monotonic_ns() + kPatience_ns;
         while (!loop_.over()) {
-            listen(20 * kMs);
+            receive(20 * kMs);
             if (loop_.link.clock().synchronized() && loop_.link.dynamics() && loop_.link.attitude()) return Ok{};
             if (monotonic_ns() > deadline)
                 return Error{
@@ -75,27 +74,27 @@ private:
             } else if (late_ns > kReportWait_ns + period_ns_ / 10) {
                 ++loop_.counts.cycles_late;
             }
-            loop_.say(loop_.autopilot.cycle(t_ns));
+            loop_.publish(loop_.autopilot.cycle(t_ns));
         }
     }
 
-    /// Until the clock shows t_ns and the attitude of that time is there; without it, a little longer.
+    /// Until the clock shows t_ns and the attitude of that time has come, or kReportWait_ns longer.
     Status wait_until(std::int64_t t_ns) {
-        t_heard_ns_ = monotonic_ns();
+        t_received_ns_ = monotonic_ns();
         while (!loop_.over()) {
             const std::int64_t left_ns = t_ns - loop_.link.clock().now_ns();
-            const bool reported = hand_on_attitude() >= t_ns;
+            const bool reported = pass_attitude() >= t_ns;
             if (left_ns <= 0 && (reported || -left_ns > kReportWait_ns)) return Ok{};
-            listen(std::clamp<std::int64_t>(left_ns, 1 * kMs, 20 * kMs));
-            if (monotonic_ns() - t_heard_ns_ > kSilence_ns)
+            receive(std::clamp<std::int64_t>(left_ns, 1 * kMs, 20 * kMs));
+            if (monotonic_ns() - t_received_ns_ > kSilence_ns)
                 return Error{fmt::format("no heartbeat for {} s", kSilence_ns / kSecond_ns),
                              loop_.link.description(), 0, 0, ErrorKind::failed};
         }
         return Ok{};
     }
 
-    /// To the autopilot, and to those who look. Its time.
-    std::int64_t hand_on_attitude() {
+    /// Passes the newest attitude to the autopilot and wakes the measuring thread; returns its time.
+    std::int64_t pass_attitude() {
         const AttitudeReport& attitude = *loop_.link.attitude();
         if (attitude.t_ns > t_attitude_ns_ || attitude.t_ns == t_start_ns_) {
             loop_.autopilot.take(attitude);
@@ -109,8 +108,8 @@ private:
         return attitude.t_ns;
     }
 
-    /// The thread of the measurements.
-    void look() {
+    /// The measuring thread.
+    void measure() {
         const OnePictureThread pictures;
         tbb::task_arena arena;
         std::int64_t done_ns = t_start_ns_;
@@ -124,12 +123,12 @@ private:
                 changed_.wait_for(lock, std::chrono::nanoseconds(kSensorWait_ns), [&] { return over_; });
                 if (over_) return;
             }
-            arena.execute([&] { look_at(t_ns); });
+            arena.execute([&] { measure_at(t_ns); });
             done_ns = t_ns;
         }
     }
 
-    void look_at(std::int64_t t_ns) {
+    void measure_at(std::int64_t t_ns) {
         for (std::size_t i = 0; i < loop_.inputs.lidars.size(); ++i) {
             if (!receiver_.turn(i, t_ns, points_)) ++loop_.counts.turns_incomplete;
             if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
@@ -149,7 +148,7 @@ private:
 
     const Loop& loop_;
     SensorReceiver receiver_;
-    std::int64_t period_ns_, t_start_ns_ = 0, t_heard_ns_ = 0;
+    std::int64_t period_ns_, t_start_ns_ = 0, t_received_ns_ = 0;
     std::mutex mutex_;
     std::condition_variable changed_;
     std::int64_t t_attitude_ns_ = std::numeric_limits<std::int64_t>::min();

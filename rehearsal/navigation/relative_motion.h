@@ -1,5 +1,5 @@
-/// rehearsal/navigation/relative_motion.h - one relative state in the three forms that navigation needs it in: as
-/// the filter keeps it, in inertial axes, and as one docking port stands before the other.
+/// rehearsal/navigation/relative_motion.h - the relative state in the three forms that navigation uses: the
+/// filter's (LVLH), inertial axes, and port to port.
 #pragma once
 
 #include "estimator/filter/motion_model.h"
@@ -8,9 +8,9 @@
 
 namespace narpa::rehearsal {
 
-/// The chaser beside the target, about the target's centre of mass, which is taken to be at rest; world axes.
+/// The chaser relative to the target's centre of mass, which is at rest; world axes.
 struct RelativeMotion {
-    Vec3 position_m{}, velocity_m_s{};  ///< of the chaser's centre of mass, as inertial axes see it
+    Vec3 position_m{}, velocity_m_s{};  ///< of the chaser's centre of mass, inertial
     Quat q_world_target{}, q_world_chaser{};
     Vec3 target_rate_rad_s{}, chaser_rate_rad_s{};  ///< against inertial space, each in its own body axes
 };
@@ -25,15 +25,15 @@ struct RelativeMotion {
 [[nodiscard]] RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double t_s);
 
 [[nodiscard]] PortState port_state(const RelativeMotion& motion, const Vehicle& target, const Vehicle& chaser);
-/// Puts the chaser's centre of mass where its port's origin, of this place and velocity in the target's port axes,
-/// asks for; attitudes and rates are those in `motion`.
+/// Sets position and velocity of the chaser's centre of mass so that its port's origin has these, in the target's
+/// port axes; attitudes and rates stay.
 void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle& target, const Vehicle& chaser,
                 RelativeMotion& motion);
 
 /// The target's rate at time 0, against inertial space, body axes.
 [[nodiscard]] Vec3 nominal_target_rate_rad_s(const Scenario& scenario);
 
-/// What gravity does to the chaser beside the target, inertial axes: linear about the target's circular orbit.
+/// Gravity at the chaser minus gravity at the target, inertial axes: linear about the target's circular orbit.
 [[nodiscard]] Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m);
 
 }  // namespace narpa::rehearsal

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/scene_model.h - what the navigation knows of what its sensors see: the scene, with the
-/// target where it believes it to be.
+/// rehearsal/navigation/scene_model.h - the scene as the navigation's model of what its sensors see, with the
+/// target at its estimated pose.
 #pragma once
 
 #include <memory>
@@ -13,8 +13,8 @@ namespace narpa::rehearsal {
 
 class SceneModel {
 public:
-    /// Reads the scenario's scene and makes it ready for rays. Errors: of the scene; a body or a sensor that it
-    /// does not have; a sensor that does not ride on the chaser.
+    /// Reads the scenario's scene and builds its tracer. Errors: of the scene; a body or sensor that it does not
+    /// have; a sensor that is not mounted on the chaser.
     static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
@@ -22,13 +22,12 @@ public:
     [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_->tracer(); }
     [[nodiscard]] std::size_t target() const noexcept { return target_; }
     [[nodiscard]] std::size_t chaser() const noexcept { return chaser_; }
-    /// Of the scene, those that the scenario navigates by, in its order.
+    /// Indices in the scene of the sensors that the scenario navigates by, in its order.
     [[nodiscard]] const std::vector<std::size_t>& cameras() const noexcept { return cameras_; }
     [[nodiscard]] const std::vector<std::size_t>& lidars() const noexcept { return lidars_; }
 
-    /// Where everything is at t_s: the target's centre of mass at the world's origin, the attractor below it along
-    /// its orbit, the chaser beside it (`T_target_chaser`: body axes of both); what else there is, as the scene has
-    /// it at time 0.
+    /// Poses at t_s: the target's centre of mass at the world's origin, the attractor at the orbit's radius below
+    /// it, the chaser at `T_target_chaser` (body axes of both). Other bodies stay as the scene has them at time 0.
     [[nodiscard]] const BodyPoses& place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser);
 
 private:

@@ -7,7 +7,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// Of each sensor, in its order, the source that was given for it.
+/// The source of each sensor, in the order of `sensors`.
 Result<std::vector<std::string>> sources_of(const std::vector<std::string>& sensors, const SourceList& given,
                                             const char* flag, const std::string& file) {
     for (const auto& [name, source] : given)

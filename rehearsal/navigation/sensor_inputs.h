@@ -1,20 +1,17 @@
-/// rehearsal/navigation/sensor_inputs.h - the sources of frames and packets that the scenario navigates by.
+/// rehearsal/navigation/sensor_inputs.h - opens the sources of frames and packets that the scenario navigates by.
 #pragma once
 
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "drivers/lidar/packet_source.h"
 #include "drivers/video/video_source.h"
+#include "rehearsal/navigation/node.h"
 #include "rehearsal/navigation/scene_model.h"
 #include "rehearsal/navigation/sweep_buffer.h"
 
 namespace narpa::rehearsal {
-
-/// NAME=SOURCE, as on the command line.
-using SourceList = std::vector<std::pair<std::string, std::string>>;
 
 struct CameraInput {
     std::size_t camera = 0;  ///< index in the scene

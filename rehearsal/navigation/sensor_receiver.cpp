@@ -50,7 +50,7 @@ void SensorReceiver::read_packets(std::size_t i) {
     }
 }
 
-void SensorReceiver::hear(const std::vector<FrameNotice>& notices, std::int64_t offset_ns) {
+void SensorReceiver::update(const std::vector<FrameNotice>& notices, std::int64_t offset_ns) {
     const std::lock_guard lock(mutex_);
     offset_ns_ = offset_ns;
     for (const FrameNotice& notice : notices)

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/sensor_receiver.h - in real time: what the sources give, kept for whoever looks, and which
-/// frame is which.
+/// rehearsal/navigation/sensor_receiver.h - real time: reads the sources, keeps the newest frames and packets, and
+/// finds the exposure time of each frame.
 #pragma once
 
 #include <condition_variable>
@@ -15,7 +15,7 @@
 
 namespace narpa::rehearsal {
 
-/// One thread a source, from making to destroying.
+/// One thread a source.
 class SensorReceiver {
 public:
     /// Both outlive it.
@@ -24,16 +24,17 @@ public:
     SensorReceiver(const SensorReceiver&) = delete;
     SensorReceiver& operator=(const SensorReceiver&) = delete;
 
-    /// What the bus said of frames, and how far the simulation clock is before CLOCK_MONOTONIC.
-    void hear(const std::vector<FrameNotice>& notices, std::int64_t offset_ns);
+    /// Frame notices from the bus, and simulation clock minus CLOCK_MONOTONIC.
+    void update(const std::vector<FrameNotice>& notices, std::int64_t offset_ns);
 
     struct Frame {
         std::int64_t t_mid_ns = 0;
         std::vector<std::uint8_t> bytes;
     };
-    /// The newest frame exposed at t_ns or before, that has not been taken yet. `camera`: in the scenario's order.
+    /// The newest frame exposed at t_ns or before, unless it was returned before. `camera`: in the scenario's
+    /// order.
     [[nodiscard]] std::optional<Frame> newest_frame(std::size_t camera, std::int64_t t_ns);
-    /// Of the turn that ends at t_ns; false: its last packet has not come.
+    /// Points of the turn that ends at t_ns; false: its last packet has not come.
     [[nodiscard]] bool turn(std::size_t lidar, std::int64_t t_ns, std::vector<RangePoint>& out);
     [[nodiscard]] std::uint64_t frames() const;
 
@@ -49,14 +50,14 @@ private:
     };
     void read_frames(std::size_t i);
     void read_packets(std::size_t i);
-    /// When it was exposed, by its own embedded line or by the notice whose hand-over fits its arrival.
+    /// Mid-exposure, from the embedded line or from the notice whose hand-over is nearest to the arrival.
     [[nodiscard]] std::optional<std::int64_t> exposed_ns(const CameraState& state, const Camera& camera,
                                                          const Arrived& frame) const;
 
     SensorInputs& inputs_;
     const SceneModel& model_;
     StopFlag stop_{false};
-    mutable std::mutex mutex_;  ///< of what follows, and of the LiDARs' buffers
+    mutable std::mutex mutex_;  ///< guards what follows and the LiDARs' buffers
     std::vector<CameraState> cameras_;
     std::int64_t offset_ns_ = 0;
     std::uint64_t frames_ = 0;

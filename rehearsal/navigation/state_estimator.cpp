@@ -7,26 +7,26 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// Room for a minute's measurements and the edges of its pulses.
+/// A minute of measurements and pulse edges.
 constexpr std::size_t kHistory = 256;
 constexpr std::uint64_t kContradictions = 5;
-/// What is known of velocity and rate when the filter begins anew.
-constexpr double kAnewVelocity_m_s = 0.2, kAnewRate_rad_s = 0.2 * kDegree;
-/// What contact leaves unsure.
+/// Standard deviations of velocity and rate when the filter restarts.
+constexpr double kRestartVelocity_m_s = 0.2, kRestartRate_rad_s = 0.2 * kDegree;
+/// Standard deviations that contact adds.
 constexpr double kMetPosition_m = 0.05, kMetAttitude_rad = 0.3 * kDegree, kMetRate_rad_s = 0.1 * kDegree,
                  kHeldVelocity_m_s = 0.01, kBouncedVelocity_m_s = 0.2;
-/// Nothing is known better than this at the start.
+/// Lower bounds of the standard deviations at the start.
 constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
                  kLeastRate_rad_s = 2e-3 * kDegree;
 
-/// A star tracker's error turns the target about the chaser: of a pose with this translation from it.
-Matrix6 turned_about_chaser(const Vec3& target_from_chaser_m, double sigma_rad) {
+/// Covariance of a pose from a star tracker's error, which rotates the target about the chaser.
+Matrix6 star_tracker_covariance(const Vec3& target_from_chaser_m, double sigma_rad) {
     Eigen::Matrix<double, 6, 3> J;
     J << Eigen::Matrix3d::Identity(), -skew(to_eigen(target_from_chaser_m));
     return sigma_rad * sigma_rad * J * J.transpose();
 }
 
-/// Variances along axes that q turns, of deviations that are at least `least`.
+/// Covariance of deviations, at least `least` each, along axes rotated by q.
 Eigen::Matrix3d spread(const Quat& q, const Vec3& sigma, double least) {
     Eigen::Vector3d variance;
     for (int i = 0; i < 3; ++i) variance[i] = std::pow(std::max(sigma[i], least), 2);
@@ -70,7 +70,7 @@ PoseMeasurement at_centres_of_mass(const TargetMeasurement& s, const Vec3& chase
     m.q_frame_chaser = q_frame_chaser;
     const Vec3 from_chaser = conjugate(m.T_chaser_sensor.q) * (m.T_chaser_sensor * m.T_sensor_target.t);
     m.covariance = covariance_of_product(s.T_sensor_target, s.covariance, T_target_mass) +
-                   turned_about_chaser(from_chaser, attitude_sigma_rad);
+                   star_tracker_covariance(from_chaser, attitude_sigma_rad);
     m.covariance = (0.5 * (m.covariance + m.covariance.transpose())).eval();
     return m;
 }
@@ -101,7 +101,7 @@ void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
     const Thrusters& thrusters = scenario_.thrusters;
     const double sigma = std::hypot(thrusters.gain_sigma, kDegree * thrusters.misalignment_sigma_deg);
     const Quat q = q_frame_chaser(t_ns);
-    // Groups stop one after another: between two of these times the force is constant.
+    // The axes' pulses end one after another; the force is constant between two of these times.
     std::array<std::int64_t, 4> edges{t_ns, t_ns, t_ns, t_ns};
     for (int i = 0; i < 3; ++i)
         edges[static_cast<std::size_t>(i + 1)] += std::llround(1e9 * std::abs(impulse_n_s[i]) / thrusters.force_n);
@@ -135,7 +135,7 @@ void StateEstimator::advance(std::int64_t t_ns) {
     filter_.predict(t_ns);
 }
 
-void StateEstimator::met(std::int64_t t_ns, bool held) {
+void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
     advance(t_ns);
     pulses_.clear();
     RelativeMotion m = motion();
@@ -148,9 +148,9 @@ void StateEstimator::met(std::int64_t t_ns, bool held) {
         Eigen::Vector3d::Constant(held ? kHeldVelocity_m_s : kBouncedVelocity_m_s),
         Eigen::Vector3d::Constant(kMetAttitude_rad), Eigen::Vector3d::Constant(kMetRate_rad_s);
     const Matrix12 covariance = filter_.covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
-    if (auto anew = PoseFilter::create(filter_settings(scenario_), filter_.t_ns(),
-                                       in_frame(m, scenario_.orbit, t_s(filter_.t_ns())), covariance))
-        filter_ = *std::move(anew);
+    if (auto restarted = PoseFilter::create(filter_settings(scenario_), filter_.t_ns(),
+                                            in_frame(m, scenario_.orbit, t_s(filter_.t_ns())), covariance))
+        filter_ = *std::move(restarted);
 }
 
 UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
@@ -160,9 +160,10 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
         q_frame_chaser(measurement.t_ns), kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
     UpdateResult result = filter_.update(m);
     if (result.outcome == UpdateOutcome::gated && filter_.counts().gated_in_a_row >= kContradictions) {
-        auto anew = PoseFilter::create(filter_settings(scenario_), m, kAnewVelocity_m_s, kAnewRate_rad_s);
-        if (anew) {
-            filter_ = *std::move(anew);
+        auto restarted =
+            PoseFilter::create(filter_settings(scenario_), m, kRestartVelocity_m_s, kRestartRate_rad_s);
+        if (restarted) {
+            filter_ = *std::move(restarted);
             ++restarts_;
             result = {UpdateOutcome::taken, 0, ""};
         }
@@ -181,13 +182,13 @@ TargetEstimate StateEstimator::estimate() const {
     const Rigid3 T_mass_target{{}, -scenario_.target.centre_of_mass_m};
     const Matrix6 covariance =
         pose.covariance +
-        turned_about_chaser(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
-    // The chaser's own centre only shifts the origin: errors stay as they are.
+        star_tracker_covariance(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
+    // The chaser's centre of mass only shifts the origin: the covariance is the same.
     return {Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
             covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
 }
 
-Rigid3 StateEstimator::guess(std::int64_t t_ns) const {
+Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {
     const double by_s = 1e-9 * static_cast<double>(t_ns - filter_.t_ns());
     RelativeState state = filter_.state();
     const Vec3 turn = state.rate_rad_s - conjugate(state.q_frame_target) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};

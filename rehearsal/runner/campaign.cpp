@@ -9,6 +9,7 @@
 
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/report_charts.h"
+#include "rehearsal/runner/run_folder.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -106,7 +107,7 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
             if (!status) return false;
             ++done;
             if (*status != 0)
-                console.say(fmt::format(
+                console.print(fmt::format(
                     "run {} failed: {}", r.run,
                     read_json(folder_of(runs[r.run - 1]) + "/result.json").value("headline", last_line(r.log))));
             return true;

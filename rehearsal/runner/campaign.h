@@ -1,4 +1,5 @@
-/// rehearsal/runner/campaign.h - many runs of one scenario over its dispersions, and what they come to.
+/// rehearsal/runner/campaign.h - a Monte Carlo campaign: many runs of one scenario over its dispersions, and a
+/// summary.
 #pragma once
 
 #include <cstdint>
@@ -9,20 +10,21 @@
 #include "base/result.h"
 #include "base/stop.h"
 #include "rehearsal/runner/rehearsal.h"
+#include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
 
 struct CampaignOptions {
     RehearsalOptions run;    ///< of each; seed: of run 1, run k has that + k - 1
     std::size_t runs = 100;  ///< each in FOLDER/runs/0001 ...
-    int jobs = 1;            ///< at the same time
+    int jobs = 1;            ///< runs in parallel
 };
 
 /// Starts `narpa rehearse` for each run that has no result of this scenario and seed yet, and summarises all:
 /// summary.json, junit.xml, index.html in the folder. The document is that of summary.json.
 Result<nlohmann::json> run_campaign(const CampaignOptions& options, const Console& console, const StopFlag& stop);
 
-/// What is known of one run.
+/// One run of a campaign.
 struct RunResult {
     std::size_t run = 0;
     std::uint64_t seed = 0;

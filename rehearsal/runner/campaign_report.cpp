@@ -1,4 +1,4 @@
-// What many runs come to, as numbers, test cases and a page.
+// The summary of a campaign as JSON, JUnit and HTML.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -14,6 +15,8 @@
 #include <fstream>
 #include <iterator>
 #include <thread>
+
+#include "base/ready.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -24,8 +27,11 @@ int open_for_output(const std::string& file) {
     return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
 }
 
+/// The child's end of the pipe of base/ready.h.
+constexpr int kReadyFd = 3;
+
 /// Between fork and exec: nothing here allocates.
-[[noreturn]] void become(char* const* line, char* const* environment, int in, int out, int err) {
+[[noreturn]] void become(char* const* line, char* const* environment, int in, int out, int err, int ready) {
     ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     ::signal(SIGPIPE, SIG_DFL);
@@ -34,6 +40,8 @@ int open_for_output(const std::string& file) {
     ::dup2(in, STDIN_FILENO);
     ::dup2(out, STDOUT_FILENO);
     ::dup2(err, STDERR_FILENO);
+    if (ready == kReadyFd) ::fcntl(ready, F_SETFD, 0);  // dup2 would leave it to be closed by exec
+    if (ready >= 0 && ready != kReadyFd) ::dup2(ready, kReadyFd);
     ::execve(line[0], line, environment);
     ::_exit(127);
 }
@@ -73,32 +81,47 @@ std::string ChildProcess::shell_line(const Command& command) {
     return out;
 }
 
-Result<ChildProcess> ChildProcess::start(const Command& command) {
+Result<ChildProcess> ChildProcess::start(Command command) {
+    if (command.ready == Ready::option)
+        command.line.insert(command.line.end(), {"--ready-fd", std::to_string(kReadyFd)});
+    if (command.ready == Ready::variable) command.environment.emplace_back("READY_FD", std::to_string(kReadyFd));
     const std::vector<std::string> environment = environment_with(command.environment);
     const std::vector<char*> line = pointers(command.line), variables = pointers(environment);
     if (::access(line[0], X_OK) != 0)
         return Error{
             fmt::format("cannot start {}: {}, expected an executable program", command.name, std::strerror(errno)),
             command.line[0]};
-    const int in = ::open("/dev/null", O_RDONLY | O_CLOEXEC), out = open_for_output(command.out),
-              err = open_for_output(command.err);
-    const pid_t pid = in < 0 || out < 0 || err < 0 ? -1 : ::fork();
-    if (pid == 0) become(line.data(), variables.data(), in, out, err);
-    const int reason = errno;
-    for (const int fd : {in, out, err})
-        if (fd >= 0) ::close(fd);
+    const Descriptor in(::open("/dev/null", O_RDONLY | O_CLOEXEC)), out(open_for_output(command.out)),
+        err(open_for_output(command.err));
+    std::array<int, 2> ends{-1, -1};
+    bool open = in && out && err;
+    if (open && command.ready != Ready::none) open = ::pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) == 0;
+    Descriptor read_end(ends[0]);
+    const Descriptor write_end(ends[1]);
+    const pid_t pid = open ? ::fork() : -1;
+    if (pid == 0) become(line.data(), variables.data(), in.get(), out.get(), err.get(), write_end.get());
     if (pid < 0)
-        return Error{fmt::format("cannot start {}: {}", command.name, std::strerror(reason)), command.err, 0, 0,
+        return Error{fmt::format("cannot start {}: {}", command.name, std::strerror(errno)), command.err, 0, 0,
                      ErrorKind::failed};
-    ::setpgid(pid, pid);  // whoever is first
-    return ChildProcess(pid);
+    ::setpgid(pid, pid);  // both sides do: whoever is first
+    return ChildProcess(pid, std::move(read_end));
 }
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
-    end(0);
+    stop(0);
     pid_ = std::exchange(other.pid_, -1);
     status_ = other.status_;
+    ready_ = std::move(other.ready_);
+    ready_text_ = std::move(other.ready_text_);
     return *this;
+}
+
+std::optional<std::string> ChildProcess::ready() {
+    std::array<char, 512> text;
+    for (ssize_t n = 0; ready_ && (n = ::read(ready_.get(), text.data(), text.size())) > 0;)
+        ready_text_.append(text.data(), static_cast<std::size_t>(n));
+    if (("\n" + ready_text_).find("\n" + std::string(kReadyLine)) == std::string::npos) return std::nullopt;
+    return ready_text_;
 }
 
 std::optional<int> ChildProcess::status() {
@@ -110,18 +133,31 @@ std::optional<int> ChildProcess::status() {
     return status_;
 }
 
+void ChildProcess::wait_ready(std::int64_t timeout_ns) const {
+    pollfd end{ready_.get(), POLLIN, 0};
+    narpa::wait_ready({&end, 1}, timeout_ns);
+}
+
 void ChildProcess::terminate() const {
     if (pid_ > 0 && !status_) ::kill(-pid_, SIGTERM);
 }
 
-void ChildProcess::end(double patience_s) {
+void ChildProcess::stop(double grace_s) {
     if (pid_ < 0) return;
     terminate();
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience_s);
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(grace_s);
     while (!status() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(5ms);
     ::kill(-pid_, SIGKILL);  // what it started and left behind, too
     while (!status()) std::this_thread::sleep_for(1ms);
     pid_ = -1;
+}
+
+std::string value_of(const std::string& lines, const std::string& key) {
+    const std::string all = "\n" + lines, line = "\n" + key + "=";
+    const std::size_t at = all.find(line);
+    if (at == std::string::npos) return "";
+    const std::size_t begin = at + line.size();
+    return all.substr(begin, all.find('\n', begin) - begin);
 }
 
 std::string program_folder() {

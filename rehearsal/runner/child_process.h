@@ -1,50 +1,66 @@
-/// rehearsal/runner/child_process.h - another program, started, watched and ended.
+/// rehearsal/runner/child_process.h - another program: started, watched and stopped.
 #pragma once
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "base/result.h"
+#include "drivers/can/descriptor.h"
 
 namespace narpa::rehearsal {
 
-/// Runs in a process group of its own, so that what it starts ends with it, and ends when its parent does.
+/// Runs in a process group of its own, so that the programs it starts are stopped with it; the kernel stops it when
+/// its parent ends.
 class ChildProcess {
 public:
+    /// How the program gets the descriptor of base/ready.h: not at all, by `--ready-fd N` after its arguments, or
+    /// by the environment variable READY_FD.
+    enum class Ready : std::uint8_t { none, option, variable };
     struct Command {
-        std::string name;                                              ///< "dynamics", for people
+        std::string name;                                              ///< "the dynamics", for people
         std::vector<std::string> line;                                 ///< program (a path) and arguments
-        std::vector<std::pair<std::string, std::string>> environment;  ///< added to ours
-        std::string out, err;                                          ///< files; the same one may take both
+        std::vector<std::pair<std::string, std::string>> environment;  ///< added to the parent's
+        std::string out, err;                                          ///< files; one file may take both
+        Ready ready = Ready::none;
     };
-    /// The line as a shell would take it.
+    /// The line as a shell takes it.
     [[nodiscard]] static std::string shell_line(const Command& command);
 
-    static Result<ChildProcess> start(const Command& command);
-    ChildProcess(ChildProcess&& other) noexcept : pid_(std::exchange(other.pid_, -1)), status_(other.status_) {}
+    static Result<ChildProcess> start(Command command);
+    ChildProcess(ChildProcess&& other) noexcept { *this = std::move(other); }
     ChildProcess& operator=(ChildProcess&& other) noexcept;
-    ~ChildProcess() { end(0); }
+    ~ChildProcess() { stop(0); }
 
-    /// Its exit status, or 128 + the signal that ended it; nothing while it runs.
+    /// Exit status, or 128 + the signal that ended it; empty while it runs.
     std::optional<int> status();
-    /// SIGTERM, and SIGKILL if that has not helped after `patience_s`. Waits for the end.
-    void end(double patience_s);
-    /// Asks it to end, and does not wait.
+    /// Its lines KEY=VALUE once READY=1 has come; does not wait.
+    [[nodiscard]] std::optional<std::string> ready();
+    /// Until `ready` may have something new or the time is over.
+    void wait_ready(std::int64_t timeout_ns) const;
+    /// SIGTERM; does not wait.
     void terminate() const;
+    /// SIGTERM, then SIGKILL after `grace_s`. Waits for the end.
+    void stop(double grace_s);
 
 private:
-    explicit ChildProcess(pid_t pid) : pid_(pid) {}
+    ChildProcess(pid_t pid, Descriptor ready) : pid_(pid), ready_(std::move(ready)) {}
     pid_t pid_ = -1;
     std::optional<int> status_;
+    Descriptor ready_;
+    std::string ready_text_;
 };
+
+/// The value of a line KEY=VALUE; empty where there is none.
+[[nodiscard]] std::string value_of(const std::string& lines, const std::string& key);
 
 /// The folder of the running program.
 [[nodiscard]] std::string program_folder();
-/// The last line of a text file that says something; empty where there is none.
+/// The last line of a text file that is not blank; empty where there is none.
 [[nodiscard]] std::string last_line(const std::string& file);
 [[nodiscard]] std::string read_text(const std::string& file);
 

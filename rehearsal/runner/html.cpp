@@ -1,4 +1,4 @@
-// What every page has.
+// HTML parts of all report pages.
 #include <fmt/format.h>
 
 #include "rehearsal/runner/report_page.h"

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "base/base64.h"
 #include "rehearsal/judge/gates.h"
@@ -17,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::size_t kPictures = 8;
 
-/// Everything that the parts of the page look at.
+/// Input of all sections.
 struct Run : Report {
     const nlohmann::json& record;
     const std::string& folder;

@@ -1,7 +1,7 @@
-/// rehearsal/runner/report_page.h - what a rehearsal has shown, as one HTML page that needs nothing else.
+/// rehearsal/runner/report_page.h - the report of a rehearsal as one self-contained HTML page.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 
@@ -15,7 +15,7 @@ namespace narpa::rehearsal {
 [[nodiscard]] std::string rehearsal_page(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict,
                                          const nlohmann::json& record, const std::string& folder);
 
-/// Head with styles and title, and what closes it: for every page.
+/// The HTML document around the body of a page.
 [[nodiscard]] std::string page_around(std::string_view title, std::string_view body);
 /// "passed", "failed" as a coloured word.
 [[nodiscard]] std::string badge(bool good, std::string_view words);

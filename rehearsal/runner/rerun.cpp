@@ -11,6 +11,7 @@
 #include "protocols/can/candump.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/run_folder.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// Gone with the object.
+/// Removed by the destructor.
 class TemporaryFolder {
 public:
     TemporaryFolder() {
@@ -52,7 +53,7 @@ bool next_line(std::ifstream& file, std::string& line) {
     return false;
 }
 
-/// Files of both folders that wall time does not enter.
+/// Files that do not depend on wall time.
 std::vector<std::string> comparable(const std::string& folder) {
     std::vector<std::string> files{"emulator/can.log"};
     std::error_code none;
@@ -144,11 +145,11 @@ Result<json> rerun(const std::string& folder, int threads, const std::string& ve
         const auto words = [&](const std::string& line) { return bus ? describe_message(*scenario, line) : line; };
         files.back().update(
             {{"line", difference->line}, {"is", words(difference->is)}, {"was", words(difference->was)}});
-        console.say(fmt::format("{}/{}: line {} differs first\n  was {}\n  is  {}", folder, name, difference->line,
-                                words(difference->was), words(difference->is)));
+        console.print(fmt::format("{}/{}: line {} differs first\n  was {}\n  is  {}", folder, name,
+                                  difference->line, words(difference->was), words(difference->is)));
     }
-    console.say(same ? fmt::format("{}: {} files repeat byte for byte", folder, files.size())
-                     : fmt::format("{}: expected the scene, its meshes and the programs as they were", folder));
+    console.print(same ? fmt::format("{}: {} files repeat byte for byte", folder, files.size())
+                       : fmt::format("{}: expected the scene, its meshes and the programs as they were", folder));
     return json{{"passed", same}, {"log", folder}, {"mode", "lockstep"}, {"files", files}};
 }
 

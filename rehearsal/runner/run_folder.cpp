@@ -1,4 +1,5 @@
-// What a rehearsal reads and leaves behind, as files.
+#include "rehearsal/runner/run_folder.h"
+
 #include <fmt/format.h>
 
 #include <cstdint>
@@ -6,7 +7,6 @@
 #include <fstream>
 #include <sstream>
 
-#include "rehearsal/runner/rehearsal.h"
 #include "renderer/scene/based_on.h"
 
 namespace narpa::rehearsal {

@@ -1,8 +1,8 @@
-/// rehearsal/scenario/scenario.h - what a rehearsal is about: two bodies near each other, how they begin, who
-/// steers, what goes wrong, and what is asked. docs/rehearsal.md has every key of the file.
+/// rehearsal/scenario/scenario.h - the description of a rehearsal: two bodies, their start, guidance and control,
+/// faults and gates. docs/rehearsal.md documents every key of the file.
 ///
 /// Frames. World: the scene's, inertial axes, its origin at the target's centre of mass. LVLH (W. Clohessy,
-/// R. Wiltshire, 1960): x up, away from the attractor, y along the circular orbit, z along its momentum, turning
+/// R. Wiltshire, 1960): x up, away from the attractor, y along the circular orbit, z along its momentum, rotating
 /// about z with the orbit's rate. Port: a docking interface's, x out of it. Docked, the chaser's port is the
 /// target's turned by 180 degrees about z. All times are seconds after the scenario's time 0.
 #pragma once
@@ -46,9 +46,9 @@ struct Vehicle {
     Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Identity();  ///< about the centre of mass, body axes
 };
 
-/// The target's attitude at time 0 is the scene's; from there on it turns.
+/// Rotation of the target, from the scene's attitude at time 0.
 struct TargetMotion {
-    bool with_lvlh = true;  ///< it holds its attitude in LVLH, beside which it turns at the rate below
+    bool with_lvlh = true;  ///< rotates with LVLH, plus the rate below
     Vec3 rate_deg_s{};      ///< body axes, at time 0; against LVLH or against inertial space
 };
 
@@ -66,10 +66,10 @@ struct AttitudeSensor {
     double rate_sigma_deg_s = 0.002;
 };
 
-/// The chaser's port at time 0 beside the target's, and how far it may be from there (standard deviations).
+/// The chaser's port relative to the target's at time 0, nominal values and standard deviations.
 struct Start {
     Vec3 position_m{60, 0, 0}, position_sigma_m{};  ///< of its origin, target's port axes
-    Vec3 velocity_m_s{}, velocity_sigma_m_s{};      ///< as the turning port axes see it
+    Vec3 velocity_m_s{}, velocity_sigma_m_s{};      ///< relative to the rotating port axes
     Vec3 attitude_deg{}, attitude_sigma_deg{};      ///< rotation vector off the docked attitude, chaser's port axes
     Vec3 rate_deg_s{}, rate_sigma_deg_s{};          ///< chaser's body axes, against the target
 };
@@ -83,19 +83,19 @@ struct Leg {
     Vec3 axis{0, 0, 1};
     double speed_m_s = 0.1;
     double hold_s = 0;                                          ///< at its end, at least
-    double within_m = std::numeric_limits<double>::infinity();  ///< the hold ends once the estimate is so near
-    bool contact = false;         ///< goes on at this speed until there is contact; only the last
+    double within_m = std::numeric_limits<double>::infinity();  ///< the hold lasts until the estimate is so near
+    bool contact = false;         ///< continues at this speed until contact; the last leg only
     bool look_at_target = false;  ///< x towards the target's port origin; otherwise the docked attitude
 };
 
 struct Navigation {
-    std::vector<std::string> cameras, lidars;  ///< names in the scene; those that the chaser navigates by
+    std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
     double period_s = 1;                       ///< of measurements and of control
     double acceleration_psd = 1e-6,
-           angular_acceleration_psd = 1e-9;  ///< m^2 s^-3, rad^2 s^-3: what the model leaves out
-    double abort_sigma_m = 2;                ///< aborts when it knows its position no better than this
-    double abort_lost_s = 20;                ///< or has had no measurement for so long
-    double abort_off_m = 5;                  ///< or its estimate is so far off the reference
+           angular_acceleration_psd = 1e-9;  ///< m^2 s^-3, rad^2 s^-3: process noise
+    double abort_sigma_m = 2;                ///< aborts at this position uncertainty
+    double abort_lost_s = 20;                ///< or after so long without a measurement
+    double abort_off_m = 5;                  ///< or so far off the reference
 };
 
 struct Control {

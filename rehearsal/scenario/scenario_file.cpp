@@ -17,6 +17,17 @@ constexpr Range kAngle_deg{.low = -360, .high = 360};
 constexpr std::array<std::string_view, 12> kAxes{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
                                                  "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
 
+/// Sets `value` where the table has the key.
+void read(TableReader& table, std::string_view key, double& value, const Range& range = kAnyNumber) {
+    value = table.number(key, range).value_or(value);
+}
+void read(TableReader& table, std::string_view key, Vec3& value, const Range& range = kAnyNumber) {
+    value = table.vec3(key, range).value_or(value);
+}
+void read(TableReader& table, std::string_view key, bool& value) {
+    value = table.boolean(key).value_or(value);
+}
+
 Vec3 unit(TableReader& table, std::string_view key, const Vec3& otherwise) {
     const Vec3 v = table.vec3(key).value_or(otherwise);
     if (norm(v) > 0) return normalized(v);
@@ -42,8 +53,8 @@ void read_orbit(TableReader& root, Orbit& orbit) {
          {"clohessy-wiltshire", Orbit::Model::clohessy_wiltshire},
          {"two-body", Orbit::Model::two_body}}};
     orbit.model = table->choice<Orbit::Model>("model", kModels).value_or(orbit.model);
-    orbit.radius_m = table->number("radius_m", kPositive).value_or(orbit.radius_m);
-    orbit.mu_m3_s2 = table->number("mu_m3_s2", kPositive).value_or(orbit.mu_m3_s2);
+    read(*table, "radius_m", orbit.radius_m, kPositive);
+    read(*table, "mu_m3_s2", orbit.mu_m3_s2, kPositive);
     orbit.up = unit(*table, "up", orbit.up);
     orbit.along = unit(*table, "along", orbit.along);
     if (std::abs(dot(orbit.up, orbit.along)) > 1e-6)
@@ -58,9 +69,9 @@ Vehicle read_vehicle(TableReader& root, const char* name, const Scene& scene) {
     if (!table) return v;
     table->require("body", "the name of a body of the scene");
     v.body = table->text("body").value_or("");
-    v.centre_of_mass_m = table->vec3("centre_of_mass_m").value_or(v.centre_of_mass_m);
+    read(*table, "centre_of_mass_m", v.centre_of_mass_m);
     v.T_body_port = read_port(*table);
-    v.mass_kg = table->number("mass_kg", kPositive).value_or(v.mass_kg);
+    read(*table, "mass_kg", v.mass_kg, kPositive);
     const Vec3 inertia = table->vec3("inertia_kg_m2", kPositive).value_or(Vec3{1, 1, 1});
     v.inertia_kg_m2 = Eigen::Vector3d(inertia.x, inertia.y, inertia.z).asDiagonal();
     const double largest = std::max({inertia.x, inertia.y, inertia.z});
@@ -86,8 +97,8 @@ void read_target(TableReader& root, Scenario& s, const Scene& scene) {
     auto table = root.table("target");
     if (!table) return;
     for (const char* key : {"body", "centre_of_mass_m", "port", "mass_kg", "inertia_kg_m2"}) (void)table->has(key);
-    s.target_motion.with_lvlh = table->boolean("with_lvlh").value_or(s.target_motion.with_lvlh);
-    s.target_motion.rate_deg_s = table->vec3("rate_deg_s").value_or(s.target_motion.rate_deg_s);
+    read(*table, "with_lvlh", s.target_motion.with_lvlh);
+    read(*table, "rate_deg_s", s.target_motion.rate_deg_s);
     table->finish();
 }
 
@@ -122,8 +133,8 @@ void read_start(TableReader& root, Start& start) {
     auto table = root.table("start");
     if (!table) return;
     const auto with_sigma = [&](const char* key, const char* sigma_key, Vec3& value, Vec3& sigma) {
-        value = table->vec3(key).value_or(value);
-        sigma = table->vec3(sigma_key, kNotNegative).value_or(sigma);
+        read(*table, key, value);
+        read(*table, sigma_key, sigma, kNotNegative);
     };
     with_sigma("position_m", "position_sigma_m", start.position_m, start.position_sigma_m);
     with_sigma("velocity_m_s", "velocity_sigma_m_s", start.velocity_m_s, start.velocity_sigma_m_s);
@@ -135,18 +146,17 @@ void read_start(TableReader& root, Start& start) {
 void read_actuators(TableReader& root, Scenario& s) {
     if (auto table = root.table("thrusters")) {
         Thrusters& t = s.thrusters;
-        t.force_n = table->number("force_n", kPositive).value_or(t.force_n);
-        t.torque_n_m = table->number("torque_n_m", kPositive).value_or(t.torque_n_m);
-        t.min_on_s = table->number("min_on_s", kNotNegative).value_or(t.min_on_s);
-        t.gain_sigma = table->number("gain_sigma", {.low = 0, .high = 0.5}).value_or(t.gain_sigma);
-        t.misalignment_sigma_deg =
-            table->number("misalignment_sigma_deg", {.low = 0, .high = 20}).value_or(t.misalignment_sigma_deg);
+        read(*table, "force_n", t.force_n, kPositive);
+        read(*table, "torque_n_m", t.torque_n_m, kPositive);
+        read(*table, "min_on_s", t.min_on_s, kNotNegative);
+        read(*table, "gain_sigma", t.gain_sigma, {.low = 0, .high = 0.5});
+        read(*table, "misalignment_sigma_deg", t.misalignment_sigma_deg, {.low = 0, .high = 20});
         table->finish();
     }
     if (auto table = root.table("attitude_sensor")) {
         AttitudeSensor& a = s.attitude_sensor;
-        a.attitude_sigma_deg = table->number("attitude_sigma_deg", kNotNegative).value_or(a.attitude_sigma_deg);
-        a.rate_sigma_deg_s = table->number("rate_sigma_deg_s", kNotNegative).value_or(a.rate_sigma_deg_s);
+        read(*table, "attitude_sigma_deg", a.attitude_sigma_deg, kNotNegative);
+        read(*table, "rate_sigma_deg_s", a.rate_sigma_deg_s, kNotNegative);
         table->finish();
     }
 }
@@ -164,13 +174,13 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
         } else {
             table.require("to_m", "[x, y, z] in the target's port axes, or `arc_deg`");
             table.refuse("axis", "belongs to `arc_deg`");
-            leg.to_m = table.vec3("to_m").value_or(leg.to_m);
+            read(table, "to_m", leg.to_m);
         }
-        leg.speed_m_s = table.number("speed_m_s", kPositive).value_or(leg.speed_m_s);
-        leg.hold_s = table.number("hold_s", {.low = 0, .high = kLongest_s}).value_or(leg.hold_s);
-        leg.within_m = table.number("within_m", kPositive).value_or(leg.within_m);
-        leg.contact = table.boolean("contact").value_or(leg.contact);
-        leg.look_at_target = table.boolean("look_at_target").value_or(leg.look_at_target);
+        read(table, "speed_m_s", leg.speed_m_s, kPositive);
+        read(table, "hold_s", leg.hold_s, {.low = 0, .high = kLongest_s});
+        read(table, "within_m", leg.within_m, kPositive);
+        read(table, "contact", leg.contact);
+        read(table, "look_at_target", leg.look_at_target);
         if (leg.contact && legs.size() + 1 != tables.size())
             table.fail("contact", "only the last leg may end with contact");
         table.finish();
@@ -203,13 +213,12 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
     if (n.cameras.empty() && n.lidars.empty())
         table->require("cameras", "`cameras` or `lidars`: what it navigates by");
-    n.period_s = table->number("period_s", {.low = 0.01, .high = 100}).value_or(n.period_s);
-    n.acceleration_psd = table->number("acceleration_psd", kPositive).value_or(n.acceleration_psd);
-    n.angular_acceleration_psd =
-        table->number("angular_acceleration_psd", kPositive).value_or(n.angular_acceleration_psd);
-    n.abort_sigma_m = table->number("abort_sigma_m", kPositive).value_or(n.abort_sigma_m);
-    n.abort_lost_s = table->number("abort_lost_s", kPositive).value_or(n.abort_lost_s);
-    n.abort_off_m = table->number("abort_off_m", kPositive).value_or(n.abort_off_m);
+    read(*table, "period_s", n.period_s, {.low = 0.01, .high = 100});
+    read(*table, "acceleration_psd", n.acceleration_psd, kPositive);
+    read(*table, "angular_acceleration_psd", n.angular_acceleration_psd, kPositive);
+    read(*table, "abort_sigma_m", n.abort_sigma_m, kPositive);
+    read(*table, "abort_lost_s", n.abort_lost_s, kPositive);
+    read(*table, "abort_off_m", n.abort_off_m, kPositive);
     const double poses = n.period_s * s.pose_rate_hz;
     if (std::abs(poses - std::round(poses)) > 1e-9 || poses < 1)
         table->fail("period_s", fmt::format("is {} pose commands at {} a second, expected a whole number of them",
@@ -220,11 +229,10 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
 void read_control(TableReader& root, Control& c) {
     auto table = root.table("control");
     if (!table) return;
-    c.bandwidth_rad_s = table->number("bandwidth_rad_s", kPositive).value_or(c.bandwidth_rad_s);
-    c.attitude_bandwidth_rad_s =
-        table->number("attitude_bandwidth_rad_s", kPositive).value_or(c.attitude_bandwidth_rad_s);
-    c.damping = table->number("damping", {.low = 0.1, .high = 10}).value_or(c.damping);
-    c.retreat_m_s = table->number("retreat_m_s", kPositive).value_or(c.retreat_m_s);
+    read(*table, "bandwidth_rad_s", c.bandwidth_rad_s, kPositive);
+    read(*table, "attitude_bandwidth_rad_s", c.attitude_bandwidth_rad_s, kPositive);
+    read(*table, "damping", c.damping, {.low = 0.1, .high = 10});
+    read(*table, "retreat_m_s", c.retreat_m_s, kPositive);
     table->finish();
 }
 
@@ -239,8 +247,8 @@ void read_faults(TableReader& root, std::vector<Fault>& faults) {
         Fault fault;
         table.require("kind", "what goes wrong");
         fault.kind = table.choice<Fault::Kind>("kind", kKinds).value_or(fault.kind);
-        fault.from_s = table.number("from_s", kNotNegative).value_or(fault.from_s);
-        fault.until_s = table.number("until_s", kPositive).value_or(fault.until_s);
+        read(table, "from_s", fault.from_s, kNotNegative);
+        read(table, "until_s", fault.until_s, kPositive);
         const bool thruster = fault.kind == Fault::Kind::thruster_off || fault.kind == Fault::Kind::thruster_stuck;
         const bool turns = fault.kind == Fault::Kind::attitude_bias || fault.kind == Fault::Kind::target_rate;
         if (thruster) table.require("axis", "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters");
@@ -261,13 +269,14 @@ void read_contact(TableReader& gates, Gates& out) {
     auto table = gates.table("contact");
     if (!table) return;
     CaptureEnvelope c;
-    const auto limit = [&](const char* key, double& value) {
-        value = table->number(key, kNotNegative).value_or(value);
-    };
-    limit("closing_min_m_s", c.closing_min_m_s), limit("closing_max_m_s", c.closing_max_m_s);
-    limit("lateral_rate_m_s", c.lateral_rate_m_s), limit("lateral_m", c.lateral_m);
-    limit("pitch_yaw_deg", c.pitch_yaw_deg), limit("roll_deg", c.roll_deg);
-    limit("pitch_yaw_rate_deg_s", c.pitch_yaw_rate_deg_s), limit("roll_rate_deg_s", c.roll_rate_deg_s);
+    read(*table, "closing_min_m_s", c.closing_min_m_s, kNotNegative);
+    read(*table, "closing_max_m_s", c.closing_max_m_s, kNotNegative);
+    read(*table, "lateral_rate_m_s", c.lateral_rate_m_s, kNotNegative);
+    read(*table, "lateral_m", c.lateral_m, kNotNegative);
+    read(*table, "pitch_yaw_deg", c.pitch_yaw_deg, kNotNegative);
+    read(*table, "roll_deg", c.roll_deg, kNotNegative);
+    read(*table, "pitch_yaw_rate_deg_s", c.pitch_yaw_rate_deg_s, kNotNegative);
+    read(*table, "roll_rate_deg_s", c.roll_rate_deg_s, kNotNegative);
     table->finish();
     out.contact = c;
 }
@@ -278,9 +287,9 @@ void read_gates(TableReader& root, Scenario& s) {
     Gates& g = s.gates;
     if (auto corridor = table->table("corridor")) {
         Gates::Corridor c;
-        c.half_angle_deg = corridor->number("half_angle_deg", {.low = 0, .high = 90}).value_or(c.half_angle_deg);
-        c.radius_m = corridor->number("radius_m", kNotNegative).value_or(c.radius_m);
-        c.from_m = corridor->number("from_m", kPositive).value_or(c.from_m);
+        read(*corridor, "half_angle_deg", c.half_angle_deg, {.low = 0, .high = 90});
+        read(*corridor, "radius_m", c.radius_m, kNotNegative);
+        read(*corridor, "from_m", c.from_m, kPositive);
         corridor->finish();
         g.corridor = c;
     }
@@ -293,17 +302,17 @@ void read_gates(TableReader& root, Scenario& s) {
     }
     if (auto navigation = table->table("navigation")) {
         Gates::NavigationError n;
-        n.sigmas = navigation->number("sigmas", kPositive).value_or(n.sigmas);
-        n.share = navigation->number("share", kUnit).value_or(n.share);
-        n.position_m = navigation->number("position_m", kPositive).value_or(n.position_m);
-        n.attitude_deg = navigation->number("attitude_deg", kPositive).value_or(n.attitude_deg);
+        read(*navigation, "sigmas", n.sigmas, kPositive);
+        read(*navigation, "share", n.share, kUnit);
+        read(*navigation, "position_m", n.position_m, kPositive);
+        read(*navigation, "attitude_deg", n.attitude_deg, kPositive);
         navigation->finish();
         g.navigation = n;
     }
     read_contact(*table, g);
     if (g.contact && !s.legs.back().contact)
         table->fail("contact", "no leg has contact = true, expected the last one to have it");
-    g.complete = table->boolean("complete").value_or(g.complete);
+    read(*table, "complete", g.complete);
     table->finish();
 }
 
@@ -316,9 +325,8 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
     table->require("name", "a text");
     s.name = table->text("name").value_or("");
     s.title = table->text("title").value_or(s.name);
-    s.duration_s =
-        table->number("duration_s", {.low = 0, .high = kLongest_s, .low_open = true}).value_or(s.duration_s);
-    s.pose_rate_hz = table->number("pose_rate_hz", {.low = 0.1, .high = 1000}).value_or(s.pose_rate_hz);
+    read(*table, "duration_s", s.duration_s, {.low = 0, .high = kLongest_s, .low_open = true});
+    read(*table, "pose_rate_hz", s.pose_rate_hz, {.low = 0.1, .high = 1000});
     if (const auto seed = table->integer("seed", 0, std::numeric_limits<std::int64_t>::max()))
         s.seed = static_cast<std::uint64_t>(*seed);
     table->require("scene", "the scene file");

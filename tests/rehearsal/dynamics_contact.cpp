@@ -13,7 +13,7 @@ Scenario closing(double speed_m_s) {
     return s;
 }
 
-TEST(Contact, IsAtTheVeryNanosecondAtWhichThePortsPlaneIsReached) {
+TEST(Contact, HappensInTheNanosecondThatReachesThePortsPlane) {
     const Scenario scenario = closing(0.07);
     Simulation s = simulate(scenario);
     s.advance_to(ns(100));
@@ -25,7 +25,7 @@ TEST(Contact, IsAtTheVeryNanosecondAtWhichThePortsPlaneIsReached) {
     expect_near(s.port().velocity_m_s, {-0.07, 0, 0}, 1e-12);  // as it was before they touched
 }
 
-TEST(Contact, StandsBeforeTheTimeThatWasAskedFor) {
+TEST(Contact, IsBeforeTheRequestedTime) {
     Simulation first = simulate(closing(0.07));
     first.advance_to(ns(100));
     Simulation s = simulate(closing(0.07));
@@ -36,7 +36,7 @@ TEST(Contact, StandsBeforeTheTimeThatWasAskedFor) {
     EXPECT_EQ(s.t_ns(), first.t_ns());
 }
 
-TEST(Contact, WithinTheEnvelopeTheChaserIsHeldAndGoesWithTheTarget) {
+TEST(Contact, InsideTheEnvelopeTheChaserIsHeldAndMovesWithTheTarget) {
     Scenario scenario = closing(0.07);
     scenario.target_motion.rate_deg_s = {0.5, 1, -2};
     scenario.start.attitude_deg = {1, 2, -1};
@@ -56,7 +56,7 @@ TEST(Contact, WithinTheEnvelopeTheChaserIsHeldAndGoesWithTheTarget) {
     expect_near(s.port().rate_rad_s, {}, 1e-12);
 }
 
-TEST(Contact, OutsideOfTheEnvelopeTheyPartAtThreeTenthsOfTheSpeed) {
+TEST(Contact, OutsideTheEnvelopeItReboundsAtThreeTenthsOfTheSpeed) {
     Scenario scenario = closing(0.2);
     scenario.start.position_m.z = 0.03;
     scenario.start.velocity_m_s.z = 0.01;
@@ -73,7 +73,7 @@ TEST(Contact, OutsideOfTheEnvelopeTheyPartAtThreeTenthsOfTheSpeed) {
     EXPECT_EQ(s.ending(), Ending::bounced);
 }
 
-TEST(Contact, PushedOnAfterABounceItDoesNotGoThrough) {
+TEST(Contact, ThrustAfterABounceDoesNotPenetrateThePort) {
     Scenario scenario = closing(0.2);
     scenario.faults.push_back({Fault::Kind::thruster_stuck, 0, 1000, "+fx", {}});
     Simulation s = simulate(scenario);
@@ -108,7 +108,7 @@ TEST(Contact, EachConditionOfTheEnvelopeCounts) {
     EXPECT_FALSE(refused([&](PortState& p) { p.T_port_chaser_port.t.y = 0.09, turn(p, {3.9, 0, 0}); }));
 }
 
-TEST(Contact, FarAsideThePortsPassEachOther) {
+TEST(Contact, PortsPassEachOtherAtALargeLateralDistance) {
     Scenario scenario = closing(0.2);
     scenario.start.position_m.y = 1.1;
     Simulation s = simulate(scenario);
@@ -118,7 +118,7 @@ TEST(Contact, FarAsideThePortsPassEachOther) {
     EXPECT_NEAR(s.port().position_m().x, -1.5, 1e-12);
 }
 
-TEST(Ending, AtTheScenariosEndOrWhenTheNavigationIsDoneOrHasLeft) {
+TEST(Ending, IsAtTheDurationOrWhenTheNavigationIsDoneOrHasLeft) {
     Scenario scenario = quiet();
     scenario.duration_s = 20;
     Simulation s = simulate(scenario);
@@ -209,7 +209,7 @@ TEST(AttitudeSensor, HasTheNoiseThatTheScenarioSays) {
     EXPECT_NEAR(std::sqrt(rate / 3 / kReports), 0.004, 4 * 0.004 / std::sqrt(6 * kReports));
 }
 
-TEST(Draws, OfOneKindDoNotShiftTheOthers) {
+TEST(Draws, ForOnePurposeDoNotShiftOthers) {
     Scenario scenario = quiet();
     scenario.thrusters.misalignment_sigma_deg = 0.5;
     scenario.attitude_sensor = {0.01, 0.004};

@@ -29,8 +29,8 @@ Vec3 position_in_lvlh(const Orbit& orbit, double t_s, const Translation& x) {
     return conjugate(orbit.q_world_lvlh(t_s)) * x.position_m;
 }
 
-TEST(OrbitMotion, AFreeBodyKeepsItsVelocityAndTakesWhatPushesIt) {
-    const Translation x = coasted(orbit_of(Model::free), 5, 2, {0, 0, 1}, {{1, 2, 3}, {4, 5, 6}});
+TEST(OrbitMotion, AFreeBodyFollowsItsVelocityAndAcceleration) {
+    const Translation x = propagated(orbit_of(Model::free), 5, 2, {0, 0, 1}, {{1, 2, 3}, {4, 5, 6}});
     expect_near(x.position_m, {9, 12, 17}, 1e-12);
     expect_near(x.velocity_m_s, {4, 5, 8}, 1e-12);
 }
@@ -41,18 +41,18 @@ TEST(OrbitMotion, ClohessyWiltshireClosesItsEllipseAfterAnOrbit) {
     // No drift along the orbit where y' = -2 n x: an ellipse twice as long as it is high.
     const Translation start = from_lvlh(orbit, {100, 0, 30}, {0, -200 * n, 0});
     Translation x = start;
-    for (int i = 0; i < 1000; ++i) x = coasted(orbit, i * quarter / 1000, quarter / 1000, {}, x);
+    for (int i = 0; i < 1000; ++i) x = propagated(orbit, i * quarter / 1000, quarter / 1000, {}, x);
     expect_near(position_in_lvlh(orbit, quarter, x), {0, -200, 0}, 1e-8);
-    expect_near(coasted(orbit, quarter, 3 * quarter, {}, x).position_m, start.position_m, 1e-8);
+    expect_near(propagated(orbit, quarter, 3 * quarter, {}, x).position_m, start.position_m, 1e-8);
 }
 
-TEST(OrbitMotion, ClohessyWiltshireUnderThrustIsTheEquationsSolvedInSmallSteps) {
+TEST(OrbitMotion, ClohessyWiltshireUnderThrustEqualsNumericalIntegration) {
     const Orbit orbit = orbit_of(Model::clohessy_wiltshire);
     const double n = orbit.rate_rad_s(), dt_s = 600;
     const Vec3 push{1e-3, -2e-3, 5e-4};
     // In LVLH axes, which is where it is constant: given as it is in the middle of the time.
-    const Translation x = coasted(orbit, 0, dt_s, orbit.q_world_lvlh(dt_s / 2) * push,
-                                  from_lvlh(orbit, {10, -20, 30}, {0.1, 0.2, -0.3}));
+    const Translation x = propagated(orbit, 0, dt_s, orbit.q_world_lvlh(dt_s / 2) * push,
+                                     from_lvlh(orbit, {10, -20, 30}, {0.1, 0.2, -0.3}));
     Vec3 r{10, -20, 30}, v{0.1, 0.2, -0.3};
     const auto acceleration = [&](const Vec3& p, const Vec3& u) {
         return Vec3{3 * n * n * p.x + 2 * n * u.y, -2 * n * u.x, -n * n * p.z} + push;
@@ -68,7 +68,7 @@ TEST(OrbitMotion, ClohessyWiltshireUnderThrustIsTheEquationsSolvedInSmallSteps) 
     expect_near(position_in_lvlh(orbit, dt_s, x), r, 1e-9);
 }
 
-TEST(OrbitMotion, OfTwoBodiesTheChasersOrbitClosesAndKeepsEnergyAndMomentum) {
+TEST(OrbitMotion, TwoBodyOrbitClosesAndKeepsEnergyAndMomentum) {
     const Orbit orbit = orbit_of(Model::two_body);
     const double R = orbit.radius_m, mu = orbit.mu_m3_s2;
     // An ellipse with the same major axis comes back when the target does: at the same radius, as fast, but
@@ -88,7 +88,7 @@ TEST(OrbitMotion, OfTwoBodiesTheChasersOrbitClosesAndKeepsEnergyAndMomentum) {
     const double step_s = period_s(orbit) / 64;
     double farthest_m = 0;
     for (int i = 0; i < 64; ++i) {
-        x = coasted(orbit, i * step_s, step_s, {}, x);
+        x = propagated(orbit, i * step_s, step_s, {}, x);
         farthest_m = std::max(farthest_m, norm(x.position_m));
         const Translation a = absolute((i + 1) * step_s, x);
         EXPECT_NEAR(energy(a) / energy(a0), 1, 1e-13);
@@ -101,7 +101,7 @@ TEST(OrbitMotion, OfTwoBodiesTheChasersOrbitClosesAndKeepsEnergyAndMomentum) {
     expect_near(x.velocity_m_s, start.velocity_m_s, 1e-9);
 }
 
-TEST(OrbitMotion, OfTwoBodiesMetresAreExactBesideTheOrbitsRadius) {
+TEST(OrbitMotion, TwoBodyMotionKeepsMetresExactAtTheOrbitsRadius) {
     const Orbit orbit = orbit_of(Model::two_body);
     // On the target's own circle a metre ahead it stays a metre ahead: an arc of 1 / R.
     const double R = orbit.radius_m, n = orbit.rate_rad_s(), arc = 1 / R;
@@ -109,23 +109,24 @@ TEST(OrbitMotion, OfTwoBodiesMetresAreExactBesideTheOrbitsRadius) {
     const Vec3 position{-back, R * std::sin(arc), 0};
     const Translation start = from_lvlh(orbit, position, {});
     const double t_s = period_s(orbit) / 3;
-    const Translation x = coasted(orbit, 0, t_s, {}, start);
+    const Translation x = propagated(orbit, 0, t_s, {}, start);
     expect_near(position_in_lvlh(orbit, t_s, x), position, 1e-10);
     EXPECT_NEAR(norm(x.velocity_m_s), n, 1e-13);
 }
 
-TEST(OrbitMotion, ClohessyWiltshireIsTwoBodiesUpToTheSquareOfTheDistance) {
+TEST(OrbitMotion, ClohessyWiltshireDiffersFromTwoBodiesByTheSquareOfTheDistance) {
     const Orbit linear = orbit_of(Model::clohessy_wiltshire), full = orbit_of(Model::two_body);
     const auto difference_m = [&](double distance_m) {
         const Translation start = from_lvlh(full, {0.6 * distance_m, -0.8 * distance_m, 0.3 * distance_m}, {});
-        return norm(coasted(full, 0, 900, {}, start).position_m - coasted(linear, 0, 900, {}, start).position_m);
+        return norm(propagated(full, 0, 900, {}, start).position_m -
+                    propagated(linear, 0, 900, {}, start).position_m);
     };
     const double near_m = difference_m(100), far_m = difference_m(1000);
     EXPECT_GT(near_m, 1e-6);
     EXPECT_NEAR(far_m / near_m, 100, 1);
 }
 
-TEST(OrbitMotion, TheAttractorMovesBesideTheTargetAsItsVelocitySays) {
+TEST(OrbitMotion, TheAttractorsVelocityIsItsRateOfChange) {
     const Orbit orbit = orbit_of(Model::two_body);
     const Motion a = attractor_motion(orbit, {0, 1, 0, 0}, 99.5), b = attractor_motion(orbit, {0, 1, 0, 0}, 100.5);
     const Motion middle = attractor_motion(orbit, {0, 1, 0, 0}, 100);
@@ -155,7 +156,7 @@ TEST(RigidBody, ATumbleKeepsEnergyAndMomentum) {
     EXPECT_NEAR(norm(then.momentum_world - before.momentum_world) / norm(before.momentum_world), 0, 1e-10);
 }
 
-TEST(RigidBody, AboutTheMiddleAxisItTurnsOverAndComesBack) {
+TEST(RigidBody, RotationAboutTheIntermediateAxisFlipsAndReturns) {
     // V. Dzhanibekov's wing nut: about the axis of the middle moment rotation is not stable.
     const Eigen::Matrix3d J = Eigen::Vector3d(1, 2, 3).asDiagonal();
     const RigidBody body(J);
@@ -172,14 +173,14 @@ TEST(RigidBody, AboutTheMiddleAxisItTurnsOverAndComesBack) {
     EXPECT_NEAR(invariants(J, a).energy_j / before.energy_j, 1, 1e-10);
 }
 
-TEST(RigidBody, ATorqueChangesTheMomentumByItselfTimesTheTime) {
+TEST(RigidBody, TorqueChangesMomentumByTorqueTimesTime) {
     const Eigen::Matrix3d J = Eigen::Vector3d(15e3, 31e3, 30e3).asDiagonal();
     const Attitude a = RigidBody(J).turned({}, {0, 400, 0}, 0.5);
     EXPECT_NEAR(a.rate_rad_s.y, 400 * 0.5 / 31e3, 1e-15);
     EXPECT_NEAR(rotation_vector(a.q_world_body).y, 0.5 * 400 / 31e3 * 0.25, 1e-15);
 }
 
-TEST(TargetMotion, HeldInLvlhItTurnsWithTheOrbitAndBesideIt) {
+TEST(TargetMotion, WithLvlhItRotatesAtTheOrbitsRatePlusItsOwn) {
     Scenario s = quiet(Model::two_body);
     s.target_motion = {true, {0, 0.5, 0}};
     s.q_world_target = normalized(Quat{1, 0.2, -0.3, 0.4});
@@ -192,7 +193,7 @@ TEST(TargetMotion, HeldInLvlhItTurnsWithTheOrbitAndBesideIt) {
     expect_near(simulation.truth().target.T_world_body * s.target.centre_of_mass_m, {}, 1e-12);
 }
 
-TEST(TargetMotion, LeftAloneItTumbles) {
+TEST(TargetMotion, WithoutLvlhItTumbles) {
     Scenario s = quiet(Model::two_body);
     s.target_motion = {false, {0.5, 1, -0.2}};
     Simulation simulation = simulate(s);
@@ -203,7 +204,7 @@ TEST(TargetMotion, LeftAloneItTumbles) {
     expect_near(simulation.truth().target.rate_rad_s, expected.rate_rad_s, 1e-12);
 }
 
-TEST(TargetMotion, TheBodiesOriginsMoveAsTheirVelocitiesSay) {
+TEST(TargetMotion, VelocitiesAreRatesOfChangeOfTheOrigins) {
     Scenario s = quiet(Model::two_body);
     s.target_motion = {false, {0.5, 1, -0.2}};
     s.start.rate_deg_s = {1, -2, 3};

@@ -1,10 +1,11 @@
-// The dynamics on a bus, against a navigation by script that knows the truth.
+// The dynamics on a bus with a scripted navigation that uses the truth.
 #include "rehearsal/dynamics/node.h"
 
 #include <atomic>
 #include <chrono>
 #include <fstream>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
 
@@ -20,7 +21,7 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 
-/// What the other side of the bus has heard; and the emulator's and the navigation's part in it.
+/// The other side of the bus: records messages and plays the emulator and the navigation.
 class Partner {
 public:
     explicit Partner(CanBus& bus, const Scenario& scenario) : bus_(bus), scenario_(scenario) {}
@@ -33,7 +34,7 @@ public:
     std::vector<DynamicsReport> reports;
     std::vector<AttitudeReport> attitudes;
     std::vector<Pose> poses;
-    std::function<void(std::int64_t t_ns)> on_period;  ///< once all is said of a control period
+    std::function<void(std::int64_t t_ns)> on_period;  ///< after all messages of a control period
 
     std::function<void()> on_turn;  ///< now and then
 
@@ -379,7 +380,7 @@ TEST(DynamicsOnUdp, TheSameRunInCanFd) {
 
 constexpr const char* kProgram = NARPA_BUILD_DIR "/bin/narpa-dynamics ";
 
-TEST(DynamicsProgram, ExitsAsTheOthersDo) {
+TEST(DynamicsProgram, UsesTheCommonExitStatuses) {
     const std::string scenario = NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml";
     const auto status = [](const std::string& arguments) {
         return test::run_command(kProgram + arguments + " 2>&1");

@@ -21,7 +21,7 @@ Loads fired(Simulation& s, const ActuatorCommand& c, double period_s = 1) {
     return {s.fired().force_n - before.force_n, s.fired().torque_n_m - before.torque_n_m};
 }
 
-TEST(Thrusters, GiveTheImpulseOnEachAxisToItsDirectionAtFullForce) {
+TEST(Thrusters, FireEachAxisInItsDirectionAtFullForce) {
     Simulation s = simulate(quiet());
     const Motion before = s.truth().chaser;
     const Loads loads = fired(s, command({20, -60.123456, 333.3}, {-9, 31.4159, 250}));
@@ -36,7 +36,7 @@ TEST(Thrusters, MoveTheCentreOfMassByImpulseOverMass) {
     // The chaser faces the target: its x axis is the port's -x.
     fired(s, command({50, 0, 0}));
     expect_near(s.port().velocity_m_s, {-50 / scenario.chaser.mass_kg, 0, 0}, 1e-12);
-    // 0.125 s at full force, then coasting: the place tells when it fired.
+    // 0.125 s at full force, then coasting: the position shows when it fired.
     const double on_s = 50 / scenario.thrusters.force_n;
     EXPECT_NEAR(s.port().position_m().x, 60 - 0.005 * (1 - on_s / 2), 1e-12);
     fired(s, command({}, {3, 0, 0}));
@@ -45,7 +45,7 @@ TEST(Thrusters, MoveTheCentreOfMassByImpulseOverMass) {
     EXPECT_NEAR(s.port().rate_rad_s.x, 30 / 15e3, 1e-12);
 }
 
-TEST(Thrusters, DoNotFireLessThanTheirLeastTimeNorLongerThanThePeriod) {
+TEST(Thrusters, FireNoLessThanTheShortestPulseAndNoLongerThanThePeriod) {
     Simulation s = simulate(quiet());  // 400 N, 20 ms: 8 N s
     expect_near(fired(s, command({7.99, -7.99, 0})).force_n, {}, 0);
     expect_near(fired(s, command({8.01, 0, -8.01})).force_n, {8.01, 0, -8.01}, 1e-12);
@@ -53,7 +53,7 @@ TEST(Thrusters, DoNotFireLessThanTheirLeastTimeNorLongerThanThePeriod) {
     expect_near(fired(s, command({})).force_n, {}, 0);
 }
 
-TEST(Thrusters, ANewCommandTakesThePlaceOfWhatTheLastHasLeft) {
+TEST(Thrusters, ANewCommandReplacesTheRestOfTheLast) {
     Simulation s = simulate(quiet());
     s.apply(command({400, 0, 0}));
     s.advance_to(ns(0.25));
@@ -62,7 +62,7 @@ TEST(Thrusters, ANewCommandTakesThePlaceOfWhatTheLastHasLeft) {
     expect_near(s.fired().force_n, {100, 40, 0}, 1e-10);
 }
 
-TEST(Thrusters, PulsesHaveTheErrorsThatTheScenarioSays) {
+TEST(Thrusters, PulseErrorsHaveTheScenariosDeviation) {
     Scenario scenario = quiet();
     scenario.thrusters.gain_sigma = 0.02;
     Simulation s = simulate(scenario, 7);
@@ -77,7 +77,7 @@ TEST(Thrusters, PulsesHaveTheErrorsThatTheScenarioSays) {
     EXPECT_NEAR(std::sqrt(squares / kPulses), 0.02, 4 * 0.02 / std::sqrt(2 * kPulses));
 }
 
-TEST(Thrusters, EachGroupIsOffItsAxisForTheWholeRun) {
+TEST(Thrusters, MisalignmentOfAGroupIsConstantInARun) {
     Scenario scenario = quiet();
     scenario.thrusters.misalignment_sigma_deg = 0.5;
     double squares = 0;
@@ -115,7 +115,7 @@ Scenario with_fault(Fault::Kind kind, double from_s, double until_s, const std::
     return s;
 }
 
-TEST(Faults, AGroupThatIsOffDoesNotFireFromThatInstantOn) {
+TEST(Faults, AGroupThatIsOffStopsAtThatInstant) {
     Simulation s = simulate(with_fault(Fault::Kind::thruster_off, 0.3, 2.9, "+fx"));
     expect_near(fired(s, command({200, 200, 0})).force_n, {400 * 0.3, 200, 0}, 1e-10);
     expect_near(fired(s, command({-200, 0, 0})).force_n, {-200, 0, 0}, 1e-10);  // the group opposite is well
@@ -129,7 +129,7 @@ TEST(Faults, AGroupThatIsStuckFiresWhateverIsCommanded) {
     expect_near(fired(s, command({}, {0, 100, 0})).torque_n_m, {0, 100, 0}, 1e-10);
 }
 
-TEST(Faults, TheAttitudeSensorIsTurnedWhileItLasts) {
+TEST(Faults, TheAttitudeSensorIsBiasedWhileItLasts) {
     Simulation s = simulate(with_fault(Fault::Kind::attitude_bias, 10, 20, "", {0, 0, 2}));
     const auto off_deg = [&](double t_s) {
         s.advance_to(ns(t_s));
@@ -163,14 +163,14 @@ TEST(Faults, CommandsAreLostWhileItLasts) {
     EXPECT_TRUE(s.apply(command({100, 0, 0})));
 }
 
-TEST(Faults, OfAThrusterThatIsNoneAreRefused) {
+TEST(Faults, OfAnUnknownThrusterAreRejected) {
     const auto s = Simulation::create(with_fault(Fault::Kind::thruster_off, 0, 1, "fx"), 1);
     ASSERT_FALSE(s);
     EXPECT_NE(s.error().what.find("\"fx\""), std::string::npos);
     EXPECT_NE(s.error().what.find("expected +fx"), std::string::npos);
 }
 
-TEST(Simulation, RefusesBodiesThatAreNone) {
+TEST(Simulation, RejectsInvalidBodies) {
     Scenario s = quiet();
     s.chaser.mass_kg = 0;
     EXPECT_NE(Simulation::create(s, 1).error().what.find("chaser: mass_kg"), std::string::npos);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "protocols/can/candump.h"
 #include "tests/rehearsal/judge_support.h"
@@ -21,7 +22,7 @@ Scenario with_all_gates() {
     return s;
 }
 
-TEST(JudgeBus, ALogReadAfterwardsGivesTheSameVerdict) {
+TEST(JudgeBus, ALogGivesTheSameVerdict) {
     const Scenario s = with_all_gates();
     Messages m = docking(s, chaser_at(s, {}, {-0.2, 0, 0}), DynamicsPhase::captured, 4);
     m.ledger(0, 1, 1.02);
@@ -50,7 +51,7 @@ TEST(JudgeBus, TheOrderOfDifferentSendersDoesNotMatter) {
     EXPECT_EQ(to_json(judge(s, other)).dump(), to_json(judge(s, m)).dump());
 }
 
-TEST(JudgeBus, WhoFellSilent) {
+TEST(JudgeBus, NamesTheMissingSender) {
     const Scenario s = small_scenario();
     const auto reason = [&](const std::function<void(Messages&)>& last) {
         Messages m(s);
@@ -94,7 +95,7 @@ TEST(JudgeBus, BetweenCommandsTheTruthIsInterpolated) {
     EXPECT_NEAR(v.navigation.position_m.max, 0.2, 1e-4);
 }
 
-TEST(JudgeBus, ATurningTargetTurnsThePortAxes) {
+TEST(JudgeBus, PortAxesRotateWithTheTarget) {
     const Scenario s = small_scenario();
     const Vec3 rate{0, 0, 0.1};
     // Rigidly joined, docked: nothing moves against the port whatever both turn.
@@ -142,7 +143,7 @@ TEST(Statistics, PercentilesAreValuesThatOccur) {
     EXPECT_EQ(distribution({}).count, 0u);
 }
 
-TEST(Junit, SaysWhatFailedAndEscapes) {
+TEST(Junit, NamesFailuresAndEscapesText) {
     Scenario s = with_all_gates();
     s.legs[0].name = "<far & \"away\">";
     const Verdict v = judge(s, docking(s, chaser_at(s, {}, {-0.2, 0, 0}), DynamicsPhase::captured, 4));

@@ -34,7 +34,7 @@ TEST(Judge, AGoodDockingPassesEveryGate) {
     EXPECT_LT(v.navigation.nees, 0.01);  // errors of the wire's steps alone
 }
 
-TEST(Judge, ContactConditionsAreThoseOfTheTruthAtThatInstant) {
+TEST(Judge, ContactConditionsAreThoseOfTheTruthAtContact) {
     Scenario s = small_scenario();
     s.gates.contact = CaptureEnvelope{};
     const Verdict v = judge(s, docking(s, good_contact(s)));
@@ -75,12 +75,12 @@ TEST(Judge, EachContactConditionFailsByItself) {
     }
 }
 
-TEST(Judge, AtALimitIsWithin) {
+TEST(Judge, LimitsBelongToTheAllowedRange) {
     const PortState s{{T_port_docked().q, {0, 0.10, 0}}, {-0.05, 0, 0.04}, {}};
     for (const ContactCondition& c : contact_conditions(CaptureEnvelope{}, s)) EXPECT_TRUE(c.within()) << c.name;
 }
 
-TEST(Judge, WhatBouncesHasNotDocked) {
+TEST(Judge, ABounceIsNoDocking) {
     Scenario s = small_scenario();
     s.gates.contact = CaptureEnvelope{};
     const Verdict v = judge(s, docking(s, chaser_at(s, {}, {-0.3, 0, 0}), DynamicsPhase::bounced));
@@ -90,7 +90,7 @@ TEST(Judge, WhatBouncesHasNotDocked) {
     EXPECT_EQ(gate(v, "duration").state, State::not_judged);
 }
 
-TEST(Judge, OffTheCorridorTellsFirstAndWorstAndWhichLeg) {
+TEST(Judge, CorridorViolationsNameFirstWorstAndLeg) {
     Scenario s = small_scenario();
     s.gates.corridor = Gates::Corridor{10, 0.5, 20};
     std::vector<std::string> told;
@@ -110,7 +110,7 @@ TEST(Judge, OffTheCorridorTellsFirstAndWorstAndWhichLeg) {
               State::passed);
 }
 
-TEST(Judge, TheCorridorIsNotJudgedWhereNobodyCame) {
+TEST(Judge, TheCorridorIsNotJudgedFartherAway) {
     Scenario s = small_scenario();
     s.gates.corridor = Gates::Corridor{10, 0.5, 5};
     Messages m(s);
@@ -125,7 +125,7 @@ TEST(Judge, TheCorridorsWall) {
     EXPECT_NEAR(corridor_clearance_m(c, {-0.6, 0.8, 0}), 0, 1e-12);
 }
 
-TEST(Judge, OnlyTheCorridorEntersTheKeepOutSphere) {
+TEST(Judge, OnlyTheCorridorLeadsIntoTheKeepOutZone) {
     Scenario s = small_scenario();
     s.gates.keep_out_m = 6;
     EXPECT_EQ(gate(judge(s, docking(s, good_contact(s))), "keep_out").state, State::failed);
@@ -152,7 +152,7 @@ TEST(Judge, DistancesHaveTwoLimits) {
     EXPECT_EQ(gate(flown(4.5, 9.5), "distance").t_first_s, 1);
 }
 
-TEST(Judge, EstimatesAreJudgedByTheirOwnDeviations) {
+TEST(Judge, EstimatesAreJudgedByTheirStandardDeviations) {
     Scenario s = small_scenario();
     s.legs[1].contact = false;
     s.gates.navigation = Gates::NavigationError{.sigmas = 3, .share = 0.75, .position_m = 5, .attitude_deg = 3};
@@ -226,7 +226,7 @@ TEST(Judge, AnAbortFailsAtOnceUnlessItIsAllowed) {
     EXPECT_TRUE(judge(s, m).passed);
 }
 
-TEST(Judge, OutOfTimeIsSaid) {
+TEST(Judge, ATimeOutIsReported) {
     Scenario s = small_scenario();
     Messages m(s);
     m.period(0, chaser_at(s, {9, 0, 0}));

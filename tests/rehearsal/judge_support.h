@@ -109,7 +109,7 @@ private:
     std::uint32_t cycle_ = 0;
 };
 
-/// From 10 m straight to the port within 10 periods, then contact as told.
+/// From 10 m straight to the port within 10 periods, then contact as given.
 inline Messages docking(const Scenario& s, const Motion& at_contact,
                         DynamicsPhase outcome = DynamicsPhase::captured, double off_axis_m = 0) {
     Messages m(s);

@@ -18,7 +18,7 @@ Leg straight(const Vec3& to_m, double speed_m_s) {
     return leg;
 }
 
-TEST(LegPath, IsContinuousArrivesAndKeepsItsLimits) {
+TEST(LegPath, IsContinuousReachesItsEndAndKeepsItsLimits) {
     Leg arc;
     arc.arc_deg = -90;
     arc.axis = {0, 0, 1};
@@ -44,7 +44,7 @@ TEST(LegPath, IsContinuousArrivesAndKeepsItsLimits) {
     }
 }
 
-TEST(LegPath, ToContactGoesOnAtItsSpeed) {
+TEST(LegPath, ToContactContinuesAtItsSpeed) {
     Leg leg = straight({0, 0, 0}, 0.075);
     leg.contact = true;
     const LegPath path = LegPath::along(leg, {3, 0, 0}, 0.01);
@@ -53,7 +53,7 @@ TEST(LegPath, ToContactGoesOnAtItsSpeed) {
     EXPECT_LT(norm(path.velocity_m_s(60) - Vec3{-0.075, 0, 0}), 1e-15);
 }
 
-TEST(LegPath, AwayTurnsRoundFirst) {
+TEST(LegPath, AwayReversesTheSpeedFirst) {
     const LegPath path = LegPath::away({2, 0, 0}, {1, 0, 0}, -0.1, 0.3, 0.02);
     EXPECT_EQ(path.velocity_m_s(0), Vec3(-0.1, 0, 0));
     EXPECT_NEAR(path.position_m(5).x, 2 - 0.25, 1e-12);
@@ -98,7 +98,7 @@ TEST(Guidance, FliesTheLegsHoldsAndDocks) {
     EXPECT_EQ(g.abort(), AbortReason::none);
 }
 
-TEST(Guidance, AHoldLastsUntilTheEstimateIsThere) {
+TEST(Guidance, AHoldLastsUntilTheEstimateIsNear) {
     const Scenario s = docking();
     Guidance g(s, 0);
     const double held = when(g, GuidancePhase::holding);
@@ -112,7 +112,7 @@ TEST(Guidance, AHoldLastsUntilTheEstimateIsThere) {
     EXPECT_EQ(g.phase(), GuidancePhase::moving);
 }
 
-TEST(Guidance, StopsBeforeThePortWhereItGivesUpNearIt) {
+TEST(Guidance, ARetreatNearThePortStopsBeforeIt) {
     const Scenario s = docking();
     Guidance g(s, 0);
     GuidanceInput input = at(g, 0);
@@ -125,7 +125,7 @@ TEST(Guidance, StopsBeforeThePortWhereItGivesUpNearIt) {
     EXPECT_GT(g.reference(30).position_m.x, 5);
 }
 
-TEST(Guidance, GivesUpForItsReasons) {
+TEST(Guidance, AbortsForEachReason) {
     const Scenario s = docking();
     const auto reason = [&](const auto& change) {
         Guidance g(s, 0);
@@ -152,7 +152,7 @@ TEST(Guidance, GivesUpForItsReasons) {
     EXPECT_EQ(reason([](GuidanceInput& i) { i.dynamics = DynamicsPhase::bounced; }), AbortReason::bounced);
 }
 
-TEST(Guidance, LooksAtTheTargetAllAround) {
+TEST(Guidance, PointsAtTheTargetAlongAnArc) {
     Scenario s = docking();
     Leg arc;
     arc.arc_deg = 180;
@@ -173,7 +173,7 @@ TEST(Guidance, LooksAtTheTargetAllAround) {
     }
 }
 
-TEST(SampledGains, PutThePolesWhereTheyAre) {
+TEST(SampledGains, PlaceTheDiscretizedPoles) {
     // Under them a double integrator falls as the continuous loop does, however long the period.
     for (const double period_s : {0.1, 1.0, 5.0}) {
         const SampledGains k = SampledGains::of(0.15, 0.9, period_s);
@@ -188,17 +188,17 @@ TEST(SampledGains, PutThePolesWhereTheyAre) {
     }
 }
 
-TEST(PulseAxis, GivesSmallForcesInTheMean) {
+TEST(PulseAxis, SmallForcesAreRightInTheMean) {
     PulseAxis axis(8, 400);
     double given = 0;
     for (int i = 0; i < 1000; ++i) {
-        const double pulse = axis.give(-0.7);
+        const double pulse = axis.modulate(-0.7);
         ASSERT_TRUE(pulse == 0 || std::abs(pulse) >= 8);
         given += pulse;
         ASSERT_LE(std::abs(given + 0.7 * (i + 1)), 8);
     }
-    EXPECT_EQ(axis.give(1e4), 400);
-    EXPECT_EQ(axis.give(0), 0) << "what was too much is not made up for";
+    EXPECT_EQ(axis.modulate(1e4), 400);
+    EXPECT_EQ(axis.modulate(0), 0) << "what was too much is not made up for";
 }
 
 struct Loop {
@@ -219,7 +219,7 @@ Reference standing(const Vec3& at_m) {
 
 /// Off the V-bar, where gravity pulls, from a metre and three degrees off; then it stays, within what one least
 /// pulse a control period does: 8 N s / 9500 kg = 0.84 mm/s.
-TEST(FlightControl, BringsThePortThereAndHoldsIt) {
+TEST(FlightControl, MovesThePortToTheReferenceAndHoldsIt) {
     Loop loop(docking());
     loop.plant.stand({30, 11, -9}, {0.05, -0.03, 0.04});
     const Reference r = standing({30, 10, -10});
@@ -234,8 +234,8 @@ TEST(FlightControl, BringsThePortThereAndHoldsIt) {
     EXPECT_LT(worst_rad, 0.2 * kDegree);
 }
 
-/// The port stands 3.2 m before the centre of mass: while the chaser turns by ten degrees it stays where it is.
-TEST(FlightControl, ThePortStaysWhileTheChaserTurns) {
+/// The port is 3.2 m before the centre of mass: it stays in place while the chaser rotates by ten degrees.
+TEST(FlightControl, ThePortStaysWhileTheChaserRotates) {
     Loop loop(docking());
     loop.plant.stand({10, 0, 0}, {0, 0.17, 0});
     const Reference r = standing({10, 0, 0});
@@ -275,7 +275,7 @@ TEST(FlightControl, FollowsTheLegsToContact) {
 }
 
 /// Before the port of a target that turns it stays where it is, and turns with it.
-TEST(FlightControl, StaysWithATargetThatTurns) {
+TEST(FlightControl, FollowsARotatingTarget) {
     Scenario s = docking();
     s.target_motion.with_lvlh = false;
     s.target_motion.rate_deg_s = {0, 0, 0.15};
@@ -291,7 +291,7 @@ TEST(FlightControl, StaysWithATargetThatTurns) {
     EXPECT_LT(loop.plant.off_docked_rad(), 0.2 * kDegree);
 }
 
-TEST(RelativeMotion, RoundTripsAndAgreesWithItsOwnRateOfChange) {
+TEST(RelativeMotion, RoundTripsAndVelocityIsItsRateOfChange) {
     Scenario s = docking();
     s.target_motion.rate_deg_s = {0.2, -0.1, 0.3};
     s.chaser.T_body_port = {exp_rotation({0.1, 0.2, -0.3}), {0.2, -0.1, 0.3}};

@@ -78,7 +78,7 @@ TEST(NavigationLoop, DocksInsideTheEnvelope) {
         EXPECT_LT(std::hypot(p.y, p.z), 0.05) << seed;
         EXPECT_EQ(flight.last().phase, GuidancePhase::docked);
         EXPECT_EQ(norm(flight.last().impulse_n_s) + norm(flight.last().angular_impulse_n_m_s), 0);
-        // Errors are what the deviations say: mean squares of six components of correlated estimates.
+        // Errors agree with the standard deviations: mean squares of six components of correlated estimates.
         double sum = 0, worst = 0;
         for (const Vector6& e : flight.errors) {
             sum += e.squaredNorm() / 6;
@@ -89,7 +89,7 @@ TEST(NavigationLoop, DocksInsideTheEnvelope) {
     }
 }
 
-TEST(NavigationLoop, GivesUpWhenItSeesNothingMore) {
+TEST(NavigationLoop, AbortsWithoutMeasurements) {
     const Scenario s = docking();
     const Flight flight = fly(s, 4, [](double t_s) { return t_s < 60; });
     EXPECT_EQ(flight.last().abort, AbortReason::lost);
@@ -103,7 +103,7 @@ TEST(NavigationLoop, GivesUpWhenItSeesNothingMore) {
 }
 
 /// Too fast for the docking system: it bounces, and goes away without touching again, knowing where it is.
-TEST(NavigationLoop, RetreatsFromAContactThatDoesNotHold) {
+TEST(NavigationLoop, RetreatsAfterABounce) {
     Scenario s = docking();
     s.legs.back().speed_m_s = 0.2;
     const Flight flight = fly(s, 7, [](double) { return true; });
@@ -118,7 +118,7 @@ TEST(NavigationLoop, RetreatsFromAContactThatDoesNotHold) {
 
 /// A thruster that does not fire: it is off its reference, or the filter contradicts the sensor, but it does not
 /// touch.
-TEST(NavigationLoop, GivesUpWhenItCannotFollow) {
+TEST(NavigationLoop, AbortsOffTheReference) {
     Scenario s = docking();
     Fault fault;
     fault.kind = Fault::Kind::commands_lost;

@@ -1,4 +1,4 @@
-// From rendered frames and simulated sweeps of the docking to where the target stands.
+// Pose measurements from rendered frames and simulated sweeps of the docking.
 #include <gtest/gtest.h>
 
 #include "rehearsal/navigation/measurements.h"
@@ -37,14 +37,14 @@ Rigid3 beside(const Rigid3& T) {
     return displaced(T, e);
 }
 
-TEST(CameraPoseEstimator, FindsTheTargetWhereItIs) {
+TEST(CameraPoseEstimator, MeasuresTheTruePose) {
     CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], 1);
     std::uint32_t number = 0;
     for (const double x_m : {25.0, 6.0}) {
         const test::Plant plant = plant_at({x_m, 0.3, -0.2}, {0.01, -0.02, 0.01});
         const Rigid3 truth = test::chaser_target(plant);
         const auto bytes = test::frame(*stage().model, plant, ++number);
-        const MeasurementResult s = estimator.look(bytes, 0, 0, plant.motion.q_world_chaser, beside(truth));
+        const MeasurementResult s = estimator.measure(bytes, 0, 0, plant.motion.q_world_chaser, beside(truth));
         ASSERT_TRUE(s.pose) << s.why;
         EXPECT_GT(s.points, 30);
         const Rigid3 T_camera_target = inverse(s.pose->T_chaser_sensor) * truth;
@@ -54,20 +54,20 @@ TEST(CameraPoseEstimator, FindsTheTargetWhereItIs) {
     }
 }
 
-TEST(CameraPoseEstimator, SaysWhyThereIsNoPose) {
+TEST(CameraPoseEstimator, GivesAReasonWithoutAPose) {
     CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], 1);
     const test::Plant plant = plant_at({20, 0, 0}, {});
     const Rigid3 truth = test::chaser_target(plant);
     auto bytes = test::frame(*stage().model, plant, 9);
     std::fill(bytes.begin(), bytes.end(), std::uint8_t{4});  // the Earth's shadow
-    const MeasurementResult dark = estimator.look(bytes, 0, 0, plant.motion.q_world_chaser, truth);
+    const MeasurementResult dark = estimator.measure(bytes, 0, 0, plant.motion.q_world_chaser, truth);
     EXPECT_FALSE(dark.pose);
     EXPECT_NE(dark.why.find("few matches"), std::string::npos) << dark.why;
     bytes.pop_back();
-    EXPECT_FALSE(estimator.look(bytes, 0, 0, plant.motion.q_world_chaser, truth).why.empty());
+    EXPECT_FALSE(estimator.measure(bytes, 0, 0, plant.motion.q_world_chaser, truth).why.empty());
 }
 
-TEST(LidarPoseEstimator, FindsTheTargetWhileTheChaserMoves) {
+TEST(LidarPoseEstimator, MeasuresThePoseWhileTheChaserMoves) {
     auto estimator = LidarPoseEstimator::create(*stage().model, stage().model->lidars()[0]);
     ASSERT_TRUE(estimator);
     test::Plant plant = plant_at({15, 0.5, -0.3}, {0.01, 0.02, -0.01});
@@ -89,28 +89,28 @@ TEST(LidarPoseEstimator, FindsTheTargetWhileTheChaserMoves) {
     later.step({}, {}, 1e-3);
     const Vector6 rate = error_between(truth, test::chaser_target(later)) / 1e-3;
     const SweepMotion motion{to_vec3(rate.tail<3>()), to_vec3(rate.head<3>())};
-    const MeasurementResult s = estimator->look(points, t_ns, motion, beside(truth), 0.1, 0.2 * kDegree);
+    const MeasurementResult s = estimator->measure(points, t_ns, motion, beside(truth), 0.1, 0.2 * kDegree);
     ASSERT_TRUE(s.pose) << s.why;
     const Vector6 error = error_between(s.pose->T_sensor_target, inverse(s.pose->T_chaser_sensor) * truth);
     EXPECT_LT(error.head<3>().norm(), 0.02 * kDegree);
     EXPECT_LT(error.tail<3>().norm(), 3e-3);
     EXPECT_LT(normalised_error_squared(error, s.pose->covariance), 22.5);
-    // Taken to stand still, the turn does not fit the model, and that is told.
-    const MeasurementResult still = estimator->look(points, t_ns, {}, beside(truth), 0.1, 0.2 * kDegree);
+    // Without motion correction the turn does not fit the model, and the reason is given.
+    const MeasurementResult still = estimator->measure(points, t_ns, {}, beside(truth), 0.1, 0.2 * kDegree);
     EXPECT_FALSE(still.pose);
     EXPECT_NE(still.why.find("points lie on the model"), std::string::npos) << still.why;
 }
 
-TEST(LidarPoseEstimator, SaysWhyThereIsNoPose) {
+TEST(LidarPoseEstimator, GivesAReasonWithoutAPose) {
     auto estimator = LidarPoseEstimator::create(*stage().model, stage().model->lidars()[0]);
     ASSERT_TRUE(estimator);
     const MeasurementResult s =
-        estimator->look({}, 0, {}, test::chaser_target(plant_at({15, 0, 0}, {})), 0.1, 0.01);
+        estimator->measure({}, 0, {}, test::chaser_target(plant_at({15, 0, 0}, {})), 0.1, 0.01);
     EXPECT_FALSE(s.pose);
     EXPECT_NE(s.why.find("beams"), std::string::npos) << s.why;
 }
 
-TEST(SceneModel, NamesWhatIsNotThere) {
+TEST(SceneModel, NamesWhatIsMissing) {
     Scenario s = stage().scenario;
     s.navigation.cameras = {"left"};
     const auto camera = SceneModel::create(s);
@@ -123,7 +123,7 @@ TEST(SceneModel, NamesWhatIsNotThere) {
     EXPECT_NE(mount.error().what.find("does not ride on the chaser"), std::string::npos) << mount.error().what;
 }
 
-TEST(SceneModel, TheEarthGoesRound) {
+TEST(SceneModel, TheEarthFollowsTheOrbit) {
     SceneModel& model = *stage().model;
     const Orbit& orbit = stage().scenario.orbit;
     const double half_s = 3.14159265358979323846 / orbit.rate_rad_s();

@@ -32,7 +32,7 @@ Scenario docking() {
     return scenario;
 }
 
-/// What the navigation said.
+/// The navigation's messages.
 struct Heard {
     std::vector<CanFrame> frames;
     std::vector<NavigationEstimate> estimates;
@@ -108,7 +108,7 @@ Heard fly(const std::string& folder, std::int64_t cycles) {
     return heard;
 }
 
-TEST(NavigationNode, AnswersEachPeriodAndSaysTheSameAgain) {
+TEST(NavigationNode, AnswersEachPeriodAndRepeatsItself) {
     const narpa::test::TemporaryFolder folder, other;
     const Heard one = fly(folder / "", 3);
     EXPECT_TRUE(one.ended) << one.ended.error().text();

@@ -26,8 +26,8 @@ AttitudeReport attitude(const test::Plant& plant) {
     return {0, std::llround(1e9 * plant.t_s), plant.motion.q_world_chaser, plant.motion.chaser_rate_rad_s};
 }
 
-/// Draws a measurement's error and a star tracker's, and looks at where the masses come out.
-TEST(CentresOfMass, TheCovarianceIsThatOfTheDraws) {
+/// Random errors of the measurement and the star tracker, propagated to the centres of mass.
+TEST(CentresOfMass, TheCovarianceIsThatOfRandomDraws) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     const Vec3 chaser_centre{-3, 0.2, 0.1}, target_centre{-12, 1, 0.5};
@@ -102,7 +102,7 @@ TEST(StateEstimator, StartsWhereTheScenarioDoes) {
     EXPECT_NEAR(std::sqrt(C(3, 3)), 0.5, 0.03);
 }
 
-TEST(StateEstimator, KnowsWhatThrustDoes) {
+TEST(StateEstimator, FollowsThrust) {
     Estimated e;
     for (int k = 0; k < 20; ++k)
         e.fly({{k % 2 ? 150.0 : -40.0, 25.0, k < 10 ? 399.0 : -60.0}, {0, 20.0 * (k % 3 - 1), 0}});
@@ -112,24 +112,24 @@ TEST(StateEstimator, KnowsWhatThrustDoes) {
     EXPECT_LT(norm(v), 1e-3);
 }
 
-TEST(StateEstimator, TellsTheMotionOfASweep) {
+TEST(StateEstimator, ComputesTheMotionDuringASweep) {
     Estimated e;
     e.plant.motion.chaser_rate_rad_s = {0.01, -0.02, 0.03};
     e.plant.motion.velocity_m_s = {0.3, -0.2, 0.1};
     const RelativeState state = in_frame(e.plant.motion, e.plant.scenario.orbit, 0);
     auto filter = StateEstimator::create(e.plant.scenario, 0, attitude(e.plant));
     ASSERT_TRUE(filter);
-    // The estimator stands still beside the port; the chaser's rate is the gyroscope's.
+    // The estimator is at rest relative to the port; the chaser's rate is the gyroscope's.
     const SweepMotion motion = filter->motion_in_chaser();
     const Rigid3 before = filter->estimate().T_chaser_target;
-    const Rigid3 after = filter->guess(10'000'000);
+    const Rigid3 after = filter->predicted(10'000'000);
     const Vector6 moved = error_between(before, after) / 0.01;
     EXPECT_LT(norm(to_vec3(moved.head<3>()) - motion.rate_rad_s), 1e-4);
     EXPECT_LT(norm(to_vec3(moved.tail<3>()) - motion.velocity_m_s), 1e-2);
     EXPECT_GT(norm(state.velocity_m_s), 0.3);
 }
 
-TEST(StateEstimator, BelievesWhatContradictsItOftenEnough) {
+TEST(StateEstimator, RestartsAfterRepeatedContradictions) {
     Estimated e;
     TargetMeasurement seen;
     Rigid3 T = chaser_target(e.plant);
@@ -143,18 +143,18 @@ TEST(StateEstimator, BelievesWhatContradictsItOftenEnough) {
     EXPECT_LT(norm(e.estimator->estimate().T_chaser_target.t - T.t), 1e-6);
 }
 
-TEST(StateEstimator, RestsAtThePortOnceItIsHeld) {
+TEST(StateEstimator, IsAtRestAtThePortAfterCapture) {
     Estimated e(docking_from({0.04, 0.01, -0.02}, {-0.075, 0, 0}));
-    e.estimator->met(1'000'000'000, true);
+    e.estimator->on_contact(1'000'000'000, true);
     const PortState port = port_state(e);
     EXPECT_NEAR(port.T_port_chaser_port.t.x, 0, 1e-9);
     EXPECT_NEAR(port.T_port_chaser_port.t.y, 0.01, 1e-3);
     EXPECT_LT(norm(port.velocity_m_s), 1e-9);
 }
 
-TEST(StateEstimator, DoesNotKnowHowFastItBounced) {
+TEST(StateEstimator, HasAnUncertainSpeedAfterABounce) {
     Estimated e(docking_from({0.2, 0.01, -0.02}, {-0.2, 0.01, 0}));
-    e.estimator->met(1'000'000'000, false);
+    e.estimator->on_contact(1'000'000'000, false);
     const PortState port = port_state(e);
     EXPECT_NEAR(port.T_port_chaser_port.t.x, 0, 1e-3);
     EXPECT_NEAR(port.velocity_m_s.x, 0, 1e-9);
@@ -172,7 +172,7 @@ TEST(StateEstimator, DoesNotKnowHowFastItBounced) {
     EXPECT_NEAR(port_state(e).velocity_m_s.x, 0.1, 0.01);
 }
 
-TEST(AttitudeTrack, TurnsEvenlyBetweenReportsAndOnAfterThem) {
+TEST(AttitudeTrack, InterpolatesBetweenReportsAndExtrapolatesAfterThem) {
     AttitudeTrack track;
     EXPECT_TRUE(track.empty());
     const Vec3 rate{0, 0, 0.1};

@@ -6,8 +6,11 @@
 #include <fstream>
 #include <thread>
 
+#include "base/ready.h"
 #include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/free_port.h"
 #include "rehearsal/runner/rerun.h"
+#include "rehearsal/runner/run_folder.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/support/temporary_folder.h"
 
@@ -26,7 +29,7 @@ int status_of(ChildProcess& child) {
     return *child.status();
 }
 
-TEST(ChildProcess, TellsHowItEndedAndWhatItSaid) {
+TEST(ChildProcess, HasItsExitStatusAndOutput) {
     const TemporaryFolder folder;
     auto child = ChildProcess::start(shell(folder, "echo \"$WHERE\"; echo first >&2; echo last >&2; exit 3"));
     ASSERT_TRUE(child);
@@ -36,22 +39,22 @@ TEST(ChildProcess, TellsHowItEndedAndWhatItSaid) {
     EXPECT_EQ(last_line(folder / "none"), "");
 }
 
-TEST(ChildProcess, WhatCannotBeStartedIsSaid) {
+TEST(ChildProcess, NamesWhatCannotBeStarted) {
     const TemporaryFolder folder;
     const auto child = ChildProcess::start({"the dynamics", {folder / "none"}, {}, folder / "out", folder / "out"});
     ASSERT_FALSE(child);
     EXPECT_NE(child.error().what.find("cannot start the dynamics"), std::string::npos);
 }
 
-TEST(ChildProcess, EndsWithAllThatItStarted) {
+TEST(ChildProcess, StopsWithAllThatItStarted) {
     const TemporaryFolder folder;
     auto child = ChildProcess::start(shell(folder, "trap '' TERM; sleep 100 & echo $!; wait; sleep 100"));
     ASSERT_TRUE(child);
     while (read_text(folder / "out").find('\n') == std::string::npos)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const int grandchild = std::stoi(read_text(folder / "out"));
-    child->end(0.05);
-    // Gone, or a zombie that nobody has waited for yet.
+    child->stop(0.05);
+    // Gone, or a zombie that init has not reaped yet.
     for (int i = 0; i < 1000; ++i) {
         const std::string stat = read_text("/proc/" + std::to_string(grandchild) + "/stat");
         if (stat.empty() || stat.find(") Z") != std::string::npos) return;
@@ -60,10 +63,65 @@ TEST(ChildProcess, EndsWithAllThatItStarted) {
     FAIL() << "process " << grandchild << " is still there";
 }
 
-TEST(ChildProcess, ItsLineReadsAsAShellTakesIt) {
+TEST(ChildProcess, ItsLineIsQuotedForAShell) {
     ChildProcess::Command c;
     c.line = {"/bin/echo", "a b", "it's", "plain"};
     EXPECT_EQ(ChildProcess::shell_line(c), "/bin/echo 'a b' 'it'\\''s' plain");
+}
+
+std::string wait_for_ready(ChildProcess& child) {
+    for (int i = 0; i < 5000; ++i) {
+        if (auto lines = child.ready()) return *lines;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return "";
+}
+
+TEST(ChildProcess, IsReadyWhenItHasWrittenSoToItsDescriptor) {
+    const TemporaryFolder folder;
+    ChildProcess::Command command = shell(
+        folder, "echo READY=1; echo CAN=slcan:29537 >&$READY_FD; read line; echo READY=1 >&$READY_FD; sleep 100");
+    command.ready = ChildProcess::Ready::variable;
+    auto child = ChildProcess::start(command);
+    ASSERT_TRUE(child);
+    const std::string lines = wait_for_ready(*child);
+    EXPECT_EQ(lines, "CAN=slcan:29537\nREADY=1\n");
+    EXPECT_EQ(value_of(lines, "CAN"), "slcan:29537");
+    EXPECT_EQ(value_of(lines, "AN"), "");
+}
+
+TEST(ChildProcess, IsNotReadyWhenItEndsBefore) {
+    const TemporaryFolder folder;
+    ChildProcess::Command command = shell(folder, "echo CAN=vcan0 >&$READY_FD; exit 2");
+    command.ready = ChildProcess::Ready::variable;
+    auto child = ChildProcess::start(command);
+    ASSERT_TRUE(child);
+    EXPECT_EQ(status_of(*child), 2);
+    EXPECT_FALSE(child->ready());
+    command.ready = ChildProcess::Ready::none;
+    auto without = ChildProcess::start(command);
+    ASSERT_TRUE(without);
+    EXPECT_EQ(status_of(*without), 2);
+    EXPECT_FALSE(without->ready());
+}
+
+TEST(ChildProcess, GetsTheDescriptorAsAnOption) {
+    const TemporaryFolder folder;
+    ChildProcess::Command command = shell(folder, "echo \"$0 $1\"; echo READY=1 >&3");
+    command.ready = ChildProcess::Ready::option;
+    auto child = ChildProcess::start(command);
+    ASSERT_TRUE(child);
+    EXPECT_EQ(wait_for_ready(*child), "READY=1\n");
+    EXPECT_EQ(status_of(*child), 0);
+    EXPECT_EQ(read_text(folder / "out"), "--ready-fd 3\n");
+}
+
+TEST(ReadyFd, ThatIsNotOpenIsBadInput) {
+    EXPECT_TRUE(check_ready_fd(-1));
+    const Status closed = check_ready_fd(987);
+    ASSERT_FALSE(closed);
+    EXPECT_EQ(closed.error().what, "--ready-fd 987: expected an open descriptor");
+    EXPECT_EQ(closed.error().kind, ErrorKind::bad_input);
 }
 
 TEST(Rerun, TheFirstDifferenceIsFoundByLine) {
@@ -92,14 +150,23 @@ TEST(Rerun, MessagesHaveNames) {
     EXPECT_EQ(describe_message(s, ""), "nothing more");
 }
 
-TEST(Rerun, OfWhatIsNoRehearsalIsRefused) {
+TEST(Rerun, RejectsFoldersWithoutARehearsal) {
     const TemporaryFolder folder;
     EXPECT_FALSE(read_record(folder / ""));
     std::ofstream(folder / "rehearsal.json") << R"({"format": 1, "seed": "x"})";
     EXPECT_FALSE(read_record(folder / ""));
 }
 
-TEST(Folder, OfOthersIsNotTaken) {
+TEST(LidarPort, LeavesRoomForPositionPackets) {
+    for (int k = 0; k < 300; ++k) {  // one in twenty that the kernel offers is too high
+        const auto port = free_lidar_port();
+        ASSERT_TRUE(port) << port.error().text();
+        EXPECT_GT(*port, 1023);
+        EXPECT_LE(*port + 5940, 65535);
+    }
+}
+
+TEST(Folder, WithOtherFilesIsNotClaimed) {
     const TemporaryFolder folder;
     EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
     EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));

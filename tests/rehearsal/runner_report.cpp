@@ -51,7 +51,7 @@ TEST(Page, IsWellFormedAndNeedsNoNetwork) {
         EXPECT_NE(page.find(there), std::string::npos) << there;
 }
 
-TEST(Page, OfARunThatNeverBeganIsOneToo) {
+TEST(Page, OfARunThatNeverStartedIsWellFormed) {
     const Scenario s = full_scenario();
     const std::string page = page_of(s, Messages(s), "/nowhere");
     EXPECT_EQ(markup_error(page), "");

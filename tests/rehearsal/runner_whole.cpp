@@ -42,7 +42,7 @@ RehearsalOptions options(const TemporaryFolder& folder) {
 
 const Console kSilent{[](std::string_view) {}, [](std::string_view) {}};
 
-TEST(Whole, LeavesAllOfItBehindAndRepeatsByteForByte) {
+TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
     const TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
@@ -61,7 +61,7 @@ TEST(Whole, LeavesAllOfItBehindAndRepeatsByteForByte) {
     EXPECT_EQ(markup_error(read_text(o.folder + "/index.html")), "");
     EXPECT_EQ(markup_error(read_text(o.folder + "/junit.xml")), "");
 
-    // What was judged as it came is what the emulator's log tells; whether its first heartbeat was heard is chance.
+    // The live verdict equals that of the emulator's log; whether the first heartbeat was received is chance.
     const auto scenario = read_scenario(o.scenario);
     const auto logged = judge_log(*scenario, o.folder + "/emulator/can.log");
     ASSERT_TRUE(logged);
@@ -76,7 +76,7 @@ TEST(Whole, LeavesAllOfItBehindAndRepeatsByteForByte) {
         EXPECT_FALSE(first_difference(o.folder + file, (folder / "run") + file)) << file;
 }
 
-TEST(Whole, AProgramThatEndsTooSoonIsTheReason) {
+TEST(Whole, NamesAProgramThatEndsTooSoon) {
     const TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
@@ -91,7 +91,7 @@ TEST(Whole, AProgramThatEndsTooSoonIsTheReason) {
     EXPECT_TRUE(fs::exists(o.folder + "/index.html"));
 }
 
-TEST(Whole, NothingThatMovesIsGivenUp) {
+TEST(Whole, EndsAfterTooLongWithoutProgress) {
     const TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
@@ -104,7 +104,7 @@ TEST(Whole, NothingThatMovesIsGivenUp) {
     EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics were never heard"), std::string::npos);
 }
 
-TEST(Whole, WhatTheEmulatorRefusesIsBadInput) {
+TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
     const TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
@@ -118,8 +118,8 @@ TEST(Whole, WhatTheEmulatorRefusesIsBadInput) {
               std::string::npos);
 }
 
-/// A navigation that the user starts, some time after it was asked for.
-TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
+/// A navigation that the user starts some time after the request.
+TEST(Whole, WaitsForANavigationStartedByTheUser) {
     const TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
@@ -128,7 +128,7 @@ TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
     int asked = 0;
     std::string told;
     Console console = kSilent;
-    console.say = [&](std::string_view words) {
+    console.print = [&](std::string_view words) {
         if (words.starts_with("start your own navigation now")) told = words;
     };
     const auto value = [&](const std::string& key) {
@@ -157,7 +157,7 @@ TEST(Whole, WaitsForANavigationOfTheUsersOwn) {
     EXPECT_NE(again.error().what.find("a program was started by hand"), std::string::npos) << again.error().text();
 }
 
-TEST(Whole, ManyRunsThatCannotBeAreRefused) {
+TEST(Whole, RejectsImpossibleCampaigns) {
     const TemporaryFolder folder;
     const auto refused = [&](const RehearsalOptions& run, int jobs) {
         const auto done = run_campaign({run, 2, jobs}, kSilent, StopFlag{false});

@@ -20,7 +20,7 @@ std::string text_of(const std::string& path) {
     return out.str();
 }
 
-TEST(Orbit, LvlhTurnsAboutTheMomentumWithTheOrbit) {
+TEST(Orbit, LvlhRotatesAboutTheMomentum) {
     const Orbit orbit;
     const double quarter_s = 0.5 * 3.14159265358979323846 / orbit.rate_rad_s();
     EXPECT_NEAR(norm(orbit.q_world_lvlh(0) * Vec3{1, 0, 0} - orbit.up), 0, 1e-12);
@@ -29,7 +29,7 @@ TEST(Orbit, LvlhTurnsAboutTheMomentumWithTheOrbit) {
     EXPECT_NEAR(norm(orbit.q_world_lvlh(quarter_s) * Vec3{0, 1, 0} + orbit.up), 0, 1e-12);
 }
 
-TEST(Scenario, TheDockingThatComesWithItIsRead) {
+TEST(Scenario, ReadsTheDocking) {
     const auto s = read_scenario(kScenarios + "docking.toml");
     ASSERT_TRUE(s) << s.error().text();
     EXPECT_EQ(s->target.can_id, 0x110u);
@@ -48,7 +48,7 @@ TEST(Scenario, TheDockingThatComesWithItIsRead) {
     EXPECT_EQ(s->chaser.inertia_kg_m2(1, 1), 31000);
 }
 
-TEST(Scenario, NamesASceneThatIsNotThere) {
+TEST(Scenario, NamesAMissingScene) {
     const test::TemporaryFolder folder;
     std::ofstream(folder / "lost.toml") << "[scenario]\nname = \"lost\"\nscene = \"none.toml\"\n";
     const auto s = read_scenario(folder / "lost.toml");
@@ -57,7 +57,7 @@ TEST(Scenario, NamesASceneThatIsNotThere) {
     EXPECT_EQ(s.error().what, "no such file");
 }
 
-TEST(Scenario, TakesFromAnotherWhatItDoesNotSay) {
+TEST(Scenario, InheritsMissingKeys) {
     const test::TemporaryFolder folder;
     std::ofstream(folder / "over.toml") << "[scenario]\nbased_on = \"" << kScenarios << "docking.toml\"\n"
                                         << "name = \"over\"\n[control]\ndamping = 0.7\n"
@@ -77,7 +77,7 @@ TEST(Scenario, TakesFromAnotherWhatItDoesNotSay) {
     EXPECT_EQ(s->legs.size(), 3u);
 }
 
-TEST(Scenario, AProblemIsToldOfTheFileThatHasIt) {
+TEST(Scenario, ErrorsNameTheFileThatHasThem) {
     const test::TemporaryFolder folder;
     std::ofstream(folder / "base.toml") << text_of(kScenarios + "docking.toml") << "\nsurprise = 1\n";
     std::ofstream(folder / "over.toml")

@@ -1,5 +1,5 @@
-/// renderer/camera/counter_random.h - random numbers by position, not by order: any pixel's noise can be drawn
-/// alone, on any thread, and is the same.
+/// renderer/camera/counter_random.h - a counter-based random number generator: a pixel's noise depends on its index
+/// alone, not on the order or the thread in which pixels are processed.
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ constexpr Block philox(Block c, std::array<std::uint32_t, 2> key) noexcept {
     return c;
 }
 
-/// Its key in every round, laid out for sixteen counters side by side. The multipliers stand beside the keys
-/// because GCC turns a multiplication by a constant it knows into a dozen shifts and additions.
+/// The keys of all rounds, for batches of kLanes counters. The multipliers are data because GCC turns a
+/// multiplication by a known constant into a dozen shifts and additions.
 struct PhiloxSchedule {
     std::array<std::uint64_t, 2> multiplier{kPhiloxMultiplier[0], kPhiloxMultiplier[1]};
     std::array<std::array<std::uint64_t, 2>, kPhiloxRounds> key;
@@ -44,17 +44,17 @@ struct PhiloxSchedule {
     }
 };
 
-struct alignas(64) BlockPerLane {
+struct alignas(64) RandomLanes {
     Lanes<std::uint32_t> w0, w1, w2, w3;
 };
 
-/// The blocks of the counters {first + lane, c1, c2, 0}. Words are kept in 64 bits, of which the upper half is left
-/// as the products leave it: the next product takes the lower half alone.
-inline BlockPerLane philox(const PhiloxSchedule& schedule, std::uint32_t first, std::uint32_t c1,
-                           std::uint32_t c2) noexcept {
+/// Blocks of the counters {first + lane, c1, c2, 0}. Words are kept in 64 bits whose upper half is undefined:
+/// products use the lower half.
+inline RandomLanes philox(const PhiloxSchedule& schedule, std::uint32_t first, std::uint32_t c1,
+                          std::uint32_t c2) noexcept {
     constexpr std::uint64_t low = 0xffffffffu;
     const auto [m0, m1] = schedule.multiplier;
-    BlockPerLane out;
+    RandomLanes out;
     for (std::size_t i = 0; i < kLanes; ++i) {
         std::uint64_t w0 = first + static_cast<std::uint32_t>(i), w1 = c1, w2 = c2, w3 = 0;
 #pragma GCC unroll 10

@@ -9,11 +9,10 @@ namespace {
 constexpr double kBeyond = 6.5;  // standard deviations: the probability is less than 2^-33
 constexpr std::uint64_t kWords = std::uint64_t{1} << 32, kColumnWords = kWords / DarkLevels::kColumns;
 
-/// The standard normal distribution function, to 1e-14, for |x| up to kBeyond: 1/2 + phi(x) (x + x^3 / 3 + x^5 / 15
-/// +
-/// ...), G. Marsaglia, "Evaluating the normal distribution", J. Stat. Software 11 (2004). By basic arithmetic
-/// alone, which is the same on each machine.
-double normal_below(double x) noexcept {
+/// Standard normal distribution function, to 1e-14, for |x| <= kBeyond: 1/2 + phi(x) (x + x^3 / 3 + x^5 / 15 +
+/// ...), G. Marsaglia, "Evaluating the normal distribution", J. Stat. Software 11 (2004). Basic arithmetic only, so
+/// that the result is the same on every machine.
+double normal_cdf(double x) noexcept {
     const double square = x * x, exponent = -square / 2 / 64;
     double term = x, sum = x;
     for (int k = 3; std::abs(term) > 1e-17 * std::abs(sum); k += 2) sum += term *= square / k;
@@ -23,11 +22,11 @@ double normal_below(double x) noexcept {
     return 0.5 + 0.398942280401432678 * density * sum;
 }
 
-/// How many of all words are for what lies below x standard deviations.
+/// Number of random words that stand for values below x standard deviations.
 std::uint64_t words_below(double x) noexcept {
     if (x >= kBeyond) return kWords;
     if (x <= -kBeyond) return 0;
-    return static_cast<std::uint64_t>(normal_below(x) * static_cast<double>(kWords) + 0.5);
+    return static_cast<std::uint64_t>(normal_cdf(x) * static_cast<double>(kWords) + 0.5);
 }
 
 }  // namespace
@@ -49,7 +48,7 @@ DarkLevels::DarkLevels(double black_dn, double read_noise_dn, std::int32_t top_d
         below = up_to;
     }
 
-    // Values with less than a column's worth get theirs filled up from one with more.
+    // A value with less than one column's probability shares its column with a value that has more.
     std::array<std::uint8_t, kColumns> few, many;
     std::size_t n_few = 0, n_many = 0;
     for (std::size_t v = 0; v < kColumns; ++v) {

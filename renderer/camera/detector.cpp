@@ -17,13 +17,12 @@ namespace {
 
 constexpr std::size_t kPixelsPerTask = 1024 * kLanes;
 
-NARPA_EACH_ISA void write(const Sensor& sensor, PixelFormat format, std::span<const Rgb> radiance,
+NARPA_EACH_ISA void write(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
                           std::size_t first_pixel, std::uint8_t* out) noexcept {
     write_pixels(sensor, format, radiance, first_pixel, out);
 }
 
-/// The camera's own detector.
-void take_detector(const Detector& d, Sensor& s) {
+void set_detector(const Detector& d, DetectorConstants& s) {
     for (int b = 0; b < 3; ++b)
         s.electrons_per_radiance[static_cast<std::size_t>(b)] = electrons_per_radiance(d, b);
     s.full_well_e = d.full_well_e;
@@ -34,8 +33,8 @@ void take_detector(const Detector& d, Sensor& s) {
     s.shot_noise = d.shot_noise;
 }
 
-/// Without noise, as many bits as the format shows, white at the top.
-void take_ideal(const Camera& c, Sensor& s) {
+/// No noise, as many bits as the format has, white_radiance at full scale.
+void set_ideal(const Camera& c, DetectorConstants& s) {
     s.bits = c.format == PixelFormat::y16 ? 16 : 8;
     s.electrons_per_radiance.fill((is_mono(c.format) ? 1.0 / 3 : 1.0) / c.white_radiance);
     s.full_well_e = std::numeric_limits<double>::infinity();
@@ -44,12 +43,12 @@ void take_ideal(const Camera& c, Sensor& s) {
 
 }  // namespace
 
-Sensor sensor_over_frame(const Camera& c, std::uint64_t seed, std::uint32_t frame) noexcept {
-    Sensor s;
+DetectorConstants detector_constants(const Camera& c, std::uint64_t seed, std::uint32_t frame) noexcept {
+    DetectorConstants s;
     if (c.detector) {
-        take_detector(*c.detector, s);
+        set_detector(*c.detector, s);
     } else {
-        take_ideal(c, s);
+        set_ideal(c, s);
     }
     const double limit_e = 0x1p28 / s.dn_per_e;
     for (std::size_t b = 0; b < 3; ++b)
@@ -77,7 +76,7 @@ double gain_e_per_dn(const Detector& d) noexcept {
 
 void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
             std::span<std::uint8_t> out) noexcept {
-    const Sensor sensor = sensor_over_frame(camera, seed, frame);
+    const DetectorConstants sensor = detector_constants(camera, seed, frame);
     const std::span<const Rgb> pixels = radiance.pixels;
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, (pixels.size() + kPixelsPerTask - 1) / kPixelsPerTask),

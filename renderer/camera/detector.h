@@ -5,8 +5,8 @@
 /// corners). A monochrome format (GREY, Y16) sums the bands in one pixel; a colour format (YUYV, RGB24) gives each
 /// band an ideal pixel of its own. Electrons = photons * quantum efficiency, with Poisson noise, clipped at the
 /// full well; read noise is added; DN = black level + electrons / gain, rounded and clamped to 0 .. 2^bits - 1. All
-/// noise comes before the rounding. Light and levels are double, what noise adds to them is single precision
-/// (noise.h); pixels without light draw their levels from a table (dark_levels.h).
+/// noise is added before rounding. Signals are double, noise is single precision (noise.h); pixels without light
+/// draw their DN from a table (dark_levels.h).
 ///
 /// DN to bytes: GREY the top 8 bits; Y16 little-endian, left-justified; RGB24 the top 8 bits of each band; YUYV
 /// from these by BT.601, limited range, chroma averaged over each pair. Values stay linear: no gamma.

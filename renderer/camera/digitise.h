@@ -1,5 +1,5 @@
-/// renderer/camera/digitise.h - radiance -> electrons -> DN -> bytes for sixteen pixels side by side: the inner
-/// loop of `expose`, for detector.cpp, which compiles it for each instruction set, and for its tests.
+/// renderer/camera/digitise.h - radiance -> electrons -> DN -> bytes for batches of kLanes pixels: the inner loop
+/// of `expose`. detector.cpp compiles it for each instruction set.
 #pragma once
 
 #include <algorithm>
@@ -11,15 +11,15 @@
 #include <span>
 
 #include "base/pixel_format.h"
-#include "renderer/scene/scene.h"
 #include "renderer/camera/dark_levels.h"
 #include "renderer/camera/noise.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa {
 
-/// A sensor's constants over one frame. What lies beyond every scale (2^28 DN of light, charge or noise) is taken
-/// to lie there, so that a level in DN always is an integer.
-struct Sensor {
+/// What is constant over one frame. Signals and noise are limited to 2^28 DN, so that a level in DN fits an
+/// integer.
+struct DetectorConstants {
     std::array<double, 3> electrons_per_radiance{};
     std::array<float, 3> radiance_max{};  ///< of each band
     double full_well_e = 0, read_noise_e = 0, dn_per_e = 0, black_dn = 0;
@@ -31,18 +31,19 @@ struct Sensor {
     PhiloxSchedule random{0};
     DarkLevels dark;
 };
-[[nodiscard]] Sensor sensor_over_frame(const Camera& camera, std::uint64_t seed, std::uint32_t frame) noexcept;
+[[nodiscard]] DetectorConstants detector_constants(const Camera& camera, std::uint64_t seed,
+                                                   std::uint32_t frame) noexcept;
 
 inline bool is_mono(PixelFormat f) noexcept {
     return f == PixelFormat::grey || f == PixelFormat::y16;
 }
 
-using DnPerLane = Lanes<std::uint32_t>;
+using DnLanes = Lanes<std::uint32_t>;
 
-/// Band by band; none below zero, and zero for one that is not a number.
-inline RgbLanes side_by_side(const Sensor& sensor, const Rgb* radiance) noexcept {
-    const auto sane = [](float v, float max) {
-        // In bits: finite and infinite numbers in their order, then what is no number, then all that is negative.
+/// Band by band, clamped to 0 .. radiance_max; NaN becomes 0.
+inline RgbLanes load_radiance(const DetectorConstants& sensor, const Rgb* radiance) noexcept {
+    const auto clamped = [](float v, float max) {
+        // Bit patterns order as: positive numbers, infinity, NaN, negative numbers.
         constexpr auto kInfinity = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity());
         const auto bits = std::bit_cast<std::uint32_t>(v);
         return std::bit_cast<float>(bits <= kInfinity ? std::min(bits, std::bit_cast<std::uint32_t>(max)) : 0u);
@@ -50,25 +51,27 @@ inline RgbLanes side_by_side(const Sensor& sensor, const Rgb* radiance) noexcept
     const auto [r_max, g_max, b_max] = sensor.radiance_max;
     RgbLanes out;
     for (std::size_t i = 0; i < kLanes; ++i) {
-        out.r[i] = sane(radiance[i].x, r_max);
-        out.g[i] = sane(radiance[i].y, g_max);
-        out.b[i] = sane(radiance[i].z, b_max);
+        out.r[i] = clamped(radiance[i].x, r_max);
+        out.g[i] = clamped(radiance[i].y, g_max);
+        out.b[i] = clamped(radiance[i].z, b_max);
     }
     return out;
 }
 
-/// Random words of pixels without light. One block is for four of them, so those of kPixels are drawn at a time.
+/// Random words of pixels without light, one each: a block of four words serves four pixels, so kPixels are drawn
+/// at a time.
 class DarkWords {
 public:
     static constexpr std::uint32_t kPixels = 4 * kLanes;
 
-    /// Of a packet: `first_pixel` is a multiple of kLanes.
-    const Lanes<std::uint32_t>& of(const Sensor& sensor, std::uint32_t first_pixel, std::uint32_t band) noexcept {
-        OfBand& b = bands_[band];
+    /// For kLanes pixels from `first_pixel` on, a multiple of kLanes.
+    const Lanes<std::uint32_t>& of(const DetectorConstants& sensor, std::uint32_t first_pixel,
+                                   std::uint32_t band) noexcept {
+        Band& b = bands_[band];
         const std::uint32_t group = first_pixel / kPixels;
         if (!b.drawn || b.group != group) {
             b.words = philox(sensor.random, group * static_cast<std::uint32_t>(kLanes), sensor.frame,
-                             kBesideTheLit + band);
+                             kFirstCounter + band);
             b.drawn = true;
             b.group = group;
         }
@@ -81,29 +84,29 @@ public:
     }
 
 private:
-    static constexpr std::uint32_t kBesideTheLit = 4;  ///< counters that no pixel with light has
-    struct OfBand {
-        BlockPerLane words;
+    static constexpr std::uint32_t kFirstCounter = 4;  ///< beyond those of digitise_lit
+    struct Band {
+        RandomLanes words;
         std::uint32_t group;
         bool drawn = false;
     };
-    std::array<OfBand, 3> bands_;
+    std::array<Band, 3> bands_;
 };
 
-/// Of pixels with any light; of others too where there is no table.
-inline DnPerLane digitise_lit(const Sensor& sensor, const Lanes<double>& mean_e, bool any_light,
-                              std::uint32_t first_pixel, std::uint32_t band) noexcept {
+/// Of pixels with light, and of dark ones where there is no table.
+inline DnLanes digitise_lit(const DetectorConstants& sensor, const Lanes<double>& mean_e, bool any_light,
+                            std::uint32_t first_pixel, std::uint32_t band) noexcept {
     Lanes<double> e = mean_e;
     std::int32_t top_dn = sensor.full_dn;
     if (sensor.read_noise_e > 0 || (sensor.shot_noise && any_light)) {
-        const BlockPerLane random = philox(sensor.random, first_pixel, sensor.frame, band);
-        const NormalsPerLane normal = normals(random);
+        const RandomLanes random = philox(sensor.random, first_pixel, sensor.frame, band);
+        const NormalLanes normal = normals(random);
         if (sensor.shot_noise) e = poisson(mean_e, normal, random);
         for (std::size_t i = 0; i < kLanes; ++i)
             e[i] = std::min(e[i], sensor.full_well_e) + sensor.read_noise_e * static_cast<double>(normal.b[i]);
         top_dn = sensor.top_dn;
     }
-    DnPerLane dn;
+    DnLanes dn;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const auto level = static_cast<std::int32_t>(e[i] * sensor.dn_per_e + (sensor.black_dn + 0.5));
         dn[i] = static_cast<std::uint32_t>(std::clamp(level, 0, top_dn));
@@ -111,22 +114,22 @@ inline DnPerLane digitise_lit(const Sensor& sensor, const Lanes<double>& mean_e,
     return dn;
 }
 
-inline DnPerLane digitise_dark(const Sensor& sensor, const Lanes<std::uint32_t>& words) noexcept {
-    DnPerLane dn;
+inline DnLanes digitise_dark(const DetectorConstants& sensor, const Lanes<std::uint32_t>& words) noexcept {
+    DnLanes dn;
     for (std::size_t i = 0; i < kLanes; ++i) dn[i] = sensor.dark.level(words[i]);
     return dn;
 }
 
-/// What a pixel draws is up to its own light alone.
-inline DnPerLane digitise(const Sensor& sensor, const Lanes<double>& mean_e, std::uint32_t first_pixel,
-                          std::uint32_t band, DarkWords& dark_words) noexcept {
+/// A pixel's noise depends on its own signal alone, not on that of its batch.
+inline DnLanes digitise(const DetectorConstants& sensor, const Lanes<double>& mean_e, std::uint32_t first_pixel,
+                        std::uint32_t band, DarkWords& dark_words) noexcept {
     std::uint64_t lit = 0;
     for (std::size_t i = 0; i < kLanes; ++i) lit += mean_e[i] > 0 ? 1u : 0u;
     const bool dark = sensor.dark.any() && lit < kLanes;
     if (dark && lit == 0) return digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
-    DnPerLane dn = digitise_lit(sensor, mean_e, lit > 0, first_pixel, band);
+    DnLanes dn = digitise_lit(sensor, mean_e, lit > 0, first_pixel, band);
     if (!dark) return dn;
-    const DnPerLane without = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
+    const DnLanes without = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
     for (std::size_t i = 0; i < kLanes; ++i) dn[i] = mean_e[i] > 0 ? dn[i] : without[i];
     return dn;
 }
@@ -140,20 +143,20 @@ inline bool is_black(const Rgb* radiance) noexcept {
     return any == 0;
 }
 
-/// DN of each band; of a monochrome pixel the first alone.
-struct alignas(64) DnPerBand {
-    std::array<DnPerLane, 3> dn;
+/// DN of each band; monochrome pixels use the first.
+struct alignas(64) DnBands {
+    std::array<DnLanes, 3> dn;
 };
-inline DnPerBand digitise(const Sensor& sensor, bool mono, const Rgb* radiance, std::uint32_t first_pixel,
-                          DarkWords& dark_words) noexcept {
-    DnPerBand out;
+inline DnBands digitise(const DetectorConstants& sensor, bool mono, const Rgb* radiance, std::uint32_t first_pixel,
+                        DarkWords& dark_words) noexcept {
+    DnBands out;
     const std::uint32_t bands = mono ? 1 : 3;
     if (sensor.dark.any() && is_black(radiance)) {
         for (std::uint32_t band = 0; band < bands; ++band)
             out.dn[band] = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
         return out;
     }
-    const RgbLanes l = side_by_side(sensor, radiance);
+    const RgbLanes l = load_radiance(sensor, radiance);
     std::array<Lanes<double>, 3> mean_e;
     const auto [red, green, blue] = sensor.electrons_per_radiance;
     for (std::size_t i = 0; i < kLanes; ++i) mean_e[0][i] = red * static_cast<double>(l.r[i]);
@@ -166,21 +169,21 @@ inline DnPerBand digitise(const Sensor& sensor, bool mono, const Rgb* radiance, 
     return out;
 }
 
-// Bytes are put together here and copied out: a pointer to bytes might point at anything, so nothing would be done
-// side by side.
+// Bytes are gathered in local arrays and copied out: a pointer to bytes may alias anything, which prevents
+// vectorisation.
 static_assert(std::endian::native == std::endian::little);
 
-inline Lanes<std::uint8_t> to_grey(int bits, const DnPerLane& dn) noexcept {
+inline Lanes<std::uint8_t> to_grey(int bits, const DnLanes& dn) noexcept {
     Lanes<std::uint8_t> out;
     for (std::size_t i = 0; i < kLanes; ++i) out[i] = static_cast<std::uint8_t>(dn[i] >> (bits - 8));
     return out;
 }
-inline Lanes<std::uint16_t> to_y16(int bits, const DnPerLane& dn) noexcept {
+inline Lanes<std::uint16_t> to_y16(int bits, const DnLanes& dn) noexcept {
     Lanes<std::uint16_t> out;
     for (std::size_t i = 0; i < kLanes; ++i) out[i] = static_cast<std::uint16_t>(dn[i] << (16 - bits));
     return out;
 }
-inline std::array<std::uint8_t, 3 * kLanes> to_rgb24(int bits, const DnPerBand& c) noexcept {
+inline std::array<std::uint8_t, 3 * kLanes> to_rgb24(int bits, const DnBands& c) noexcept {
     std::array<std::uint8_t, 3 * kLanes> out;
     for (std::size_t i = 0; i < kLanes; ++i) {
         out[3 * i] = static_cast<std::uint8_t>(c.dn[0][i] >> (bits - 8));
@@ -193,10 +196,10 @@ inline std::array<std::uint8_t, 3 * kLanes> to_rgb24(int bits, const DnPerBand& 
 /// ITU-R BT.601, 8 bits: luma 16..235 = 16 + (65.481 R + 128.553 G + 24.966 B) / 255; chroma 16..240 = 128 +
 /// (-37.797 R - 74.203 G + 112 B) / 255 and 128 + (112 R - 93.786 G - 18.214 B) / 255 of the mean of a pair. All in
 /// thousandths, so that rounding is exact.
-inline std::array<std::uint32_t, kLanes / 2> to_yuyv(int bits, const DnPerBand& c) noexcept {
+inline std::array<std::uint32_t, kLanes / 2> to_yuyv(int bits, const DnBands& c) noexcept {
     constexpr std::uint32_t kLuma = 255'000, kChroma = 2 * kLuma;  // of each pixel, of a pair
     constexpr std::uint32_t kLumaHalfUp = 33 * (kLuma / 2), kChromaHalfUp = 257 * (kChroma / 2);
-    DnPerLane y, u, v;  // u and v wrap below zero until the pair's offset is added
+    DnLanes y, u, v;  // u and v wrap below zero until the pair's offset is added
     for (std::size_t i = 0; i < kLanes; ++i) {
         const std::uint32_t r = c.dn[0][i] >> (bits - 8), g = c.dn[1][i] >> (bits - 8),
                             b = c.dn[2][i] >> (bits - 8);
@@ -213,10 +216,10 @@ inline std::array<std::uint32_t, kLanes / 2> to_yuyv(int bits, const DnPerBand& 
     return out;
 }
 
-/// Sixteen pixels into kLanes * bytes_per_pixel(format) bytes.
-inline void write_packet(const Sensor& sensor, PixelFormat format, const Rgb* radiance, std::uint32_t first_pixel,
-                         DarkWords& dark_words, std::uint8_t* out) noexcept {
-    const DnPerBand c = digitise(sensor, is_mono(format), radiance, first_pixel, dark_words);
+/// kLanes pixels into kLanes * bytes_per_pixel(format) bytes.
+inline void write_lanes(const DetectorConstants& sensor, PixelFormat format, const Rgb* radiance,
+                        std::uint32_t first_pixel, DarkWords& dark_words, std::uint8_t* out) noexcept {
+    const DnBands c = digitise(sensor, is_mono(format), radiance, first_pixel, dark_words);
     const auto put = [out](const auto& bytes) { std::memcpy(out, bytes.data(), sizeof bytes); };
     switch (format) {
         case PixelFormat::grey: return put(to_grey(sensor.bits, c.dn[0]));
@@ -226,9 +229,8 @@ inline void write_packet(const Sensor& sensor, PixelFormat format, const Rgb* ra
     }
 }
 
-/// Pixels one after another, from `first_pixel` of the image on, a multiple of kLanes: `out` is where the first
-/// one's bytes go.
-inline void write_pixels(const Sensor& sensor, PixelFormat format, std::span<const Rgb> radiance,
+/// Consecutive pixels from `first_pixel` of the image on, a multiple of kLanes, whose bytes start at `out`.
+inline void write_pixels(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
                          std::size_t first_pixel, std::uint8_t* out) noexcept {
     const std::size_t bytes = bytes_per_pixel(format);
     Lanes<Rgb> rest{};
@@ -238,9 +240,8 @@ inline void write_pixels(const Sensor& sensor, PixelFormat format, std::span<con
         const std::size_t count = std::min(kLanes, radiance.size() - i);
         const bool whole = count == kLanes;
         if (!whole) std::copy_n(&radiance[i], count, rest.begin());
-        write_packet(sensor, format, whole ? &radiance[i] : rest.data(),
-                     static_cast<std::uint32_t>(first_pixel + i), dark_words,
-                     whole ? out + i * bytes : rest_out.data());
+        write_lanes(sensor, format, whole ? &radiance[i] : rest.data(), static_cast<std::uint32_t>(first_pixel + i),
+                    dark_words, whole ? out + i * bytes : rest_out.data());
         if (!whole) std::copy_n(rest_out.begin(), count * bytes, out + i * bytes);
     }
 }

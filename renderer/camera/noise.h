@@ -1,8 +1,8 @@
-/// renderer/camera/noise.h - what pixels draw: standard normals and Poisson counts, sixteen side by side.
+/// renderer/camera/noise.h - standard normals and Poisson counts for batches of kLanes pixels.
 ///
-/// Every lane is a function of its own numbers alone, without a branch, so that the loops become vector code; the
-/// few library functions that this needs are written out. The polynomials are minimax fits, of errors weighted as
-/// the bound beside each says.
+/// Lanes are independent and without branches, so that the loops become vector code; logarithm, sine and cosine are
+/// written out for that reason. The polynomials are minimax fits; the bound beside each is that of its weighted
+/// error.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace narpa {
 
-/// -ln u of the even number u = (word + 1/2) / 2^32, to 2.5e-7 of itself.
+/// -ln u of the uniform number u = (word + 1/2) / 2^32, to a relative error of 2.5e-7.
 inline float minus_log(std::uint32_t word) noexcept {
     constexpr std::uint32_t kSqrtHalf = 0x3f3504f3u;  // bits of the float
     constexpr float kLn2 = 0.693147181f;
@@ -22,7 +22,7 @@ inline float minus_log(std::uint32_t word) noexcept {
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(static_cast<float>(word) + 0.5f);
     const std::int32_t e = static_cast<std::int32_t>(bits - kSqrtHalf) >> 23;
     const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(e) << 23));
-    // Next to 1 the float has lost the digits that 1 - u is made of.
+    // Near u = 1 the rounding of u would dominate 1 - u: it is formed from the integer.
     const float one_less = -(static_cast<float>(static_cast<std::int32_t>(~word)) + 0.5f) * 0x1p-32f;
     const float f = e == 32 ? one_less : m - 1;
     // ln(1 + f) = f - f^2 / 2 + f^3 p(f), p to 4e-8 |f|^-2.
@@ -38,7 +38,7 @@ struct SineCosine {
     float sine, cosine;
 };
 /// Of the angle 2 pi (word + 1/2) / 2^32, to 1.5e-7.
-inline SineCosine of_turn(std::uint32_t word) noexcept {
+inline SineCosine sincos_of_word(std::uint32_t word) noexcept {
     const std::uint32_t quadrant = (word + 0x20000000u) >> 30;  // 3 and then 0 again where this wraps
     const auto rest = static_cast<std::int32_t>(word - (quadrant << 30));
     const float x = (static_cast<float>(rest) + 0.5f) * 1.46291808e-9f, z = x * x;  // radians, |x| <= pi / 4
@@ -52,24 +52,24 @@ inline SineCosine of_turn(std::uint32_t word) noexcept {
     return {sign(swapped ? c : s, quadrant), sign(swapped ? s : c, quadrant + 1)};
 }
 
-/// Two independent standard normals for each lane, by Box and Muller (1958) in single precision: within 1e-6 of
-/// the exact ones, up to 6.7 standard deviations.
-struct alignas(64) NormalsPerLane {
+/// Two independent standard normals per lane, by Box and Muller (1958) in single precision: to 1e-6, up to 6.7
+/// standard deviations.
+struct alignas(64) NormalLanes {
     Lanes<float> a, b;
 };
-inline NormalsPerLane normals(const BlockPerLane& random) noexcept {
-    NormalsPerLane out;
+inline NormalLanes normals(const RandomLanes& random) noexcept {
+    NormalLanes out;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const float radius = std::sqrt(2 * minus_log(random.w0[i]));
-        const SineCosine angle = of_turn(random.w1[i]);
+        const SineCosine angle = sincos_of_word(random.w1[i]);
         out.a[i] = radius * angle.cosine;
         out.b[i] = radius * angle.sine;
     }
     return out;
 }
 
-/// An even number in (0, 1) for each lane: 52 bits and a half.
-inline Lanes<double> uniforms(const BlockPerLane& random) noexcept {
+/// A uniform number in (0, 1) per lane, of 52 bits and a half.
+inline Lanes<double> uniforms(const RandomLanes& random) noexcept {
     Lanes<double> out;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const std::uint64_t bits = (std::uint64_t{random.w2[i]} << 32 | random.w3[i]) >> 12;
@@ -78,11 +78,11 @@ inline Lanes<double> uniforms(const BlockPerLane& random) noexcept {
     return out;
 }
 
-/// Means from here on take the normal approximation.
+/// From this mean on counts are drawn by the normal approximation.
 inline constexpr double kPoissonExactBelow = 32;
 
-/// Poisson counts of means from 0 to less than kPoissonExactBelow, by inversion of the distribution, whose sums are
-/// good to 1e-13.
+/// Poisson counts of means in [0, kPoissonExactBelow) by inversion of the distribution function, which is accurate
+/// to 1e-13.
 inline Lanes<double> exact_poisson(const Lanes<double>& mean, const Lanes<double>& uniform) noexcept {
     // exp(-mean) = exp(-mean / 64)^64, by its power series.
     Lanes<double> p, sum, count{};
@@ -94,8 +94,8 @@ inline Lanes<double> exact_poisson(const Lanes<double>& mean, const Lanes<double
     for (int n = 0; n < 6; ++n)
         for (std::size_t i = 0; i < kLanes; ++i) p[i] *= p[i];
     sum = p;
-    // The bound is 13 standard deviations above the largest mean: sums that rounding keeps below `uniform` end. A
-    // lane that has its count takes no harm from going on with the others; the end is looked for every few steps.
+    // The bound, 13 standard deviations above the largest mean, ends sums that rounding keeps below `uniform`.
+    // Lanes that are done do not change; whether all are is tested every few steps.
     constexpr int kMost = 112, kStride = 4;
     for (int k = 0; k < kMost; k += kStride) {
         for (int step = 1; step <= kStride; ++step) {
@@ -115,17 +115,17 @@ inline Lanes<double> exact_poisson(const Lanes<double>& mean, const Lanes<double
 
 /// A Poisson count of a mean from kPoissonExactBelow to 1e38: the normal with the first Cornish-Fisher term,
 /// rounded. Mean, variance and skewness stay exact (the variance that the term and the rounding add, 1/18 + 1/12,
-/// is taken off), the distribution functions differ by less than 1e-3. The departure from the mean is in single
-/// precision; not even -7 standard deviations take the count below zero.
-inline double many_poisson(double mean, float normal) noexcept {
+/// is subtracted); the distribution functions differ by less than 1e-3. The deviation from the mean is in single
+/// precision; -7 standard deviations still give a count above zero.
+inline double normal_poisson(double mean, float normal) noexcept {
     const float spread = std::sqrt(static_cast<float>(mean - 5.0 / 36));
     const float departure = spread * normal + (normal * normal - 1) * (1.0f / 6);
     return std::floor(mean + static_cast<double>(departure) + 0.5);
 }
 
-/// Poisson counts of means that are not below zero. A packet pays for the methods that its lanes need.
-inline Lanes<double> poisson(const Lanes<double>& mean, const NormalsPerLane& normal,
-                             const BlockPerLane& random) noexcept {
+/// Poisson counts of means >= 0. Each method runs only if a lane needs it.
+inline Lanes<double> poisson(const Lanes<double>& mean, const NormalLanes& normal,
+                             const RandomLanes& random) noexcept {
     std::uint64_t lit = 0, bright = 0;  // how many
     for (std::size_t i = 0; i < kLanes; ++i) {
         lit += mean[i] > 0 ? 1u : 0u;
@@ -134,7 +134,7 @@ inline Lanes<double> poisson(const Lanes<double>& mean, const NormalsPerLane& no
     Lanes<double> count{};
     if (bright != 0)
         for (std::size_t i = 0; i < kLanes; ++i) {
-            const double many = many_poisson(mean[i], normal.a[i]);
+            const double many = normal_poisson(mean[i], normal.a[i]);
             count[i] = mean[i] >= kPoissonExactBelow ? many : 0.0;
         }
     if (lit != bright) {

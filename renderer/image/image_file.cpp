@@ -58,7 +58,7 @@ public:
         for (std::size_t i = 0; i < pixels_; ++i) plane[i] = static_cast<float>(value(i));
         planes_.emplace_back(name, std::move(plane));
     }
-    /// The value, and what rounding it to 32 bits took away.
+    /// The value rounded to 32 bits, and the rounding error.
     void add_exact(const std::string& name, const std::function<double(std::size_t)>& value) {
         add(name, value);
         add(name + ".rest", [&](std::size_t i) {
@@ -99,7 +99,7 @@ Planes planes_of(const RenderedFrame& frame) {
 }
 
 Status write_exr(const std::string& path, const RenderedFrame& frame) {
-    // OpenEXR's own messages do not say why a file could not be opened; this one does.
+    // OpenEXR's messages do not contain the reason why a file cannot be opened.
     if (const Status writable = write_bytes(path, "", nullptr, 0); !writable) return writable.error();
     try {
         Planes planes = planes_of(frame);
@@ -126,7 +126,7 @@ Status write_exr(const std::string& path, const RenderedFrame& frame) {
 Status write_png(const std::string& path, const RenderedFrame& frame) {
     try {
         const int width = frame.radiance.width, height = frame.radiance.height;
-        // OpenCV takes no const data; it only reads here.
+        // cv::Mat has no const view; OpenCV only reads it.
         const auto view = [&](int type) {
             return cv::Mat(height, width, type, const_cast<std::uint8_t*>(frame.bytes.data()));
         };

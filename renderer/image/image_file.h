@@ -11,7 +11,7 @@
 
 namespace narpa {
 
-/// One frame in all its forms; a format takes what it can hold.
+/// A frame before and after the detector; each file format stores what it can hold.
 struct RenderedFrame {
     const Camera& camera;
     const RadianceImage& radiance;
@@ -23,11 +23,11 @@ struct RenderedFrame {
 ///   .exr  linear radiance R, G, B (W m^-2 sr^-1) and beside it, where `aovs` has them, depth.Z and range (m,
 ///         infinite where nothing is hit), normal.X/Y/Z and position.X/Y/Z (world, m), body (index, -1 none),
 ///         albedo.R/G/B, variance; all 32-bit floats. OpenEXR has no doubles, so depth, range and position
-///         come with a second channel that holds what rounding took away (depth.Z.rest, range.rest,
-///         position.X.rest ...): their sum is good to 2^-48, 1e-7 m at the distance of the Moon.
+///         have a second channel with the rounding error of the first (depth.Z.rest, range.rest, position.X.rest
+///         ...): their sum is accurate to 2^-48, 1e-7 m at the distance of the Moon.
 ///   .pfm  linear radiance, little-endian, rows from the bottom
 ///   .png  the camera's own output: GREY 8-bit, Y16 16-bit grey, RGB24 and YUYV 8-bit colour
-///   .raw  the camera's own output, byte for byte as a video device gets it
+///   .raw  the camera's own output, byte for byte as written to a video device
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);
 

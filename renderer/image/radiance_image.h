@@ -18,16 +18,16 @@ struct RadianceImage {
         : width(w), height(h), pixels(static_cast<std::size_t>(w) * static_cast<std::size_t>(h)) {}
 };
 
-/// Outputs at the first hit through each pixel's centre, wanted only by `narpa render --aov`.
+/// Arbitrary output variables: the first hit of the ray through each pixel's centre.
 /// Background: depth and range infinite, body -1, the rest zero.
 struct Aovs {
     std::vector<double> range_m, depth_m;  ///< along the ray; along the camera's z axis
     std::vector<Vec3> position, normal;    ///< world
     std::vector<std::int32_t> body;
     std::vector<Rgb> albedo;  ///< base colour with its texture: a mirror's reflectance, white for glass
-    /// Of the pixel's mean over the bands (0 for spp < 2, but for tiny bodies), W^2 m^-4 sr^-2: pixel_samples.h
-    /// says how it is estimated and which 95 % interval goes with it. Within a budget: what a frame expects of
-    /// itself (frame_error.h), where it came to refined; else 0.
+    /// Of the pixel's mean over the bands, W^2 m^-4 sr^-2 (0 for spp < 2, except for subpixel bodies): pixel_samples.h
+    /// describes the estimate and its 95 % interval. With a budget: the expected variance (frame_error.h) of refined
+    /// frames, else 0.
     std::vector<float> variance;
 };
 

@@ -51,7 +51,7 @@ std::vector<std::uint8_t> bytes_of(const Camera& c, const RadianceImage& image) 
 }
 
 /// One pixel's DN in one band as the header of the detector describes it, with the standard library's functions.
-double plain_level(const Sensor& s, double mean_e, std::uint32_t pixel, std::uint32_t band) {
+double plain_level(const DetectorConstants& s, double mean_e, std::uint32_t pixel, std::uint32_t band) {
     if (mean_e == 0 && s.dark.any())  // a word of a block for four pixels
         return s.dark.level(philox({pixel / 64 * 16 + pixel % 16, s.frame, 4 + band, 0}, {3, 0})[pixel / 16 % 4]);
     const Block w = philox({pixel, s.frame, band, 0}, {3, 0});
@@ -67,7 +67,7 @@ double plain_level(const Sensor& s, double mean_e, std::uint32_t pixel, std::uin
     }
     return s.black_dn + (std::min(e, s.full_well_e) + s.read_noise_e * radius * std::sin(angle)) * s.dn_per_e;
 }
-double plain_electrons(const Sensor& s, float radiance, std::size_t band) {
+double plain_electrons(const DetectorConstants& s, float radiance, std::size_t band) {
     const double e = s.electrons_per_radiance[band] * static_cast<double>(radiance);
     return e > 0 ? e : 0;
 }
@@ -77,7 +77,7 @@ TEST(DetectorPackets, ValuesAreThoseOfThePlainDescription) {
     const RadianceImage image = motley(width, height);
     for (const PixelFormat format : {PixelFormat::y16, PixelFormat::rgb24}) {
         const Camera c = noisy_camera(width, height, format);
-        const Sensor s = sensor_over_frame(c, 3, 8);
+        const DetectorConstants s = detector_constants(c, 3, 8);
         const std::vector<std::uint8_t> bytes = bytes_of(c, image);
         int near_an_edge = 0;
         const auto expect = [&](double mean_e, std::size_t pixel, std::uint32_t band, int shift, int got) {
@@ -169,12 +169,12 @@ TEST(DetectorPackets, YuyvRoundsItsFormulaExactly) {
 
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // The inner loop as each instruction set has it; `expose` takes the widest that the machine knows.
-using Write = void(const Sensor&, PixelFormat, std::span<const Rgb>, std::size_t, std::uint8_t*);
-[[gnu::flatten]] void on_base_line(const Sensor& s, PixelFormat f, std::span<const Rgb> l, std::size_t first,
+using Write = void(const DetectorConstants&, PixelFormat, std::span<const Rgb>, std::size_t, std::uint8_t*);
+[[gnu::flatten]] void on_base_line(const DetectorConstants& s, PixelFormat f, std::span<const Rgb> l, std::size_t first,
                                    std::uint8_t* out) {
     write_pixels(s, f, l, first, out);
 }
-[[gnu::flatten, gnu::target("arch=x86-64-v3")]] void on_avx2(const Sensor& s, PixelFormat f, std::span<const Rgb> l,
+[[gnu::flatten, gnu::target("arch=x86-64-v3")]] void on_avx2(const DetectorConstants& s, PixelFormat f, std::span<const Rgb> l,
                                                              std::size_t first, std::uint8_t* out) {
     write_pixels(s, f, l, first, out);
 }
@@ -185,7 +185,7 @@ TEST(DetectorPackets, SameBytesOnEachInstructionSet) {
             Camera c = noisy_camera(124, 30, format);
             if (!noisy) c.detector->shot_noise = false, c.detector->read_noise_e = 0;
             const std::vector<std::uint8_t> widest = bytes_of(c, image);
-            const Sensor s = sensor_over_frame(c, 3, 8);
+            const DetectorConstants s = detector_constants(c, 3, 8);
             for (Write* const write : {&on_base_line, &on_avx2}) {
                 if (write == &on_avx2 && !__builtin_cpu_supports("avx2")) continue;
                 std::vector<std::uint8_t> out(widest.size());

@@ -49,7 +49,7 @@ TEST(Philox, SideBySideIsTheSame) {
     for (const std::uint64_t seed : {std::uint64_t{0}, std::uint64_t{0x123456789abcdef0}, ~std::uint64_t{0}})
         for (const std::uint32_t first : {0u, 12'345u, 0xfffffff8u})  // the last wraps
             for (const std::uint32_t frame : {0u, 77u, 0xffffffffu}) {
-                const BlockPerLane lanes = philox(PhiloxSchedule(seed), first, frame, 2);
+                const RandomLanes lanes = philox(PhiloxSchedule(seed), first, frame, 2);
                 for (std::uint32_t i = 0; i < kLanes; ++i)
                     ASSERT_EQ((Block{lanes.w0[i], lanes.w1[i], lanes.w2[i], lanes.w3[i]}),
                               philox({first + i, frame, 2, 0},
@@ -62,7 +62,7 @@ TEST(Noise, FunctionsAreThoseOfTheStandardLibrary) {
     for (const std::uint32_t word : telling_words()) {
         const double log = -std::log(open_unit(word)), angle = 2 * std::numbers::pi * open_unit(word);
         log_error = std::max(log_error, std::abs(static_cast<double>(minus_log(word)) / log - 1));
-        const SineCosine v = of_turn(word);
+        const SineCosine v = sincos_of_word(word);
         angle_error = std::max({angle_error, std::abs(static_cast<double>(v.sine) - std::sin(angle)),
                                 std::abs(static_cast<double>(v.cosine) - std::cos(angle))});
     }
@@ -74,10 +74,10 @@ TEST(Noise, NormalsAreThoseOfBoxAndMuller) {
     const std::vector<std::uint32_t> words = telling_words();
     double worst = 0;
     for (std::size_t k = 0; k + kLanes <= words.size(); k += kLanes) {
-        BlockPerLane random{};
+        RandomLanes random{};
         for (std::size_t i = 0; i < kLanes; ++i)
             random.w0[i] = words[k + i], random.w1[i] = words[words.size() - 1 - k - i];
-        const NormalsPerLane normal = normals(random);
+        const NormalLanes normal = normals(random);
         for (std::size_t i = 0; i < kLanes; ++i) {
             const double radius = std::sqrt(-2 * std::log(open_unit(random.w0[i]))),
                          angle = 2 * std::numbers::pi * open_unit(random.w1[i]);
@@ -91,8 +91,8 @@ TEST(Noise, NormalsAreThoseOfBoxAndMuller) {
 TEST(Noise, HasItsDistributions) {
     std::vector<double> a, b, even;
     for (std::uint32_t first = 0; first < 400'000; first += kLanes) {
-        const BlockPerLane random = philox(PhiloxSchedule(4), first, 0, 0);
-        const NormalsPerLane normal = normals(random);
+        const RandomLanes random = philox(PhiloxSchedule(4), first, 0, 0);
+        const NormalLanes normal = normals(random);
         const Lanes<double> uniform = uniforms(random);
         for (std::size_t i = 0; i < kLanes; ++i) {
             a.push_back(static_cast<double>(normal.a[i]));
@@ -124,7 +124,7 @@ double inverted(double mean, double uniform) {
 TEST(Poisson, FaintCountsAreExact) {
     std::uint32_t first = 0;
     for (int round = 0; round < 2000; ++round, first += kLanes) {
-        const BlockPerLane random = philox(PhiloxSchedule(6), first, 0, 0);
+        const RandomLanes random = philox(PhiloxSchedule(6), first, 0, 0);
         const Lanes<double> uniform = uniforms(random);
         Lanes<double> mean;
         for (std::size_t i = 0; i < kLanes; ++i)
@@ -142,8 +142,8 @@ TEST(Poisson, FaintCountsAreExact) {
 
 TEST(Poisson, LanesKnowNothingOfEachOther) {
     const Lanes<double> means{0, 3, 0, 31.9, 32, 1e5, 0.01, 0, 40, 0, 0, 7, 1e27, 0, 0, 20};
-    const BlockPerLane random = philox(PhiloxSchedule(9), 0, 0, 0);
-    const NormalsPerLane normal = normals(random);
+    const RandomLanes random = philox(PhiloxSchedule(9), 0, 0, 0);
+    const NormalLanes normal = normals(random);
     const Lanes<double> together = poisson(means, normal, random);
     for (std::size_t i = 0; i < kLanes; ++i) {
         Lanes<double> alone{};
@@ -162,7 +162,7 @@ TEST(Poisson, HasTheDistributionOnBothSidesOfTheThreshold) {
         std::vector<int> count(600);
         double sum = 0, squares = 0, cubes = 0;
         for (std::uint32_t first = 0; first < n; first += kLanes) {
-            const BlockPerLane random = philox(PhiloxSchedule(11), first, 0, 0);
+            const RandomLanes random = philox(PhiloxSchedule(11), first, 0, 0);
             for (const double k : poisson(means, normals(random), random)) {
                 ASSERT_EQ(k, std::floor(k));
                 ++count[static_cast<std::size_t>(k)];

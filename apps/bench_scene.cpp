@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "renderer/camera/camera_model.h"
+
 namespace narpa::cli {
 
 Result<std::string> shipped_scene(const std::string& name) {
@@ -21,9 +23,7 @@ Result<std::string> shipped_scene(const std::string& name) {
 
 void resize(Camera& c, int width, int height) {
     const double x = static_cast<double>(width) / c.width, y = static_cast<double>(height) / c.height;
-    c.cx = (c.cx + 0.5) * x - 0.5;
-    c.cy = (c.cy + 0.5) * y - 0.5;
-    c.fx *= x, c.fy *= y;
+    c = scaled(c, x, y);
     c.width = width, c.height = height;
 }
 

@@ -122,8 +122,15 @@ std::vector<Method> methods(const PnpSetting& setting) {
                        return of_fit(refine_with_tiny_solver(t.input(), start));
                    }});
     all.push_back({kPnpPeerCold, [flat](const PnpTrial& t, const Rigid3&) {
+                       PnpPoints points(kPointsMax);
+                       points.assign(t.input());
+                       std::vector<BodyPoint> normalised;
+                       for (std::size_t i = 0; i < points.size(); ++i)
+                           normalised.push_back({points.centred_body_m(i), points.normalised(i)});
+                       std::vector<CentredPose> poses;
+                       opencv_starts(normalised, flat, poses);
                        std::vector<Rigid3> starts;
-                       opencv_starts(t.input(), flat, starts);
+                       for (const CentredPose& pose : poses) starts.push_back(points.uncentred(pose));
                        return best_by_ceres(t, starts);
                    }});
     for (const auto& [name, method] : {std::pair{"ITERATIVE", cv::SOLVEPNP_ITERATIVE},

@@ -82,8 +82,8 @@ std::optional<PnpTrial> draw_trial(const PnpSetting& s, std::mt19937_64& random)
     for (std::size_t i = 0; i < n; ++i) {
         trial.body_m.push_back(Vec3{u(random), u(random), u(random)} * half);
         const Vec3 p = trial.T_camera_body * trial.body_m.back();
-        Pixel pixel{focal_px * p.x / p.z + trial.camera.cx + s.noise_px * normal(random),
-                    focal_px * p.y / p.z + trial.camera.cy + s.noise_px * normal(random)};
+        const auto [x, y] = trial.camera.of_plane(p.x / p.z, p.y / p.z);
+        Pixel pixel{x + s.noise_px * normal(random), y + s.noise_px * normal(random)};
         if (i >= trial.inliers) pixel = {kPixels * (0.5 + 0.5 * u(random)), kPixels * (0.5 + 0.5 * u(random))};
         trial.pixels.push_back(pixel);
     }

@@ -1,5 +1,7 @@
 #include "bench/raw_embree_scene.h"
 
+#include "renderer/camera/camera_model.h"
+
 namespace narpa {
 
 Result<RawScene> RawScene::build(const Scene& scene, const BodyPoses& at) {
@@ -42,10 +44,9 @@ Result<RawScene> RawScene::build(const Scene& scene, const BodyPoses& at) {
     return raw;
 }
 
-RawAim::RawAim(const Camera& c, const Rigid3& T)
-    : origin(vec_cast<float>(T.t)),
-      across(vec_cast<float>(T.q * Vec3{1 / c.fx, 0, 0})),
-      down(vec_cast<float>(T.q * Vec3{0, 1 / c.fy, 0})),
-      ahead(vec_cast<float>(T.q * Vec3{-c.cx / c.fx, -c.cy / c.fy, 1})) {}
+RawAim::RawAim(const Camera& c, const Rigid3& T) : origin(vec_cast<float>(T.t)) {
+    const auto [at_zero, per_x, per_y] = Pinhole(c).rays(T.q);
+    across = vec_cast<float>(per_x), down = vec_cast<float>(per_y), ahead = vec_cast<float>(at_zero);
+}
 
 }  // namespace narpa

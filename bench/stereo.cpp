@@ -13,6 +13,7 @@
 #include "emulator/world.h"
 #include "estimator/pose/pose_estimate.h"
 #include "plot/plot.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/camera/detector.h"
 #include "renderer/film/camera_image.h"
 
@@ -35,7 +36,7 @@ const Camera* find_camera(const Scene& scene, const std::string& name) {
 }
 
 Vector3d direction(const Camera& c, const Vector2d& px) {
-    return {(px.x() - c.cx) / c.fx, (px.y() - c.cy) / c.fy, 1};
+    return to_eigen(CameraModelHandle(c)->on_plane({px.x(), px.y()}));
 }
 
 /// One of the two cameras, where it is, and what is around it.

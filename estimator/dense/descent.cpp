@@ -7,6 +7,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "renderer/camera/camera_model.h"
+
 namespace narpa {
 namespace {
 
@@ -63,9 +65,9 @@ private:
 };
 
 /// Longest way that a point of the target goes in the image, about.
-double motion_px(const Vector6& step, const Camera& camera, const Rigid3& T_camera_target, double extent_px) {
+double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_camera_target, double extent_px) {
     const double z = std::max(T_camera_target.t.z, 1e-9);
-    return camera.fx * step.segment<2>(3).norm() / z +
+    return pixels_per_radian * step.segment<2>(3).norm() / z +
            0.5 * extent_px * (step.head<3>().norm() + std::abs(step[5]) / z);
 }
 
@@ -98,6 +100,7 @@ Descent::Descent(const Camera& camera, const SensorModel& sensor, const RenderSc
                  std::size_t target, int factor, LevelView& view, const DenseOptions& options,
                  DenseEstimate& estimate)
     : camera_(camera),
+      pixels_per_radian_(CameraModelHandle(camera)->pixels_per_radian()),
       sensor_(sensor),
       render_scene_(render_scene),
       target_(target),
@@ -184,7 +187,7 @@ void Descent::shift() {
     if (dx == 0 && dy == 0) return;
     Vector6 sideways = Vector6::Zero();
     const double z = std::abs(e_.T_camera_body.t.z);
-    sideways[3] = dx * z / camera_.fx, sideways[4] = dy * z / camera_.fy;
+    sideways[3] = dx * z / pixels_per_radian_, sideways[4] = dy * z / pixels_per_radian_;
     e_.T_camera_body = displaced(e_.T_camera_body, sideways);
     render(e_.T_camera_body);
 }
@@ -222,7 +225,7 @@ Descent::Step Descent::next_step(double damping) const {
     Step s;
     s.pose = stride_ * damped.ldlt().solve(equations_.pose_gradient());
     s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
-    s.motion_px = motion_px(s.pose, camera_, e_.T_camera_body, extent_px(view_.window()));
+    s.motion_px = motion_px(s.pose, pixels_per_radian_, e_.T_camera_body, extent_px(view_.window()));
     s.size = coarse_ ? s.motion_px / kCoarseStep_px : s.sigmas / o_.sigmas;
     s.trusted = stride_ == 1 && s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
     return s;

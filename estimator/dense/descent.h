@@ -44,6 +44,7 @@ private:
     void note(double sigmas, bool better);
 
     const Camera& camera_;
+    const double pixels_per_radian_;
     const SensorModel& sensor_;
     const RenderScene& render_scene_;
     const std::size_t target_;

@@ -8,7 +8,7 @@
 
 #include "estimator/dense/pixel_patch.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
 
@@ -67,19 +67,19 @@ private:
         const double jump = a.signal - b.signal;
         if (jump == 0) return;
         jumps_ += std::abs(jump);
-        const SeenPoint& near = a.depth_m <= b.depth_m ? a : b;
+        const SeenPoint& near = a.range_m <= b.range_m ? a : b;
         const bool rides_along = near.body >= 0 && near.body == grid_.camera().mount;
         if (near.body < 0 || rides_along) return;
-        double along = 0.5, depth_m = near.depth_m;
+        double along = 0.5, range_m = near.range_m;
         // A side on the border is half this pixel's, but for a contour, whose place is known.
         double share = 0.5 * (within(ia, ja) ? 1 : 0) + 0.5 * (within(ib, jb) ? 1 : 0);
         const double xa = x_ * grid_.fineness() + ia, ya = y_ * grid_.fineness() + ja;
         const double dx = ib - ia, dy = jb - ja;
         if (is_contour(a, b)) {
-            find_contour(a, b, xa, ya, dx, dy, along, depth_m);
+            find_contour(a, b, xa, ya, dx, dy, along, range_m);
             share = (along < 0.5 ? within(ia, ja) : within(ib, jb)) ? 1 : 0;
         }
-        if (share > 0) sum_ += share * jump * velocity(xa + along * dx, ya + along * dy, depth_m, dy == 0);
+        if (share > 0) sum_ += share * jump * velocity(xa + along * dx, ya + along * dy, range_m, dy == 0);
     }
 
     /// Are the two not neighbouring points of one surface? Judged by the slopes that their normals tell.
@@ -92,23 +92,22 @@ private:
         return norm(a.position - b.position) > kSurfaceSteps * step_m;
     }
 
-    /// Where on the way (dx, dy) from a at (xa, ya), 0, to b, 1, the nearer surface ends, and its depth there.
+    /// Where on the way (dx, dy) from a at (xa, ya), 0, to b, 1, the nearer surface ends, and its range there.
     void find_contour(const SeenPoint& a, const SeenPoint& b, double xa, double ya, double dx, double dy,
-                      double& along, double& depth_m) const {
-        const bool near_is_a = a.depth_m <= b.depth_m;
+                      double& along, double& range_m) const {
+        const bool near_is_a = a.range_m <= b.range_m;
         const SeenPoint& far = near_is_a ? b : a;
         double on_near = near_is_a ? 0 : 1, on_far = 1 - on_near;
         const Frame& f = grid_.frame();
-        const Vec3 axis = f.T_world_camera.q * Vec3{0, 0, 1};
         for (int k = 0; k < kHalvings; ++k) {
             const double middle = 0.5 * (on_near + on_far);
-            const Ray ray = camera_ray(f.camera, f.T_world_camera, xa + middle * dx, ya + middle * dy);
+            const Ray ray = camera_ray(f.model, f.T_world_camera, xa + middle * dx, ya + middle * dy);
             const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-            const double here_m = hit.body < 0 ? kInfinity : hit.range_m * dot(ray.direction, axis);
-            const bool nearer = std::abs(here_m - depth_m) < std::abs(here_m - far.depth_m);
+            const double here_m = hit.body < 0 ? kInfinity : hit.range_m;
+            const bool nearer = std::abs(here_m - range_m) < std::abs(here_m - far.range_m);
             if (hit.body >= 0 && (hit.body != far.body || nearer)) {
                 on_near = middle;
-                depth_m = here_m;
+                range_m = here_m;
             } else {
                 on_far = middle;
             }
@@ -117,11 +116,12 @@ private:
     }
 
     /// Of the point at this place of the grid, across a side: points of the grid per unit of the pose's error.
-    [[nodiscard]] Row velocity(double x, double y, double depth_m, bool horizontal) const {
-        const Camera& c = grid_.camera();
-        const double u = (x - c.cx) / c.fx, v = (y - c.cy) / c.fy;
-        const Vec3 a = depth_m * Vec3{u, v, 1} - t_camera_target_;  // about the target's origin, in camera axes
-        const Vec3 move = horizontal ? (c.fx / depth_m) * Vec3{1, 0, -u} : (c.fy / depth_m) * Vec3{0, 1, -v};
+    [[nodiscard]] Row velocity(double x, double y, double range_m, bool horizontal) const {
+        const CameraModel& model = *grid_.frame().model;
+        const Vec3 point = range_m * model.direction({x, y});
+        const Vec3 a = point - t_camera_target_;  // about the target's origin, in camera axes
+        const ProjectionJacobian J = model.jacobian(point);
+        const Vec3& move = horizontal ? J.x : J.y;
         Row row;
         row << to_eigen(cross(a, move)), to_eigen(move);
         return row;
@@ -141,12 +141,12 @@ Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, cons
     for (int j = 0; j < kShadingPoints; ++j)
         for (int i = 0; i < kShadingPoints; ++i) {
             constexpr double kStep = 1.0 / kShadingPoints, kFirst = 0.5 * kStep - 0.5;
-            const Ray ray = camera_ray(f.camera, f.T_world_camera, x + kFirst + kStep * i, y + kFirst + kStep * j);
+            const Ray ray = camera_ray(f.model, f.T_world_camera, x + kFirst + kStep * i, y + kFirst + kStep * j);
             const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
             if (hit.body < 0 || hit.body == f.camera.mount) continue;
             if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) continue;
             const Surface surface =
-                surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m * kStep / f.camera.fx);
+                surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m * kStep / f.model->pixels_per_radian());
             const Vec3& to_sun = f.sun->centre();
             const double cosine = dot(surface.normal, to_sun);
             if (cosine <= 0 || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) continue;

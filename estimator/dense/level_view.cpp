@@ -1,7 +1,12 @@
 #include "estimator/dense/level_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "renderer/camera/camera_model.h"
 
 namespace narpa {
 namespace {
@@ -11,14 +16,24 @@ constexpr double kRoom_px = 6, kRoomPart = 0.1;
 /// Windows begin and end at multiples of this, so that small moves do not change them.
 constexpr int kRounding_px = 8;
 
-/// Of an ellipsoid's outline along one axis of the normalised image: tangents of its dual conic.
-struct Extremes {
-    double low = 0, high = 0;
-};
-Extremes extremes(const Eigen::Matrix3d& dual, int axis) {
-    const double middle = dual(axis, 2) / dual(2, 2);
-    const double half = std::sqrt(std::max(middle * middle - dual(axis, axis) / dual(2, 2), 0.0));
-    return {middle - half, middle + half};
+/// Corners of a polygon about an ellipsoid's outline as the camera sees it, camera axes; none where the camera is
+/// inside.
+std::optional<std::array<Vec3, 32>> outline(const BodyBounds& bounds, const Rigid3& T_camera_target) {
+    // In the space where the ellipsoid is a unit sphere the outline is a circle.
+    const Vec3 eye = (inverse(T_camera_target).t - bounds.centre_m) / bounds.semi_axes_m;
+    const double distance = norm(eye);
+    if (!(distance > 1)) return {};
+    const Vec3 z = eye / distance;
+    const Vec3 x = normalized(cross(z, std::abs(z.x) < 0.5 ? Vec3{1, 0, 0} : Vec3{0, 1, 0})), y = cross(z, x);
+    std::array<Vec3, 32> corners;
+    const double step = 2 * std::numbers::pi / static_cast<double>(corners.size());
+    const double radius = std::sqrt(1 - 1 / (distance * distance)) / std::cos(0.5 * step);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+        const double angle = step * static_cast<double>(i);
+        const Vec3 corner = z / distance + radius * (std::cos(angle) * x + std::sin(angle) * y);
+        corners[i] = T_camera_target * (bounds.centre_m + corner * bounds.semi_axes_m);
+    }
+    return corners;
 }
 
 /// Pixels from the first to the last, clipped; count 0: none.
@@ -38,19 +53,23 @@ Interval rounded(double low_px, double high_px, int size) {
 
 std::optional<Window> window_about(const Tracer& tracer, const Camera& camera, std::size_t target,
                                    const Rigid3& T_camera_target) {
-    const BodyBounds& bounds = tracer.bounds(target);
-    const Eigen::Vector3d centre = to_eigen(T_camera_target * bounds.centre_m);
-    Eigen::Matrix3d axes;
-    const auto turned = columns(T_camera_target.q);
-    for (int k = 0; k < 3; ++k) axes.col(k) = bounds.semi_axes_m[k] * to_eigen(turned[static_cast<std::size_t>(k)]);
-    const Eigen::Matrix3d shape = axes * axes.transpose();
-    const double depth_m = std::sqrt(shape(2, 2));
-    if (!(centre.z() + depth_m > 0)) return {};
-    if (centre.z() - depth_m <= 0) return Window{0, 0, camera.width, camera.height};  // the camera may be inside
-    const Eigen::Matrix3d dual = shape - centre * centre.transpose();
-    const Extremes u = extremes(dual, 0), v = extremes(dual, 1);
-    const double left = camera.cx + camera.fx * u.low, right = camera.cx + camera.fx * u.high;
-    const double top = camera.cy + camera.fy * v.low, bottom = camera.cy + camera.fy * v.high;
+    const Window whole{0, 0, camera.width, camera.height};
+    const CameraModelHandle model(camera);
+    const auto corners = outline(tracer.bounds(target), T_camera_target);
+    if (!corners) return whole;
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    double left = kInfinity, right = -kInfinity, top = kInfinity, bottom = -kInfinity;
+    std::size_t without_image = 0;
+    for (const Vec3& corner : *corners) {
+        const auto p = model->project(corner);
+        if (!p)
+            ++without_image;
+        else
+            left = std::min(left, p->x), right = std::max(right, p->x), top = std::min(top, p->y),
+            bottom = std::max(bottom, p->y);
+    }
+    if (without_image == corners->size()) return {};
+    if (without_image > 0) return whole;
     if (right < -0.5 || bottom < -0.5 || left > camera.width - 0.5 || top > camera.height - 0.5) return {};
     const Interval x = rounded(left, right, camera.width), y = rounded(top, bottom, camera.height);
     return Window{x.first, y.first, x.count, y.count};
@@ -60,18 +79,11 @@ double extent_px(const Window& window) {
     return std::max(window.width, window.height);
 }
 
-Camera window_camera(const Camera& camera, const Window& window) {
-    Camera c = camera;
-    c.width = window.width, c.height = window.height;
-    c.cx -= window.x, c.cy -= window.y;
-    return c;
-}
-
-LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window,
-                     std::size_t target, const BodyPoses& at)
+LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window, std::size_t target,
+                     const BodyPoses& at)
     : window_(window),
-      view_(render_scene, window_camera(camera, window), target, at),
-      derivative_(render_scene, window_camera(camera, window), target, at) {
+      view_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at),
+      derivative_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at) {
     const std::size_t n = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
     measured_.resize(n);
     signal_.resize(n);

@@ -24,8 +24,6 @@ struct Window {
 /// Longest side of the target's bounds in the image, px; the image's own where they reach beyond it.
 [[nodiscard]] double extent_px(const Window& window);
 
-[[nodiscard]] Camera window_camera(const Camera& camera, const Window& window);
-
 /// Signal and derivative in a window of the camera.
 class LevelView {
 public:

@@ -6,11 +6,7 @@ namespace narpa {
 namespace {
 
 Camera finer_camera(const Camera& camera, int factor) {
-    Camera c = camera;
-    c.width *= factor, c.height *= factor;
-    c.fx *= factor, c.fy *= factor;
-    c.cx = (c.cx + 0.5) * factor - 0.5;
-    c.cy = (c.cy + 0.5) * factor - 0.5;
+    Camera c = scaled(camera, factor, factor);
     c.lens.reset();
     return c;
 }
@@ -42,7 +38,6 @@ void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, in
     side_ = s + 2;
     points_.resize(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
     sees_anything_ = false;
-    const Vec3 axis = f.T_world_camera.q * Vec3{0, 0, 1};
     Packet p;
     CameraSamples samples;
     samples.middle = true;
@@ -54,12 +49,11 @@ void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, in
         for (std::size_t i = 0; i < samples.n; ++i) {
             constexpr double kInfinity = std::numeric_limits<double>::infinity();
             SeenPoint& seen = points_[place[i]];
-            seen = {signal_of(sensor, radiance[i]), -1, kInfinity, kInfinity, {}, {}, p.rays.direction[i]};
+            seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
             if (p.hits.body[i] < 0) continue;
             sees_anything_ = true;
             seen.body = p.hits.body[i];
             seen.range_m = p.hits.range_m[i];
-            seen.depth_m = seen.range_m * dot(seen.ray_direction, axis);
             seen.position = p.hits.position[i];
             seen.normal = p.hits.geometric_normal[i];
         }

@@ -36,7 +36,7 @@ private:
 struct SeenPoint {
     double signal = 0;  ///< DN above black
     int body = -1;
-    double range_m = 0, depth_m = 0;             ///< along the ray, along the camera's axis
+    double range_m = 0;                          ///< along the ray
     Vec3 position{}, normal{}, ray_direction{};  ///< world
 };
 

@@ -5,8 +5,10 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "estimator/features/flow_noise.h"
+#include "estimator/pose/reprojection.h"
 
 namespace narpa {
 namespace {
@@ -41,21 +43,11 @@ PixelCovariance with_floor(const PixelCovariance& c, double floor_px) {
     return {c.uu + floor_px * floor_px, c.uv, c.vv + floor_px * floor_px};
 }
 
-Pixel seen_at(const Camera& camera, const Vec3& p) {
-    return {camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
-}
-
-/// Of a point's pixel by the pose's error (pose_estimate.h).
-Eigen::Matrix<double, 2, 6> pixel_derivative(const Camera& camera, const Rigid3& T, const Vec3& body_m) {
-    const Vec3 a = T.q * body_m, p = a + T.t;
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << camera.fx / p.z, 0, -camera.fx * p.x / (p.z * p.z), 0, camera.fy / p.z,
-        -camera.fy * p.y / (p.z * p.z);
-    Eigen::Matrix3d minus_skew;
-    minus_skew << 0, a.z, -a.y, -a.z, 0, a.x, a.y, -a.x, 0;
-    Eigen::Matrix<double, 2, 6> J;
-    J << by_point * minus_skew, by_point;
-    return J;
+/// Infinite where the point has no image.
+Pixel project(const CameraModel& camera, const Vec3& p) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const auto image = camera.project(p);
+    return image ? Pixel{image->x, image->y} : Pixel{kInfinity, kInfinity};
 }
 
 /// Part of a window's side that it shares with another so far away.
@@ -95,11 +87,11 @@ struct FeatureAlignment::Points {
 
     [[nodiscard]] std::size_t size() const { return body_m.size(); }
 
-    [[nodiscard]] std::vector<double> residuals_px(const Camera& camera, const Rigid3& T) const {
+    [[nodiscard]] std::vector<double> residuals_px(const CameraModel& camera, const Rigid3& T) const {
         std::vector<double> lengths;
         lengths.reserve(size());
         for (std::size_t i = 0; i < size(); ++i) {
-            const Pixel p = seen_at(camera, T * body_m[i]);
+            const Pixel p = project(camera, T * body_m[i]);
             lengths.push_back(std::hypot(p.u - pixels[i].u, p.v - pixels[i].v));
         }
         return lengths;
@@ -118,7 +110,7 @@ struct FeatureAlignment::Points {
     }
     /// What it adds to the covariance that the errors beyond the sensor's noise of two matches are alike as far as
     /// their windows overlap: C (sum over pairs of J_i' W_i S_ij W_j J_j) C.
-    [[nodiscard]] Matrix6 covariance_of_shared_errors(const Camera& camera, const Rigid3& T, const Matrix6& C,
+    [[nodiscard]] Matrix6 covariance_of_shared_errors(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
                                                       double floor_px) const {
         std::vector<Eigen::Matrix<double, 6, 2>> pulls;  // J' W
         pulls.reserve(size());
@@ -126,7 +118,7 @@ struct FeatureAlignment::Points {
             const PixelCovariance c = with_floor(noise[i], floor_px);
             Eigen::Matrix2d S;
             S << c.uu, c.uv, c.uv, c.vv;
-            pulls.emplace_back(pixel_derivative(camera, T, body_m[i]).transpose() * S.inverse());
+            pulls.emplace_back(reprojection_jacobian(camera, T, body_m[i]).transpose() * S.inverse());
         }
         Matrix6 middle = Matrix6::Zero();
         for (std::size_t i = 0; i < size(); ++i)
@@ -140,12 +132,12 @@ struct FeatureAlignment::Points {
     }
     /// The error of a match beyond the sensor's noise that makes chi^2 what its degrees of freedom say; 0 where the
     /// noise explains it all.
-    [[nodiscard]] double floor_px(const Camera& camera, const Rigid3& T) const {
+    [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T) const {
         const double freedom = std::max(1.0, 2 * static_cast<double>(size()) - 6);
         const auto chi2 = [&](double floor) {
             double sum = 0;
             for (std::size_t i = 0; i < size(); ++i) {
-                const Pixel p = seen_at(camera, T * body_m[i]);
+                const Pixel p = project(camera, T * body_m[i]);
                 sum += mahalanobis(p.u - pixels[i].u, p.v - pixels[i].v, with_floor(noise[i], floor));
             }
             return sum;
@@ -165,8 +157,7 @@ FeatureAlignment::FeatureAlignment(const RenderScene& render_scene, const Camera
       matcher_(settings.kind, settings.features) {}
 
 bool FeatureAlignment::on_smooth_surface(double u, double v, const Hit& hit) const {
-    const Camera& camera = view_.camera();
-    const double step_m = kStep_px * hit.range_m / camera.fx;
+    const double step_m = kStep_px * hit.range_m / CameraModelHandle(view_.camera())->pixels_per_radian();
     constexpr std::array<std::array<double, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
     return std::all_of(kAround.begin(), kAround.end(), [&](const std::array<double, 2>& d) {
         const Hit beside = view_.look_through(u + kNeighbour_px * d[0], v + kNeighbour_px * d[1]);
@@ -230,13 +221,13 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     FeatureEstimate estimate;
     estimate.T_camera_target = guess;
     view_.place_bodies(at);
-    const Camera& camera = view_.camera();
+    const CameraModelHandle model(view_.camera());
+    const CameraModel& camera = *model;
     const ToneScale tones(frame, sensor_);
     const TonedImage toned_frame = tones.toned(frame);
     FrameSettings render_settings;
     render_settings.spp = settings_.spp;
     render_settings.seed = settings_.seed;
-    const Pinhole pinhole{camera.fx, camera.fy, camera.cx, camera.cy};
     PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
     double floor_px = 1;  // until the matches tell
     Points points;
@@ -259,7 +250,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
             const std::vector<PixelCovariance> covariances = points.covariances(floor_px);
             RefineOptions options;
             options.loss.kind = loss;
-            const PnpInput input{pinhole, points.body_m, points.pixels, 1, covariances};
+            const PnpInput input{model, points.body_m, points.pixels, 1, covariances};
             return PnpFit(refiner.refine(input, estimate.T_camera_target, options));
         };
         const std::vector<double> before = points.residuals_px(camera, estimate.T_camera_target);
@@ -285,8 +276,8 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         }
         std::vector<double> moved;
         for (const Vec3& p : points.body_m) {
-            const Pixel a = seen_at(camera, estimate.T_camera_target * p),
-                        b = seen_at(camera, fit.T_camera_body * p);
+            const Pixel a = project(camera, estimate.T_camera_target * p),
+                        b = project(camera, fit.T_camera_body * p);
             moved.push_back(std::hypot(a.u - b.u, a.v - b.v));
         }
         round.agreeing = estimate.agreeing = static_cast<int>(points.size());
@@ -307,8 +298,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         }
     }
     estimate.bound =
-        refiner.refine({pinhole, points.body_m, points.pixels, 1, points.noise}, estimate.T_camera_target)
-            .covariance;
+        refiner.refine({model, points.body_m, points.pixels, 1, points.noise}, estimate.T_camera_target).covariance;
     return estimate;
 }
 

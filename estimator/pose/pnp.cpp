@@ -25,7 +25,8 @@ double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, 
         sum += p.seen.u * p.seen.u + p.seen.v * p.seen.v;
     }
     const double seen_rms = std::sqrt(std::max(0.0, sum / n - mean_u * mean_u - mean_v * mean_v));
-    return input.camera.fx * seen_rms * spread.rms_m.z / (spread.rms_m.x * typical_sigma_px(input));
+    return input.camera->pixels_per_radian() * seen_rms * spread.rms_m.z /
+           (spread.rms_m.x * typical_sigma_px(input));
 }
 
 bool is_a_line(const PointExtent& spread) {
@@ -87,8 +88,8 @@ void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread, cons
     if (few) consider_triples(options);
     if (!fits_the_noise()) {
         starts_.clear();
-        opencv_starts(input, depth < kFlatSigma, starts_);
-        for (const Rigid3& T : starts_) consider(T, options);
+        opencv_starts(gathered_, depth < kFlatSigma, starts_);
+        for (const CentredPose& start : starts_) consider(start, options);
     }
     if (few || depth < kReversibleSigma || !fits_the_noise()) consider_reversed(spread, options);
 }
@@ -120,11 +121,7 @@ void PnpSolver::gather() {
 }
 
 void PnpSolver::consider(const CentredPose& start, const PnpOptions& options) {
-    consider(points_.uncentred(start), options);
-}
-
-void PnpSolver::consider(const Rigid3& start, const PnpOptions& options) {
-    refine(points_, start, {options.lm, {}}, trial_);
+    refine(points_, points_.uncentred(start), {options.lm, {}}, trial_);
     if (trial_.status == PnpStatus::behind_camera || trial_.status == PnpStatus::not_finite) return;
     PnpFit& first = solution_.fit;
     PnpFit& second = solution_.second;

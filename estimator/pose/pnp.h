@@ -53,21 +53,21 @@ private:
     void solve_with_outliers(const PnpInput& input, const PnpOptions& options);
     void gather();
     void consider(const CentredPose& start, const PnpOptions& options);
-    void consider(const Rigid3& start, const PnpOptions& options);
     void consider_triples(const PnpOptions& options);
     void consider_reversed(const PointExtent& spread, const PnpOptions& options);
     [[nodiscard]] bool fits_the_noise() const;
     [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);
-    [[nodiscard]] bool find_consensus(const PnpInput& input, const PnpOptions& options, bool orthographic);
+    [[nodiscard]] bool find_consensus(const PnpOptions& options, bool orthographic);
+    [[nodiscard]] std::array<BodyPoint, 3> sample(const std::array<std::size_t, 3>& drawn) const;
     void try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
-    void try_p3p(const PnpInput& input, const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
+    void try_p3p(const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
     void try_hypothesis(const CentredPose& pose, const PnpOptions& options);
 
     PnpPoints points_, all_;  // those in use, and with outliers
     std::vector<BodyPoint> gathered_;
     std::vector<double> squared_;
     std::vector<std::uint8_t> flags_;
-    std::vector<Rigid3> starts_;
+    std::vector<CentredPose> starts_;
     PnpFit trial_;
     struct Consensus {
         double cost_of_sample = 0;  // of the best sample, before refinement

@@ -1,12 +1,16 @@
 #include "estimator/pose/pnp_ceres.h"
 
-#include <ceres/ceres.h>
-#include <ceres/rotation.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/sized_cost_function.h>
+#include <ceres/solver.h>
 #include <ceres/tiny_solver.h>
-#include <ceres/tiny_solver_autodiff_function.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <memory>
+
+#include "estimator/pose/reprojection.h"
 
 namespace narpa {
 namespace {
@@ -21,54 +25,73 @@ Eigen::Matrix2d whitening(const PnpInput& input, std::size_t i) {
     return Eigen::LLT<Eigen::Matrix2d>(information).matrixU();
 }
 
-template <class T>
-void whitened_residual(const PnpInput& input, std::size_t i, const Eigen::Matrix2d& W, const T* b, T* residual) {
-    const T u = input.camera.fx * b[0] / b[2] + input.camera.cx - input.pixels[i].u;
-    const T v = input.camera.fy * b[1] / b[2] + input.camera.cy - input.pixels[i].v;
-    residual[0] = W(0, 0) * u + W(0, 1) * v;
-    residual[1] = W(1, 1) * v;
+/// d exp(r) p = left_jacobian(r) dr x exp(r) p: the left Jacobian of SO(3).
+Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
+    const double angle = r.norm(), square = angle * angle;
+    const bool small = angle < 1e-4;
+    const double a = small ? 0.5 - square / 24 : (1 - std::cos(angle)) / square;
+    const double b = small ? 1.0 / 6 - square / 120 : (angle - std::sin(angle)) / (angle * square);
+    return Eigen::Matrix3d::Identity() + a * skew(r) + b * skew(r) * skew(r);
 }
 
-/// Of one point.
+/// Whitened residual of one point. The parameters: a rotation vector from the start's attitude, and the
+/// translation.
 struct Residual {
     const PnpInput& input;
+    Quat start;
     std::size_t i;
     Eigen::Matrix2d W = whitening(input, i);
 
-    template <class T>
-    bool operator()(const T* q_wxyz, const T* t, T* residual) const {
-        const Vec3& p = input.body_m[i];
-        const T a[3] = {T(p.x), T(p.y), T(p.z)};
-        T b[3];
-        ceres::UnitQuaternionRotatePoint(q_wxyz, a, b);
-        for (int k = 0; k < 3; ++k) b[k] += t[k];
-        if (b[2] <= T(0)) return false;
-        whitened_residual(input, i, W, b, residual);
+    /// False where the point has no image. `jacobian` may be null.
+    bool evaluate(const double* x, Eigen::Vector2d& residual, Matrix26* jacobian) const {
+        const Rigid3 T{exp_rotation({x[0], x[1], x[2]}) * start, {x[3], x[4], x[5]}};
+        const auto image = input.camera->project(T * input.body_m[i]);
+        if (!image) return false;
+        residual = W * Eigen::Vector2d(image->x - input.pixels[i].u, image->y - input.pixels[i].v);
+        if (jacobian == nullptr) return true;
+        *jacobian = W * reprojection_jacobian(*input.camera, T, input.body_m[i]);
+        jacobian->leftCols<3>() *= left_jacobian({x[0], x[1], x[2]});
         return true;
     }
 };
 
-/// Of all points, by a rotation vector from the start and a translation.
+class ResidualOfPoint final : public ceres::SizedCostFunction<2, 6> {
+public:
+    ResidualOfPoint(const PnpInput& input, const Quat& start, std::size_t i) : residual_{input, start, i} {}
+
+    bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
+        Eigen::Vector2d residual;
+        Matrix26 J;
+        const bool wanted = jacobians != nullptr && jacobians[0] != nullptr;
+        if (!residual_.evaluate(x[0], residual, wanted ? &J : nullptr)) return false;
+        std::copy_n(residual.data(), 2, residuals);
+        if (wanted) Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>>(jacobians[0], 2, 6) = J;
+        return true;
+    }
+
+private:
+    Residual residual_;
+};
+
+/// Of all points, for the tiny solver.
 struct AllResiduals {
     using Scalar = double;
     enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 6 };
 
-    const PnpInput& input;
-    const Rigid3& start;
-    std::vector<Eigen::Matrix2d> W{};
+    std::vector<Residual> points;
 
-    [[nodiscard]] int NumResiduals() const { return 2 * static_cast<int>(input.body_m.size()); }
+    [[nodiscard]] int NumResiduals() const { return 2 * static_cast<int>(points.size()); }
 
-    template <class T>
-    bool operator()(const T* x, T* residuals) const {
-        for (std::size_t i = 0; i < input.body_m.size(); ++i) {
-            const Vec3 turned = start.q * input.body_m[i];
-            const T a[3] = {T(turned.x), T(turned.y), T(turned.z)};
-            T b[3];
-            ceres::AngleAxisRotatePoint(x, a, b);
-            for (int k = 0; k < 3; ++k) b[k] += x[3 + k];
-            if (b[2] <= T(0)) return false;
-            whitened_residual(input, i, W[i], b, residuals + 2 * i);
+    bool operator()(const double* x, double* residuals, double* jacobian) const {
+        Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>> all(jacobian, NumResiduals(),
+                                                                 jacobian != nullptr ? 6 : 0);
+        for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(points.size()); ++i) {
+            Eigen::Vector2d residual;
+            Matrix26 J;
+            if (!points[static_cast<std::size_t>(i)].evaluate(x, residual, jacobian != nullptr ? &J : nullptr))
+                return false;
+            std::copy_n(residual.data(), 2, residuals + 2 * i);
+            if (jacobian != nullptr) all.middleRows<2>(2 * i) = J;
         }
         return true;
     }
@@ -113,6 +136,10 @@ PnpFit refused(PnpStatus status) {
     return fit;
 }
 
+Rigid3 pose_of(const Quat& start, const double* x) {
+    return {normalized(exp_rotation({x[0], x[1], x[2]}) * start), {x[3], x[4], x[5]}};
+}
+
 bool is_usable(const Rigid3& T) {
     const double n = dot(T.q, T.q);
     return std::isfinite(n) && n > 0 && is_finite(T.t);
@@ -125,17 +152,14 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
     if (!is_usable(start)) return refused(PnpStatus::not_finite);
     const Quat q0 = normalized(start.q);
     for (const Vec3& p : input.body_m)
-        if (!((q0 * p + start.t).z > 0)) return refused(PnpStatus::behind_camera);
-    double q[4] = {q0.w, q0.x, q0.y, q0.z}, t[3] = {start.t.x, start.t.y, start.t.z};
+        if (!input.camera->project(q0 * p + start.t)) return refused(PnpStatus::behind_camera);
+    double x[6] = {0, 0, 0, start.t.x, start.t.y, start.t.z};
     const std::unique_ptr<ceres::LossFunction> loss_of_all = loss_function(loss);
     ceres::Problem::Options ours;
     ours.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     ceres::Problem problem(ours);
-    problem.AddParameterBlock(q, 4, new ceres::QuaternionManifold);
-    problem.AddParameterBlock(t, 3);
     for (std::size_t i = 0; i < input.body_m.size(); ++i)
-        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Residual, 2, 4, 3>(new Residual{input, i}),
-                                 loss_of_all.get(), q, t);
+        problem.AddResidualBlock(new ResidualOfPoint(input, q0, i), loss_of_all.get(), x);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
     options.num_threads = 1;
@@ -144,8 +168,7 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
     if (summary.termination_type == ceres::FAILURE) return refused(PnpStatus::behind_camera);
-    PnpFit fit = judged(input, {normalized(Quat{q[0], q[1], q[2], q[3]}), {t[0], t[1], t[2]}}, loss,
-                        summary.termination_type == ceres::CONVERGENCE);
+    PnpFit fit = judged(input, pose_of(q0, x), loss, summary.termination_type == ceres::CONVERGENCE);
     fit.summary.iterations = static_cast<int>(summary.iterations.size()) - 1;
     for (std::size_t i = 0; i < summary.iterations.size(); ++i)
         fit.summary.chi2_at[i] = 2 * summary.iterations[i].cost;
@@ -155,19 +178,14 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
 PnpFit refine_with_tiny_solver(const PnpInput& input, const Rigid3& start) {
     if (const PnpStatus status = check(input); status != PnpStatus::converged) return refused(status);
     if (!is_usable(start)) return refused(PnpStatus::not_finite);
-    const Rigid3 from{normalized(start.q), start.t};
-    AllResiduals residuals{input, from};
-    for (std::size_t i = 0; i < input.body_m.size(); ++i) residuals.W.push_back(whitening(input, i));
-    using Function = ceres::TinySolverAutoDiffFunction<AllResiduals, Eigen::Dynamic, 6>;
-    const Function function(residuals);
-    ceres::TinySolver<Function> solver;
+    const Quat q0 = normalized(start.q);
+    AllResiduals residuals;
+    for (std::size_t i = 0; i < input.body_m.size(); ++i) residuals.points.push_back({input, q0, i});
+    ceres::TinySolver<AllResiduals> solver;
     Vector6 x;
-    x << 0, 0, 0, to_eigen(from.t);
-    const auto summary = solver.Solve(function, &x);
-    const Quat q = exp_rotation({x[0], x[1], x[2]}) * from.q;
-    using Status = std::decay_t<decltype(summary.status)>;
-    PnpFit fit =
-        judged(input, {normalized(q), {x[3], x[4], x[5]}}, {}, summary.status != Status::HIT_MAX_ITERATIONS);
+    x << 0, 0, 0, to_eigen(start.t);
+    const auto summary = solver.Solve(residuals, &x);
+    PnpFit fit = judged(input, pose_of(q0, x.data()), {}, summary.status != decltype(solver)::HIT_MAX_ITERATIONS);
     fit.summary.iterations = summary.iterations;
     return fit;
 }

@@ -27,10 +27,7 @@ const char* in_words(PnpStatus status) {
 }
 
 PnpStatus check(const PnpInput& input) {
-    const Pinhole& c = input.camera;
-    if (!(c.fx > 0 && c.fy > 0 && std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) &&
-          std::isfinite(c.cy)))
-        return PnpStatus::bad_camera;
+    if (!input.camera->is_valid()) return PnpStatus::bad_camera;
     if (input.body_m.size() != input.pixels.size()) return PnpStatus::sizes_differ;
     if (!input.covariance_px2.empty() && input.covariance_px2.size() != input.pixels.size())
         return PnpStatus::sizes_differ;
@@ -39,11 +36,27 @@ PnpStatus check(const PnpInput& input) {
         if (!is_finite(p)) return PnpStatus::not_finite;
     for (const Pixel& p : input.pixels)
         if (!std::isfinite(p.u) || !std::isfinite(p.v)) return PnpStatus::not_finite;
+    if (input.camera->pinhole() == nullptr)
+        for (const Pixel& p : input.pixels)
+            if (!(input.camera->direction({p.u, p.v}).z > 0)) return PnpStatus::behind_camera;
     if (!(input.sigma_px > 0) || !std::isfinite(input.sigma_px)) return PnpStatus::bad_noise;
     for (const PixelCovariance& s : input.covariance_px2)
         if (!(s.uu > 0 && s.uu * s.vv > s.uv * s.uv) || !std::isfinite(s.uu * s.vv)) return PnpStatus::bad_noise;
     return PnpStatus::converged;
 }
+
+namespace {
+
+/// A pinhole's formulas are inlined; of any other model they are virtual calls.
+template <class F>
+void with_model(const CameraModel& model, const F& f) {
+    if (const Pinhole* pinhole = model.pinhole())
+        f(*pinhole);
+    else
+        f(model);
+}
+
+}  // namespace
 
 PnpPoints::PnpPoints(std::size_t points_max) : groups_((points_max + kGroup - 1) / kGroup) {}
 
@@ -51,7 +64,9 @@ void PnpPoints::assign(const PnpInput& input) {
     size_ = input.body_m.size();
     centroid_ = {};
     for (const Vec3& p : input.body_m) centroid_ += p * (1.0 / static_cast<double>(size_));
-    for (std::size_t i = 0; i < size_; ++i) put(i, input, i);
+    with_model(*input.camera, [&](const auto& model) {
+        for (std::size_t i = 0; i < size_; ++i) put(i, input, model, i);
+    });
     pad();
 }
 
@@ -61,27 +76,39 @@ void PnpPoints::assign(const PnpInput& input, std::span<const std::uint8_t> chos
     for (std::size_t i = 0; i < chosen.size(); ++i)
         if (chosen[i] != 0) sum += input.body_m[i], ++size_;
     centroid_ = sum / static_cast<double>(size_);
-    for (std::size_t i = 0, to = 0; i < chosen.size(); ++i)
-        if (chosen[i] != 0) put(to++, input, i);
+    with_model(*input.camera, [&](const auto& model) {
+        for (std::size_t i = 0, to = 0; i < chosen.size(); ++i)
+            if (chosen[i] != 0) put(to++, input, model, i);
+    });
     pad();
 }
 
-void PnpPoints::put(std::size_t i, const PnpInput& input, std::size_t point) {
+/// Residuals are taken on the plane z = 1 and weighed as those of the image, to first order about the measured
+/// pixel: exact for a pinhole.
+template <class Model>
+void PnpPoints::put(std::size_t i, const PnpInput& input, const Model& model, std::size_t point) {
     const Vec3 a = input.body_m[point] - centroid_;
-    const Pixel& p = input.pixels[point];
-    const Pinhole& c = input.camera;
+    const Vec3 on_plane = model.on_plane({input.pixels[point].u, input.pixels[point].v});
+    const ProjectionJacobian J = model.jacobian(on_plane);
     Group& to = groups_[i / kGroup];
     const std::size_t k = i % kGroup;
     to.x[k] = a.x, to.y[k] = a.y, to.z[k] = a.z;
-    to.u[k] = (p.u - c.cx) / c.fx, to.v[k] = (p.v - c.cy) / c.fy;
-    if (input.covariance_px2.empty()) {
-        to.l00[k] = c.fx / input.sigma_px, to.l10[k] = 0, to.l11[k] = c.fy / input.sigma_px;
-        return;
-    }
+    to.u[k] = on_plane.x, to.v[k] = on_plane.y;
     // C^-1 = W' W with W upper triangular: 1 / sqrt(var(v)) last, and u by what v does not tell of it.
-    const PixelCovariance& s = input.covariance_px2[point];
-    const double w = 1 / std::sqrt(s.uu - s.uv * s.uv / s.vv);
-    to.l00[k] = c.fx * w, to.l10[k] = -c.fy * w * s.uv / s.vv, to.l11[k] = c.fy / std::sqrt(s.vv);
+    double w00 = 1 / input.sigma_px, w01 = 0, w11 = w00;
+    if (!input.covariance_px2.empty()) {
+        const PixelCovariance& s = input.covariance_px2[point];
+        w00 = 1 / std::sqrt(s.uu - s.uv * s.uv / s.vv), w01 = -w00 * s.uv / s.vv, w11 = 1 / std::sqrt(s.vv);
+    }
+    // W J, made upper triangular again by a rotation of its rows.
+    const double a00 = w00 * J.x.x + w01 * J.y.x, a01 = w00 * J.x.y + w01 * J.y.y;
+    const double a10 = w11 * J.y.x, a11 = w11 * J.y.y;
+    if (a10 == 0) {
+        to.l00[k] = a00, to.l10[k] = a01, to.l11[k] = a11;
+    } else {
+        const double r = std::hypot(a00, a10), c = a00 / r, s = a10 / r;
+        to.l00[k] = r, to.l10[k] = c * a01 + s * a11, to.l11[k] = c * a11 - s * a01;
+    }
 }
 
 void PnpPoints::pad() {

@@ -8,14 +8,9 @@
 
 #include "estimator/pose/levenberg_marquardt.h"
 #include "estimator/pose/robust_loss.h"
+#include "renderer/camera/camera_model.h"
 
 namespace narpa {
-
-/// A pinhole: u = fx x / z + cx, v = fy y / z + cy; camera x right, y down, z forward; the centre of the top-left
-/// pixel is (0, 0).
-struct Pinhole {
-    double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px
-};
 
 struct Pixel {
     double u = 0, v = 0;
@@ -29,9 +24,9 @@ struct PixelCovariance {
 };
 
 /// N points: body_m[i] is seen at pixels[i]. `covariance_px2`: one for each, or empty, and then sigma_px holds for
-/// u and v of all.
+/// u and v of all. Every pixel's ray has z > 0.
 struct PnpInput {
-    Pinhole camera;
+    CameraModelHandle camera;
     std::span<const Vec3> body_m;
     std::span<const Pixel> pixels;
     double sigma_px = 1;
@@ -80,7 +75,7 @@ public:
     [[nodiscard]] std::size_t capacity() const noexcept { return groups_.size() * kGroup; }
     [[nodiscard]] const Vec3& centroid_body_m() const noexcept { return centroid_; }
 
-    /// Of point i: from the centroid, body axes; and ((u - cx) / fx, (v - cy) / fy).
+    /// Of point i: from the centroid, body axes; and where its pixel's ray meets the plane z = 1.
     [[nodiscard]] Vec3 centred_body_m(std::size_t i) const {
         const Group& g = groups_[i / kGroup];
         return {g.x[i % kGroup], g.y[i % kGroup], g.z[i % kGroup]};
@@ -109,12 +104,13 @@ public:
     struct alignas(64) Group {
         using Lanes = std::array<double, kGroup>;
         Lanes x, y, z;        // of the body, from the centroid
-        Lanes u, v;           // (pixel - principal point) / focal length
+        Lanes u, v;           // where the pixel's ray meets the plane z = 1
         Lanes l00, l10, l11;  // whitened residual = (l00 ru + l10 rv, l11 rv); 0 where there is no point
     };
 
 private:
-    void put(std::size_t i, const PnpInput& input, std::size_t point);
+    template <class Model>
+    void put(std::size_t i, const PnpInput& input, const Model& model, std::size_t point);
     void pad();
 
     std::size_t size_ = 0;

@@ -34,7 +34,7 @@ double samples_needed(std::size_t inliers, std::size_t n) {
 
 void PnpSolver::solve_with_outliers(const PnpInput& input, const PnpOptions& options) {
     all_.assign(input);
-    if (!find_consensus(input, options, true) && !find_consensus(input, options, false)) {
+    if (!find_consensus(options, true) && !find_consensus(options, false)) {
         solution_.status = PnpStatus::no_consensus;
         return;
     }
@@ -67,7 +67,7 @@ std::size_t PnpSolver::mark_inliers(const PnpPoints& points, const Rigid3& T, st
     return inliers;
 }
 
-bool PnpSolver::find_consensus(const PnpInput& input, const PnpOptions& options, bool orthographic) {
+bool PnpSolver::find_consensus(const PnpOptions& options, bool orthographic) {
     const std::size_t n = all_.size();
     const int tries = orthographic ? options.hypotheses_max : std::min(options.hypotheses_max, kP3pHypothesesMax);
     std::minstd_rand random(static_cast<std::minstd_rand::result_type>(options.seed));
@@ -78,27 +78,28 @@ bool PnpSolver::find_consensus(const PnpInput& input, const PnpOptions& options,
         if (orthographic) {
             try_orthographic(drawn, options);
         } else {
-            try_p3p(input, drawn, options);
+            try_p3p(drawn, options);
         }
     }
     const auto enough = static_cast<std::size_t>(options.inliers_min * static_cast<double>(n));
     return consensus_.inliers >= std::max(kInliersMin, enough);
 }
 
-void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
+std::array<BodyPoint, 3> PnpSolver::sample(const std::array<std::size_t, 3>& drawn) const {
     std::array<BodyPoint, 3> sample;
     for (std::size_t k = 0; k < 3; ++k) sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
-    const PoseStarts starts = triple_starts(sample);
+    return sample;
+}
+
+void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
+    const PoseStarts starts = triple_starts(sample(drawn));
     for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i], options);
 }
 
-void PnpSolver::try_p3p(const PnpInput& input, const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
-    std::array<Vec3, 3> body;
-    std::array<Pixel, 3> pixels;
-    for (std::size_t k = 0; k < 3; ++k) body[k] = input.body_m[drawn[k]], pixels[k] = input.pixels[drawn[k]];
+void PnpSolver::try_p3p(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
     starts_.clear();
-    opencv_p3p(input.camera, body, pixels, starts_);
-    for (const Rigid3& T : starts_) try_hypothesis(all_.centred(T), options);
+    opencv_p3p(sample(drawn), starts_);
+    for (const CentredPose& start : starts_) try_hypothesis(start, options);
 }
 
 void PnpSolver::try_hypothesis(const CentredPose& pose, const PnpOptions& options) {

@@ -15,7 +15,7 @@ namespace narpa {
 /// Centred points and their normalised pixels, gathered from a PnpPoints or a sample of it.
 struct BodyPoint {
     Vec3 body_m{};  ///< from the points' mean
-    Pixel seen{};   ///< (u - cx) / fx, (v - cy) / fy
+    Pixel seen{};   ///< where its pixel's ray meets the plane z = 1
 };
 
 /// The directions in which points spread, widest first, and their rms extent along each.
@@ -44,9 +44,8 @@ struct PoseStarts {
 
 /// By OpenCV: SQPNP (Terzakis and Lourakis 2020), and IPPE (Collins and Bartoli 2014) where `flat`, of which both
 /// solutions come. Added to `out`; allocates.
-void opencv_starts(const PnpInput& input, bool flat, std::vector<Rigid3>& out);
+void opencv_starts(std::span<const BodyPoint> points, bool flat, std::vector<CentredPose>& out);
 /// Up to four poses of three points, by OpenCV's AP3P (Ke and Roumeliotis 2017). Added to `out`; allocates.
-void opencv_p3p(const Pinhole& camera, const std::array<Vec3, 3>& body_m, const std::array<Pixel, 3>& pixels,
-                std::vector<Rigid3>& out);
+void opencv_p3p(const std::array<BodyPoint, 3>& points, std::vector<CentredPose>& out);
 
 }  // namespace narpa

@@ -8,13 +8,14 @@
 #include <Eigen/Core>
 
 #include "base/pose.h"
-#include "renderer/scene/scene.h"
+#include "estimator/pose/pose_estimate.h"
+#include "renderer/camera/camera_model.h"
 
 namespace narpa {
 
 class EpipolarWarp {
 public:
-    EpipolarWarp(const Camera& from, const Camera& to, const Rigid3& T_to_from);
+    EpipolarWarp(const Pinhole& from, const Pinhole& to, const Rigid3& T_to_from);
 
     [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& px) const {
         return origin_ + px.x() * across_ + px.y() * down_;
@@ -25,16 +26,18 @@ public:
     }
     [[nodiscard]] Eigen::Vector2d px(const Eigen::Vector3d& ray, double inverse_depth) const {
         const Eigen::Vector3d q = ray + inverse_depth * t_;
-        return focal_px_.cwiseProduct(q.head<2>() / q.z()) + centre_px_;
+        const auto [x, y] = to_.of_plane(q.x() / q.z(), q.y() / q.z());
+        return {x, y};
     }
     /// Change of `px` per change of the inverse depth: along the epipolar line.
     [[nodiscard]] Eigen::Vector2d px_slope(const Eigen::Vector3d& ray, double inverse_depth) const {
         const Eigen::Vector3d q = ray + inverse_depth * t_;
-        return focal_px_.cwiseProduct(t_.head<2>() - t_.z() / q.z() * q.head<2>()) / q.z();
+        const auto [x, y] = to_.jacobian({q.x(), q.y(), q.z()});
+        return {dot(x, to_vec3(t_)), dot(y, to_vec3(t_))};
     }
     /// The inverse depth at which `px` has this coordinate (0 column, 1 row), where the epipolar line crosses it.
     [[nodiscard]] double inverse_depth_at(const Eigen::Vector3d& ray, int axis, double coordinate_px) const {
-        const double n = (coordinate_px - centre_px_[axis]) / focal_px_[axis];
+        const double n = to_.on_plane({coordinate_px, coordinate_px})[axis];
         return (ray[axis] - n * ray.z()) / (n * t_.z() - t_[axis]);
     }
     /// Inverse depth in the other camera's frame.
@@ -44,7 +47,7 @@ public:
 
 private:
     Eigen::Vector3d origin_, across_, down_, t_;
-    Eigen::Vector2d focal_px_, centre_px_;
+    Pinhole to_;
 };
 
 }  // namespace narpa

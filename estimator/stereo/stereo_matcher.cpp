@@ -42,6 +42,8 @@ Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredIm
         return Error{
             "a stereo pair with no focal length or a pose that is not one, expected finite numbers and a unit "
             "quaternion"};
+    if (CameraModelHandle(pair.left)->pinhole() == nullptr || CameraModelHandle(pair.right)->pinhole() == nullptr)
+        return Error{"a camera whose epipolar lines are curves, expected two pinholes"};
     if (norm(pair.T_right_left.t) == 0) return Error{"a stereo pair without a baseline, expected two places"};
     if (!(s.nearest_m > 0 && s.farthest_m > s.nearest_m))
         return Error{"depths from " + std::to_string(s.nearest_m) + " to " + std::to_string(s.farthest_m) +
@@ -67,8 +69,8 @@ public:
           settings_(settings),
           left_(pair.left, left),
           right_(pair.right, right),
-          there_(pair.left, pair.right, pair.T_right_left),
-          back_(pair.right, pair.left, inverse(pair.T_right_left)) {}
+          there_(pinhole(pair.left), pinhole(pair.right), pair.T_right_left),
+          back_(pinhole(pair.right), pinhole(pair.left), inverse(pair.T_right_left)) {}
 
     void take_corner(int u, int v, StereoPoints& out) {
         StereoCounts& n = out.counts;
@@ -90,6 +92,8 @@ public:
     }
 
 private:
+    static Pinhole pinhole(const Camera& camera) { return *CameraModelHandle(camera)->pinhole(); }
+
     /// Does the search from the right frame end where it began in the left one?
     bool comes_home(const WholePixelMatch& whole, const InverseDepths& range) {
         const Eigen::Vector3d ray = there_.ray(patch_.centre_px());

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/pose/pose_estimate.h"
+#include "estimator/pose/reprojection.h"
 
 namespace narpa {
 namespace {
@@ -22,18 +22,24 @@ constexpr int kIterationsMax = 20, kHalvingsMax = 10;
 constexpr double kRounding = 1e-12;
 
 /// Direction of a pixel's ray, z = 1.
-Vector3d ray_through(const Camera& camera, const Vector2d& px) {
-    return {(px.x() - camera.cx) / camera.fx, (px.y() - camera.cy) / camera.fy, 1};
+Vector3d ray_through(const CameraModelHandle& camera, const Vector2d& px) {
+    return to_eigen(camera->on_plane({px.x(), px.y()}));
 }
 
-bool is_usable(const Camera& c) {
-    return std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy) && c.fx > 0 &&
-           c.fy > 0;
+/// Of the line through the camera's centre and the point, which may lie behind it; not finite where it has none.
+Vector2d image_of_line(const CameraModel& camera, const Vector3d& p) {
+    const auto image = camera.project(to_vec3(p.z() < 0 ? Vector3d(-p) : p));
+    return image ? Vector2d(image->x, image->y) : Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+}
+Matrix23 jacobian_of_line(const CameraModel& camera, const Vector3d& p) {
+    const double sign = p.z() < 0 ? -1 : 1;
+    return sign * to_eigen(camera.jacobian(to_vec3(sign * p)));
 }
 
 bool is_usable(const StereoPair& pair) {
     const Rigid3& T = pair.T_right_left;
-    return is_usable(pair.left) && is_usable(pair.right) && is_finite(T.t) && std::abs(norm(T.q) - 1) < 1e-6;
+    return CameraModelHandle(pair.left)->is_valid() && CameraModelHandle(pair.right)->is_valid() &&
+           is_finite(T.t) && std::abs(norm(T.q) - 1) < 1e-6;
 }
 
 bool is_usable(const PixelMeasurement& m) {
@@ -45,7 +51,8 @@ bool is_usable(const PixelMeasurement& m) {
 class TwoViews {
 public:
     TwoViews(const StereoPair& pair, const PixelMeasurement& left, const PixelMeasurement& right)
-        : pair_(pair),
+        : left_(pair.left),
+          right_(pair.right),
           left_px_(left.px),
           right_px_(right.px),
           R_(rotation_matrix(pair.T_right_left.q)),
@@ -55,7 +62,7 @@ public:
 
     /// Where the left ray passes the right one closest, by the angle seen from the right camera.
     [[nodiscard]] Vector3d first_guess() const {
-        const Vector3d l = ray_through(pair_.left, left_px_), r = ray_through(pair_.right, right_px_);
+        const Vector3d l = ray_through(left_, left_px_), r = ray_through(right_, right_px_);
         const Vector3d turned = r.cross(R_ * l), moved = r.cross(t_);
         const double squared = moved.squaredNorm();
         return {l.x(), l.y(), squared > 0 ? -moved.dot(turned) / squared : 0};
@@ -70,15 +77,11 @@ public:
     }
 
     void linearise(const Vector3d& s, Matrix3d& information, Vector3d& gradient) const {
-        Matrix23 J_left = Matrix23::Zero();
-        J_left(0, 0) = pair_.left.fx, J_left(1, 1) = pair_.left.fy;
-        const Vector3d q = in_right(s);
-        Matrix23 J_project;
-        J_project << pair_.right.fx / q.z(), 0, -pair_.right.fx * q.x() / (q.z() * q.z()),  //
-            0, pair_.right.fy / q.z(), -pair_.right.fy * q.y() / (q.z() * q.z());
+        Matrix23 J_left = to_eigen(left_->jacobian({s.x(), s.y(), 1}));
+        J_left.col(2).setZero();  // by the inverse depth
         Matrix3d J_point;
         J_point << R_.col(0), R_.col(1), t_;
-        const Matrix23 J_right = J_project * J_point;
+        const Matrix23 J_right = jacobian_of_line(*right_, in_right(s)) * J_point;
         information = J_left.transpose() * left_weight_ * J_left + J_right.transpose() * right_weight_ * J_right;
         gradient = J_left.transpose() * left_weight_ * left_residual(s) +
                    J_right.transpose() * right_weight_ * right_residual(s);
@@ -86,15 +89,13 @@ public:
 
 private:
     [[nodiscard]] Vector2d left_residual(const Vector3d& s) const {
-        return left_px_ - Vector2d(pair_.left.fx * s.x() + pair_.left.cx, pair_.left.fy * s.y() + pair_.left.cy);
+        return left_px_ - image_of_line(*left_, {s.x(), s.y(), 1});
     }
     [[nodiscard]] Vector2d right_residual(const Vector3d& s) const {
-        const Vector3d q = in_right(s);
-        return right_px_ - Vector2d(pair_.right.fx * q.x() / q.z() + pair_.right.cx,
-                                    pair_.right.fy * q.y() / q.z() + pair_.right.cy);
+        return right_px_ - image_of_line(*right_, in_right(s));
     }
 
-    const StereoPair& pair_;
+    CameraModelHandle left_, right_;
     Vector2d left_px_, right_px_;
     Matrix3d R_;
     Vector3d t_;
@@ -160,7 +161,10 @@ Result<double> printed_depth_m(const StereoPair& pair, const Vector2d& left_px, 
     if (!is_usable(pair) || !left_px.allFinite() || !right_px.allFinite())
         return Error{"a stereo pair or a pixel that is not finite, expected numbers"};
     const Eigen::Array3d l = ray_through(pair.left, left_px);
-    const double U_r = right_px.x() - pair.right.cx, f_r = pair.right.fx;
+    const CameraModelHandle right(pair.right);
+    if (right->pinhole() == nullptr)
+        return Error{"a right camera that is not a pinhole, expected one for this formula"};
+    const double U_r = right_px.x() - right->pinhole()->cx, f_r = right->pinhole()->fx;
     const Matrix3d R = rotation_matrix(pair.T_right_left.q);
     const Vec3& t = pair.T_right_left.t;
     const Eigen::Array3d column = f_r * R.row(0).transpose().array() * l;

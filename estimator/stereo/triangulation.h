@@ -13,8 +13,8 @@
 
 namespace narpa {
 
-/// Two calibrated cameras, or one camera at two instants. Of the cameras the size, the intrinsics and, for
-/// matching, the detector count.
+/// Two calibrated cameras, or one camera at two instants. Of the cameras the size, the model and, for matching, the
+/// detector are used.
 struct StereoPair {
     Camera left, right;
     Rigid3 T_right_left{};

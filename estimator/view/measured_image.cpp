@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "renderer/camera/camera_model.h"
 #include "renderer/camera/detector.h"
 
 namespace narpa {
@@ -114,12 +115,7 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
 }
 
 Camera coarser_camera(const Camera& camera, int factor) {
-    Camera c = camera;
-    c.width /= factor, c.height /= factor;
-    c.fx /= factor, c.fy /= factor;
-    c.cx = (c.cx + 0.5) / factor - 0.5;
-    c.cy = (c.cy + 0.5) / factor - 0.5;
-    return c;
+    return scaled(camera, 1.0 / factor, 1.0 / factor);
 }
 
 MeasuredImage coarser_image(const MeasuredImage& image, int factor) {

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "renderer/camera/camera_model.h"
+
 namespace narpa {
 
 Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, BodyPoses& at) {
@@ -29,8 +31,7 @@ void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
 }
 
 Hit ModelView::look_through(double u_px, double v_px) const noexcept {
-    const Vec3 direction{(u_px - camera_.cx) / camera_.fx, (v_px - camera_.cy) / camera_.fy, 1};
-    const Ray ray{T_world_camera_.t, T_world_camera_.q * normalized(direction)};
+    const Ray ray = camera_ray(camera_, T_world_camera_, u_px, v_px);
     return render_scene_.tracer().intersect(at_, ray, std::numeric_limits<double>::infinity());
 }
 

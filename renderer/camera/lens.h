@@ -1,15 +1,14 @@
-/// renderer/camera/lens.h - a thin lens: what is not at the focus distance is blurred.
+/// renderer/camera/lens.h - a thin lens in front of any camera model: depth of field.
 ///
-/// 1/f = 1/image + 1/focus (Gauss); distances from the lens along its axis enter as their inverses, so that
-/// infinity is the number 0. f is the focal length of the glass, less than every focus distance. A camera's fx, fy
-/// are the image distance in pixels, as a calibration at that focus finds them: they do not change with the focus
-/// here.
+/// 1/f = 1/image + 1/focus (Gauss). Distances along the axis enter as their inverses, so that infinity is 0. f is
+/// the focal length of the glass, less than every focus distance. The camera model is that of the chief rays, as a
+/// calibration at this focus finds it: it does not change with the focus.
 #pragma once
 
 #include <cmath>
 #include <limits>
 
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/light/concentric_disc.h"
 
 namespace narpa {
@@ -26,7 +25,8 @@ namespace narpa {
            std::abs(inverse_focus_per_m - inverse_depth_per_m);
 }
 
-/// The same in pixels, of a point at this depth along the camera's z axis; `focal_px` is the camera's fx or fy.
+/// The same in pixels, of a point at this depth along the camera's z axis; `focal_px`: px per unit of the plane z
+/// = 1.
 [[nodiscard]] inline double circle_of_confusion_px(const Lens& lens, double focal_px, double depth_m) {
     return lens.aperture_diameter_m * focal_px * std::abs(1 / lens.focus_distance_m - 1 / depth_m);
 }
@@ -39,19 +39,20 @@ namespace narpa {
     return {radius_m * x, radius_m * y, 0};
 }
 
-/// The ray from this point of the aperture to where the pinhole's ray through image point (x, y) meets the plane of
-/// focus.
-[[nodiscard]] inline Ray lens_ray(const Camera& c, const Lens& lens, const Rigid3& T_world_camera, double x,
-                                  double y, const Vec3& from) {
-    const Vec3 pinhole{(x - c.cx) / c.fx, (y - c.cy) / c.fy, 1.0};
-    return {T_world_camera * from, T_world_camera.q * normalized(pinhole - from / lens.focus_distance_m)};
+/// Direction, in camera axes, from a point of the aperture to where the chief ray, that through the lens's centre,
+/// meets the plane of focus. `chief`: any length, z > 0.
+[[nodiscard]] inline Vec3 lens_direction(const Lens& lens, const Vec3& chief, const Vec3& from) {
+    return normalized(chief / chief.z - from / lens.focus_distance_m);
+}
+/// The chief ray that meets a ray from this point of the aperture in the plane of focus: the inverse, of z = 1.
+[[nodiscard]] inline Vec3 chief_direction(const Lens& lens, const Vec3& direction, const Vec3& from) {
+    return direction / direction.z + from / lens.focus_distance_m;
 }
 
-/// The image point that a ray from this point of the aperture in this direction (camera axes, z > 0) comes to lie
-/// on: the inverse of the above.
-[[nodiscard]] inline std::array<double, 2> image_point(const Camera& c, const Lens& lens, const Vec3& from,
-                                                       const Vec3& direction_camera) {
-    return image_point(c, direction_camera / direction_camera.z + from / lens.focus_distance_m);
+/// The ray from a point of the aperture that is focused on image point (x, y), world axes.
+[[nodiscard]] inline Ray lens_ray(const CameraModelHandle& model, const Lens& lens, const Rigid3& T_world_camera,
+                                  double x, double y, const Vec3& from) {
+    return {T_world_camera * from, T_world_camera.q * lens_direction(lens, model->on_plane({x, y}), from)};
 }
 
 }  // namespace narpa

@@ -1,7 +1,6 @@
 #include "renderer/film/camera_batch.h"
 
 #include "base/each_isa.h"
-#include "renderer/camera/camera_ray.h"
 #include "renderer/camera/lens.h"
 #include "renderer/integrator/batch_sampler.h"
 
@@ -17,48 +16,40 @@ BatchSampler sampler_of(const Frame& f, const CameraSamples& s) noexcept {
     return {f.settings.seed, f.settings.frame, s.n, s.number, s.sample};
 }
 
-NARPA_EACH_ISA void aim_at_centres(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
-    Vec3Lanes direction;
-    for (std::size_t i = 0; i < kLanes; ++i) {
-        const Vec3 d = camera_ray(f.camera, f.T_world_camera, s.x[i], s.y[i]).direction;
-        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
-    }
-    rays.direction = direction;
+struct ImagePoints {
+    Lanes<double> x, y;
+};
+
+void aim_through(const Frame& f, const ImagePoints& p, RayBatch& rays) noexcept {
+    f.model->directions(f.T_world_camera.q, p.x, p.y, rays.direction);
     rays.origin.fill(f.T_world_camera.t);
 }
 
-/// Where in its pixel each passes, and two coordinates more.
-inline void points_of_pixels(const Frame& f, const CameraSamples& s, Points& u) noexcept {
+void aim_at_centres(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
+    ImagePoints p;
+    for (std::size_t i = 0; i < kLanes; ++i) p.x[i] = s.x[i], p.y[i] = s.y[i];
+    aim_through(f, p, rays);
+}
+
+/// Each sample's own point of its pixel. `u`: out, coordinates of which the last two are left.
+NARPA_EACH_ISA void points_in_pixels(const Frame& f, const CameraSamples& s, ImagePoints& p, Points& u) noexcept {
     sampler_of(f, s).points(u);
-    if (!s.centre) return;
-    u[0].fill(0.5);
-    u[1].fill(0.5);
-}
-
-/// Each at its own point of the pixel. `u`: out, coordinates of which the last two are left.
-NARPA_EACH_ISA void aim_in_pixels(const Frame& f, const CameraSamples& s, RayBatch& rays, Points& u) noexcept {
-    points_of_pixels(f, s, u);
-    Vec3Lanes direction;
+    if (s.centre) u[0].fill(0.5), u[1].fill(0.5);
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const double x = s.x[i] + u[0][i] - 0.5, y = s.y[i] + u[1][i] - 0.5;
-        const Vec3 d = camera_ray(f.camera, f.T_world_camera, x, y).direction;
-        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+        p.x[i] = s.x[i] + u[0][i] - 0.5;
+        p.y[i] = s.y[i] + u[1][i] - 0.5;
     }
-    rays.direction = direction;
-    rays.origin.fill(f.T_world_camera.t);
 }
 
-/// Each at its own point of the pixel and of the lens.
-NARPA_EACH_ISA void aim_through_lens(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
-    Points u;
-    points_of_pixels(f, s, u);
+/// Moves rays through the centre of the lens to the points (u, v) of the aperture. `rays`: in, directions in camera
+/// axes.
+NARPA_EACH_ISA void move_over_lens(const Lens& lens, const Rigid3& T_world_camera, const Lanes<double>& u,
+                                   const Lanes<double>& v, RayBatch& rays) noexcept {
     Vec3Lanes origin, direction;
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const double x = s.x[i] + u[0][i] - 0.5, y = s.y[i] + u[1][i] - 0.5;
-        const Ray ray =
-            lens_ray(f.camera, *f.lens, f.T_world_camera, x, y, aperture_point(*f.lens, u[2][i], u[3][i]));
-        origin.put(i, ray.origin);
-        direction.put(i, ray.direction);
+        const Vec3 from = aperture_point(lens, u[i], v[i]);
+        origin.put(i, T_world_camera * from);
+        direction.put(i, T_world_camera.q * lens_direction(lens, rays.direction[i], from));
     }
     rays.origin = origin;
     rays.direction = direction;
@@ -96,11 +87,14 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
         return;
     }
     Points u;
+    ImagePoints image;
+    points_in_pixels(f, s, image, u);
     if (f.lens == nullptr) {
-        aim_in_pixels(f, s, p.rays, u);
+        aim_through(f, image, p.rays);
         if (sun) aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
     } else {
-        aim_through_lens(f, s, p.rays);
+        f.model->directions({}, image.x, image.y, p.rays.direction);
+        move_over_lens(*f.lens, f.T_world_camera, u[2], u[3], p.rays);
         if (!sun) return;
         next_points(f, s, kPathsOwn, u);
         aim_at_sun(*f.sun, u[2], u[3], p.to_sun);

@@ -37,12 +37,25 @@ void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
     });
 }
 
+/// Pixels beyond the image circle of a camera that has one.
+void blacken_unseen(const Camera& camera, RadianceImage& out) {
+    const CameraModelHandle model(camera);
+    if (model->pinhole() != nullptr) return;
+    for (int y = 0; y < out.height; ++y)
+        for (int x = 0; x < out.width; ++x)
+            if (!model->sees({static_cast<double>(x), static_cast<double>(y)}))
+                out.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width) +
+                           static_cast<std::size_t>(x)] = {};
+}
+
 }  // namespace
 
 struct CameraRenderer::Impl {
     Impl(const RenderScene& the_render_scene, const Camera& the_camera)
         : render_scene(the_render_scene), camera(the_camera), passes(the_render_scene.tracer(), the_camera) {}
 
+    FrameAccount render(const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+                        RadianceImage& out, Aovs* aovs);
     FrameAccount render_uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
         passes.begin(f, f.lens);
         const PassCount count = passes.uniform(f, out, variance);
@@ -66,20 +79,24 @@ CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const Rigid3& T_world_camera,
                                     const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
-    Impl& i = *impl_;
+    const FrameAccount account = impl_->render(at, T_world_camera, settings, out, aovs);
+    blacken_unseen(impl_->camera, out);
+    return account;
+}
+
+FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const Rigid3& T_world_camera,
+                                          const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     if (!uniform && aovs == nullptr)
-        return render_within_budget(i.passes, i.costs, i.render_scene, i.camera, at, T_world_camera, settings, out,
-                                    nullptr);
-    const Frame frame = make_frame(i.render_scene, at, i.camera, T_world_camera, settings);
+        return render_within_budget(passes, costs, render_scene, camera, at, T_world_camera, settings, out, nullptr);
+    const Frame frame = make_frame(render_scene, at, camera, T_world_camera, settings);
     if (aovs != nullptr) {
         resize(*aovs, out.pixels.size());
         store_first_hits(frame, out.width, out.height, *aovs);
     }
-    if (uniform) return i.render_uniform(frame, out, variance);
-    return render_within_budget(i.passes, i.costs, i.render_scene, i.camera, at, T_world_camera, settings, out,
-                                variance);
+    if (uniform) return render_uniform(frame, out, variance);
+    return render_within_budget(passes, costs, render_scene, camera, at, T_world_camera, settings, out, variance);
 }
 
 void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,

@@ -40,7 +40,8 @@ void store_first_hit(const Frame& f, const Ray& ray, const Hit& hit, std::size_t
     aovs.variance[pixel] = 0;
     aovs.albedo[pixel] = {};
     if (seen)
-        aovs.albedo[pixel] = base_colour(surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m / f.camera.fx));
+        aovs.albedo[pixel] =
+            base_colour(surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m / f.model->pixels_per_radian()));
 }
 
 }  // namespace narpa

@@ -35,8 +35,9 @@ struct Pairs {
 struct alignas(64) GBuffer::Around {
     Grid<float> radiance{}, nx{}, ny{}, nz{}, depth{};
     Grid<std::uint32_t> surface{};
-    /// Where a ray is one metre along the camera's axis, in the world's axes: ahead + x * right + y * down.
+    /// Of a pinhole: where a ray is one metre along the camera's axis, in the world's axes: ahead + x * right + y * down.
     Vec3f ahead, right, down;
+    const Frame* frame = nullptr;  ///< of any other camera
     int x_first, y_first, x_last, y_last;  ///< pixel of the corner of the rim; the image's last
 };
 
@@ -149,9 +150,12 @@ constexpr std::size_t cell(int row, int column) {
 /// Beyond the image its last pixels are repeated: no edge there. The rim's corners are nobody's neighbours.
 void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
-    a.right = vec_cast<float>(f.T_world_camera.q * Vec3{1 / f.camera.fx, 0, 0});
-    a.down = vec_cast<float>(f.T_world_camera.q * Vec3{0, 1 / f.camera.fy, 0});
-    a.ahead = vec_cast<float>(f.T_world_camera.q * Vec3{-f.camera.cx / f.camera.fx, -f.camera.cy / f.camera.fy, 1});
+    if (const Pinhole* pinhole = f.model->pinhole()) {
+        const auto [origin, per_x, per_y] = pinhole->rays(f.T_world_camera.q);
+        a.ahead = vec_cast<float>(origin), a.right = vec_cast<float>(per_x), a.down = vec_cast<float>(per_y);
+    } else {
+        a.frame = &f;
+    }
     a.x_first = tx * kTile - 1, a.y_first = ty * kTile - 1;
     a.x_last = width_ - 1, a.y_last = height_ - 1;
     const int columns = std::min(kTile, width_ - tx * kTile), rows = std::min(kTile, height_ - ty * kTile);
@@ -196,8 +200,29 @@ namespace {
 struct Positions {
     Grid<float> x, y, z;
 };
+/// By the camera's own model. Rays across the camera's axis have no depth: nothing there is steady.
+template <class Around>
+[[gnu::noinline]] void locate_by_model(const Around& a, Positions& p) {
+    static_assert(kRow == kLanes);
+    const Vec3 axis = a.frame->T_world_camera.q * Vec3{0, 0, 1};
+    Lanes<double> x, y;
+    Vec3Lanes direction;
+    for (int row = 0; row < kSide + 2; ++row) {
+        for (int column = 0; column < kRow; ++column)
+            x[static_cast<std::size_t>(column)] = std::clamp(a.x_first + column, 0, a.x_last);
+        y.fill(std::clamp(a.y_first + row, 0, a.y_last));
+        a.frame->model->directions(a.frame->T_world_camera.q, x, y, direction);
+        for (std::size_t column = 0; column < kLanes; ++column) {
+            const auto at = static_cast<std::size_t>(row) * kRow + column;
+            const Vec3 d = direction[column];
+            const Vec3f position = vec_cast<float>((static_cast<double>(a.depth[at]) / dot(d, axis)) * d);
+            p.x[at] = position.x, p.y[at] = position.y, p.z[at] = position.z;
+        }
+    }
+}
 template <class Around>
 [[gnu::always_inline]] inline void locate(const Around& a, Positions& p) {
+    if (a.frame != nullptr) return locate_by_model(a, p);
     for (int row = 0; row < kSide + 2; ++row)
         for (int column = 0; column < kRow; ++column) {
             const auto at = static_cast<std::size_t>(row * kRow + column);

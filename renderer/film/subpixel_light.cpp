@@ -82,7 +82,6 @@ void Collector::sample(const SubpixelDisc& disc) {
 }
 
 void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t samples) {
-    const Camera& c = f_.camera;
     const PixelSampler numbers(0, 0, 0);  // the same for every body and frame, as the points are
     Vec3 from{};                          // on the aperture, camera axes
     if (f_.lens != nullptr) {
@@ -94,14 +93,17 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
     const Vec3 way = disc.centre + at.x * disc.right + at.y * disc.up - start;
     const double range = norm(way);
     const Vec3 direction = way / range, seen = conjugate(f_.T_world_camera.q) * direction;
-    const auto [x, y] = f_.lens != nullptr ? image_point(c, *f_.lens, from, seen) : image_point(c, seen);
-    const std::size_t pixel = block_.holding(x, y);
+    const Vec3 chief = f_.lens != nullptr ? normalized(chief_direction(*f_.lens, seen, from)) : seen;
+    const auto image = f_.model->project(chief);
+    if (!image) return;
+    const std::size_t pixel = block_.holding(image->x, image->y);
     if (pixel == block_.n) return;
 
     const std::size_t i = packet_.rays.n++;
     const double solid_angle = at.area * std::abs(dot(cross(disc.right, disc.up), direction)) / (range * range);
     pixel_[i] = pixel;
-    area_px2_[i] = solid_angle * c.fx * c.fy / (seen.z * seen.z * seen.z);
+    const double tilt = chief.z / seen.z;  // solid angles of the two rays on the plane of focus
+    area_px2_[i] = solid_angle * f_.model->pixels_per_sr(chief) * (tilt * tilt * tilt);
     packet_.rays.put(i, {f_.T_world_camera.t + start, direction});
     packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kSubpixelSamplesMost + s;
     if (!f_.sun) return;

@@ -5,34 +5,34 @@
 #include <utility>
 
 #include "base/each_isa.h"
+#include "renderer/camera/camera_model.h"
+#include "renderer/film/cone_culling.h"
+
 namespace narpa {
 namespace {
 
 constexpr double kEmbreeSlack = 4e-6;  ///< of the size of a mesh
 constexpr double kGuard_px = 1e-3;     ///< more than what rounding does to image coordinates
 
-/// The image in units of tiles: tile (i, j) is what lies from i to i + 1 and from j to j + 1.
+/// The image of a pinhole in units of tiles: tile (i, j) is what lies from i to i + 1 and from j to j + 1.
 struct Grid {
     int tiles_x, tiles_y;
     double width, height;
-    double scale_x, scale_y, origin_x, origin_y;  ///< x = origin + scale * direction.x / direction.z
+    Pinhole image;
     double guard = kGuard_px / kTileSize;
     double lens_radius_m, inverse_focus_per_m;  ///< of a pinhole 0, 0
     double longest;  ///< of the rays, per metre along the camera's z axis, the longest, from anywhere on the lens
 
-    Grid(const Camera& c, const Lens* lens, int tx, int ty)
+    Grid(const Pinhole& pinhole, const Camera& c, const Lens* lens, int tx, int ty)
         : tiles_x(tx),
           tiles_y(ty),
           width(static_cast<double>(c.width) / kTileSize),
           height(static_cast<double>(c.height) / kTileSize),
-          scale_x(c.fx / kTileSize),
-          scale_y(c.fy / kTileSize),
-          origin_x((c.cx + 0.5) / kTileSize),
-          origin_y((c.cy + 0.5) / kTileSize),
+          image(pinhole.with_scale(1.0 / kTileSize, 1.0 / kTileSize).with_origin(-0.5, -0.5)),
           lens_radius_m(lens != nullptr ? 0.5 * lens->aperture_diameter_m : 0),
           inverse_focus_per_m(lens != nullptr ? 1 / lens->focus_distance_m : 0) {
-        const double x = std::max(origin_x, width - origin_x) / scale_x,
-                     y = std::max(origin_y, height - origin_y) / scale_y;
+        const double x = std::max(image.cx, width - image.cx) / image.fx,
+                     y = std::max(image.cy, height - image.cy) / image.fy;
         longest = std::sqrt(1 + x * x + y * y) + lens_radius_m * inverse_focus_per_m;
     }
 };
@@ -59,26 +59,6 @@ TileRect tiles_of(const Extent& e, const Grid& g) {
     return {tile_at(e.x_low - g.guard, g.tiles_x), tile_at(e.y_low - g.guard, g.tiles_y),
             tile_at(e.x_high + g.guard, g.tiles_x), tile_at(e.y_high + g.guard, g.tiles_y)};
 }
-
-/// The camera as a body sees it, and the other way round. Differences first, rotations then: the places may be
-/// 4e8 m from the origin.
-struct BodyView {
-    Vec3 camera_body;               ///< place of the camera
-    std::array<Vec3, 3> axes;       ///< the body's, in the camera's frame
-    std::array<Vec3, 3> axes_body;  ///< the camera's, in the body's frame
-    Vec3 centre_camera;             ///< the body's origin
-    double rounding_m;              ///< bound of what rounding moves a ray by
-
-    BodyView(const Rigid3& T_world_body, const Rigid3& T_world_camera) {
-        const Vec3 apart = T_world_body.t - T_world_camera.t;
-        const Quat q_camera_body = conjugate(T_world_camera.q) * T_world_body.q;
-        camera_body = conjugate(T_world_body.q) * -apart;
-        centre_camera = conjugate(T_world_camera.q) * apart;
-        axes = columns(q_camera_body);
-        axes_body = columns(conjugate(q_camera_body));
-        rounding_m = 0x1p-49 * (norm(T_world_body.t) + norm(T_world_camera.t) + norm(apart)) + 1e-12;  // above 0
-    }
-};
 
 constexpr std::size_t kCorners = 8;
 using PerCorner = std::array<double, kCorners>;
@@ -131,8 +111,9 @@ public:
         }
         Extent e;
         const double blur = widest_blur();
-        e.add(grid_.origin_x + grid_.scale_x * x, grid_.origin_y + grid_.scale_y * y,
-              grid_.scale_x * (reach_x * inverse_z + blur), grid_.scale_y * (reach_y * inverse_z + blur));
+        const auto [image_x, image_y] = grid_.image.of_plane(x, y);
+        e.add(image_x, image_y, grid_.image.fx * (reach_x * inverse_z + blur),
+              grid_.image.fy * (reach_y * inverse_z + blur));
         return e;
     }
 
@@ -149,8 +130,8 @@ public:
         const Corners p = corners();
         const auto add = [&](double x, double y, double z) {
             const double blur = grid_.lens_radius_m * std::abs(1 / z - grid_.inverse_focus_per_m);
-            e.add(grid_.origin_x + grid_.scale_x * x / z, grid_.origin_y + grid_.scale_y * y / z,
-                  grid_.scale_x * blur, grid_.scale_y * blur);
+            const auto [image_x, image_y] = grid_.image.of_plane(x / z, y / z);
+            e.add(image_x, image_y, grid_.image.fx * blur, grid_.image.fy * blur);
         };
         for (std::size_t c = 0; c < kCorners; ++c)
             if (p.z[c] >= near_z) add(p.x[c], p.y[c], p.z[c]);
@@ -167,12 +148,12 @@ public:
     template <class F>
     void for_each_row(const TileRect& rect, const F& f) const {
         const double blur = widest_blur();
-        const double reach_x = grid_.scale_x * blur + grid_.guard, reach_y = grid_.scale_y * blur + grid_.guard;
+        const double reach_x = grid_.image.fx * blur + grid_.guard, reach_y = grid_.image.fy * blur + grid_.guard;
         Corners p = corners();
         for (std::size_t c = 0; c < kCorners; ++c) {
             const double inverse_z = 1 / p.z[c];
-            p.x[c] = grid_.origin_x + grid_.scale_x * p.x[c] * inverse_z;
-            p.y[c] = grid_.origin_y + grid_.scale_y * p.y[c] * inverse_z;
+            const auto [x, y] = grid_.image.of_plane(p.x[c] * inverse_z, p.y[c] * inverse_z);
+            p.x[c] = x, p.y[c] = y;
         }
         struct Line {
             double x_upper, y_upper, x_lower, y_lower, slope;
@@ -296,7 +277,7 @@ NARPA_EACH_ISA void mark_boxes(const std::vector<BoxNode>& nodes, const Grid& gr
 /// a sphere, the rays that meet it make a circular cone, and so do, about them, those of a rectangle of the image.
 class SeenEllipsoid {
 public:
-    SeenEllipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view) : grid_(grid) {
+    SeenEllipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view) {
         const Vec3& semi_axes_m = bounds.semi_axes_m;
         // Rays from elsewhere on the lens meet what those from its centre meet when a ball of the lens's radius is
         // added to it: an ellipsoid that holds the sum (A. Kurzhanski, I. Valyi, "Ellipsoidal Calculus for
@@ -313,12 +294,14 @@ public:
         if (around_) return;
         to_centre_ = to_centre_ / distance;
         sin_ = radius / distance, cos_ = std::sqrt((1 - sin_) * (1 + sin_));
-        per_x_ = squeeze * view.axes_body[0] / grid.scale_x;
-        per_y_ = squeeze * view.axes_body[1] / grid.scale_y;
-        ahead_ = squeeze * view.axes_body[2];
+        const auto [origin, per_x, per_y] = grid.image.rays({});
+        const auto squeezed = [&](const Vec3& d) {
+            return squeeze * (d.x * view.axes_body[0] + d.y * view.axes_body[1] + d.z * view.axes_body[2]);
+        };
+        origin_ = squeezed(origin), per_x_ = squeezed(per_x), per_y_ = squeezed(per_y);
         // The lens turns a ray by as much as this many tiles in the plane of a pinhole.
-        reach_x_ = grid.scale_x * grid.lens_radius_m * grid.inverse_focus_per_m + grid.guard;
-        reach_y_ = grid.scale_y * grid.lens_radius_m * grid.inverse_focus_per_m + grid.guard;
+        reach_x_ = grid.image.fx * grid.lens_radius_m * grid.inverse_focus_per_m + grid.guard;
+        reach_y_ = grid.image.fy * grid.lens_radius_m * grid.inverse_focus_per_m + grid.guard;
     }
 
     void mark(const TileRect& rect, TileMask& mask) const {
@@ -326,11 +309,7 @@ public:
         if (overlap == Overlap::none) return;
         const int columns = rect.x_last - rect.x_first + 1, rows = rect.y_last - rect.y_first + 1;
         if (overlap == Overlap::whole || columns * rows == 1) return mask.mark(rect);
-        TileRect low = rect, high = rect;
-        if (columns >= rows)
-            low.x_last = rect.x_first + columns / 2 - 1, high.x_first = low.x_last + 1;
-        else
-            low.y_last = rect.y_first + rows / 2 - 1, high.y_first = low.y_last + 1;
+        const auto [low, high] = halves(rect);
         mark(low, mask);
         mark(high, mask);
     }
@@ -341,13 +320,12 @@ private:
         const double half_x = 0.5 * (rect.x_last + 1 - rect.x_first) + reach_x_,
                      half_y = 0.5 * (rect.y_last + 1 - rect.y_first) + reach_y_;
         const double x = 0.5 * (rect.x_first + rect.x_last + 1), y = 0.5 * (rect.y_first + rect.y_last + 1);
-        const Vec3 middle = normalized(ahead_ + (x - grid_.origin_x) * per_x_ + (y - grid_.origin_y) * per_y_);
+        const Vec3 middle = normalized(origin_ + x * per_x_ + y * per_y_);
         // Of the cone about the rectangle: its widest corner.
         double sine = 0;
         for (const double i : {-1.0, 1.0})
             for (const double j : {-1.0, 1.0}) {
-                const Vec3 corner = ahead_ + (x + i * half_x - grid_.origin_x) * per_x_ +
-                                    (y + j * half_y - grid_.origin_y) * per_y_;
+                const Vec3 corner = origin_ + (x + i * half_x) * per_x_ + (y + j * half_y) * per_y_;
                 if (!(dot(middle, corner) > 0)) return Overlap::partly;
                 sine = std::max(sine, norm(cross(middle, corner)) / norm(corner));
             }
@@ -360,19 +338,22 @@ private:
         return Overlap::partly;
     }
 
-    const Grid& grid_;
-    bool around_ = false;         ///< the camera is inside
-    Vec3 to_centre_;              ///< unit
-    double sin_ = 0, cos_ = 0;    ///< of half the angle of the body's cone
-    Vec3 per_x_, per_y_, ahead_;  ///< of the direction of a ray, per tile
+    bool around_ = false;          ///< the camera is inside
+    Vec3 to_centre_;               ///< unit
+    double sin_ = 0, cos_ = 0;     ///< of half the angle of the body's cone
+    Vec3 origin_, per_x_, per_y_;  ///< of the direction of a ray: Pinhole::rays in the squeezed frame
     double reach_x_ = 0, reach_y_ = 0;
 };
 
-/// Within the box about it, which is the tighter of the two for one that is very flat or long.
-void mark_ellipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view, TileMask& mask) {
+BoxNode box_about(const BodyBounds& bounds) {
     const Vec3f low = vec_cast<float>(bounds.centre_m - bounds.semi_axes_m),
                 high = vec_cast<float>(bounds.centre_m + bounds.semi_axes_m);
-    const BoxNode node{{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+    return {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+}
+
+/// Within the box about it, which is the tighter of the two for one that is very flat or long.
+void mark_ellipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view, TileMask& mask) {
+    const BoxNode node = box_about(bounds);
     const double rounding_m = 0x1p-23 * (norm(bounds.centre_m) + norm(bounds.semi_axes_m)) + view.rounding_m;
     const SeenBox box(node, grid, view, rounding_m);
     if (box.behind()) return;
@@ -406,7 +387,29 @@ TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
 
 void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept {
     std::fill(listed_.begin(), listed_.end(), std::uint8_t{0});
-    const Grid grid(camera_, lens, tiles_x_, tiles_y_);
+    const CameraModelHandle model(camera_);
+    if (const Pinhole* pinhole = model->pinhole())
+        update_pinhole(*pinhole, at, T_world_camera, lens);
+    else
+        update_by_cones(*model, at, T_world_camera, lens);
+}
+
+void TileCulling::update_by_cones(const CameraModel& model, const BodyPoses& at, const Rigid3& T_world_camera,
+                                  const Lens* lens) noexcept {
+    const ConeCulling culling(model, lens, tiles_x_, tiles_y_);
+    for (const std::uint32_t body : tracer_.all_bodies()) {
+        const BodyView view(at.T_world_body[body], T_world_camera);
+        const std::vector<BoxNode>& boxes = shapes_[outline_of_body_[body]].boxes;
+        const BoxNode all = box_about(tracer_.bounds(body));
+        const double slack_m = kEmbreeSlack * tracer_.bounding_radius_m(body) + view.rounding_m;
+        culling.mark(boxes.empty() ? std::span(&all, 1) : std::span(boxes), view, slack_m, mask_);
+        list(body);
+    }
+}
+
+void TileCulling::update_pinhole(const Pinhole& pinhole, const BodyPoses& at, const Rigid3& T_world_camera,
+                                 const Lens* lens) noexcept {
+    const Grid grid(pinhole, camera_, lens, tiles_x_, tiles_y_);
     for (const std::uint32_t body : tracer_.all_bodies()) {
         const BodyView view(at.T_world_body[body], T_world_camera);
         const std::vector<BoxNode>& boxes = shapes_[outline_of_body_[body]].boxes;

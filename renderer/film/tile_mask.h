@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <vector>
@@ -12,6 +13,17 @@ namespace narpa {
 struct TileRect {
     int x_first, y_first, x_last, y_last;
 };
+
+/// Cut across its longer side; more than one tile.
+inline std::array<TileRect, 2> halves(const TileRect& r) noexcept {
+    const int columns = r.x_last - r.x_first + 1, rows = r.y_last - r.y_first + 1;
+    TileRect low = r, high = r;
+    if (columns >= rows)
+        low.x_last = r.x_first + columns / 2 - 1, high.x_first = low.x_last + 1;
+    else
+        low.y_last = r.y_first + rows / 2 - 1, high.y_first = low.y_last + 1;
+    return {low, high};
+}
 
 class TileMask {
 public:

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "renderer/camera/camera_model.h"
 #include "renderer/integrator/frame_settings.h"
 #include "renderer/integrator/path.h"
 #include "renderer/integrator/subpixel_bodies.h"
@@ -27,7 +28,8 @@ struct Frame {
     const Camera& camera;
     const Rigid3& T_world_camera;
     const FrameSettings& settings;
-    const Lens* lens;  ///< null: a pinhole
+    CameraModelHandle model;
+    const Lens* lens;  ///< null: none, all in focus
     std::optional<SunDisc> sun;
     const Integrator& integrator;
     bool quick;         ///< the integrator is SunDirectLighting

@@ -31,20 +31,22 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const bool sun_first =
         !direct && on.sun_first && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
     const Integrator& by_waves = direct ? static_cast<const Integrator&>(kDirectIntegrator) : kPathIntegrator;
+    const CameraModelHandle model(camera);
     return {render_scene,
             tracer,
             at,
             camera,
             T_world_camera,
             settings,
+            model,
             lens,
             scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
             sun_only ? kSunDirectLighting : by_waves,
             sun_only,
             sun_first,
-            {settings.max_depth, 1 / (camera.fx * std::sqrt(settings.spp)), direct, small_bodies,
+            {settings.max_depth, 1 / (model->pixels_per_radian() * std::sqrt(settings.spp)), direct, small_bodies,
              sun_first && settings.spp > 1 ? 1 : kFewSurvive, on.path_reuse},
-            SubpixelBodies(tracer, at, camera, T_world_camera, lens)};
+            SubpixelBodies(tracer, at, camera, model, T_world_camera, lens)};
 }
 
 }  // namespace narpa

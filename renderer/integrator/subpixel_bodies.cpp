@@ -29,8 +29,8 @@ std::array<Vec3, 2> frame_about(const Vec3& z, const Vec3& towards) {
 }  // namespace
 
 SubpixelBodies::SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera,
-                               const Rigid3& T_world_camera, const Lens* lens)
-    : tracer_(tracer), at_(at), camera_(camera), T_world_camera_(T_world_camera), lens_(lens) {
+                               const CameraModelHandle& model, const Rigid3& T_world_camera, const Lens* lens)
+    : tracer_(tracer), at_(at), model_(model), T_world_camera_(T_world_camera), lens_(lens) {
     for (std::size_t body = 0; body < at.T_world_body.size() && !any_; ++body)
         any_ = disc_within(static_cast<int>(body), 0, 0, camera.width - 1, camera.height - 1).has_value();
 }
@@ -43,8 +43,8 @@ Vec3 SubpixelBodies::centre_camera(std::size_t body) const noexcept {
 }
 
 double SubpixelBodies::reach_px(const Vec3& centre, double radius_m) const noexcept {
-    if (centre.z <= 0) return kInfinity;
-    return std::max(camera_.fx, camera_.fy) * radius_m * norm(centre) / (centre.z * centre.z);
+    if (!model_->project(centre)) return kInfinity;
+    return radius_m * largest_stretch(model_->jacobian(centre));
 }
 
 bool SubpixelBodies::contains(int body) const noexcept {
@@ -59,9 +59,12 @@ std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, i
     const Vec3 centre = centre_camera(disc.body);
     disc.radius_px = reach_px(centre, largest(tracer_.bounds(disc.body).semi_axes_m));
     if (!(2 * disc.radius_px < kSubpixelWidth_px)) return std::nullopt;
-    if (lens_ != nullptr)
-        disc.radius_px += 0.5 * circle_of_confusion_px(*lens_, std::max(camera_.fx, camera_.fy), centre.z);
-    const auto [x, y] = image_point(camera_, centre);
+    if (lens_ != nullptr) {
+        auto [x, y] = model_->jacobian(centre / centre.z);
+        x.z = y.z = 0;  // the aperture is a disc across the axis
+        disc.radius_px += 0.5 * circle_of_confusion_px(*lens_, largest_stretch({x, y}), centre.z);
+    }
+    const auto [x, y] = *model_->project(centre);
     disc.x_px = x, disc.y_px = y;
     const double margin = disc.radius_px * (1 + 1e-3) + 0.51;  // half a pixel, and what perspective bends
     if (x < x_first - margin || x > x_last + margin || y < y_first - margin || y > y_last + margin)

@@ -8,6 +8,7 @@
 
 #include <optional>
 
+#include "renderer/camera/camera_model.h"
 #include "renderer/geometry/tracer.h"
 
 namespace narpa {
@@ -27,9 +28,9 @@ struct SubpixelDisc {
 
 class SubpixelBodies {
 public:
-    /// `lens` is null for a pinhole. All arguments outlive this.
-    SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
-                   const Lens* lens);
+    /// `lens` is null where all is in focus. All arguments but the model outlive this.
+    SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const CameraModelHandle& model,
+                   const Rigid3& T_world_camera, const Lens* lens);
 
     /// Is there any in the image? If not, nobody asks further.
     [[nodiscard]] bool any() const noexcept { return any_; }
@@ -42,13 +43,14 @@ public:
 
 private:
     [[nodiscard]] Vec3 centre_camera(std::size_t body) const noexcept;
-    /// Half the width of the image of a ball of this radius, at its longest, px.
+    /// Half the width of the image of a ball of this radius, at its longest, px; infinite where its centre has
+    /// none.
     [[nodiscard]] double reach_px(const Vec3& centre_camera, double radius_m) const noexcept;
     void span_disc(SubpixelDisc& disc) const noexcept;
 
     const Tracer& tracer_;
     const BodyPoses& at_;
-    const Camera& camera_;
+    CameraModelHandle model_;
     const Rigid3& T_world_camera_;
     const Lens* lens_;
     bool any_ = false;

@@ -9,6 +9,7 @@
 #include "bench/raw_embree.h"
 #include "bench/reference_loop.h"
 #include "emulator/world.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa {
@@ -21,7 +22,7 @@ std::unique_ptr<World> shipped(const std::string& file, int size, RenderSettings
     scene->render.method = method;
     Camera& c = scene->cameras[0];
     const double k = static_cast<double>(size) / c.width;
-    c.fx *= k, c.fy *= k, c.cx = (c.cx + 0.5) * k - 0.5, c.cy = (c.cy + 0.5) * k - 0.5;
+    c = scaled(c, k, k);
     c.width = c.height = size;
     auto world = World::create(*std::move(scene));
     EXPECT_TRUE(world) << world.error().text();

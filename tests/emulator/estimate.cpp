@@ -8,6 +8,7 @@
 
 #include "emulator/log/estimate_report.h"
 #include "emulator/trajectory.h"
+#include "renderer/camera/camera_model.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
@@ -27,8 +28,7 @@ protected:
         if (!read) ADD_FAILURE() << read.error().text();
         Scene s = *std::move(read);
         Camera& c = s.cameras[0];
-        c.fx /= 2, c.fy /= 2, c.cx = (c.cx + 0.5) / 2 - 0.5, c.cy = (c.cy + 0.5) / 2 - 0.5;
-        c.width /= 2, c.height /= 2;
+        c = scaled(c, 0.5, 0.5);
         s.render.spp = 4;
         return s;
     }

@@ -118,20 +118,19 @@ TEST_F(PnpStart, OpenCvsStartsAreExactOnExactPixels) {
         const bool flat = trial % 2 == 1 && std::abs((truth.q * Vec3{0, 0, 1}).z) > 0.2;
         if (flat)
             for (Vec3& p : body) p.z = 0;
-        const test::Seen seen = test::see(random_, body, truth, 0);
-        std::vector<Rigid3> starts;
-        opencv_starts(seen.input(), flat, starts);
+        const Gathered g(test::see(random_, body, truth, 0));
+        const auto nearest = [&](const std::vector<CentredPose>& starts) {
+            double best = M_PI;
+            for (const CentredPose& start : starts)
+                best = std::min(best, error_between(g.points.uncentred(start), truth).norm());
+            return best;
+        };
+        std::vector<CentredPose> starts, of_three;
+        opencv_starts(g.list, flat, starts);
         ASSERT_GE(starts.size(), flat ? 3u : 1u);
-        double best = M_PI;
-        for (const Rigid3& T : starts) best = std::min(best, error_between(T, truth).norm());
-        EXPECT_LT(best, 1e-4);
-
-        std::vector<Rigid3> of_three;
-        opencv_p3p(seen.camera, {body[0], body[1], body[2]}, {seen.pixels[0], seen.pixels[1], seen.pixels[2]},
-                   of_three);
-        best = M_PI;
-        for (const Rigid3& T : of_three) best = std::min(best, error_between(T, truth).norm());
-        EXPECT_LT(best, 1e-4);
+        EXPECT_LT(nearest(starts), 1e-4);
+        opencv_p3p({g.list[0], g.list[1], g.list[2]}, of_three);
+        EXPECT_LT(nearest(of_three), 1e-4);
     }
 }
 

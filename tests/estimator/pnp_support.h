@@ -8,7 +8,7 @@
 
 namespace narpa::test {
 
-inline constexpr Pinhole kPaperCamera{1319.4792168823421, 1319.4792168823421, 249.5, 249.5};
+inline const Pinhole kPaperCamera{1319.4792168823421, 1319.4792168823421, 249.5, 249.5};
 
 inline Quat random_attitude(std::mt19937_64& random) {
     std::normal_distribution<double> n;

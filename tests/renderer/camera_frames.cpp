@@ -3,7 +3,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/camera/detector.h"
 #include "renderer/film/camera_image.h"
 #include "tests/support/allocation_counter.h"

@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/geometry/ellipsoid.h"
 #include "tests/support/shapes.h"
 

@@ -3,7 +3,7 @@
 
 #include "renderer/camera/detector.h"
 #include "renderer/film/camera_image.h"
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -76,7 +76,8 @@ TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
                 const Vec3 q = ray.origin + focus / dot(ray.direction, axis) * ray.direction;
                 EXPECT_LE(norm(p - q), 1e-13 * (focus + 10));
             }
-            const auto [back_x, back_y] = image_point(c, *c.lens, from, conjugate(T.q) * ray.direction);
+            const Vec3 chief = chief_direction(*c.lens, conjugate(T.q) * ray.direction, from);
+            const auto [back_x, back_y] = *Pinhole(c).project(chief);
             EXPECT_NEAR(back_x, x, 1e-9);
             EXPECT_NEAR(back_y, y, 1e-9);
         }

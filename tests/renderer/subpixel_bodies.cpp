@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/subpixel_bodies.h"
 #include "tests/renderer/camera_support.h"

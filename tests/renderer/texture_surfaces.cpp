@@ -6,7 +6,7 @@
 #include <random>
 
 #include "renderer/material/texture_lookup.h"
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/integrator/shading.h"
 #include "tests/support/shapes.h"
 

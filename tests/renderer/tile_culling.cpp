@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/camera/lens.h"
 #include "renderer/geometry/box_tree.h"
 #include "tests/support/allocation_counter.h"

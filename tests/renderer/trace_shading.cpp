@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "renderer/camera/camera_ray.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/sampler.h"
 #include "renderer/integrator/shading.h"

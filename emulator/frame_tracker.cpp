@@ -17,8 +17,15 @@ constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
 /// Standard deviations beyond which the target is lost: a render there would show something else. Shift is a part
 /// of the range.
 constexpr double kMostTurn_rad = 0.5, kMostShift = 0.2;
-/// So many measurements in a row that contradict the filter are right, and it is wrong.
-constexpr std::uint64_t kContradictions = 5;
+
+PoseTrackerSettings tracker_settings(const TrackerOptions& options) {
+    PoseTrackerSettings settings;
+    settings.filter.motion.acceleration_psd = options.acceleration_psd;
+    settings.filter.motion.angular_acceleration_psd = options.angular_acceleration_psd;
+    settings.first_velocity_m_s = kFirstVelocity_m_s;
+    settings.first_rate_rad_s = kFirstRate_rad_s;
+    return settings;
+}
 
 }  // namespace
 
@@ -61,7 +68,7 @@ EstimateReport TrackedFrame::report(std::uint8_t camera) const {
 
 struct FrameTracker::Impl {
     Impl(const World& w, const Camera& c, std::size_t body, const TrackerOptions& o)
-        : world(w), camera(c), target(body), options(o), random(o.seed) {}
+        : world(w), camera(c), target(body), options(o), random(o.seed), tracker(tracker_settings(o)) {}
 
     /// What one frame says, from a guess.
     void measure(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
@@ -81,7 +88,7 @@ struct FrameTracker::Impl {
     std::optional<FeatureAlignment> by_points;
     std::optional<DenseAlignment> by_pixels;
     DenseOptions dense_used;  ///< with the last frame
-    std::optional<PoseFilter> filter;
+    PoseTracker tracker;
 };
 
 Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, std::size_t camera_index,
@@ -118,10 +125,10 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
     const Rigid3 T_world_camera = m.world.sensor_pose(m.camera.mount, m.camera.T_mount_camera, at);
     out.truth = inverse(T_world_camera) * at.T_world_body[m.target];
     const Quat q_frame_chaser = (T_world_camera * inverse(m.T_chaser_camera())).q;
-    if (m.filter) m.filter->predict(t_ns);
-    if (m.filter && !m.knows_where(q_frame_chaser)) m.filter.reset();
-    if (m.filter) {
-        out.guess = inverse(m.T_chaser_camera()) * m.filter->pose(q_frame_chaser).T_chaser_target;
+    if (m.tracker.started()) m.tracker.filter().predict(t_ns);
+    if (m.tracker.started() && !m.knows_where(q_frame_chaser)) m.tracker.stop();
+    if (m.tracker.started()) {
+        out.guess = inverse(m.T_chaser_camera()) * m.tracker.filter().pose(q_frame_chaser).T_chaser_target;
     } else {
         out.guess = off_truth(out.truth, m.options, m.random);
     }
@@ -131,9 +138,9 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
         out.why = image.error().what;
     }
     if (out.measured) m.fuse({t_ns, *out.measured, out.covariance, m.T_chaser_camera(), q_frame_chaser}, out);
-    if (m.filter) {
+    if (m.tracker.started()) {
         // Chaser axes to camera axes: the mounting is exact.
-        const PoseFilter::Pose known = m.filter->pose(q_frame_chaser);
+        const PoseFilter::Pose known = m.tracker.filter().pose(q_frame_chaser);
         const Rigid3 T_camera_chaser = inverse(m.T_chaser_camera());
         out.filtered = T_camera_chaser * known.T_chaser_target;
         out.filtered_covariance = covariance_in_other_axes(T_camera_chaser.q, known.covariance);
@@ -189,34 +196,16 @@ void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Bod
 }
 
 bool FrameTracker::Impl::knows_where(const Quat& q_frame_chaser) const {
-    const PoseFilter::Pose known = filter->pose(q_frame_chaser);
+    const PoseFilter::Pose known = tracker.filter().pose(q_frame_chaser);
     return rotation_sigma(known.covariance) < kMostTurn_rad &&
            position_sigma(known.covariance) < kMostShift * norm(known.T_chaser_target.t);
 }
 
 void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& out) {
-    if (filter) {
-        const UpdateResult update = filter->update(measurement);
-        out.nis = update.nis;
-        if (update.outcome == UpdateOutcome::taken) {
-            out.state = EstimateState::measured;
-            return;
-        }
-        out.why = update.why;
-        if (filter->counts().gated_in_a_row < kContradictions) return;
-    }
-    FilterSettings settings;
-    settings.motion.acceleration_psd = options.acceleration_psd;
-    settings.motion.angular_acceleration_psd = options.angular_acceleration_psd;
-    auto made = PoseFilter::create(settings, measurement, kFirstVelocity_m_s, kFirstRate_rad_s);
-    if (!made) {
-        out.why = made.error().what;
-        return;
-    }
-    filter.emplace(*std::move(made));
-    out.nis = 0;
-    out.why.clear();
-    out.state = EstimateState::measured;
+    const UpdateResult update = tracker.update(measurement);
+    out.nis = update.nis;
+    out.why = update.why;
+    if (update.outcome == UpdateOutcome::taken) out.state = EstimateState::measured;
 }
 
 }  // namespace narpa

@@ -83,10 +83,10 @@ Result<StateEstimator> StateEstimator::create(const Scenario& s, std::int64_t t_
     nominal.q_world_chaser = attitude.q_world_chaser;
     nominal.chaser_rate_rad_s = attitude.rate_rad_s;
     place_port(s.start.position_m, s.start.velocity_m_s, s.target, s.chaser, nominal);
-    auto filter = PoseFilter::create(filter_settings(s), t_start_ns, in_frame(nominal, s.orbit, 0),
-                                     first_covariance(s, nominal));
-    if (!filter) return filter.error();
-    StateEstimator made(s, t_start_ns, *std::move(filter));
+    PoseTracker tracker({filter_settings(s), kRestartVelocity_m_s, kRestartRate_rad_s, kContradictions});
+    if (auto good = tracker.start(t_start_ns, in_frame(nominal, s.orbit, 0), first_covariance(s, nominal)); !good)
+        return good.error();
+    StateEstimator made(s, t_start_ns, std::move(tracker));
     made.take(attitude);
     return made;
 }
@@ -129,10 +129,10 @@ void StateEstimator::advance(std::int64_t t_ns) {
         const Pulse pulse = pulses_.front();
         pulses_.pop_front();
         if (!pulses_.empty() && pulses_.front().from_ns == pulse.from_ns) continue;
-        filter_.predict(pulse.from_ns);
-        filter_.accelerate(pulse.acceleration_m_s2, pulse.psd);
+        tracker_.filter().predict(pulse.from_ns);
+        tracker_.filter().accelerate(pulse.acceleration_m_s2, pulse.psd);
     }
-    filter_.predict(t_ns);
+    tracker_.filter().predict(t_ns);
 }
 
 void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
@@ -147,10 +147,9 @@ void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
     more << Eigen::Vector3d::Constant(kMetPosition_m),
         Eigen::Vector3d::Constant(held ? kHeldVelocity_m_s : kBouncedVelocity_m_s),
         Eigen::Vector3d::Constant(kMetAttitude_rad), Eigen::Vector3d::Constant(kMetRate_rad_s);
-    const Matrix12 covariance = filter_.covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
-    if (auto restarted = PoseFilter::create(filter_settings(scenario_), filter_.t_ns(),
-                                            in_frame(m, scenario_.orbit, t_s(filter_.t_ns())), covariance))
-        filter_ = *std::move(restarted);
+    const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
+    // On an error the filter stays as it is.
+    (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
 }
 
 UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
@@ -158,27 +157,18 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     const PoseMeasurement m = at_centres_of_mass(
         measurement, scenario_.chaser.centre_of_mass_m, scenario_.target.centre_of_mass_m,
         q_frame_chaser(measurement.t_ns), kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
-    UpdateResult result = filter_.update(m);
-    if (result.outcome == UpdateOutcome::gated && filter_.counts().gated_in_a_row >= kContradictions) {
-        auto restarted =
-            PoseFilter::create(filter_settings(scenario_), m, kRestartVelocity_m_s, kRestartRate_rad_s);
-        if (restarted) {
-            filter_ = *std::move(restarted);
-            ++restarts_;
-            result = {UpdateOutcome::taken, 0, ""};
-        }
-    }
+    const UpdateResult result = tracker_.update(m);
     if (result.outcome == UpdateOutcome::taken) taken_ns_ = std::max(taken_ns_, measurement.t_ns);
     return result;
 }
 
 RelativeMotion StateEstimator::motion() const {
     const AttitudeTrack::At now = attitude_.at(t_ns());
-    return in_world(filter_.state(), scenario_.orbit, t_s(t_ns()), now.q_world_chaser, now.rate_rad_s);
+    return in_world(filter().state(), scenario_.orbit, t_s(t_ns()), now.q_world_chaser, now.rate_rad_s);
 }
 
 TargetEstimate StateEstimator::estimate() const {
-    const PoseFilter::Pose pose = filter_.pose(q_frame_chaser(t_ns()));
+    const PoseFilter::Pose pose = filter().pose(q_frame_chaser(t_ns()));
     const Rigid3 T_mass_target{{}, -scenario_.target.centre_of_mass_m};
     const Matrix6 covariance =
         pose.covariance +
@@ -189,8 +179,8 @@ TargetEstimate StateEstimator::estimate() const {
 }
 
 Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {
-    const double by_s = 1e-9 * static_cast<double>(t_ns - filter_.t_ns());
-    RelativeState state = filter_.state();
+    const double by_s = 1e-9 * static_cast<double>(t_ns - filter().t_ns());
+    RelativeState state = filter().state();
     const Vec3 turn = state.rate_rad_s - conjugate(state.q_frame_target) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
     state.position_m = state.position_m + by_s * state.velocity_m_s;
     state.q_frame_target = normalized(state.q_frame_target * exp_rotation(by_s * turn));

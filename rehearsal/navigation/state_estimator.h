@@ -5,7 +5,7 @@
 #include <deque>
 
 #include "estimator/cloud/range_points.h"
-#include "estimator/filter/pose_filter.h"
+#include "estimator/filter/pose_tracker.h"
 #include "rehearsal/navigation/attitude_track.h"
 #include "rehearsal/navigation/flight_control.h"
 
@@ -43,7 +43,7 @@ public:
     void take(const AttitudeReport& report) { attitude_.take(report); }
     /// Impulses commanded at t_ns: each pulse lasts from then on as long as it takes at full force.
     void thrust(std::int64_t t_ns, const Vec3& impulse_n_s);
-    /// Late measurements are inserted at their own time. After kContradictions gated ones in a row the filter
+    /// Late measurements are inserted at their own time. After several gated ones in a row the filter
     /// restarts from the last of them.
     UpdateResult take(const TargetMeasurement& measurement);
     /// The ports touched shortly before t_ns. `held`: captured, the ports rest in one plane; otherwise they
@@ -53,7 +53,7 @@ public:
     void advance(std::int64_t t_ns);
 
     /// The time of the state: of the last prediction or the newest measurement, whichever is later.
-    [[nodiscard]] std::int64_t t_ns() const noexcept { return filter_.t_ns(); }
+    [[nodiscard]] std::int64_t t_ns() const noexcept { return filter().t_ns(); }
     [[nodiscard]] RelativeMotion motion() const;
     [[nodiscard]] AttitudeTrack::At attitude(std::int64_t t_ns) const noexcept { return attitude_.at(t_ns); }
     [[nodiscard]] TargetEstimate estimate() const;
@@ -65,7 +65,7 @@ public:
         return 1e-9 * static_cast<double>(t_ns - t_start_ns_);
     }
 
-    [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
+    [[nodiscard]] std::uint64_t restarts() const noexcept { return tracker_.restarts(); }
     /// Time of the last accepted measurement; at first the start.
     [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
 
@@ -75,17 +75,17 @@ private:
         Vec3 acceleration_m_s2{};  ///< of the target relative to the chaser, frame axes
         double psd = 0;
     };
-    StateEstimator(const Scenario& scenario, std::int64_t t_start_ns, PoseFilter filter)
-        : scenario_(scenario), t_start_ns_(t_start_ns), filter_(std::move(filter)), taken_ns_(t_start_ns) {}
+    StateEstimator(const Scenario& scenario, std::int64_t t_start_ns, PoseTracker tracker)
+        : scenario_(scenario), t_start_ns_(t_start_ns), tracker_(std::move(tracker)), taken_ns_(t_start_ns) {}
+    [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
 
     Scenario scenario_;
     std::int64_t t_start_ns_;
-    PoseFilter filter_;
+    PoseTracker tracker_;  ///< started
     AttitudeTrack attitude_;
     std::deque<Pulse> pulses_;  ///< that start after the filter's time
     std::int64_t taken_ns_;
-    std::uint64_t restarts_ = 0;
 };
 
 }  // namespace narpa::rehearsal

@@ -128,7 +128,7 @@ std::vector<Method> methods(const PnpSetting& setting) {
                        for (std::size_t i = 0; i < points.size(); ++i)
                            normalised.push_back({points.centred_body_m(i), points.normalised(i)});
                        std::vector<CentredPose> poses;
-                       opencv_starts(normalised, flat, poses);
+                       opencv_poses(normalised, flat, poses);
                        std::vector<Rigid3> starts;
                        for (const CentredPose& pose : poses) starts.push_back(points.uncentred(pose));
                        return best_by_ceres(t, starts);

@@ -100,7 +100,8 @@ Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, s
     FeatureSettings features;
     features.spp = options.spp;
     features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
-    impl->by_points.emplace(world.render_scene(), camera, *target, BodyPoses(world.scene().bodies.size()), features);
+    impl->by_points.emplace(world.render_scene(), camera, *target, BodyPoses(world.scene().bodies.size()),
+                            features);
     if (options.method == EstimateMethod::dense) impl->by_pixels.emplace(world.render_scene(), camera, *target);
     return std::unique_ptr<FrameTracker>(new FrameTracker(std::move(impl)));
 }

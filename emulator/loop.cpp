@@ -115,7 +115,7 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
 /// Without real-time priority, on one thread: it uses the time that the sensors leave.
 void Emulator::run_estimator(const StopFlag& stop) {
     name_thread("narpa-estimate");
-    const OnePictureThread pictures;  // workers with the sensors' priority would delay the sensors
+    const SingleThreadedOpenCv pictures;  // workers with the sensors' priority would delay the sensors
     tbb::task_arena alone(1);
     alone.execute([&] { estimator_->run(stop); });
 }

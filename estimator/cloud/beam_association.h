@@ -1,4 +1,4 @@
-/// estimator/cloud/beam_association.h - what each beam of a sweep should have met, had the target this pose.
+/// estimator/cloud/beam_association.h - correspondences of a sweep's beams with the model at a pose.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ namespace narpa {
 
 enum class BeamFate : std::uint8_t {
     met,      ///< the model's surface lies on the beam
-    missed,   ///< the beam passes the model by
-    grazing,  ///< it meets it at so flat an angle that its range says nothing
+    missed,   ///< the beam misses the model
+    grazing,  ///< it meets the surface at too flat an angle for its range to be used
 };
 
-/// A point beside the plane that it should lie on, in target axes and about the target's origin.
+/// A point and the tangent plane that it should lie on, target coordinates.
 struct PointToPlane {
     BeamFate fate = BeamFate::missed;
     Vec3 surface_m{}, normal{};  ///< where the model was met; unit, towards the LiDAR
@@ -27,17 +27,17 @@ struct PointToPlane {
 
 class BeamAssociation {
 public:
-    /// `tracer` outlives it. Only the body `target` is looked at.
+    /// `tracer` outlives it. Only the body `target` is traced.
     BeamAssociation(const Tracer& tracer, std::size_t target);
 
-    /// The sweep that is asked about from now on. Allocates only for more points than ever before.
+    /// Sets the sweep. Allocates only for more points than ever before.
     void take(std::span<const RangePoint> points, const SweepMotion& motion);
     [[nodiscard]] std::size_t size() const noexcept { return beams_.size(); }
 
-    /// For every `stride`-th point from the first, in order, at this pose at the time of the sweep. With
-    /// `search_m` > 0, which serves where the pose is far off, sixteen rays look for the surface as far around the
-    /// beam, and the place nearest to the point is taken; a point whose beam misses is drawn straight to it, edges
-    /// draw too. Its sigma_m is then a quarter of `search_m` with the noise: all that is within reach counts alike.
+    /// For every `stride`-th point from the first, in order, at this pose at the time of the sweep. With `search_m`
+    /// > 0, for poses that are far off, sixteen rays within that distance of the beam are traced and the hit
+    /// nearest to the point is used; a point whose beam misses is then attracted by the surface and its edges. Its
+    /// sigma_m is a quarter of `search_m` combined with the noise, so that all points within reach weigh alike.
     void associate(const Rigid3& T_lidar_target, const RangeNoise& noise, double grazing_cosine, double search_m,
                    std::size_t stride, std::vector<PointToPlane>& out) const;
 
@@ -45,7 +45,7 @@ public:
     [[nodiscard]] Vector6 derivative(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const;
 
 private:
-    /// A beam as it looks from a target that rests: the target's turn since the time of the pose is taken out.
+    /// A beam relative to a target at rest: compensated for the target's motion since the time of the pose.
     struct Beam {
         Quat turn{};               ///< of the target since then, LiDAR axes
         Vec3 origin_m, direction;  ///< turned back

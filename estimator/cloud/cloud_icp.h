@@ -1,11 +1,10 @@
 /// estimator/cloud/cloud_icp.h - the pose of a target from a LiDAR's sweep: point-to-plane ICP against its model.
 ///
-/// Each beam is cast into the model at the current pose; where it meets the surface is the point's partner, the
-/// tangent plane there is what the measured point should lie on (Y. Chen, G. Medioni, "Object modelling by
-/// registration of multiple range images", 1992; partners along the line of sight: G. Blais, M. Levine, 1995).
-/// Gauss-Newton on robust weights: first of few points, partners looked for around each beam, in ever smaller
-/// circles; then of all along their beams. Motions that the points do not tell are left as the start has them, and
-/// reported (observability.h).
+/// Each beam is traced into the model at the current pose; the hit is the correspondence, and the measured point
+/// should lie on the tangent plane there (Y. Chen, G. Medioni, "Object modelling by registration of multiple range
+/// images", 1992; correspondences along the line of sight: G. Blais, M. Levine, 1995). Robustly weighted
+/// Gauss-Newton: first on few points with correspondences searched around each beam, within decreasing radii; then
+/// on all along their beams. Unobservable motions stay as in the start and are reported (observability.h).
 #pragma once
 
 #include <span>
@@ -19,14 +18,14 @@ namespace narpa {
 
 struct IcpSettings {
     RangeNoise noise{};
-    std::size_t search_points = 100;  ///< of the sweep, about so many are searched for
-    int search_iterations = 10;       ///< circles of the search
+    std::size_t search_points = 100;  ///< of the sweep, about, that the search uses
+    int search_iterations = 10;       ///< of the search, each with a smaller radius
     int iterations = 50;              ///< at most, after the search
-    double grazing_cosine = 0.05;     ///< beams that meet a surface flatter than this do not count
+    double grazing_cosine = 0.05;     ///< beams that meet a surface at a flatter angle are not used
     double unobserved_below = 1e-3;   ///< normalised eigenvalue (observability.h)
-    double settled = 0.05;            ///< a step of so many standard deviations is the last; 0: take all iterations
-    /// Of the points, so many lie on the model where the pose is right: with fewer, what else stands in the LiDAR's
-    /// view apart, it is a false minimum. A search that ends in one is done again with four times the points.
+    double settled = 0.05;            ///< converged: a step of fewer standard deviations; 0: all iterations
+    /// Least part of the points on the model at a right pose: fewer mean a false minimum. The search is then
+    /// repeated with four times the points.
     double explained_least = 0.9;
 };
 /// An Error names the setting, what it is and what was expected.
@@ -34,28 +33,28 @@ struct IcpSettings {
 
 struct CloudEstimate {
     Rigid3 T_lidar_target{};
-    /// Of the pose's error (pose_estimate.h): of the robust estimate as it is (P. Huber, Robust Statistics, 1981,
-    /// section 7.6), for the scatter that the residuals show, at least that of the noise.
+    /// Of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
+    /// section 7.6), for the residuals' own scatter, at least that of the noise.
     Matrix6 covariance = Matrix6::Zero();
-    /// Cramer-Rao: the least covariance there can be for the points that were used, with the noise as it is set.
+    /// Cramer-Rao bound for the points used and the noise of the settings.
     Matrix6 bound = Matrix6::Zero();
     Observability observability{};
     int iterations = 0;     ///< with those of the search
     bool settled = false;   ///< the last step was small
     bool credible = false;  ///< settled, and enough points are explained
-    double scatter = 0;     ///< of the residuals, in standard deviations of the noise: 1 where all is as set
+    double scatter = 0;     ///< of the residuals, in standard deviations of the noise: 1 where the settings hold
     double residual_m = 0;  ///< RMS of the distances of the points used from their planes
     std::size_t points = 0, used = 0, missed = 0, grazing = 0, rejected = 0;  ///< sum: points = the rest
-    /// Of the points, those that lie where the model has them, within four standard deviations of the noise.
+    /// Points within four standard deviations of the noise from the model.
     std::size_t explained = 0;
 };
 
 class CloudIcp {
 public:
-    /// `tracer` outlives it. `target`: index of the body whose pose is looked for. Errors: no such body, settings.
+    /// `tracer` outlives it. `target`: index of the body whose pose is estimated. Errors: no such body, settings.
     static Result<CloudIcp> create(const Tracer& tracer, std::size_t target, const IcpSettings& settings);
 
-    /// `search_m`: how far surfaces may lie off at the start, some distance * angle + shift; 0: no search around
+    /// `search_m`: bound of the error of surfaces at the start, about distance * angle + shift; 0: no search around
     /// the beams. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
     /// search that is not finite, or fewer than six beams that meet the model. Allocates only for more points than
     /// ever before, or an Error.

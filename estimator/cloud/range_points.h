@@ -1,4 +1,4 @@
-/// estimator/cloud/range_points.h - a LiDAR's sweep as numbers to estimate from.
+/// estimator/cloud/range_points.h - a LiDAR's sweep as measurements.
 #pragma once
 
 #include "base/pose.h"
@@ -10,12 +10,12 @@ struct RangePoint {
     Vec3 origin_m{};     ///< where the beam starts
     Vec3 direction{};    ///< unit
     double range_m = 0;  ///< along the beam, > 0
-    double t_s = 0;      ///< when it was fired, after the time that the pose is asked for
+    double t_s = 0;      ///< when it was fired, relative to the time of the pose
 
     [[nodiscard]] Vec3 position_m() const { return origin_m + range_m * direction; }
 };
 
-/// How the target moves in the LiDAR's axes while the sweep lasts: at t_s after the time of the pose its attitude
+/// The target's motion in the LiDAR's axes during the sweep: at t_s after the time of the pose its attitude
 /// is exp_rotation(t_s * rate) * q and its origin lies at t + t_s * velocity.
 struct SweepMotion {
     Vec3 velocity_m_s{};

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "estimator/dense/descent.h"
+#include "estimator/dense/level_solver.h"
 
 namespace narpa {
 namespace {
@@ -145,11 +145,11 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
         LevelView& view = i.view_of(factor, camera, *window, at);
         view.measure(coarser_image(frame, factor), coarser_variance(frame_variance, i.camera, factor));
-        Descent descent(camera, i.sensor, i.render_scene, i.target, factor, view, options, e);
-        e.status = descent.run(first);
+        LevelSolver solver(camera, i.sensor, i.render_scene, i.target, factor, view, options, e);
+        e.status = solver.run(first);
         if (factor != options.finest || e.status != DenseStatus::converged) continue;
-        descent.polish();
-        descent.conclude();
+        solver.polish();
+        solver.finish();
     }
     return e;
 }
@@ -173,8 +173,8 @@ Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camer
     view.measure(coarser_image(none, factor), coarser_variance(frame_variance, i.camera, factor));
     DenseEstimate e;
     e.T_camera_body = T_camera_body;
-    Descent descent(camera, i.sensor, i.render_scene, i.target, factor, view, options, e);
-    return descent.bound();
+    LevelSolver solver(camera, i.sensor, i.render_scene, i.target, factor, view, options, e);
+    return solver.bound();
 }
 
 }  // namespace narpa

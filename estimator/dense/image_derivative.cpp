@@ -18,32 +18,32 @@ namespace {
 using Row = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Neighbouring points of a surface lie no further from each other than so many times what its slope asks for.
+/// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
 constexpr double kSurfaceSteps = 2.5;
-/// The least cosine between ray and surface by which a slope is judged.
+/// Lower limit of the cosine between ray and normal in that prediction.
 constexpr double kLeastCosine = 0.02;
-/// Halvings of the way between two rays in the search for a contour.
+/// Bisections between two rays in the search for a contour.
 constexpr int kHalvings = 10;
-/// Part of the distance by which the camera is displaced to see the BSDF change.
+/// Step of the finite difference of the BSDF, as a part of the range.
 constexpr double kViewStep = 1e-3;
-/// Points of a pixel, each way, at which the change of its shine is taken.
+/// Points of a pixel, each way, at which that difference is taken.
 constexpr int kShadingPoints = 2;
-/// Rays each way in any pixel; more where they see the light change by more than this part of the sensor's noise.
+/// Rays each way in any pixel; more where the radiance varies by more than this part of the sensor's noise.
 constexpr int kAnywhere = 3;
-constexpr double kEventful = 1;
+constexpr double kVarying = 1;
 
 bool depends_on_view(const Material& m) {
     if (is_specular(m) || m.kind == Material::Kind::lambert) return false;
     return m.kind != Material::Kind::phong || m.specular != Rgb{};
 }
 
-/// One pixel on one grid.
+/// The first two terms of one pixel, on one grid.
 class PixelSides {
 public:
     PixelSides(const FineGrid& grid, const PixelPatch& patch, int x, int y, const Vec3& t_camera_target)
         : grid_(grid), patch_(patch), x_(x), y_(y), t_camera_target_(t_camera_target) {}
 
-    /// The sides within the pixel and its part of those on its border.
+    /// Sum over the sides within the pixel and its share of those on its border.
     Row sum() {
         const int s = grid_.fineness();
         for (int j = 0; j < s; ++j)
@@ -53,7 +53,7 @@ public:
             }
         return sum_ / (static_cast<double>(s) * s);
     }
-    /// DN by which the light changes across the pixel, all ups and downs counted; after `sum`.
+    /// Total variation of the signal across the pixel, DN; after `sum`.
     [[nodiscard]] double change() const { return jumps_ / grid_.fineness(); }
 
 private:
@@ -61,17 +61,17 @@ private:
         return i >= 0 && j >= 0 && i < grid_.fineness() && j < grid_.fineness();
     }
 
-    /// What moves across the side between a and b, to the right of it or below.
+    /// The side between a and b, its neighbour to the right or below.
     void add(int ia, int ja, int ib, int jb) {
-        const SeenPoint &a = patch_.at(ia, ja), &b = patch_.at(ib, jb);
+        const RaySample &a = patch_.at(ia, ja), &b = patch_.at(ib, jb);
         const double jump = a.signal - b.signal;
         if (jump == 0) return;
         jumps_ += std::abs(jump);
-        const SeenPoint& near = a.range_m <= b.range_m ? a : b;
+        const RaySample& near = a.range_m <= b.range_m ? a : b;
         const bool rides_along = near.body >= 0 && near.body == grid_.camera().mount;
         if (near.body < 0 || rides_along) return;
         double along = 0.5, range_m = near.range_m;
-        // A side on the border is half this pixel's, but for a contour, whose place is known.
+        // A side on the border counts half for this pixel, except a contour, whose position is known.
         double share = 0.5 * (within(ia, ja) ? 1 : 0) + 0.5 * (within(ib, jb) ? 1 : 0);
         const double xa = x_ * grid_.fineness() + ia, ya = y_ * grid_.fineness() + ja;
         const double dx = ib - ia, dy = jb - ja;
@@ -82,8 +82,8 @@ private:
         if (share > 0) sum_ += share * jump * velocity(xa + along * dx, ya + along * dy, range_m, dy == 0);
     }
 
-    /// Are the two not neighbouring points of one surface? Judged by the slopes that their normals tell.
-    static bool is_contour(const SeenPoint& a, const SeenPoint& b) {
+    /// True where the two are not neighbouring points of one surface, by the slopes from their normals.
+    static bool is_contour(const RaySample& a, const RaySample& b) {
         if (a.body != b.body) return true;
         const double cosine =
             std::max(std::min(std::abs(dot(a.normal, a.ray_direction)), std::abs(dot(b.normal, b.ray_direction))),
@@ -92,11 +92,12 @@ private:
         return norm(a.position - b.position) > kSurfaceSteps * step_m;
     }
 
-    /// Where on the way (dx, dy) from a at (xa, ya), 0, to b, 1, the nearer surface ends, and its range there.
-    void find_contour(const SeenPoint& a, const SeenPoint& b, double xa, double ya, double dx, double dy,
+    /// Where between a at (xa, ya), 0, and b at (xa + dx, ya + dy), 1, the nearer surface ends, and its range
+    /// there.
+    void find_contour(const RaySample& a, const RaySample& b, double xa, double ya, double dx, double dy,
                       double& along, double& range_m) const {
         const bool near_is_a = a.range_m <= b.range_m;
-        const SeenPoint& far = near_is_a ? b : a;
+        const RaySample& far = near_is_a ? b : a;
         double on_near = near_is_a ? 0 : 1, on_far = 1 - on_near;
         const Frame& f = grid_.frame();
         for (int k = 0; k < kHalvings; ++k) {
@@ -115,7 +116,7 @@ private:
         along = 0.5 * (on_near + on_far);
     }
 
-    /// Of the point at this place of the grid, across a side: points of the grid per unit of the pose's error.
+    /// Image velocity across a side at this point of the grid: grid points per unit of the pose's error.
     [[nodiscard]] Row velocity(double x, double y, double range_m, bool horizontal) const {
         const CameraModel& model = *grid_.frame().model;
         const Vec3 point = range_m * model.direction({x, y});
@@ -135,7 +136,8 @@ private:
     double jumps_ = 0;
 };
 
-/// The Sun's light that comes back to a camera displaced against the target, by central differences of the BSDF.
+/// The third term: change of reflected sunlight with the direction to the camera, by central differences of the
+/// BSDF.
 Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, const Vec3& t_camera_target) {
     Vec3 per_metre{};  // DN per metre of the surface against the camera, world axes
     for (int j = 0; j < kShadingPoints; ++j)
@@ -185,14 +187,14 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
     const Frame frame = make_frame(render_scene_, at_, camera_, T_world_camera, plain);
     const FineGrid fine(render_scene_, at_, camera_, T_world_camera, settings, fineness);
     const Vec3& t = T_camera_target.t;
-    const double eventful_dn = kEventful * std::sqrt(sensor.variance_dn2(sensor.black_dn));
+    const double varying_dn = kVarying * std::sqrt(sensor.variance_dn2(sensor.black_dn));
     const auto pixel = [&](PixelPatch& patch, int x, int y) -> Row {
-        patch.look(coarse, sensor, x, y);
+        patch.trace(coarse, sensor, x, y);
         if (!patch.sees_anything()) return Row::Zero();
         PixelSides sides(coarse, patch, x, y, t);
         Row sum = sides.sum();
-        if (fineness > kAnywhere && sides.change() > eventful_dn) {
-            patch.look(fine, sensor, x, y);
+        if (fineness > kAnywhere && sides.change() > varying_dn) {
+            patch.trace(fine, sensor, x, y);
             sum = PixelSides(fine, patch, x, y, t).sum();
         }
         if (!view_dependent_) return sum;

@@ -1,24 +1,23 @@
-/// estimator/dense/image_derivative.h - how each pixel of a rendered image changes with the pose.
+/// estimator/dense/image_derivative.h - Jacobian of each pixel of a rendered image by the pose.
 ///
-/// A pixel is the mean of the light L over its square. With the point x of the image fixed, L changes as what is
-/// seen there moves by with the velocity v(x), known exactly from the depth, and as what is seen shines differently
-/// towards a camera that stands elsewhere:
+/// A pixel is the mean of the radiance L over its square. At a fixed image point x, L changes because the surface
+/// there moves with the image velocity v(x), known exactly from the range, and because its BSDF depends on the
+/// direction to the camera:
 ///
 ///   dT/dpose = - mean(v . grad L) + sum over edges of (L_near - L_far) (v_near . n) length / area + mean(dL/dview)
 ///
-/// The first two are one: L is taken on a grid of rays in each pixel, finer where it changes much, and each side
-/// between two neighbours is an edge across which L jumps and which moves with the nearer of the two surfaces. So
-/// textures, creases, shadows' edges and silhouettes are all counted, none twice; the sums over a staircase of
-/// sides are those over the edge itself, as n length sums to the same. Where the sides lie in depth beside each
-/// other but not on one surface, the edge is an occluding contour: rays find its place between the two, and so the
-/// pixel that it belongs to, and the depth of the nearer surface at the contour, where a round body's rim stands.
-/// (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans. Graph. 37(6), 2018,
-/// choose points of the edges at random; here they are on a grid.)
+/// The first two terms are computed together: L is sampled on a grid of rays in each pixel, finer where it varies,
+/// and each side between two neighbours is an edge across which L jumps and which moves with the nearer of the two
+/// surfaces. Textures, creases, shadow edges and silhouettes are all included, none twice; a staircase of sides
+/// sums to the edge itself, as the sum of n length is the same. Where two neighbours are not on one surface the
+/// edge is an occluding contour: bisection by rays finds its position, hence its pixel, and the range of the nearer
+/// surface there. (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans.
+/// Graph. 37(6), 2018, sample edges at random; here the points are on a grid.)
 ///
-/// The light falls on the target as the world has it and does not change with the pose (ModelView): shadows lie
-/// still on the surface and move with it, a Lambert surface's shine is constant, and of the others the Sun's direct
-/// light changes as the BSDF does with the direction to the camera. Not counted: the same for lamps and for light
-/// that comes by other surfaces, and shadows of the body that carries the camera.
+/// The target's illumination does not change with the pose (ModelView): shadows move with the surface, the radiance
+/// of a Lambert surface is constant, and for other materials direct sunlight changes as the BSDF does with the
+/// direction to the camera. Not included: the same for lamps and indirect light, and shadows of the body that
+/// carries the camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,11 +39,11 @@ public:
     /// `camera` is that of the image. `render_scene` outlives it.
     ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at);
 
-    /// As ModelView has it.
+    /// As ModelView::place_bodies.
     void place_bodies(const BodyPoses& at) { at_ = at; }
 
-    /// Of the expected DN, but for clipping, at this pose. Row-major; the outermost pixels, beside which nothing is
-    /// known, are zero. `fineness` >= 1: rays each way in a pixel where the light changes much. Runs on the calling
+    /// Jacobian of the predicted DN at this pose, without clipping. Row-major; zero in the outermost pixels, which
+    /// lack neighbours. `fineness` >= 1: rays each way in a pixel where the radiance varies. Runs on the calling
     /// thread's TBB arena; the same on any number of threads.
     std::span<const PixelDerivative> at(const Rigid3& T_camera_target, const SensorModel& sensor,
                                         const FrameSettings& settings, int fineness);

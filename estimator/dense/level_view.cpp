@@ -11,9 +11,9 @@
 namespace narpa {
 namespace {
 
-/// Pixels around the target's bounds, and part of their extent, for it to move in and for its edges to be seen.
+/// Margin about the target's bounds, in pixels and as a part of their extent.
 constexpr double kRoom_px = 6, kRoomPart = 0.1;
-/// Windows begin and end at multiples of this, so that small moves do not change them.
+/// Windows begin and end at multiples of this, so that small motions do not change them.
 constexpr int kRounding_px = 8;
 
 /// Corners of a polygon about an ellipsoid's outline as the camera sees it, camera axes; none where the camera is
@@ -79,8 +79,8 @@ double extent_px(const Window& window) {
     return std::max(window.width, window.height);
 }
 
-LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window, std::size_t target,
-                     const BodyPoses& at)
+LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window,
+                     std::size_t target, const BodyPoses& at)
     : window_(window),
       view_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at),
       derivative_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at) {

@@ -1,5 +1,4 @@
-/// estimator/dense/level_view.h - one level of the pyramid: the part of the image about the target, measured and
-/// expected.
+/// estimator/dense/level_view.h - one pyramid level: measured and predicted image in a window about the target.
 #pragma once
 
 #include <optional>
@@ -17,28 +16,28 @@ struct Window {
     friend bool operator==(const Window&, const Window&) = default;
 };
 
-/// Where the target's bounds lie in the image at this pose, with room around; nothing where they do not meet it or
-/// lie behind the camera.
+/// The window that holds the target's bounds at this pose, with a margin; nothing where they are outside the image
+/// or behind the camera.
 [[nodiscard]] std::optional<Window> window_about(const Tracer& tracer, const Camera& camera, std::size_t target,
                                                  const Rigid3& T_camera_target);
 /// Longest side of the target's bounds in the image, px; the image's own where they reach beyond it.
 [[nodiscard]] double extent_px(const Window& window);
 
-/// Signal and derivative in a window of the camera.
+/// Signal and Jacobian in a window of the camera's image.
 class LevelView {
 public:
     LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window, std::size_t target,
               const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
-    /// As ModelView has it.
+    /// As ModelView::place_bodies.
     void place_bodies(const BodyPoses& at);
-    /// Takes the measured image (of the level's whole camera) and variance (or none) into the window.
+    /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);
     void differentiate(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
                        int fineness);
-    /// The images as they were last made.
+    /// The latest of each.
     [[nodiscard]] PhotometricImages images(double pixels_averaged) const;
 
 private:

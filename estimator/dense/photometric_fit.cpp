@@ -10,7 +10,7 @@
 namespace narpa {
 namespace {
 
-/// A sigma of zero: so sure that nothing moves it.
+/// Precision of an exact prior.
 constexpr double kSure = 1e12;
 
 double precision(double sigma) {
@@ -36,7 +36,7 @@ public:
         const double signal = at_p(i_.signal), measured = at_p(i_.measured);
         const double expected = sensor_.black_dn + e_.gain * signal + e_.offset_dn;
         Residual out;
-        // Where either is clipped the other tells nothing but that it is bright.
+        // A clipped value carries no information.
         if (expected >= sensor_.top_dn || measured >= sensor_.top_dn) return out;
         const double variance = sensor_.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
                                 model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance);
@@ -47,7 +47,7 @@ public:
         out.tells = signal > 0 || (!i_.derivative.empty() && !i_.derivative[p].isZero(0));
         return out;
     }
-    /// The outermost pixels have no derivative.
+    /// The outermost pixels have no Jacobian.
     template <class Do>
     void each(int y, Do&& act) const {
         for (int x = 1; x < i_.width - 1; ++x)
@@ -63,7 +63,7 @@ private:
     const double model_dn2_;
 };
 
-/// Row by row, so that the threads have no say in the sums.
+/// Row by row, so that sums do not depend on the number of threads.
 template <class Sum, class Add>
 Sum sum_rows(const PhotometricImages& images, Add&& add) {
     std::vector<Sum> rows(static_cast<std::size_t>(std::max(images.height, 0)));

@@ -32,7 +32,7 @@ FineGrid::FineGrid(const RenderScene& render_scene, const BodyPoses& at, const C
       settings_(one_ray(settings)),
       frame_(make_frame(render_scene, at, camera_, T_world_camera_, settings_)) {}
 
-void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, int y) {
+void PixelPatch::trace(const FineGrid& grid, const SensorModel& sensor, int x, int y) {
     const int s = grid.fineness();
     const Frame& f = grid.frame();
     side_ = s + 2;
@@ -48,7 +48,7 @@ void PixelPatch::look(const FineGrid& grid, const SensorModel& sensor, int x, in
         trace_samples(f, samples, f.tracer.all_bodies(), p, radiance);
         for (std::size_t i = 0; i < samples.n; ++i) {
             constexpr double kInfinity = std::numeric_limits<double>::infinity();
-            SeenPoint& seen = points_[place[i]];
+            RaySample& seen = points_[place[i]];
             seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
             if (p.hits.body[i] < 0) continue;
             sees_anything_ = true;

@@ -1,4 +1,4 @@
-/// estimator/dense/pixel_patch.h - a pixel as a grid of rays sees it: light and geometry, with a ring around.
+/// estimator/dense/pixel_patch.h - radiance and geometry on a grid of rays within a pixel and a ring around it.
 #pragma once
 
 #include <vector>
@@ -8,10 +8,10 @@
 
 namespace narpa {
 
-/// DN above black that this radiance makes, not clipped.
+/// DN above black of this radiance, not clipped.
 [[nodiscard]] double signal_of(const SensorModel& sensor, const Rgb& radiance);
 
-/// A camera with `fineness` x `fineness` rays for each pixel of another, through the middles of as many squares.
+/// A camera with fineness x fineness pixels for each pixel of another.
 class FineGrid {
 public:
     /// All but `camera` outlive it.
@@ -32,8 +32,8 @@ private:
     Frame frame_;
 };
 
-/// What one ray meets. Nothing: body -1, infinitely far.
-struct SeenPoint {
+/// The first hit of one ray. None: body -1, infinite range.
+struct RaySample {
     double signal = 0;  ///< DN above black
     int body = -1;
     double range_m = 0;                          ///< along the ray
@@ -42,11 +42,11 @@ struct SeenPoint {
 
 class PixelPatch {
 public:
-    /// Looks at a pixel and at the ring of grid points around it, without the ring's corners.
-    void look(const FineGrid& grid, const SensorModel& sensor, int x, int y);
+    /// Traces a pixel and the ring of grid points around it, without the ring's corners.
+    void trace(const FineGrid& grid, const SensorModel& sensor, int x, int y);
 
     /// Point (i, j) of the pixel's own, 0 .. fineness - 1, or of the ring, -1 and fineness.
-    [[nodiscard]] const SeenPoint& at(int i, int j) const {
+    [[nodiscard]] const RaySample& at(int i, int j) const {
         return points_[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
                        static_cast<std::size_t>(i + 1)];
     }
@@ -55,7 +55,7 @@ public:
 private:
     int side_ = 0;
     bool sees_anything_ = false;
-    std::vector<SeenPoint> points_;
+    std::vector<RaySample> points_;
 };
 
 }  // namespace narpa

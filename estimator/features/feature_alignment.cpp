@@ -21,9 +21,9 @@ double ms_since(Clock::time_point start) {
 
 /// Half the window over which a match's noise is summed: that of the optical flow.
 constexpr int kHalfWindow_px = 10;
-/// Of a descriptor's place, where nothing better is known: as measured, 0.15 to 0.4 px.
+/// Standard deviation of a descriptor's position: measured, 0.15 to 0.4 px.
 constexpr double kDescriptor_px = 0.3;
-/// A match whose residual exceeds this many of the others' median is no match.
+/// A match whose residual exceeds this many times the median is an outlier.
 constexpr double kOutlier = 4;
 /// Median of the length of a residual of unit variance in u and in v: Rayleigh's.
 constexpr double kRayleighMedian = 1.17741;
@@ -33,10 +33,9 @@ constexpr double kNeighbour_px = 1.5;
 /// outline.
 constexpr double kStep_px = 6;
 
-/// Steps whose square, normalised by the covariance, is less, are noise: a view chooses other features than the one
-/// before.
+/// Steps of a smaller normalised square are noise: each view selects other features.
 constexpr double kSettledSquared = 9;
-/// Of the blocks in which the target is looked for.
+/// Side of the blocks in which the target is searched.
 constexpr int kBlock_px = 6;
 
 PixelCovariance with_floor(const PixelCovariance& c, double floor_px) {
@@ -79,7 +78,7 @@ std::string_view name(FeatureStatus status) noexcept {
     return names[static_cast<std::size_t>(status)];
 }
 
-/// Matches of one view, with their places on the body.
+/// Correspondences of one view.
 struct FeatureAlignment::Points {
     std::vector<Vec3> body_m;
     std::vector<Pixel> pixels;
@@ -108,8 +107,8 @@ struct FeatureAlignment::Points {
         for (const PixelCovariance& c : noise) all.push_back(with_floor(c, floor_px));
         return all;
     }
-    /// What it adds to the covariance that the errors beyond the sensor's noise of two matches are alike as far as
-    /// their windows overlap: C (sum over pairs of J_i' W_i S_ij W_j J_j) C.
+    /// Covariance due to excess errors that are correlated between matches as far as their windows overlap:
+    /// C (sum over pairs of J_i' W_i S_ij W_j J_j) C.
     [[nodiscard]] Matrix6 covariance_of_shared_errors(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
                                                       double floor_px) const {
         std::vector<Eigen::Matrix<double, 6, 2>> pulls;  // J' W
@@ -130,8 +129,8 @@ struct FeatureAlignment::Points {
             }
         return floor_px * floor_px * C * middle * C;
     }
-    /// The error of a match beyond the sensor's noise that makes chi^2 what its degrees of freedom say; 0 where the
-    /// noise explains it all.
+    /// The excess error of a match beyond the sensor's noise that makes chi^2 equal to its degrees of freedom; 0
+    /// where the noise suffices.
     [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T) const {
         const double freedom = std::max(1.0, 2 * static_cast<double>(size()) - 6);
         const auto chi2 = [&](double floor) {
@@ -160,7 +159,7 @@ bool FeatureAlignment::on_smooth_surface(double u, double v, const Hit& hit) con
     const double step_m = kStep_px * hit.range_m / CameraModelHandle(view_.camera())->pixels_per_radian();
     constexpr std::array<std::array<double, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
     return std::all_of(kAround.begin(), kAround.end(), [&](const std::array<double, 2>& d) {
-        const Hit beside = view_.look_through(u + kNeighbour_px * d[0], v + kNeighbour_px * d[1]);
+        const Hit beside = view_.trace_pixel(u + kNeighbour_px * d[0], v + kNeighbour_px * d[1]);
         if (beside.body != hit.body) return false;
         const Vec3 between = beside.position - hit.position;
         const double off_plane =
@@ -177,7 +176,7 @@ void FeatureAlignment::find_target() {
     for (int v0 = 0; v0 < camera.height; v0 += kBlock_px)
         for (int u0 = 0; u0 < camera.width; u0 += kBlock_px) {
             const double middle = 0.5 * (kBlock_px - 1);
-            if (view_.look_through(u0 + middle, v0 + middle).body != static_cast<int>(view_.target())) continue;
+            if (view_.trace_pixel(u0 + middle, v0 + middle).body != static_cast<int>(view_.target())) continue;
             const int u1 = std::min(u0 + kBlock_px, camera.width), v1 = std::min(v0 + kBlock_px, camera.height);
             for (int v = v0; v < v1; ++v)
                 std::fill(&on_target_[static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u0)],
@@ -201,7 +200,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
     const std::vector<FeatureMatch> matches = matcher_.match(toned_view, toned_frame, on_target_);
     const Rigid3 T_target_world = inverse(view_.T_world_target());
     for (const FeatureMatch& m : matches) {
-        const Hit hit = view_.look_through(m.view_u, m.view_v);
+        const Hit hit = view_.trace_pixel(m.view_u, m.view_v);
         if (hit.body != target || !on_smooth_surface(m.view_u, m.view_v, hit)) continue;
         PixelCovariance noise{kDescriptor_px * kDescriptor_px, 0, kDescriptor_px * kDescriptor_px};
         if (settings_.kind == FeatureKind::corners) {
@@ -245,7 +244,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
             return estimate;
         }
 
-        // Outliers first: a pose that they cannot pull far, and who agrees with it.
+        // First a robust pose; then least squares on its inliers.
         const auto solve = [&](Loss loss) {
             const std::vector<PixelCovariance> covariances = points.covariances(floor_px);
             RefineOptions options;

@@ -1,8 +1,8 @@
-/// estimator/features/feature_alignment.h - the pose of the target by rendering and comparing points.
+/// estimator/features/feature_alignment.h - pose estimation by rendering the model and matching features.
 ///
-/// The paper's section VI: render the model at the guess, match features of the render with the frame, take each
-/// one's place on the body from the render's own geometry, solve for the pose, and do it again from there until
-/// the view stops moving. The place on the body is exact: a ray through the feature, not a pixel of a depth map.
+/// The paper's section VI: render the model at the guess, match features of the rendered view with the frame,
+/// intersect the features' rays with the model, solve PnP, and repeat from the new pose until the view stops
+/// moving. The points on the body are exact: a ray through each feature, not a pixel of a depth map.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@ namespace narpa {
 
 struct FeatureSettings {
     FeatureKind kind = FeatureKind::corners;
-    int features = 400;        ///< looked for in the view
+    int features = 400;        ///< detected in the view, at most
     int renders_max = 10;      ///< views rendered for a frame
-    double settled_px = 0.02;  ///< a solution that moves the points by less (RMS) is the last
+    double settled_px = 0.02;  ///< converged: a solution that moves the points by less (RMS)
     int spp = 4;               ///< of the views
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
 };
@@ -27,8 +27,8 @@ struct FeatureSettings {
 enum class FeatureStatus : std::uint8_t {
     settled,
     unsettled,    ///< still moving after renders_max views
-    few_matches,  ///< fewer than kFewestMatches points agree
-    no_pose,      ///< the solver found none: its reason is in `solver`
+    few_matches,  ///< fewer than kFewestMatches inliers
+    no_pose,      ///< the solver failed: see `solver`
 };
 inline constexpr int kFewestMatches = 8;
 [[nodiscard]] std::string_view name(FeatureStatus status) noexcept;
@@ -45,10 +45,10 @@ struct FeatureEstimate {
     FeatureStatus status = FeatureStatus::few_matches;
     PnpStatus solver = PnpStatus::converged;
     Rigid3 T_camera_target{};
-    /// Of the matches' own scatter: what the sensor's noise explains, and what is left over (`floor_px`). Matches
-    /// whose windows overlap share what is left over in proportion.
+    /// From the sensor's noise and the excess scatter of the matches (`floor_px`), which is correlated between
+    /// matches whose windows overlap, in proportion to the overlap.
     Matrix6 covariance = Matrix6::Zero();
-    /// Cramer-Rao for these points with nothing but the sensor's noise.
+    /// Cramer-Rao for these points with the sensor's noise alone.
     Matrix6 bound = Matrix6::Zero();
     int agreeing = 0;
     double floor_px = 0;  ///< error of a match beyond the sensor's noise, in u and in v
@@ -59,15 +59,15 @@ struct FeatureEstimate {
     }
 };
 
-/// Keeps what it renders with from frame to frame.
+/// Keeps its memory from frame to frame.
 class FeatureAlignment {
 public:
     /// `render_scene` outlives it. `target`: index of the body. `at`: as of ModelView.
     FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at,
                      const FeatureSettings& settings = {});
 
-    /// `at`: where the bodies are when the frame is exposed. Points that the view shows where the frame does not
-    /// (occlusion, other light) are outvoted, not told. Runs on the calling thread's TBB arena.
+    /// `at`: poses of the bodies when the frame is exposed. Wrong matches (occlusion, other illumination) are
+    /// rejected as outliers. Runs on the calling thread's TBB arena.
     [[nodiscard]] FeatureEstimate align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess);
 
 private:

@@ -12,10 +12,10 @@ namespace {
 
 /// Distance of a descriptor's best match over that of its second best (Lowe 2004).
 constexpr float kRatio = 0.8f;
-/// A corner that is followed to the frame and back comes home within this, px.
-constexpr float kHome_px = 0.5f;
+/// Largest forward-backward error of a tracked corner, px.
+constexpr float kRoundTrip_px = 0.5f;
 constexpr int kFlowWindow_px = 21, kFlowLevels = 4;
-/// Of the frame's pixels so many may be brighter than the top of the scale.
+/// Part of the frame's pixels that may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
 
 cv::Mat as_mat(const TonedImage& image) {
@@ -66,7 +66,7 @@ ToneScale::ToneScale(const MeasuredImage& frame, const SensorModel& sensor) : se
     steps_ = 255 / (stabilised(top_dn) - black_);
 }
 
-/// A change by the standard deviation of the noise is a change by 1.
+/// Has a standard deviation of 1.
 double ToneScale::stabilised(double dn) const {
     const double above = dn - sensor_.black_dn, constant = sensor_.read_dn2 + sensor_.rounding_dn2;
     if (sensor_.shot_dn <= 0) return above / std::sqrt(constant);
@@ -95,10 +95,10 @@ TonedImage ToneScale::toned(const RadianceImage& view) const {
     return out;
 }
 
-OnePictureThread::OnePictureThread() : before_(cv::getNumThreads()) {
+SingleThreadedOpenCv::SingleThreadedOpenCv() : before_(cv::getNumThreads()) {
     cv::setNumThreads(1);
 }
-OnePictureThread::~OnePictureThread() {
+SingleThreadedOpenCv::~SingleThreadedOpenCv() {
     cv::setNumThreads(before_);
 }
 
@@ -154,7 +154,7 @@ struct FeatureMatcher::Impl {
                                  stop);
         for (std::size_t i = 0; i < start.size(); ++i) {
             const cv::Point2f missed = home[i] - start[i];
-            if (found[i] != 0 && found_back[i] != 0 && std::hypot(missed.x, missed.y) < kHome_px)
+            if (found[i] != 0 && found_back[i] != 0 && std::hypot(missed.x, missed.y) < kRoundTrip_px)
                 matches.push_back(pair_of(start[i], there[i]));
         }
         return matches;

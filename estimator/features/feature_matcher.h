@@ -1,4 +1,4 @@
-/// estimator/features/feature_matcher.h - the same points in two pictures: the view at a guess, and the frame.
+/// estimator/features/feature_matcher.h - correspondences between the rendered view and the frame.
 #pragma once
 
 #include <cstdint>
@@ -11,23 +11,22 @@
 
 namespace narpa {
 
-/// Light as eight bits a pixel, row-major, in steps of equal noise: the generalised Anscombe transform (Murtagh,
-/// Starck and Bijaoui 1995) of DN, so that a step in the dark, where rounding hides it, weighs no more than one in
-/// the light.
+/// Eight bits a pixel, row-major, variance-stabilised: the generalised Anscombe transform of DN (Murtagh, Starck
+/// and Bijaoui 1995), so that one step is the same number of standard deviations everywhere.
 struct TonedImage {
     int width = 0, height = 0;
     std::vector<std::uint8_t> pixels;
 };
 
-/// One for a frame and for the views that it is compared with.
+/// The tone curve of a frame and of the views that it is compared with.
 class ToneScale {
 public:
-    /// 255 stands for nearly the brightest of the frame.
+    /// 255 is nearly the brightest DN of the frame.
     ToneScale(const MeasuredImage& frame, const SensorModel& sensor);
 
     [[nodiscard]] TonedImage toned(const MeasuredImage& frame) const;
     [[nodiscard]] TonedImage toned(const RadianceImage& view) const;
-    /// Variance of a pixel of a toned frame, in its own steps: the sensor's noise, and rounding to eight bits.
+    /// Variance of a pixel of a toned frame in steps^2: sensor noise, and rounding to eight bits.
     [[nodiscard]] double variance() const;
 
 private:
@@ -42,7 +41,7 @@ enum class FeatureKind : std::uint8_t {
     sift,     ///< Lowe 2004
     akaze,    ///< Alcantarilla et al. 2013
     orb,      ///< Rublee et al. 2011
-    corners,  ///< minimum eigenvalue (Shi and Tomasi 1994), followed by pyramidal optical flow (Bouguet 2001)
+    corners,  ///< minimum eigenvalue (Shi and Tomasi 1994), tracked by pyramidal optical flow (Bouguet 2001)
 };
 [[nodiscard]] std::string_view name(FeatureKind kind) noexcept;
 
@@ -52,13 +51,13 @@ struct FeatureMatch {
     double frame_u = 0, frame_v = 0;
 };
 
-/// While it lives OpenCV uses the calling threads alone, in the whole process; then as many as before.
-class OnePictureThread {
+/// While it exists OpenCV uses the calling threads alone, in the whole process; then as many as before.
+class SingleThreadedOpenCv {
 public:
-    OnePictureThread();
-    ~OnePictureThread();
-    OnePictureThread(const OnePictureThread&) = delete;
-    OnePictureThread& operator=(const OnePictureThread&) = delete;
+    SingleThreadedOpenCv();
+    ~SingleThreadedOpenCv();
+    SingleThreadedOpenCv(const SingleThreadedOpenCv&) = delete;
+    SingleThreadedOpenCv& operator=(const SingleThreadedOpenCv&) = delete;
 
 private:
     int before_;
@@ -66,15 +65,15 @@ private:
 
 class FeatureMatcher {
 public:
-    /// `most`: features that are looked for in each picture.
+    /// `most`: features detected in each image, at most.
     FeatureMatcher(FeatureKind kind, int most);
     ~FeatureMatcher();
     FeatureMatcher(FeatureMatcher&&) noexcept;
     FeatureMatcher& operator=(FeatureMatcher&&) noexcept;
 
     [[nodiscard]] FeatureKind kind() const noexcept;
-    /// Descriptors pass Lowe's ratio test and match both ways; corners are followed there and back. `on_target`:
-    /// where features of the view may lie, non-zero, as large as the view.
+    /// Descriptors pass Lowe's ratio test and match both ways; corners are tracked forward and back. `on_target`:
+    /// mask of the view, non-zero where features may lie.
     [[nodiscard]] std::vector<FeatureMatch> match(const TonedImage& view, const TonedImage& frame,
                                                   const std::vector<std::uint8_t>& on_target);
 

@@ -1,4 +1,4 @@
-/// estimator/features/flow_noise.h - how far noise in a picture moves a corner that is followed to it.
+/// estimator/features/flow_noise.h - covariance of a corner's position by optical flow.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,9 +7,9 @@
 
 namespace narpa {
 
-/// Covariance (px^2; u, v) of where optical flow finds a point, at `variance` of the noise of each pixel of the
-/// picture that it is followed to: variance * (sum of g g' over the window)^-1, g the picture's gradients. The
-/// window is `half_px` to each side. Zero where the window holds no corner: the sum is singular.
+/// Covariance (px^2; u, v) of a point tracked by optical flow, for independent noise of this `variance` in the
+/// pixels of the image that it is tracked to: variance * (sum of g g' over the window)^-1, g the image gradients.
+/// The window reaches `half_px` to each side. Zero where the sum is singular: no corner.
 [[nodiscard]] Eigen::Matrix2d flow_covariance(const TonedImage& image, double variance, double u_px, double v_px,
                                               int half_px);
 

@@ -1,4 +1,4 @@
-/// estimator/filter/discretise.h - a linear system driven by white noise, over a stretch of time.
+/// estimator/filter/discretise.h - discretisation of a linear system driven by white noise.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,8 @@ struct Discrete {
     Matrix transition, integral, noise;
 };
 
-/// Exact but for rounding: power series over so short a part that they converge at once, doubled as often as it
-/// takes (the numbers are those of C. Van Loan, "Computing integrals involving the matrix exponential", 1978).
+/// Exact to rounding: power series over a short step, then doubling (the quantities of C. Van Loan, "Computing
+/// integrals involving the matrix exponential", 1978).
 template <int N>
 [[nodiscard]] Discrete<N> discretise(const Eigen::Matrix<double, N, N>& F, const Eigen::Matrix<double, N, N>& Qc,
                                      double dt_s) {

@@ -1,4 +1,4 @@
-/// estimator/filter/motion_model.h - how a target moves beside a chaser, and what is known of it as time goes on.
+/// estimator/filter/motion_model.h - relative motion of a target and a chaser: propagation of state and covariance.
 ///
 /// The frame is either inertial or LVLH, that of W. Clohessy and R. Wiltshire (1960): x up, away from the Earth, y
 /// along the circular orbit, z along its momentum; it turns about z with the orbit's rate. The chaser is its
@@ -16,7 +16,7 @@ namespace narpa {
 using Vector12 = Eigen::Matrix<double, 12, 1>;
 using Matrix12 = Eigen::Matrix<double, 12, 12>;
 
-/// The target beside the chaser: their centres of mass, which are the origins of their body axes.
+/// The target relative to the chaser; origins are the centres of mass.
 struct RelativeState {
     Vec3 position_m{};      ///< of the target's origin from the chaser's, frame axes
     Vec3 velocity_m_s{};    ///< its rate of change as the frame sees it
@@ -40,7 +40,7 @@ struct MotionModel {
     /// The target's, about its centre of mass in its body axes: it tumbles as a rigid body without a torque. None:
     /// its rate stays as it is in its own axes.
     std::optional<Eigen::Matrix3d> inertia_kg_m2{};
-    /// White noise that drives what the model leaves out: power spectral densities, on each axis, of acceleration
+    /// Process noise: power spectral densities of white noise, on each axis, of acceleration
     /// (m^2 s^-3) and of angular acceleration (rad^2 s^-3).
     double acceleration_psd = 1e-8;
     double angular_acceleration_psd = 1e-10;
@@ -48,7 +48,7 @@ struct MotionModel {
 /// An Error names the field, what it is and what was expected.
 [[nodiscard]] Status check(const MotionModel& model);
 
-/// Moves state and covariance on by dt_s >= 0. `acceleration_m_s2`: known, of the target relative to the chaser,
+/// Propagates state and covariance by dt_s >= 0. `acceleration_m_s2`: known, of the target relative to the chaser,
 /// frame axes, constant. Allocates nothing.
 void propagate(const MotionModel& model, double dt_s, const Vec3& acceleration_m_s2, RelativeState& state,
                Matrix12& covariance);

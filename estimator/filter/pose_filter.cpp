@@ -72,7 +72,7 @@ void correct(const Innovation& innovation, const Matrix6& measurement_covariance
     state = displaced(state, step);
     const Matrix12 rest = Matrix12::Identity() - K * H;
     P = (rest * P * rest.transpose() + K * measurement_covariance * K.transpose()).eval();
-    // Errors are now about the attitude that was just put right: to first order half the step is turned off.
+    // Reset: errors now refer to the corrected attitude, to first order a rotation by half the step.
     Matrix12 reset = Matrix12::Identity();
     const Eigen::Vector3d a = 0.5 * step.segment<3>(6);
     reset.block<3, 3>(6, 6) << 1, a.z(), -a.y(), -a.z(), 1, a.x(), a.y(), -a.x(), 1;
@@ -127,15 +127,15 @@ Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, const Pose
     return create(settings, first.t_ns, state, 0.5 * (P + P.transpose()));
 }
 
-PoseFilter::Knowledge PoseFilter::moved_on(Knowledge from, const Thrust& thrust, std::int64_t by_ns) const {
+PoseFilter::Estimate PoseFilter::propagated(Estimate from, const Thrust& thrust, std::int64_t by_ns) const {
     MotionModel motion = settings_.motion;
     motion.acceleration_psd += thrust.psd;
     propagate(motion, 1e-9 * static_cast<double>(by_ns), thrust.acceleration_m_s2, from.state, from.covariance);
     return from;
 }
 
-/// The oldest goes where there is no room.
-void PoseFilter::remember(std::size_t place, const Event& event) {
+/// Drops the oldest where the history is full.
+void PoseFilter::insert(std::size_t place, const Event& event) {
     if (history_.size() == settings_.history) {
         std::move(history_.begin() + 1, history_.begin() + static_cast<std::ptrdiff_t>(place), history_.begin());
         history_[place - 1] = event;
@@ -146,7 +146,7 @@ void PoseFilter::remember(std::size_t place, const Event& event) {
 
 void PoseFilter::predict(std::int64_t t_ns) {
     if (t_ns <= t_ns_) return;
-    now_ = moved_on(now_, history_.back().thrust, t_ns - t_ns_);
+    now_ = propagated(now_, history_.back().thrust, t_ns - t_ns_);
     t_ns_ = t_ns;
 }
 
@@ -154,7 +154,7 @@ bool PoseFilter::accelerate(const Vec3& acceleration_m_s2, double psd) {
     if (!is_finite(acceleration_m_s2) || !(psd >= 0 && std::isfinite(psd))) return false;
     const Thrust thrust{acceleration_m_s2, psd};
     if (history_.back().thrust == thrust) return true;
-    remember(history_.size(), {t_ns_, now_, thrust, false, {}});
+    insert(history_.size(), {t_ns_, now_, thrust, false, {}});
     return true;
 }
 
@@ -185,7 +185,7 @@ UpdateResult PoseFilter::update(const PoseMeasurement& m) {
     ++counts_.taken;
     counts_.gated_in_a_row = 0;
     if (history_.size() == settings_.history) --place;  // the first one goes
-    remember(static_cast<std::size_t>(later - history_.begin()), event);
+    insert(static_cast<std::size_t>(later - history_.begin()), event);
     for (std::size_t i = place + 1; i < history_.size(); ++i) {
         Event& e = history_[i];
         e.after = after(history_[i - 1], e.t_ns);

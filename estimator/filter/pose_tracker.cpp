@@ -10,8 +10,9 @@ Status PoseTracker::start(std::int64_t t_ns, const RelativeState& state, const M
 }
 
 UpdateResult PoseTracker::update(const PoseMeasurement& measurement) {
-    UpdateResult result{UpdateOutcome::bad, 0,
-                        "it cannot start a filter: expected finite numbers, unit quaternions, a positive definite covariance"};
+    UpdateResult result{
+        UpdateOutcome::bad, 0,
+        "it cannot start a filter: expected finite numbers, unit quaternions, a positive definite covariance"};
     if (filter_) {
         result = filter_->update(measurement);
         if (result.outcome != UpdateOutcome::gated || filter_->counts().gated_in_a_row < settings_.gated_in_a_row)

@@ -1,5 +1,5 @@
-/// estimator/filter/pose_tracker.h - a pose filter that starts from its first measurement, and starts again once several
-/// measurements in a row contradict it.
+/// estimator/filter/pose_tracker.h - a pose filter that starts from its first measurement, and starts again once
+/// several measurements in a row contradict it.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// estimator/pose/cholesky6.h - symmetric positive definite systems of six: small enough to be written out.
+/// estimator/pose/cholesky6.h - LDL' of symmetric positive definite 6 x 6 systems, unrolled.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ public:
 #pragma GCC unroll 6
             for (int k = 0; k < j; ++k) d -= scaled[j][k] * L_[j][k];
             positive_ = positive_ && d > 0;
-            // How much of a row's own information the rows before it leave over does not depend on its unit.
+            // The remaining part of a diagonal entry does not depend on the row's unit.
             smallest_ = std::min(smallest_, d / M(j, j));
             inverse_d_[j] = 1 / d;
 #pragma GCC unroll 6

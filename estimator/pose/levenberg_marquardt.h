@@ -1,7 +1,7 @@
 /// estimator/pose/levenberg_marquardt.h - damped least squares over six parameters, on normal equations.
 ///
-/// The paper's appendix B with its misprints mended: the step (A + lambda D) h = g has the same D, diag(A), as the
-/// gain ratio's denominator h . (lambda D h + g); a rejected step multiplies lambda, and with L_up = 11 and
+/// The paper's appendix B with its misprints corrected: the step (A + lambda D) h = g has the same D, diag(A), as
+/// the gain ratio's denominator h . (lambda D h + g); a rejected step multiplies lambda, and with L_up = 11 and
 /// L_down = 9 (Gavin, "The Levenberg-Marquardt algorithm for nonlinear least squares curve-fitting problems") the
 /// damping cannot return to where it was and cycle. Allocates nothing.
 #pragma once
@@ -48,7 +48,7 @@ struct DampedStep {
     return step;
 }
 
-/// A^-1. False where A has no rank of six within rounding: some direction is not seen.
+/// A^-1. False where A is singular within rounding: some direction is not observable.
 [[nodiscard]] inline bool invert_information(const Matrix6& A, Matrix6& inverse) {
     constexpr double kSmallestPivot = 1e-12;
     const Cholesky6 factor(A);
@@ -60,9 +60,8 @@ struct DampedStep {
 inline constexpr std::size_t kLmIterationsMax = 200;
 inline constexpr int kLmPatience = 6;
 
-/// Converged: the undamped step is shorter than step_sigma; or, in a valley that the linear model does not follow,
-/// a step was taken and chi2 fell by less than chi2_settled over the last kLmPatience: no noise tells that from its
-/// minimum.
+/// Converged: the undamped step is shorter than step_sigma; or, in a curved valley, a step was taken and chi2 fell
+/// by less than chi2_settled, far below its noise, over the last kLmPatience iterations.
 struct LmOptions {
     double lambda = 1e-3;      ///< at the start
     double gain_min = 1e-3;    ///< a step is taken where the gain ratio exceeds this
@@ -107,7 +106,7 @@ void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& 
     while (summary.iterations < iterations_max) {
         const DampedStep step = damped_step(now, lambda, o.damping);
         if (step.solved && small(step)) {
-            // Damping makes steps short as well: what counts is how far the undamped one would go.
+            // Damping shortens steps too: convergence is judged by the undamped one.
             const DampedStep full = damped_step(now, 0, o.damping);
             if (!full.solved || small(full)) {
                 if (full.solved) state = problem.moved(state, full.h);

@@ -5,7 +5,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kFlatSigma = 3;         // thinner than this in the picture, a body's depth tells nothing
+constexpr double kFlatSigma = 3;         // a body thinner than this in the image is treated as flat
 constexpr double kReversibleSigma = 20;  // thicker than this, the reversed pose cannot fit
 constexpr std::size_t kSurePoints = 6;   // with fewer, wrong minima fit within the noise
 
@@ -16,7 +16,7 @@ double typical_sigma_px(const PnpInput& input) {
     return std::sqrt(sum / static_cast<double>(input.covariance_px2.size()));
 }
 
-/// How many standard deviations the body's thinnest direction covers in the picture, about.
+/// Extent of the body's thinnest direction in the image, in standard deviations of a pixel, about.
 double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, const PointExtent& spread) {
     double mean_u = 0, mean_v = 0, sum = 0;
     const double n = static_cast<double>(points.size());
@@ -68,7 +68,7 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& opt
     solution_.inlier.assign(input.body_m.size(), 1);
     points_.assign(input);
     gather();
-    const PointExtent spread = spread_of(gathered_);
+    const PointExtent spread = extent_of(gathered_);
     if (is_a_line(spread)) {
         solution_.status = PnpStatus::degenerate;
         return solution_;
@@ -83,18 +83,18 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& opt
 void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread, const PnpOptions& options) {
     const double depth = depth_in_sigma(input, gathered_, spread);
     const bool few = points_.size() < kSurePoints;
-    const PoseStarts starts = orthographic_starts(gathered_, spread, depth < kFlatSigma);
+    const InitialPoses starts = orthographic_poses(gathered_, spread, depth < kFlatSigma);
     for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i], options);
     if (few) consider_triples(options);
     if (!fits_the_noise()) {
         starts_.clear();
-        opencv_starts(gathered_, depth < kFlatSigma, starts_);
+        opencv_poses(gathered_, depth < kFlatSigma, starts_);
         for (const CentredPose& start : starts_) consider(start, options);
     }
     if (few || depth < kReversibleSigma || !fits_the_noise()) consider_reversed(spread, options);
 }
 
-// Four or five points fit several poses within the noise: those that three of them allow, too, are tried.
+// Four or five points fit several poses within the noise: the poses of triples are tried too.
 void PnpSolver::consider_triples(const PnpOptions& options) {
     constexpr std::size_t kTriples = 4, kRefined = 3;
     std::array<std::pair<double, CentredPose>, 2 * kTriples> tried;
@@ -103,7 +103,7 @@ void PnpSolver::consider_triples(const PnpOptions& options) {
         std::array<BodyPoint, 3> triple;
         for (std::size_t k = 0, i = 0; k < 3; ++i)
             if (i != left_out) triple[k++] = gathered_[i];
-        const PoseStarts starts = triple_starts(triple);
+        const InitialPoses starts = three_point_poses(triple);
         for (std::size_t i = 0; i < starts.count; ++i)
             tried[count++] = {points_.truncated_cost(starts.pose[i], std::numeric_limits<double>::infinity()),
                               starts.pose[i]};

@@ -1,8 +1,9 @@
-/// estimator/pose/pnp.h - a pose from points alone: no guess, outliers if need be, and never a silent choice.
+/// estimator/pose/pnp.h - perspective-n-point: the pose from correspondences, without a guess, with outliers on
+/// request.
 ///
-/// PoseStarts (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the noise
-/// allows, or points are too few to tell, OpenCV's SQPNP and IPPE are asked as well. The pose that a nearly flat or
-/// far body shows just as well is always looked for, and reported where the data cannot refuse it.
+/// Initial poses (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the
+/// noise allows, or points are few, OpenCV's SQPNP and IPPE supply more initial poses. The second pose of a nearly
+/// flat or distant body is always searched for, and reported where the data cannot exclude it.
 #pragma once
 
 #include <vector>
@@ -15,7 +16,7 @@ namespace narpa {
 struct PnpOptions {
     bool outliers = false;      ///< some pixels may belong to other points: RANSAC first (Fischler and Bolles 1981)
     int hypotheses_max = 2000;  ///< that RANSAC may try, of either kind
-    double inliers_min = 0.25;  ///< part of the points that must agree, and five at least
+    double inliers_min = 0.25;  ///< least part of the points that are inliers, and five at least
     std::uint64_t seed = 1;     ///< of RANSAC's samples
     LmOptions lm;
 };
@@ -45,7 +46,7 @@ class PnpSolver {
 public:
     explicit PnpSolver(std::size_t points_max);
 
-    /// At least four points. The solution stays valid until the next call. Allocates only where OpenCV is asked.
+    /// At least four points. The solution stays valid until the next call. Allocates only where OpenCV is used.
     const PnpSolution& solve(const PnpInput& input, const PnpOptions& options = {});
 
 private:

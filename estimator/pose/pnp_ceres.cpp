@@ -108,7 +108,7 @@ std::unique_ptr<ceres::LossFunction> loss_function(const RobustLoss& loss) {
 }
 
 /// The pose with chi2, covariance and status as pnp_refine.h has them.
-PnpFit judged(const PnpInput& input, const Rigid3& T, const RobustLoss& loss, bool converged) {
+PnpFit evaluated(const PnpInput& input, const Rigid3& T, const RobustLoss& loss, bool converged) {
     PnpPoints points(input.body_m.size());
     points.assign(input);
     const CentredPose pose = points.centred(T);
@@ -130,7 +130,7 @@ PnpFit judged(const PnpInput& input, const Rigid3& T, const RobustLoss& loss, bo
     return fit;
 }
 
-PnpFit refused(PnpStatus status) {
+PnpFit failure(PnpStatus status) {
     PnpFit fit;
     fit.status = status;
     return fit;
@@ -148,11 +148,11 @@ bool is_usable(const Rigid3& T) {
 }  // namespace
 
 PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const RobustLoss& loss) {
-    if (const PnpStatus status = check(input); status != PnpStatus::converged) return refused(status);
-    if (!is_usable(start)) return refused(PnpStatus::not_finite);
+    if (const PnpStatus status = check(input); status != PnpStatus::converged) return failure(status);
+    if (!is_usable(start)) return failure(PnpStatus::not_finite);
     const Quat q0 = normalized(start.q);
     for (const Vec3& p : input.body_m)
-        if (!input.camera->project(q0 * p + start.t)) return refused(PnpStatus::behind_camera);
+        if (!input.camera->project(q0 * p + start.t)) return failure(PnpStatus::behind_camera);
     double x[6] = {0, 0, 0, start.t.x, start.t.y, start.t.z};
     const std::unique_ptr<ceres::LossFunction> loss_of_all = loss_function(loss);
     ceres::Problem::Options ours;
@@ -167,8 +167,8 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
     options.max_num_iterations = 100;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
-    if (summary.termination_type == ceres::FAILURE) return refused(PnpStatus::behind_camera);
-    PnpFit fit = judged(input, pose_of(q0, x), loss, summary.termination_type == ceres::CONVERGENCE);
+    if (summary.termination_type == ceres::FAILURE) return failure(PnpStatus::behind_camera);
+    PnpFit fit = evaluated(input, pose_of(q0, x), loss, summary.termination_type == ceres::CONVERGENCE);
     fit.summary.iterations = static_cast<int>(summary.iterations.size()) - 1;
     for (std::size_t i = 0; i < summary.iterations.size(); ++i)
         fit.summary.chi2_at[i] = 2 * summary.iterations[i].cost;
@@ -176,8 +176,8 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
 }
 
 PnpFit refine_with_tiny_solver(const PnpInput& input, const Rigid3& start) {
-    if (const PnpStatus status = check(input); status != PnpStatus::converged) return refused(status);
-    if (!is_usable(start)) return refused(PnpStatus::not_finite);
+    if (const PnpStatus status = check(input); status != PnpStatus::converged) return failure(status);
+    if (!is_usable(start)) return failure(PnpStatus::not_finite);
     const Quat q0 = normalized(start.q);
     AllResiduals residuals;
     for (std::size_t i = 0; i < input.body_m.size(); ++i) residuals.points.push_back({input, q0, i});
@@ -185,7 +185,8 @@ PnpFit refine_with_tiny_solver(const PnpInput& input, const Rigid3& start) {
     Vector6 x;
     x << 0, 0, 0, to_eigen(start.t);
     const auto summary = solver.Solve(residuals, &x);
-    PnpFit fit = judged(input, pose_of(q0, x.data()), {}, summary.status != decltype(solver)::HIT_MAX_ITERATIONS);
+    PnpFit fit =
+        evaluated(input, pose_of(q0, x.data()), {}, summary.status != decltype(solver)::HIT_MAX_ITERATIONS);
     fit.summary.iterations = summary.iterations;
     return fit;
 }

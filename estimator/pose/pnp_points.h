@@ -1,4 +1,4 @@
-/// estimator/pose/pnp_points.h - points of the body and where the camera sees them.
+/// estimator/pose/pnp_points.h - correspondences: points of the body and their pixels.
 #pragma once
 
 #include <array>
@@ -46,21 +46,21 @@ enum class PnpStatus : std::uint8_t {
     bad_noise,        ///< sigma_px is not above 0, or a covariance not positive definite
     no_consensus,     ///< no pose agrees with enough of the points
 };
-/// A sentence that says what was wrong and what was expected.
+/// What was wrong and what was expected, as a sentence.
 [[nodiscard]] const char* in_words(PnpStatus status);
 
-/// `converged` where the input can be used, else what is wrong with it.
+/// `converged` where the input is usable, else what is wrong with it.
 [[nodiscard]] PnpStatus check(const PnpInput& input);
 
-/// The state that is solved for: a camera-frame rotation about the points' centroid, and where the centroid is. In
-/// it rotation and translation are nearly independent wherever the body's origin lies.
+/// The state of the solver: attitude, and position of the points' centroid, so that rotation and translation are
+/// nearly independent wherever the body's origin lies.
 struct CentredPose {
     Quat q{};
     Vec3 centroid_m{};  ///< in the camera's frame
 };
 
-/// Points made ready for a solver: centred, normalised, whitened, in groups of eight so that the processor works on
-/// several at a time. Sums are taken in one order on every processor.
+/// Correspondences prepared for the solver: centred, normalised, whitened, in groups of eight for vector code. Sums
+/// have the same order on every processor.
 class PnpPoints {
 public:
     /// Room for so many points; `assign` allocates nothing up to this number.

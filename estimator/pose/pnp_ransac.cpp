@@ -53,7 +53,7 @@ void PnpSolver::solve_with_outliers(const PnpInput& input, const PnpOptions& opt
         T = solution_.fit.T_camera_body;
     }
     gather();
-    const PointExtent spread = spread_of(gathered_);
+    const PointExtent spread = extent_of(gathered_);
     if (solution_.fit.ok()) consider_reversed(spread, options);
 }
 
@@ -92,7 +92,7 @@ std::array<BodyPoint, 3> PnpSolver::sample(const std::array<std::size_t, 3>& dra
 }
 
 void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
-    const PoseStarts starts = triple_starts(sample(drawn));
+    const InitialPoses starts = three_point_poses(sample(drawn));
     for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i], options);
 }
 

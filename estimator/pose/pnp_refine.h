@@ -1,4 +1,4 @@
-/// estimator/pose/pnp_refine.h - the pose that fits points best, from a pose near it, without touching the heap.
+/// estimator/pose/pnp_refine.h - least-squares pose from correspondences and a nearby pose, without allocation.
 ///
 /// Levenberg-Marquardt (levenberg_marquardt.h) on the reprojection error. The attitude is a quaternion; classical
 /// Rodrigues parameters are the increment of one step, set to zero after it, so that no attitude is special (a
@@ -30,7 +30,7 @@ struct PnpFit {
     [[nodiscard]] double relative_position_sigma() const {
         return std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) / norm(T_camera_body.t);
     }
-    /// The pixel noise that the residuals speak for, as a multiple of the given one; 1 without redundancy.
+    /// The pixel noise estimated from the residuals, as a multiple of the given one; 1 without redundancy.
     [[nodiscard]] double noise_scale() const {
         return degrees_of_freedom > 0 ? std::sqrt(chi2 / degrees_of_freedom) : 1.0;
     }

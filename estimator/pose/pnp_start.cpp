@@ -86,7 +86,7 @@ bool posit(std::span<const BodyPoint> points, const PointExtent& spread, bool fl
 
 }  // namespace
 
-PointExtent spread_of(std::span<const BodyPoint> points) {
+PointExtent extent_of(std::span<const BodyPoint> points) {
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
     for (const BodyPoint& p : points) {
         const Eigen::Vector3d a = to_eigen(p.body_m);
@@ -99,8 +99,8 @@ PointExtent spread_of(std::span<const BodyPoint> points) {
     return {{widest, middle, cross(widest, middle)}, {rms(2), rms(1), rms(0)}};
 }
 
-PoseStarts orthographic_starts(std::span<const BodyPoint> points, const PointExtent& spread, bool flat) {
-    PoseStarts starts;
+InitialPoses orthographic_poses(std::span<const BodyPoint> points, const PointExtent& spread, bool flat) {
+    InitialPoses starts;
     if (!(spread.rms_m.y > kLine * spread.rms_m.x)) return starts;
     for (const double sign : {1.0, -1.0}) {
         if (posit(points, spread, flat, sign, starts.pose[starts.count])) ++starts.count;
@@ -109,10 +109,10 @@ PoseStarts orthographic_starts(std::span<const BodyPoint> points, const PointExt
     return starts;
 }
 
-PoseStarts triple_starts(std::array<BodyPoint, 3> points) {
+InitialPoses three_point_poses(std::array<BodyPoint, 3> points) {
     const Vec3 mean = (points[0].body_m + points[1].body_m + points[2].body_m) / 3.0;
     for (BodyPoint& p : points) p.body_m -= mean;
-    PoseStarts starts = orthographic_starts(points, spread_of(points), true);
+    InitialPoses starts = orthographic_poses(points, extent_of(points), true);
     for (std::size_t i = 0; i < starts.count; ++i) starts.pose[i].centroid_m -= starts.pose[i].q * mean;
     return starts;
 }

@@ -40,7 +40,7 @@ void unless_refused(const F& f) {
 
 }  // namespace
 
-void opencv_starts(std::span<const BodyPoint> points, bool flat, std::vector<CentredPose>& out) {
+void opencv_poses(std::span<const BodyPoint> points, bool flat, std::vector<CentredPose>& out) {
     const OpencvPoints p(points);
     std::vector<cv::Mat> rotations, translations;
     for (const auto method : {cv::SOLVEPNP_SQPNP, cv::SOLVEPNP_IPPE}) {

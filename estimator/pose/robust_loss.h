@@ -1,5 +1,5 @@
-/// estimator/pose/robust_loss.h - what a point costs whose residual is large: losses as in Ceres, of the squared
-/// normalised length s = r' C^-1 r of a point's residual.
+/// estimator/pose/robust_loss.h - robust losses as in Ceres, functions of a residual's squared normalised length
+/// s = r' C^-1 r.
 #pragma once
 
 #include <cmath>

@@ -1,8 +1,8 @@
-/// estimator/stereo/epipolar_warp.h - where the pixels of one camera lie in another, for a surface of given inverse
-/// depth.
+/// estimator/stereo/epipolar_warp.h - warp of pixels from one pinhole camera to another for a given inverse depth.
 ///
 /// A pixel's ray in the other camera's frame, at unit depth in its own, is affine in the pixel; on a plane the
-/// inverse depth is too. So a patch of a plane is carried over exactly, by the homography that the plane induces.
+/// inverse depth is affine too. A patch of a plane is therefore warped exactly, by the homography that the plane
+/// induces.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@ public:
     [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& px) const {
         return origin_ + px.x() * across_ + px.y() * down_;
     }
-    /// Is the point before the other camera?
+    /// Is the point in front of the other camera?
     [[nodiscard]] bool is_before(const Eigen::Vector3d& ray, double inverse_depth) const {
         return ray.z() + inverse_depth * t_.z() > 0;
     }

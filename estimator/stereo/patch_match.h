@@ -1,5 +1,4 @@
-/// estimator/stereo/patch_match.h - one patch of a picture found in another: to the whole pixel, then between
-/// pixels.
+/// estimator/stereo/patch_match.h - matches a patch of one image in another: to the whole pixel, then to subpixels.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,25 +10,25 @@
 
 namespace narpa {
 
-/// A camera's picture with all that is needed to match it.
+/// A camera's image, prepared for matching.
 struct StereoView {
     Camera camera;
     SensorModel sensor;
     MeasuredImage image,
-        soft;            ///< as taken; with the highest frequencies damped, which do not survive interpolation
+        soft;            ///< as taken; low-pass filtered against aliasing in the interpolation
     SplineImage spline;  ///< of the soft one
 
     StereoView(const Camera& c, const MeasuredImage& frame);
 };
 
-/// A square of whole pixels about a whole pixel; may be kept and filled again.
+/// A square of whole pixels about a whole pixel; can be reused.
 struct Patch {
     int u = 0, v = 0, radius_px = 0;
     std::vector<double> dn;  ///< row-major, 2 radius + 1 each way
 
     [[nodiscard]] Eigen::Vector2d centre_px() const { return {u, v}; }
 };
-/// False where the square leaves the picture or a pixel of it is full.
+/// False where the square leaves the image or a pixel of it is saturated.
 [[nodiscard]] bool cut_patch(const StereoView& view, int u, int v, int radius_px, Patch& patch);
 
 struct InverseDepths {
@@ -45,8 +44,8 @@ struct WholePixelMatch {
 };
 inline constexpr double kApart_px = 3;
 
-/// The best of the whole pixels that the epipolar line comes by between two inverse depths, by the correlation with
-/// the patch as a plane would show it that faces the patch's camera at that depth. Nothing where none lies inside.
+/// The best of the whole pixels along the epipolar line between two inverse depths, by correlation with the patch
+/// warped as a plane that faces the patch's camera at that depth. Nothing where none lies inside the image.
 [[nodiscard]] std::optional<WholePixelMatch> search_line(const Patch& patch, const EpipolarWarp& warp,
                                                          const StereoView& there, const InverseDepths& range);
 
@@ -58,10 +57,10 @@ struct SubPixelMatch {
     double misfit = 0;
 };
 
-/// Least squares on a shift, the relief of the ground (a plane's slopes in inverse depth, and small curvatures),
-/// gain and offset: Lucas and Kanade 1981, with the homography of the plane. Pixels are weighted by the sensors'
-/// noise and what is left unexplained of their places, and by a Gaussian about the middle; the covariance follows
-/// from the same. Nothing where it does not settle within a pixel and a half of the whole-pixel match.
+/// Least squares on a shift, the relief (slopes and small curvatures of the inverse depth), gain and offset: Lucas
+/// and Kanade 1981 with the homography of the plane. Pixels are weighted by the sensors' noise, the unmodelled
+/// error of their positions, and a Gaussian window; the covariance follows from the same. Nothing where it does not
+/// converge within a pixel and a half of the whole-pixel match.
 [[nodiscard]] std::optional<SubPixelMatch> fit_patch(const Patch& patch, const StereoView& here,
                                                      const EpipolarWarp& warp, const StereoView& there,
                                                      const WholePixelMatch& start);

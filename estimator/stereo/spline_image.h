@@ -1,5 +1,5 @@
-/// estimator/stereo/spline_image.h - a picture between its pixels: the cubic B-spline through them (Unser, Aldroubi
-/// and Eden 1993), twice continuously differentiable. Beyond its edges it is mirrored.
+/// estimator/stereo/spline_image.h - subpixel interpolation by the cubic B-spline through the pixels (Unser,
+/// Aldroubi and Eden 1993), twice continuously differentiable; mirrored at the edges.
 #pragma once
 
 #include <Eigen/Core>

@@ -15,8 +15,8 @@ constexpr double kLeastStrength = 1e-4;
 constexpr int kCornerBlock_px = 5, kCornersPerPoint = 10;
 /// Of an exact pixel: small beside any match, large beside rounding.
 constexpr double kExact_px = 1e-4;
-/// There and back by whole pixels.
-constexpr double kHome_px = 1.5;
+/// Largest left-right-left error of the whole-pixel search.
+constexpr double kRoundTrip_px = 1.5;
 
 std::string size_text(int width, int height) {
     return std::to_string(width) + " x " + std::to_string(height);
@@ -80,7 +80,7 @@ public:
         if (!whole) return void(++n.cut_off);
         if (whole->correlation < kLeastCorrelation) return void(++n.unlike);
         if (whole->ambiguity > kMostAmbiguity) return void(++n.ambiguous);
-        if (!comes_home(*whole, range)) return void(++n.inconsistent);
+        if (!is_consistent(*whole, range)) return void(++n.inconsistent);
         const auto match = fit_patch(patch_, left_, there_, right_, *whole);
         if (!match) return void(++n.unsettled);
         StereoPoint p{patch_.centre_px(), *whole, *match, {}};
@@ -94,8 +94,8 @@ public:
 private:
     static Pinhole pinhole(const Camera& camera) { return *CameraModelHandle(camera)->pinhole(); }
 
-    /// Does the search from the right frame end where it began in the left one?
-    bool comes_home(const WholePixelMatch& whole, const InverseDepths& range) {
+    /// Left-right consistency: the search from the right frame ends where it began in the left one.
+    bool is_consistent(const WholePixelMatch& whole, const InverseDepths& range) {
         const Eigen::Vector3d ray = there_.ray(patch_.centre_px());
         const double a = there_.inverse_depth_there(ray, range.low);
         const double b = there_.inverse_depth_there(ray, range.high);
@@ -103,7 +103,7 @@ private:
                        settings_.patch_radius_px, right_patch_))
             return false;
         const auto home = search_line(right_patch_, back_, left_, {std::min(a, b), std::max(a, b)});
-        return home && (home->px - patch_.centre_px()).norm() < kHome_px;
+        return home && (home->px - patch_.centre_px()).norm() < kRoundTrip_px;
     }
 
     const StereoPair& pair_;

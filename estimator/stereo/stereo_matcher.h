@@ -1,13 +1,13 @@
 /// estimator/stereo/stereo_matcher.h - points of a scene from two frames of known relative pose.
 ///
-/// Corners of the left frame (Shi and Tomasi 1994) are looked for along their epipolar lines in the right one,
-/// first to the whole pixel, as the paper's section V does, then between pixels. A point is the middle of the left
-/// pixel that its corner was found in, so that the left pixel is exact and the whole error is the match's.
+/// Corners of the left frame (Shi and Tomasi 1994) are searched along their epipolar lines in the right one, first
+/// to the whole pixel, as in the paper's section V, then to subpixels. A point is the centre of its corner's left
+/// pixel, so that the left pixel is exact and the error is the match's alone.
 ///
-/// The errors of matches, as scenes/descent shows them (200 points, 500 x 500 pixels, detector noise of about a
-/// seventieth of the signal): 0.026 px along the epipolar line and 0.016 px across it, as predicted within a tenth;
-/// without noise 0.029 and 0.015, where the prediction is 1.5 times too small in variance. So noise is not what
-/// limits them there, but relief within a patch, along the line, and what a frame's pixels have aliased.
+/// Errors of matches in scenes/descent (200 points, 500 x 500 pixels, detector noise of about a seventieth of the
+/// signal): 0.026 px along the epipolar line and 0.016 px across it, as predicted within a tenth; without noise
+/// 0.029 and 0.015, where the predicted variance is 1.5 times too small. They are limited by relief within a patch,
+/// along the line, and by aliasing.
 #pragma once
 
 #include <vector>
@@ -19,7 +19,7 @@ namespace narpa {
 
 struct StereoSettings {
     int points_max = 100;                  ///< the strongest corners that pass all checks
-    double nearest_m = 0, farthest_m = 0;  ///< depths in the left frame between which points are looked for
+    double nearest_m = 0, farthest_m = 0;  ///< depths in the left frame between which points are searched
     int patch_radius_px = 9;               ///< 2 .. 50; the smaller, the less relief and the more noise
     int apart_px = 12;                     ///< least distance of two corners
 };
@@ -31,14 +31,14 @@ struct StereoPoint {
     TriangulatedPoint point;        ///< from `match`
 };
 
-/// Corners that were looked at, by what became of them.
+/// Outcomes of the corners.
 struct StereoCounts {
     int accepted = 0;
-    int cut_off = 0;       ///< the patch, or all of its epipolar line, leaves a frame, or is overexposed
+    int cut_off = 0;       ///< the patch, or all of its epipolar line, is outside a frame or saturated
     int unlike = 0;        ///< correlation below kLeastCorrelation
-    int ambiguous = 0;     ///< another place along the line looks nearly as much like it
-    int inconsistent = 0;  ///< the right frame's patch is found elsewhere in the left one
-    int unsettled = 0;     ///< the sub-pixel fit does not settle
+    int ambiguous = 0;     ///< another place along the line correlates nearly as well
+    int inconsistent = 0;  ///< the search from the right frame ends elsewhere in the left one
+    int unsettled = 0;     ///< the subpixel fit does not converge
     int off_line = 0;      ///< more than kFarthestOff_sigmas from the epipolar line
     int without_depth = 0;
 };
@@ -53,7 +53,7 @@ struct StereoPoints {
 [[nodiscard]] Result<StereoPoints> match_stereo(const StereoPair& pair, const MeasuredImage& left,
                                                 const MeasuredImage& right, const StereoSettings& settings);
 
-/// The left pixel of a match, which is known by definition, as a measurement.
+/// The left pixel of a match, exact by definition, as a measurement.
 [[nodiscard]] PixelMeasurement exact_pixel(const Eigen::Vector2d& px);
 
 }  // namespace narpa

@@ -1,4 +1,4 @@
-/// estimator/stereo/triangulation.h - a point from its two pictures, and how well it is known.
+/// estimator/stereo/triangulation.h - a point from its two image points, with its covariance.
 ///
 /// Points are in the left camera's frame (x right, y down, z forward), metres; pixels count from the centre of the
 /// top-left one. The paper's section V has the printed formula.
@@ -20,7 +20,7 @@ struct StereoPair {
     Rigid3 T_right_left{};
 };
 
-/// Where a point appears in one picture.
+/// The image of a point in one camera.
 struct PixelMeasurement {
     Eigen::Vector2d px{0, 0};
     Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
@@ -29,9 +29,9 @@ struct PixelMeasurement {
 enum class TriangulationStatus : std::uint8_t {
     good,
     behind_camera,  ///< the rays meet behind one of the cameras
-    no_parallax,  ///< its depth cannot be told from infinite: short baseline, far point, or on the baseline itself
-    bad_input,    ///< not finite, a covariance that is not positive definite, a quaternion or focal length that is
-                  ///< none
+    no_parallax,    ///< its depth is compatible with infinity: short baseline, far point, or on the baseline itself
+    bad_input,  ///< not finite, a covariance that is not positive definite, a quaternion or focal length that is
+                ///< none
 };
 
 struct TriangulatedPoint {
@@ -40,9 +40,8 @@ struct TriangulatedPoint {
     Eigen::Vector3d point_m = Eigen::Vector3d::Zero();
     Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
     double inverse_depth_1_m = 0;
-    double sigma_inverse_depth_1_m = 0;  ///< infinite where the pictures tell nothing of the depth
-    /// By how many standard deviations the rays miss each other: its square is chi-square with one degree of
-    /// freedom.
+    double sigma_inverse_depth_1_m = 0;  ///< infinite where the depth is not observable
+    /// Standard deviations by which the rays miss each other: its square is chi-square with one degree of freedom.
     double epipolar_sigmas = 0;
 };
 
@@ -55,9 +54,9 @@ inline constexpr double kLeastParallax_sigmas = 3;
 [[nodiscard]] TriangulatedPoint triangulate(const StereoPair& pair, const PixelMeasurement& left,
                                             const PixelMeasurement& right);
 
-/// The depth z_l that the paper prints (section V), which looks at the right picture's column alone: useless where
-/// the baseline runs along the columns. Errors: the right column does not depend on the depth (a vertical baseline,
-/// the epipole), so that there is nothing to divide by; not finite.
+/// The depth z_l as printed in the paper (section V), from the right image's column alone: useless where the
+/// baseline runs along the columns. Errors: the right column does not depend on the depth (a vertical baseline, the
+/// epipole); not finite; a right camera that is not a pinhole.
 [[nodiscard]] Result<double> printed_depth_m(const StereoPair& pair, const Eigen::Vector2d& left_px,
                                              const Eigen::Vector2d& right_px);
 

@@ -10,8 +10,7 @@
 namespace narpa {
 namespace {
 
-/// How the bands' digital numbers make the one number of a pixel: weights that sum to 1; monochrome formats add the
-/// bands' light before they count it.
+/// Weights by which the bands' digital numbers are averaged; monochrome formats add the bands before conversion.
 std::array<double, 3> band_weights(PixelFormat format) {
     switch (format) {
         case PixelFormat::grey:
@@ -97,7 +96,7 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
     MeasuredImage image{camera.width, camera.height - (camera.embedded_line ? 1 : 0), {}};
     image.dn.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
     const int bits = converter_bits(camera);
-    // A truncated number stands for the middle of what it may have been.
+    // A truncated number is read as the centre of its interval.
     const double step = std::exp2(bits - 8), middle = (step - 1) / 2;
     for (std::size_t i = 0; i < image.dn.size(); ++i) {
         double dn = 0;

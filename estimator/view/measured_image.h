@@ -1,4 +1,4 @@
-/// estimator/view/measured_image.h - a camera's frame as numbers to estimate from, and the noise in them.
+/// estimator/view/measured_image.h - a camera's frame in digital numbers, and the noise model of its pixels.
 #pragma once
 
 #include <array>
@@ -21,10 +21,9 @@ struct MeasuredImage {
     }
 };
 
-/// What a pixel's digital number tells of radiance: DN = black + sum over bands of dn_per_radiance * L, clipped to
-/// 0 .. top, with the variance of read noise, shot noise and rounding. From the camera's detector
-/// (renderer/camera/detector.h), or of the ideal sensor that it has without one. In units of the converter's DN,
-/// whatever bits of it the format shows.
+/// From radiance to digital numbers: DN = black + sum over bands of dn_per_radiance * L, clipped to 0 .. top, with
+/// the variance of read noise, shot noise and rounding. Of the camera's detector (renderer/camera/detector.h), or
+/// of an ideal sensor without one. In DN of the converter, whatever bits of it the format keeps.
 struct SensorModel {
     std::array<double, 3> dn_per_radiance{};  ///< DN per W m^-2 sr^-1 in the red, green, blue band
     double black_dn = 0;
@@ -44,10 +43,10 @@ struct SensorModel {
 /// image has one row fewer: the last holds no light. Errors: the number of bytes is not the format's.
 [[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);
 
-/// The same camera with 1 / factor of the pixels each way, each of which covers factor x factor of the finer ones;
-/// what does not fill one at the right and at the bottom is left out.
+/// A pyramid level: the same camera with 1 / factor of the pixels each way. Incomplete ones at the right and at the
+/// bottom are left out.
 [[nodiscard]] Camera coarser_camera(const Camera& camera, int factor);
-/// Means over factor x factor pixels: what coarser_camera sees, with 1 / factor^2 of the variance.
+/// Means over factor x factor pixels: the image of coarser_camera, with 1 / factor^2 of the variance.
 [[nodiscard]] MeasuredImage coarser_image(const MeasuredImage& image, int factor);
 
 }  // namespace narpa

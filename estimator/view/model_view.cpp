@@ -30,7 +30,7 @@ void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
     renderer_.render(at_, T_world_camera_, settings, radiance_, aovs ? &aovs_ : nullptr);
 }
 
-Hit ModelView::look_through(double u_px, double v_px) const noexcept {
+Hit ModelView::trace_pixel(double u_px, double v_px) const noexcept {
     const Ray ray = camera_ray(camera_, T_world_camera_, u_px, v_px);
     return render_scene_.tracer().intersect(at_, ray, std::numeric_limits<double>::infinity());
 }

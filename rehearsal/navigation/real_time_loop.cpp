@@ -110,7 +110,7 @@ private:
 
     /// The measuring thread.
     void measure() {
-        const OnePictureThread pictures;
+        const SingleThreadedOpenCv pictures;
         tbb::task_arena arena;
         std::int64_t done_ns = t_start_ns_;
         for (;;) {

@@ -88,8 +88,7 @@ public:
     double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px
 
     Pinhole() = default;
-    Pinhole(double fx_px, double fy_px, double cx_px, double cy_px)
-        : fx(fx_px), fy(fy_px), cx(cx_px), cy(cy_px) {}
+    Pinhole(double fx_px, double fy_px, double cx_px, double cy_px) : fx(fx_px), fy(fy_px), cx(cx_px), cy(cy_px) {}
     explicit Pinhole(const Camera& c) : Pinhole(c.fx, c.fy, c.cx, c.cy) {}
 
     [[nodiscard]] Vec3 on_plane(const ImagePoint& p) const noexcept override {

@@ -6,8 +6,8 @@
 
 #include "renderer/film/budgeted_frame.h"
 #include "renderer/film/camera_batch.h"
-#include "renderer/geometry/flush_denormals.h"
 #include "renderer/film/first_hit.h"
+#include "renderer/geometry/flush_denormals.h"
 
 namespace narpa {
 namespace {
@@ -89,7 +89,8 @@ FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const Rigid3& T_w
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     if (!uniform && aovs == nullptr)
-        return render_within_budget(passes, costs, render_scene, camera, at, T_world_camera, settings, out, nullptr);
+        return render_within_budget(passes, costs, render_scene, camera, at, T_world_camera, settings, out,
+                                    nullptr);
     const Frame frame = make_frame(render_scene, at, camera, T_world_camera, settings);
     if (aovs != nullptr) {
         resize(*aovs, out.pixels.size());

@@ -37,9 +37,7 @@ protected:
             pixels.push_back({image->x + sigma_px * normal(random), image->y + sigma_px * normal(random)});
         }
     }
-    [[nodiscard]] PnpInput input(double sigma_px) const {
-        return {model, body_m, pixels, sigma_px};
-    }
+    [[nodiscard]] PnpInput input(double sigma_px) const { return {model, body_m, pixels, sigma_px}; }
 
     std::mt19937_64 random{7};
     const std::shared_ptr<const CameraModel> model = std::make_shared<EquidistantCamera>(500, 480, 640, 500);

@@ -23,7 +23,7 @@ protected:
             points.assign(seen.input());
             for (std::size_t i = 0; i < points.size(); ++i)
                 list.push_back({points.centred_body_m(i), points.normalised(i)});
-            spread = spread_of(list);
+            spread = extent_of(list);
         }
     };
     static double angle(const CentredPose& pose, const Rigid3& truth) { return angle_between(pose.q, truth.q); }
@@ -47,7 +47,7 @@ TEST_F(PnpStart, SolidBodiesGiveOnePoseNearTheTruth) {
         for (int trial = 0; trial < 100; ++trial) {
             const Rigid3 truth{test::random_attitude(random_), Vec3{0.05, -0.08, 1} * range_m};
             const Gathered g(test::see(random_, test::random_points(random_, 8, 1), truth, 0));
-            const PoseStarts starts = orthographic_starts(g.list, g.spread, false);
+            const InitialPoses starts = orthographic_poses(g.list, g.spread, false);
             ASSERT_EQ(starts.count, 1u);
             EXPECT_LT(angle(starts.pose[0], truth), 3 * kDegree) << range_m;
             EXPECT_LT(norm(g.points.uncentred(starts.pose[0]).t - truth.t), 0.03 * range_m);
@@ -63,7 +63,7 @@ TEST_F(PnpStart, FlatBodiesGiveTwoOfWhichOneIsNear) {
         std::vector<Vec3> flat = test::random_points(random_, 6, 1);
         for (Vec3& p : flat) p.z = 0;
         const Gathered g(test::see(random_, flat, truth, 0));
-        const PoseStarts starts = orthographic_starts(g.list, g.spread, true);
+        const InitialPoses starts = orthographic_poses(g.list, g.spread, true);
         ASSERT_EQ(starts.count, 2u);
         const double first = angle(starts.pose[0], truth), second = angle(starts.pose[1], truth);
         near += std::min(first, second) < 3 * kDegree ? 1 : 0;
@@ -100,7 +100,7 @@ TEST_F(PnpStart, TriplesNeedNotBeCentred) {
         const Rigid3 truth{test::random_attitude(random_), {0.4, -0.3, 25}};
         const test::Seen seen = test::see(random_, test::random_points(random_, 5, 1), truth, 0);
         const Gathered g(seen);
-        const PoseStarts starts = triple_starts({g.list[0], g.list[1], g.list[2]});
+        const InitialPoses starts = three_point_poses({g.list[0], g.list[1], g.list[2]});
         double best = M_PI, off = 1e9;
         for (std::size_t i = 0; i < starts.count; ++i) {
             best = std::min(best, angle(starts.pose[i], truth));
@@ -126,7 +126,7 @@ TEST_F(PnpStart, OpenCvsStartsAreExactOnExactPixels) {
             return best;
         };
         std::vector<CentredPose> starts, of_three;
-        opencv_starts(g.list, flat, starts);
+        opencv_poses(g.list, flat, starts);
         ASSERT_GE(starts.size(), flat ? 3u : 1u);
         EXPECT_LT(nearest(starts), 1e-4);
         opencv_p3p({g.list[0], g.list[1], g.list[2]}, of_three);
@@ -140,8 +140,8 @@ TEST_F(PnpStart, LinesAndCoincidingPointsGiveNone) {
     for (int i = 0; i < 6; ++i) line.push_back(Vec3{1, 2, 3} * (0.1 * i));
     for (const std::vector<Vec3>& points : {line, std::vector<Vec3>(6, Vec3{1, 1, 1})}) {
         const Gathered g(test::see(random_, points, truth, 0));
-        EXPECT_EQ(orthographic_starts(g.list, g.spread, true).count, 0u);
-        EXPECT_EQ(orthographic_starts(g.list, g.spread, false).count, 0u);
+        EXPECT_EQ(orthographic_poses(g.list, g.spread, true).count, 0u);
+        EXPECT_EQ(orthographic_poses(g.list, g.spread, false).count, 0u);
     }
 }
 

@@ -1,4 +1,4 @@
-/// estimator/dense/descent.h - Levenberg-Marquardt on one level of one frame.
+/// estimator/dense/level_solver.h - Levenberg-Marquardt on one pyramid level of one frame.
 #pragma once
 
 #include "estimator/dense/dense_alignment.h"
@@ -9,19 +9,20 @@ namespace narpa {
 /// Finite, and a rotation.
 [[nodiscard]] bool is_pose(const Rigid3& T);
 
-class Descent {
+class LevelSolver {
 public:
     /// All outlive it. `camera`: of the level, each of whose pixels is `factor` x `factor` of the sensor's.
-    Descent(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene, std::size_t target,
-            int factor, LevelView& view, const DenseOptions& options, DenseEstimate& estimate);
+    LevelSolver(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene,
+                std::size_t target, int factor, LevelView& view, const DenseOptions& options,
+                DenseEstimate& estimate);
 
-    /// Moves the estimate to where this level's images agree; `first`: sideways by whole pixels before that, as a
-    /// guess may be off by more than a derivative reaches.
+    /// Iterates on this level; `first`: after a search over shifts by whole pixels, as a guess may be off by more
+    /// than the Jacobian is valid for.
     DenseStatus run(bool first);
-    /// One more step with many more rays, so that the noise of the render's own samples hardly weighs in the end.
+    /// One more step with many more rays, against the sampling noise of the rendered image.
     void polish();
-    /// What the images tell of the pose where they were rendered last, and whether they fit.
-    void conclude();
+    /// Covariance, residuals and status at the last rendered pose.
+    void finish();
     /// DenseAlignment::bound at the estimate.
     Result<Matrix6> bound();
 
@@ -30,7 +31,7 @@ private:
         Vector6 pose = Vector6::Zero();
         double sigmas = 0, motion_px = 0;
         double size = 0;       ///< below 1: small enough to end with
-        bool trusted = false;  ///< so small that noise decides whether the cost falls
+        bool trusted = false;  ///< so small that noise decides whether the cost decreases
     };
 
     [[nodiscard]] double pixels_averaged() const { return static_cast<double>(factor_) * factor_; }
@@ -40,8 +41,8 @@ private:
     bool linearise();
     [[nodiscard]] Step next_step(double damping) const;
     bool try_step(const Step& step);
-    void lengthen(const Step& step);
-    void note(double sigmas, bool better);
+    void adapt_stride(const Step& step);
+    void record(double sigmas, bool better);
 
     const Camera& camera_;
     const double pixels_per_radian_;
@@ -56,13 +57,13 @@ private:
     double rays_;  ///< for each pixel of the target
     const int fineness_;
     FrameSettings settings_{};
-    double target_px_ = 0;  ///< pixels that tell of the target; 0: not known yet
+    double target_px_ = 0;  ///< pixels that show the target; 0: not known yet
 
     Robustness robust_{};
     PhotometricCost cost_{};
     PhotometricEquations equations_{};
     Vector6 last_step_ = Vector6::Zero();
-    double stride_ = 1;  ///< by which steps are lengthened
+    double stride_ = 1;  ///< factor of the step length
 };
 
 }  // namespace narpa

@@ -1,4 +1,4 @@
-#include "estimator/dense/descent.h"
+#include "estimator/dense/level_solver.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -12,43 +12,43 @@
 namespace narpa {
 namespace {
 
-/// Coarse levels are done when a step moves nothing by more than this, px of the level.
+/// Coarse levels converge when a step moves the target by less than this, px of the level.
 constexpr double kCoarseStep_px = 0.1;
 constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-7, kDampingStep = 10;
 constexpr int kMostRefused = 4;
-/// Steps that move the target by less are taken without a look at the cost, in which the noise of the render's
-/// samples weighs more than they do.
+/// Steps that move the target by less are accepted without testing the cost, whose change is below its sampling
+/// noise.
 constexpr double kCoarseTrust_px = 0.5, kFineTrust_px = 0.1;
-/// A level has ended when so many steps in a row were no smaller than this part of the smallest before.
+/// A level ends after so many steps in a row that are no smaller than this part of the smallest before.
 constexpr int kMostStalled = 2;
 constexpr double kShrinking = 0.9;
-/// Steps so many times as large as they should be in the end are put down to that noise too.
+/// Steps of up to this many times the convergence threshold are attributed to that noise too.
 constexpr double kStillSmall = 10;
-/// Part of the cost that a coarse level gains with each step while it gets on.
+/// Least relative decrease of a coarse level's cost per step that counts as progress.
 constexpr double kCoarseGain = 0.01;
-/// Steps go the same way if the cosine between them is larger.
+/// Consecutive steps are parallel if the cosine between them is larger.
 constexpr double kSameWay = 0.7, kLongestStride = 8;
-/// Residuals so many times as large as their noise: what is seen is not what is rendered.
+/// Residuals of more than this many times their noise: the model does not fit.
 constexpr double kNoFit = 4;
-/// Or an exposure that is so many standard deviations off what is known of it.
+/// Or a gain this many standard deviations off its prior.
 constexpr double kPriorHolds = 4, kLeastOff = 1e-3;
-/// The noise of the render's samples may make a good step look worse by so much of the cost.
+/// Sampling noise may increase the cost of a good step by this part.
 constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
-/// Least eigenvalue of the pose's information, scaled to ones on its diagonal.
+/// Least eigenvalue of the pose's information, scaled to a unit diagonal.
 constexpr double kLeastInformation = 1e-10;
-/// Coarse levels, whose pixels hold many of the fine ones, take this part of the rays and so much coarser a grid.
+/// Coarse levels use this part of the rays and a grid coarser by this factor.
 constexpr double kCoarseRays = 0.125;
 constexpr int kCoarseFineness = 3;
-/// The last step takes so many times the rays of those before.
+/// The last step uses this many times the rays.
 constexpr double kPolishRays = 8;
-/// Of a window that the target is taken to fill before it is known.
+/// Part of the window that the target is assumed to fill at first.
 constexpr double kFirstPart = 0.25;
 constexpr int kMostShift_px = 12;
-/// While the pose is off, residuals are those of the model: this part of the signal, squared.
+/// Model error on coarse levels: this part of the signal power.
 constexpr double kCoarseModel = 0.1;
 constexpr double kLeastGain = 0.05;
-/// A derivative serves for poses so near, px.
+/// The Jacobian is reused for poses within this motion, px.
 constexpr double kDerivativeServes_px = 0.2;
 
 class Stopwatch {
@@ -64,14 +64,14 @@ private:
     std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
 };
 
-/// Longest way that a point of the target goes in the image, about.
+/// Largest motion of a point of the target in the image, about.
 double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_camera_target, double extent_px) {
     const double z = std::max(T_camera_target.t.z, 1e-9);
     return pixels_per_radian * step.segment<2>(3).norm() / z +
            0.5 * extent_px * (step.head<3>().norm() + std::abs(step[5]) / z);
 }
 
-bool tells_all(const Matrix6& information) {
+bool is_observable(const Matrix6& information) {
     const Vector6 sizes = information.diagonal();
     if (!(sizes.minCoeff() > 0) || !sizes.allFinite()) return false;
     const Vector6 unit = sizes.cwiseSqrt().cwiseInverse();
@@ -96,9 +96,9 @@ bool is_pose(const Rigid3& T) {
     return finite && std::abs(norm(T.q) - 1) < 1e-3;
 }
 
-Descent::Descent(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene,
-                 std::size_t target, int factor, LevelView& view, const DenseOptions& options,
-                 DenseEstimate& estimate)
+LevelSolver::LevelSolver(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene,
+                         std::size_t target, int factor, LevelView& view, const DenseOptions& options,
+                         DenseEstimate& estimate)
     : camera_(camera),
       pixels_per_radian_(CameraModelHandle(camera)->pixels_per_radian()),
       sensor_(sensor),
@@ -113,7 +113,7 @@ Descent::Descent(const Camera& camera, const SensorModel& sensor, const RenderSc
       fineness_(coarse_ ? std::max(1, options.fineness / kCoarseFineness) : options.fineness),
       settings_(settings_of(options)) {}
 
-DenseStatus Descent::run(bool first) {
+DenseStatus LevelSolver::run(bool first) {
     render(e_.T_camera_body);
     if (first) shift();
     robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images(pixels_averaged())) : 0;
@@ -126,7 +126,7 @@ DenseStatus Descent::run(bool first) {
             moved_px = 0;
         }
         if (!linearise()) return DenseStatus::too_few_pixels;
-        if (k == 0) note(0, true);
+        if (k == 0) record(0, true);
         const double cost_before = cost_.robust;
         Step step = next_step(damping);
         for (int refused = 0; !try_step(step); ++refused) {
@@ -136,7 +136,7 @@ DenseStatus Descent::run(bool first) {
             step = next_step(damping);
         }
         if (step.size < 1) return DenseStatus::converged;
-        // Noise of the render keeps the pose moving.
+        // Sampling noise keeps the pose moving.
         const bool shrinks = step.size < kShrinking * least;
         const bool gains = coarse_ ? cost_.robust < (1 - kCoarseGain) * cost_before : step.size > kStillSmall;
         stalled = shrinks || gains ? 0 : stalled + 1;
@@ -144,12 +144,12 @@ DenseStatus Descent::run(bool first) {
         if (step.trusted && stalled == kMostStalled) return DenseStatus::converged;
         moved_px += step.motion_px;
         damping = std::max(damping / kDampingStep, kLeastDamping);
-        lengthen(step);
+        adapt_stride(step);
     }
     return least < kStillSmall ? DenseStatus::converged : DenseStatus::out_of_steps;
 }
 
-void Descent::polish() {
+void LevelSolver::polish() {
     rays_ *= kPolishRays;
     render(e_.T_camera_body);
     differentiate();
@@ -157,7 +157,7 @@ void Descent::polish() {
     if (linearise()) try_step(next_step(kLeastDamping));
 }
 
-void Descent::conclude() {
+void LevelSolver::finish() {
     const Stopwatch watch(e_.solve_ms);
     const PhotometricImages images = view_.images(pixels_averaged());
     e_.covariance = equations(images, sensor_, e_.exposure, o_.exposure, robust_).pose_covariance();
@@ -170,18 +170,18 @@ void Descent::conclude() {
     e_.chi2_per_pixel = now.chi2 / static_cast<double>(std::max<std::size_t>(now.pixels, 1));
 }
 
-Result<Matrix6> Descent::bound() {
+Result<Matrix6> LevelSolver::bound() {
     render(e_.T_camera_body);
     differentiate();
     PhotometricImages images = view_.images(pixels_averaged());
     images.signal_variance = {};
     const auto all = equations(images, sensor_, {}, o_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
     const Matrix6 information = all.pose_information();
-    if (!tells_all(information)) return Error{"too few pixels tell of the target to say all of its pose"};
+    if (!is_observable(information)) return Error{"too few pixels tell of the target to say all of its pose"};
     return Matrix6(information.inverse());
 }
 
-void Descent::shift() {
+void LevelSolver::shift() {
     const int most = std::min({kMostShift_px, view_.window().width / 4, view_.window().height / 4});
     const auto [dx, dy] = best_shift(view_.images(pixels_averaged()), sensor_, most);
     if (dx == 0 && dy == 0) return;
@@ -192,22 +192,22 @@ void Descent::shift() {
     render(e_.T_camera_body);
 }
 
-void Descent::render(const Rigid3& T) {
+void LevelSolver::render(const Rigid3& T) {
     const Stopwatch watch(e_.render_ms);
     const double window = static_cast<double>(view_.window().width) * view_.window().height;
     if (target_px_ == 0) target_px_ = kFirstPart * window;
-    // A coarse pixel's noise is to be less, as the sensor's is. All pixels get their middles first.
+    // A coarse pixel's noise is to be less, as the sensor's is. All pixels get one ray first.
     settings_.budget.rays = static_cast<std::uint64_t>(2 * window + rays_ * factor_ * factor_ * target_px_);
     view_.render(T, sensor_, settings_);
 }
 
-void Descent::differentiate() {
+void LevelSolver::differentiate() {
     const Stopwatch watch(e_.derivative_ms);
     view_.differentiate(e_.T_camera_body, sensor_, settings_, fineness_);
 }
 
-/// False where not all of the pose follows from the image.
-bool Descent::linearise() {
+/// False where the pose is not observable.
+bool LevelSolver::linearise() {
     const Stopwatch watch(e_.solve_ms);
     const PhotometricImages images = view_.images(pixels_averaged());
     robust_.scale = residual_scale(images, sensor_, e_.exposure, robust_.model_dn2);
@@ -215,10 +215,10 @@ bool Descent::linearise() {
     cost_ = cost(images, sensor_, e_.exposure, o_.exposure, robust_);
     equations_ = equations(images, sensor_, e_.exposure, o_.exposure, robust_);
     target_px_ = static_cast<double>(cost_.pixels);
-    return cost_.pixels >= kFewestPixels && tells_all(equations_.pose_information());
+    return cost_.pixels >= kFewestPixels && is_observable(equations_.pose_information());
 }
 
-Descent::Step Descent::next_step(double damping) const {
+LevelSolver::Step LevelSolver::next_step(double damping) const {
     const Matrix6 information = equations_.pose_information();
     Matrix6 damped = information;
     damped.diagonal() *= 1 + damping;
@@ -231,9 +231,9 @@ Descent::Step Descent::next_step(double damping) const {
     return s;
 }
 
-/// Where details are further off than they reach, they make steps short that broader features ask for: while
-/// these go the same way, they are lengthened.
-void Descent::lengthen(const Step& step) {
+/// Fine details that are further off than their extent shorten steps: while consecutive steps are parallel, they
+/// are lengthened.
+void LevelSolver::adapt_stride(const Step& step) {
     const Matrix6 information = equations_.pose_information();
     const double along = step.pose.dot(information * last_step_);
     const double lengths =
@@ -242,8 +242,8 @@ void Descent::lengthen(const Step& step) {
     last_step_ = step.pose;
 }
 
-/// Takes the step if it is no worse.
-bool Descent::try_step(const Step& step) {
+/// Accepts the step if the cost does not increase.
+bool LevelSolver::try_step(const Step& step) {
     const Rigid3 there = displaced(e_.T_camera_body, step.pose);
     if (!is_pose(there) || !window_about(render_scene_.tracer(), camera_, target_, there)) return false;
     const Eigen::Vector2d e = equations_.exposure_step(step.pose);
@@ -257,11 +257,11 @@ bool Descent::try_step(const Step& step) {
         e_.exposure = exposure;
         cost_ = now;
     }
-    note(step.sigmas, better);
+    record(step.sigmas, better);
     return better;
 }
 
-void Descent::note(double sigmas, bool better) {
+void LevelSolver::record(double sigmas, bool better) {
     const double pixels = static_cast<double>(view_.window().width) * view_.window().height;
     e_.steps.push_back(
         {factor_, cost_.robust / (robust_.scale * robust_.scale * pixels), sigmas, e_.T_camera_body, better});

@@ -40,12 +40,14 @@ void PixelPatch::trace(const FineGrid& grid, const SensorModel& sensor, int x, i
     sees_anything_ = false;
     Packet p;
     CameraSamples samples;
-    samples.middle = true;
+    samples.centre = true;
     samples.sample.fill(0);
+    samples.path.fill(0);
     Lanes<std::size_t> place;
     const auto trace = [&] {
         RgbLanes radiance;
-        trace_samples(f, samples, f.tracer.all_bodies(), p, radiance);
+        trace_rays(f, samples, f.tracer.all_bodies(), p);
+        f.integrator.radiance(f, p, radiance);
         for (std::size_t i = 0; i < samples.n; ++i) {
             constexpr double kInfinity = std::numeric_limits<double>::infinity();
             RaySample& seen = points_[place[i]];

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "bench/approach_frames.h"
+#include "bench/statistics.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 
@@ -17,19 +18,12 @@ namespace narpa {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-/// Stretches of the approach that are told apart, m.
+/// Ends of the range bands, m.
 constexpr std::array kBandEnds{std::numeric_limits<double>::infinity(), 30.0, 10.0, 3.0, 0.0};
-/// Of the start's error, so much may be left where the pose counts as found.
+/// A pose counts as found where at most this fraction of the start's error is left.
 constexpr double kFoundPart = 0.2;
 
-double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-/// One method, ready for frames.
+/// One method, initialised for the camera and the target.
 class Method {
 public:
     Method(EstimateMethod method, const World& world, const Camera& camera, std::size_t target,
@@ -48,8 +42,8 @@ public:
         }
     }
 
-    /// From a guess so far off.
-    ApproachFrame look(const ApproachView& view, const Rigid3& guess, const Vector6& off, bool with_bound) {
+    /// `off`: the error of the guess.
+    ApproachFrame estimate(const ApproachView& view, const Rigid3& guess, const Vector6& off, bool with_bound) {
         ApproachFrame out;
         out.range_m = norm(view.truth.t);
         const auto start = Clock::now();
@@ -108,7 +102,7 @@ ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, do
         b.rotation_of_bound = std::sqrt(turn_of_bound / bounded);
         b.position_of_bound = std::sqrt(shift_of_bound / bounded);
     }
-    b.nees_median = median(nees), b.ms_median = median(ms);
+    b.nees_median = quantile(nees, 0.5), b.ms_median = quantile(ms, 0.5);
     b.renders_mean = b.frames > 0 ? renders / b.frames : 0;
     return b;
 }
@@ -122,12 +116,12 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
     const Camera& camera = world.scene().cameras[camera_index];
     ApproachFrames frames(world, camera, target, o);
     std::vector<ApproachRun> runs;
-    std::deque<Method> methods;  // they stay where they are
+    std::deque<Method> methods;  // stable addresses
     for (const EstimateMethod m : o.methods) {
         methods.emplace_back(m, world, camera, target, o);
         runs.push_back({m, {}, {}, {}});
     }
-    // All methods see the same frames from the same starts.
+    // All methods estimate from the same frames and starts.
     std::mt19937_64 random(o.seed);
     for (int k = 0; k < o.frames && !stop; ++k) {
         tell(fmt::format("approach: frame {}/{}", k, o.frames));
@@ -136,7 +130,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
             const Vector6 off =
                 random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(view.truth.t), random);
             for (std::size_t m = 0; m < methods.size(); ++m)
-                runs[m].frames.push_back(methods[m].look(view, displaced(view.truth, off), off, true));
+                runs[m].frames.push_back(methods[m].estimate(view, displaced(view.truth, off), off, true));
         });
     }
     for (const double deg : o.basin_trials > 0 ? o.basin : std::vector<double>{}) {
@@ -148,7 +142,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
                     frames.make_at(o.basin_range_m, static_cast<std::uint32_t>(o.frames + k));
                 const Vector6 off = random_error(deg * kDegree, 0.01 * deg * norm(view.truth.t), random);
                 for (std::size_t m = 0; m < methods.size(); ++m) {
-                    cells[m].found += methods[m].look(view, displaced(view.truth, off), off, false).found;
+                    cells[m].found += methods[m].estimate(view, displaced(view.truth, off), off, false).found;
                     ++cells[m].trials;
                 }
             });

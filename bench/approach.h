@@ -1,5 +1,5 @@
-/// bench/approach.h - the pose from single frames all along an approach: how often it is found from a poor
-/// guess, how well, how fast; and from how far off it is found.
+/// bench/approach.h - poses from single frames along an approach: success rate from a poor guess, error, time; and
+/// how large an error of the guess each method tolerates.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,12 @@ struct ApproachOptions {
     int frames = 200;
     double from_m = 100, to_m = 1.2;  ///< range, target's origin to camera; in equal steps of its logarithm
     Vec3 along{1, 0, 0};              ///< from the target towards the camera, target axes
-    Vec3 up{0, 0, 1};                 ///< what is up in the picture, target axes
-    double offset_of_range = 0.03;  ///< the camera's way off that line, and of its aim off the target's origin: RMS
+    Vec3 up{0, 0, 1};                 ///< up in the image, target axes
+    double offset_of_range =
+        0.03;  ///< RMS offset of the camera from that line and of its aim from the target's origin
     double start_deg = 5, start_percent = 5;
-    int frame_spp = 16;                               ///< of the frames that stand for the sensor's
-    std::vector<double> basin{2, 5, 10, 15, 20, 30};  ///< starts off by so many degrees and per cent; empty: none
+    int frame_spp = 16;                               ///< of the frames that are estimated from
+    std::vector<double> basin{2, 5, 10, 15, 20, 30};  ///< errors of the starts, degrees and per cent; empty: none
     int basin_trials = 10;
     double basin_range_m = 20;
     std::uint64_t seed = 1;
@@ -31,23 +32,23 @@ struct ApproachOptions {
 
 struct ApproachFrame {
     double range_m = 0;
-    bool found = false;    ///< the method says so, and the error is less than a fifth of the start's, both ways
-    bool claimed = false;  ///< the method says so
-    double rotation_rad = 0, position_m = 0;              ///< errors
+    bool found = false;                       ///< claimed, and both errors are below a fifth of the start's
+    bool claimed = false;                     ///< by the method
+    double rotation_rad = 0, position_m = 0;  ///< errors
     double bound_rotation_rad = 0, bound_position_m = 0;  ///< roots of the summed variances of the bound
     double nees = 0;
     double ms = 0;
     int renders = 0;
 };
 
-/// Over the frames of a stretch of the approach in which the pose was found.
+/// Over the frames of a range band.
 struct ApproachBand {
     double from_m = 0, to_m = 0;
     int frames = 0, found = 0;
     int wrong = 0;  ///< claimed, but not found
     double rotation_rms_rad = 0, position_rms_m = 0;
     double rotation_of_bound = 0, position_of_bound = 0;  ///< RMS of error over bound
-    double nees_median = 0;                               ///< 5.35 where covariances are right
+    double nees_median = 0;                               ///< 5.35 for a consistent estimator
     double ms_median = 0, renders_mean = 0;
 };
 
@@ -64,7 +65,8 @@ struct ApproachRun {
 };
 
 /// `target` and the camera are of the world's scene, placed as the approach goes; other bodies stay where the scene
-/// has them at time 0. `tell` hears how far it is; what was done so far where `stop` is set.
+/// has them at time 0. `tell` is called with each step. Returns the results so far once `stop` is
+/// set.
 [[nodiscard]] Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t camera,
                                                             std::size_t target, const ApproachOptions& options,
                                                             TracingThreads& threads,

@@ -1,4 +1,4 @@
-/// bench/approach_frames.h - the frames of an approach as a camera would put them out, with their truth.
+/// bench/approach_frames.h - the frames of an approach as a camera exposes them, with their true poses.
 #pragma once
 
 #include "bench/approach.h"
@@ -11,7 +11,7 @@ struct ApproachView {
     Rigid3 truth{};  ///< T_camera_target
     BodyPoses at;    ///< of every body
     MeasuredImage image;
-    std::vector<float> variance_dn2;  ///< of the samples that the frame was rendered with: what no real sensor has
+    std::vector<float> variance_dn2;  ///< of the Monte Carlo noise, which no real sensor has
 };
 
 class ApproachFrames {

@@ -1,20 +1,17 @@
 #include "bench/filter.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <nlohmann/json.hpp>
 #include <random>
+
+#include "bench/statistics.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kStateSize = 12;
 
 Matrix6 camera_covariance() {
     Vector6 sigma;
@@ -43,7 +40,7 @@ public:
     }
     [[nodiscard]] const RelativeState& truth() const { return truth_; }
     [[nodiscard]] const Matrix12& first_covariance() const { return covariance_; }
-    [[nodiscard]] RelativeState first_guess() { return displaced(truth_, draw<kStateSize>(covariance_)); }
+    [[nodiscard]] RelativeState first_guess() { return displaced(truth_, draw<kFilterStates>(covariance_)); }
     [[nodiscard]] PoseMeasurement measure(std::int64_t t_ns, const Matrix6& covariance) {
         PoseMeasurement m{t_ns, {}, covariance, mount_, attitude(t_ns)};
         const Quat q = conjugate(m.q_frame_chaser);
@@ -51,7 +48,7 @@ public:
         m.T_sensor_target = displaced(inverse(mount_) * T_chaser_target, draw<6>(covariance));
         return m;
     }
-    /// In parts so small that an impulse of noise in the middle of each is as good as noise all along.
+    /// In steps so short that one impulse of noise in the middle of each approximates white noise.
     void one_second() {
         constexpr int kParts = 10;
         MotionModel quiet = case_.motion;
@@ -86,12 +83,6 @@ private:
     Rigid3 mount_{normalized(Quat{0.9, -0.2, 0.3, 0.1}), {0.4, -0.2, 1.0}};
 };
 
-double thread_microseconds() {
-    std::timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
-}
-
 /// Sums over the runs, each second.
 void add(const PoseFilter& filter, const RelativeState& truth, FilterTime& time) {
     const Vector12 e = error_between(filter.state(), truth);
@@ -124,7 +115,7 @@ public:
                 if (late_ns > 0) filter.predict(t_ns + late_ns);
                 take(filter, m);
             }
-            // What is known is compared at the time of the truth, with all that came until then.
+            // Estimate and truth are compared at the same time, after all measurements up to it.
             if (late_ns == 0) add(filter, flight.truth(), out_.times[static_cast<std::size_t>(s)]);
             flight.one_second();
             if (late_ns > 0) {
@@ -176,7 +167,7 @@ std::vector<FilterCase> filter_cases() {
 }
 
 double FilterRun::band() const {
-    return 1.96 * std::sqrt(2.0 * kStateSize / runs);
+    return 1.96 * std::sqrt(2.0 * kFilterStates / runs);
 }
 double FilterRun::nees() const {
     double sum = 0;
@@ -184,8 +175,9 @@ double FilterRun::nees() const {
     return sum / static_cast<double>(times.size());
 }
 double FilterRun::inside_band() const {
-    const auto inside = std::count_if(
-        times.begin(), times.end(), [this](const FilterTime& t) { return std::abs(t.nees - kStateSize) < band(); });
+    const auto inside = std::count_if(times.begin(), times.end(), [this](const FilterTime& t) {
+        return std::abs(t.nees - kFilterStates) < band();
+    });
     return static_cast<double>(inside) / static_cast<double>(times.size());
 }
 
@@ -201,43 +193,6 @@ Result<std::vector<FilterRun>> run_filter(const std::vector<FilterCase>& cases,
         runs.push_back(run.done());
     }
     return runs;
-}
-
-nlohmann::json to_json(const FilterRun& r) {
-    nlohmann::json times = nlohmann::json::array();
-    for (const FilterTime& t : r.times)
-        times.push_back({{"t_s", t.t_s},
-                         {"nees", t.nees},
-                         {"position_rms_m", t.position_rms_m},
-                         {"position_sigma_m", t.position_sigma_m},
-                         {"attitude_rms_rad", t.attitude_rms_rad},
-                         {"attitude_sigma_rad", t.attitude_sigma_rad}});
-    return {{"name", r.name},
-            {"runs", r.runs},
-            {"nees", r.nees()},
-            {"band", {kStateSize - r.band(), kStateSize + r.band()}},
-            {"inside_band", r.inside_band()},
-            {"nis", r.nis},
-            {"updates", r.updates},
-            {"gated", r.gated},
-            {"update_microseconds", r.update_microseconds},
-            {"times", times}};
-}
-
-std::string in_words(const std::vector<FilterRun>& runs) {
-    std::string text =
-        fmt::format("{:<40} {:>5} {:>6} {:>13} {:>7} {:>6} {:>6} {:>20} {:>22} {:>7}\n", "case", "runs", "NEES",
-                    "band", "inside", "NIS", "gated", "last mm: rms, sigma", "last mrad: rms, sigma", "us");
-    for (const FilterRun& r : runs) {
-        const FilterTime& last = r.times.back();
-        text += fmt::format(
-            "{:<40} {:5} {:6.2f} {:6.2f}-{:5.2f} {:6.0f}% {:6.2f} {:6} {:12.2f} {:7.2f} {:14.3f} {:7.3f} "
-            "{:7.1f}\n",
-            r.name, r.runs, r.nees(), kStateSize - r.band(), kStateSize + r.band(), 100 * r.inside_band(), r.nis,
-            r.gated, 1e3 * last.position_rms_m, 1e3 * last.position_sigma_m, 1e3 * last.attitude_rms_rad,
-            1e3 * last.attitude_sigma_rad, r.update_microseconds);
-    }
-    return text;
 }
 
 }  // namespace narpa

@@ -1,5 +1,5 @@
-/// bench/filter.h - is the filter as good as it says? Simulated flights, and the normalised estimation
-/// error squared (NEES) over time.
+/// bench/filter.h - consistency of the pose filter: simulated flights, and the normalised estimation error squared
+/// (NEES) over time.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@
 
 namespace narpa {
 
-/// A target 30 m ahead that comes closer and turns, its attitude beginning half a turn from the sensor's. Poses
-/// come once a second from each sensor, with the errors that their covariances say.
+/// A target 30 m ahead that approaches and rotates, its attitude initially half a turn from the sensor's. Each
+/// sensor measures the pose once a second, with errors drawn from its covariance.
 struct FilterCase {
     std::string name;
     MotionModel motion{};
     bool camera = true, lidar = false;  ///< a camera: range ten times worse than direction; a LiDAR: all alike
-    double lidar_late_s = 0;            ///< its poses come so long after they were true
+    double lidar_late_s = 0;            ///< delay of its measurements
 };
-/// Free and in orbit, camera and LiDAR, and both of them on a tumbling target, the LiDAR's poses late.
+/// Free and in orbit, camera and LiDAR, and both of a tumbling target with delayed LiDAR measurements.
 [[nodiscard]] std::vector<FilterCase> filter_cases();
 
 struct FilterBenchSettings {
@@ -29,17 +29,19 @@ struct FilterBenchSettings {
     std::uint64_t seed = 1;
 };
 
+inline constexpr int kFilterStates = 12;
+
 struct FilterTime {
     double t_s = 0;
-    double nees = 0;                                  ///< mean over the runs; twelve where the covariance is right
-    double position_rms_m = 0, position_sigma_m = 0;  ///< what the error is, what the filter says: three axes
+    double nees = 0;                                  ///< mean over the runs; twelve for a consistent filter
+    double position_rms_m = 0, position_sigma_m = 0;  ///< true and predicted: three axes
     double attitude_rms_rad = 0, attitude_sigma_rad = 0;
 };
 struct FilterRun {
     std::string name;
     int runs = 0;
     std::vector<FilterTime> times;  ///< each second
-    double nis = 0;                 ///< mean; six
+    double nis = 0;                 ///< mean; six for a consistent filter
     std::uint64_t updates = 0, gated = 0;
     double update_microseconds = 0;  ///< time of the thread, mean, with the prediction before it
 

@@ -4,17 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <nlohmann/json.hpp>
 #include <random>
 
+#include "bench/statistics.h"
 #include "estimator/cloud/sweep_points.h"
 #include "renderer/film/camera_image.h"
 
 namespace narpa {
 namespace {
 
-/// Found: within so many standard deviations of the bound at the truth. Other minima lie hundreds of them away.
+/// Found: within so many standard deviations of the bound at the truth. Other minima are hundreds of them away.
 constexpr double kFoundSigma = 10;
 
 class Sweeps {
@@ -32,37 +31,37 @@ public:
           points_(shots_.size()),
           bytes_(model_.spec().data_packet_bytes) {}
 
-    [[nodiscard]] double even(double low, double high) {
+    [[nodiscard]] double uniform(double low, double high) {
         return std::uniform_real_distribution<double>(low, high)(random_);
     }
     [[nodiscard]] double normal() { return std::normal_distribution<double>()(random_); }
     [[nodiscard]] Vec3 direction() { return normalized(Vec3{normal(), normal(), normal()}); }
 
-    /// The target's x axis points back at the LiDAR, within the cone; any roll; somewhat off the middle.
+    /// The target's x axis points back at the LiDAR, within the cone; any roll; slightly off the LiDAR's y axis.
     [[nodiscard]] Rigid3 pose() {
-        const double distance = even(settings_.distance_min_m, settings_.distance_max_m);
-        const Vec3 aim = normalized(Vec3{even(-0.05, 0.05), 1, even(-0.05, 0.05)});
-        const double off = std::acos(even(std::cos(settings_.cone_deg * kDegree), 1));
+        const double distance = uniform(settings_.distance_min_m, settings_.distance_max_m);
+        const Vec3 aim = normalized(Vec3{uniform(-0.05, 0.05), 1, uniform(-0.05, 0.05)});
+        const double off = std::acos(uniform(std::cos(settings_.cone_deg * kDegree), 1));
         const Vec3 x = -aim, side = normalized(cross(x, direction())), up = cross(x, side);
         const Vec3 axis = std::cos(off) * x + std::sin(off) * side;
-        return {exp_rotation(even(-3.14, 3.14) * axis) *
+        return {exp_rotation(uniform(-3.14, 3.14) * axis) *
                     quat_from_columns(axis, normalized(cross(up, axis)), cross(axis, normalized(cross(up, axis)))),
                 distance * aim};
     }
     [[nodiscard]] SweepMotion motion() {
         const double v = settings_.velocity_m_s, w = settings_.rate_rad_s;
-        return {{even(-v, v), even(-v, v), even(-v, v)}, {even(-w, w), even(-w, w), even(-w, w)}};
+        return {{uniform(-v, v), uniform(-v, v), uniform(-v, v)}, {uniform(-w, w), uniform(-w, w), uniform(-w, w)}};
     }
-    [[nodiscard]] Rigid3 beside(const Rigid3& T, const IcpStarts& starts) {
+    [[nodiscard]] Rigid3 start_near(const Rigid3& T, const IcpStarts& starts) {
         Vector6 e;
         e << to_eigen(starts.angle_deg * kDegree * direction()),
             to_eigen(starts.distance_fraction * norm(T.t) * direction());
         return displaced(T, e);
     }
 
-    /// One turn, from behind to behind; the pose is that of its middle, when the rotor points ahead. Packets are
-    /// written and read again.
-    void fire(const Rigid3& T_lidar_target, const SweepMotion& motion, std::vector<RangePoint>& out) {
+    /// One turn, from behind to behind. The pose is valid at its middle, when the rotor points forward. Points pass
+    /// through the model's packets.
+    void scan(const Rigid3& T_lidar_target, const SweepMotion& motion, std::vector<RangePoint>& out) {
         const auto turn_ns = static_cast<std::int64_t>(1e9 / settings_.rotation_hz);
         out.clear();
         const std::int64_t period_ns = model_.packet_period_ns(settings_.rotation_hz);
@@ -83,7 +82,7 @@ public:
     }
 
 private:
-    /// Of the target alone, with noise; 0: none.
+    /// Range to the target alone, with noise; 0: no return.
     double range_of(const Ray& beam) {
         RayBatch rays;
         HitBatch hits;
@@ -107,19 +106,6 @@ private:
     std::vector<LidarPoint> points_;
     std::vector<std::uint8_t> bytes_;
 };
-
-/// What this thread has computed: an alignment keeps to it, and whatever else the machine does is left out.
-double thread_microseconds() {
-    std::timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
-}
-
-double quantile(std::vector<double>& values, double p) {
-    if (values.empty()) return 0;
-    std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(p * static_cast<double>(values.size() - 1) + 0.5)];
-}
 
 Status check(const IcpBenchSettings& s, const std::vector<IcpStarts>& starts) {
     if (!(s.distance_min_m > 0 && s.distance_max_m >= s.distance_min_m && s.range_max_m > s.distance_max_m))
@@ -169,7 +155,7 @@ struct Sums {
 
 Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target, const IcpBenchSettings& settings,
                                     const std::vector<IcpStarts>& starts,
-                                    const std::function<void(int, int)>& tell) {
+                                    const std::function<void(int, int)>& progress) {
     if (auto good = check(settings, starts); !good) return good.error();
     IcpSettings icp_settings = settings.icp;
     icp_settings.noise.range_m =
@@ -189,15 +175,15 @@ Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target, cons
         for (int i = 0; i < at.count; ++i) {
             const Rigid3 truth = sweeps.pose();
             const SweepMotion motion = sweeps.motion();
-            sweeps.fire(truth, motion, points);
-            const Rigid3 start = sweeps.beside(truth, at);
+            sweeps.scan(truth, motion, points);
+            const Rigid3 start = sweeps.start_near(truth, at);
             const double reach_m = world.tracer().bounding_radius_m(target);
             const double search_m = at.distance_fraction * norm(truth.t) + at.angle_deg * kDegree * reach_m;
             const double from_us = thread_microseconds();
             const auto e = icp.align(points, motion, start, search_m);
             const double took_us = thread_microseconds() - from_us;
             const auto known = icp.align(points, motion, truth);
-            if (tell) tell(++done, all);
+            if (progress) progress(++done, all);
             sums.points += static_cast<double>(points.size());
             if (!e || !known) {
                 ++run.told;
@@ -220,39 +206,6 @@ Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target, cons
         runs.push_back(std::move(run));
     }
     return runs;
-}
-
-nlohmann::json to_json(const IcpRun& r) {
-    return {{"start_angle_deg", r.starts.angle_deg},
-            {"start_distance_fraction", r.starts.distance_fraction},
-            {"starts", r.starts.count},
-            {"found", r.found},
-            {"told", r.told},
-            {"unobserved", r.unobserved},
-            {"rotation_rms_deg", r.rotation_rms_deg},
-            {"translation_rms_m", r.translation_rms_m},
-            {"rotation_to_bound", r.rotation_to_bound},
-            {"translation_to_bound", r.translation_to_bound},
-            {"nees", r.nees},
-            {"points", r.points},
-            {"iterations", r.iterations},
-            {"microseconds_p50", r.microseconds_p50},
-            {"microseconds_p99", r.microseconds_p99}};
-}
-
-std::string in_words(const std::vector<IcpRun>& runs) {
-    std::string text =
-        "start deg      %  starts   found  silent  unseen  rot mdeg    mm  to bound: rot, trans  nees"
-        "  points  steps   us p50      p99\n";
-    for (const IcpRun& r : runs)
-        text += fmt::format(
-            "{:9.1f} {:6.1f} {:7} {:6.1f}% {:7} {:7} {:9.1f} {:5.1f} {:14.2f} {:6.2f} {:5.2f} {:7.0f} {:6.1f} "
-            "{:8.0f} {:8.0f}\n",
-            r.starts.angle_deg, 100 * r.starts.distance_fraction, r.starts.count, 100 * r.found_fraction(),
-            r.starts.count - r.found - r.told, r.unobserved, 1e3 * r.rotation_rms_deg, 1e3 * r.translation_rms_m,
-            r.rotation_to_bound, r.translation_to_bound, r.nees, r.points, r.iterations, r.microseconds_p50,
-            r.microseconds_p99);
-    return text;
 }
 
 }  // namespace narpa

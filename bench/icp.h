@@ -13,8 +13,8 @@
 
 namespace narpa {
 
-/// So many starts, each of a sweep of its own, the given angle about a random axis and the given part of the
-/// distance in a random direction beside the truth.
+/// Starts, each with its own sweep: off the truth by the angle about a random axis, and by the fraction of the
+/// distance in a random direction.
 struct IcpStarts {
     double angle_deg = 5;
     double distance_fraction = 0.05;
@@ -37,23 +37,23 @@ struct IcpBenchSettings {
 /// RMS over its bound: of the root mean square of error over the bound's standard deviation, three axes together.
 struct IcpRun {
     IcpStarts starts;
-    int found = 0;       ///< within ten standard deviations of the bound that a start at the truth tells
-    int told = 0;        ///< of the others, those that were told to be wrong: not credible
-    int unobserved = 0;  ///< of the found, those that report motions that cannot be seen; not in what follows
+    int found = 0;       ///< within ten standard deviations of the bound that holds at the truth
+    int told = 0;        ///< of the others, those that the estimator itself calls not credible
+    int unobserved = 0;  ///< of the found, those with unobservable motions; excluded below
     double rotation_rms_deg = 0, translation_rms_m = 0;
     double rotation_to_bound = 0, translation_to_bound = 0;
-    double nees = 0;                                    ///< mean; six where the covariance is right
+    double nees = 0;                                    ///< mean; six for a consistent estimator
     double points = 0, iterations = 0;                  ///< mean
-    double microseconds_p50 = 0, microseconds_p99 = 0;  ///< of an alignment: time of its one thread
+    double microseconds_p50 = 0, microseconds_p99 = 0;  ///< of an alignment: CPU time of its one thread
 
     [[nodiscard]] double found_fraction() const { return static_cast<double>(found) / starts.count; }
 };
 
-/// `target`: the body's index. `tell`: hears the starts done and the starts there are. Errors: settings.
+/// `target`: the body's index. `progress` is called with the starts done and the total. Errors: settings.
 [[nodiscard]] Result<std::vector<IcpRun>> run_icp(const World& world, std::size_t target,
                                                   const IcpBenchSettings& settings,
                                                   const std::vector<IcpStarts>& starts,
-                                                  const std::function<void(int, int)>& tell = {});
+                                                  const std::function<void(int, int)>& progress = {});
 
 [[nodiscard]] nlohmann::json to_json(const IcpRun& run);
 /// A table, a line for each.

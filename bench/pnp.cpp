@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "bench/pnp_trial.h"
+#include "bench/statistics.h"
 #include "estimator/pose/pnp.h"
 #include "estimator/pose/pnp_ceres.h"
 
@@ -16,18 +17,18 @@ namespace {
 constexpr double kFailedAtBounds = 10;
 constexpr std::size_t kPointsMax = 1024;
 
-struct Answer {
+struct PoseResult {
     std::optional<Rigid3> T_camera_body;
     bool flagged = false;
 };
 
-/// A way to solve a trial; `start` is the tracked pose.
+/// A method that solves a trial; `start` is the tracked pose.
 struct Method {
     std::string name;
-    std::function<Answer(const PnpTrial&, const Rigid3& start)> solve;
+    std::function<PoseResult(const PnpTrial&, const Rigid3& start)> solve;
 };
 
-// OpenCV's methods, on its own terms.
+// OpenCV's methods.
 
 struct CvTrial {
     cv::Mat K, points, pixels;
@@ -38,26 +39,26 @@ struct CvTrial {
           pixels(static_cast<int>(t.pixels.size()), 1, CV_64FC2, const_cast<Pixel*>(t.pixels.data())) {}
 };
 
-Answer as_answer(const cv::Mat& rotation, const cv::Mat& translation) {
+PoseResult as_result(const cv::Mat& rotation, const cv::Mat& translation) {
     const Rigid3 T{exp_rotation({rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2)}),
                    {translation.at<double>(0), translation.at<double>(1), translation.at<double>(2)}};
     if (!std::isfinite(norm(T.q)) || !is_finite(T.t)) return {};
     return {T};
 }
 
-/// OpenCV throws where a method does not take so few points or this shape: no answer.
-Answer opencv(const PnpTrial& trial, cv::SolvePnPMethod method) {
+/// No pose where OpenCV throws: a method that does not take so few points, or this shape.
+PoseResult opencv(const PnpTrial& trial, cv::SolvePnPMethod method) {
     const CvTrial t(trial);
     cv::Mat r, tr;
     try {
         if (!cv::solvePnP(t.points, t.pixels, t.K, cv::noArray(), r, tr, false, method)) return {};
-        return as_answer(r, tr);
+        return as_result(r, tr);
     } catch (const cv::Exception&) {
         return {};
     }
 }
 
-Answer opencv_ransac(const PnpTrial& trial) {
+PoseResult opencv_ransac(const PnpTrial& trial) {
     const CvTrial t(trial);
     cv::Mat r, tr;
     std::vector<int> inliers;
@@ -73,24 +74,24 @@ Answer opencv_ransac(const PnpTrial& trial) {
         for (const int i : inliers)
             points.push_back(t.points.at<cv::Point3d>(i)), pixels.push_back(t.pixels.at<cv::Point2d>(i));
         cv::solvePnPRefineLM(points, pixels, t.K, cv::noArray(), r, tr);
-        return as_answer(r, tr);
+        return as_result(r, tr);
     } catch (const cv::Exception&) {
         return {};
     }
 }
 
-Answer of_fit(const PnpFit& fit) {
-    return fit.ok() || fit.status == PnpStatus::no_convergence ? Answer{fit.T_camera_body} : Answer{};
+PoseResult of_fit(const PnpFit& fit) {
+    return fit.ok() || fit.status == PnpStatus::no_convergence ? PoseResult{fit.T_camera_body} : PoseResult{};
 }
 
-/// The better of the minima that these starts lead Ceres to.
-Answer best_by_ceres(const PnpTrial& trial, std::span<const Rigid3> starts) {
+/// The best minimum that Ceres reaches from these starts.
+PoseResult best_by_ceres(const PnpTrial& trial, std::span<const Rigid3> starts) {
     std::optional<PnpFit> best;
     for (const Rigid3& start : starts) {
         PnpFit fit = refine_with_tiny_solver(trial.input(), start);
         if (fit.ok() && (!best || fit.chi2 < best->chi2)) best = fit;
     }
-    return best ? of_fit(*best) : Answer{};
+    return best ? of_fit(*best) : PoseResult{};
 }
 
 std::vector<Method> methods(const PnpSetting& setting) {
@@ -105,8 +106,8 @@ std::vector<Method> methods(const PnpSetting& setting) {
     std::vector<Method> all;
     all.push_back({kPnpCold, [solver, options](const PnpTrial& t, const Rigid3&) {
                        const PnpSolution& s = solver->solve(t.input(), options);
-                       if (!s.ok() && s.status != PnpStatus::no_convergence) return Answer{};
-                       return Answer{s.fit.T_camera_body, s.ambiguous() || s.imprecise};
+                       if (!s.ok() && s.status != PnpStatus::no_convergence) return PoseResult{};
+                       return PoseResult{s.fit.T_camera_body, s.ambiguous() || s.imprecise};
                    }});
     all.push_back({kPnpWarm, [refiner, warm](const PnpTrial& t, const Rigid3& start) {
                        return of_fit(refiner->refine(t.input(), start, warm));
@@ -143,41 +144,29 @@ std::vector<Method> methods(const PnpSetting& setting) {
     return all;
 }
 
-double median(std::vector<double>& values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-double rms(const std::vector<double>& values) {
-    double sum = 0;
-    for (const double v : values) sum += v * v;
-    return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
-}
-
-/// What one method did in a cell so far.
+/// Results of one method in a cell.
 struct Tally {
     std::vector<double> rotation, position, us;
     int trials = 0, failed = 0, flagged = 0;
 
-    void add(const PnpTrial& trial, const Answer& answer, double took_us) {
+    void add(const PnpTrial& trial, const PoseResult& result, double took_us) {
         ++trials;
         us.push_back(took_us);
-        bool good = answer.T_camera_body.has_value();
+        bool good = result.T_camera_body.has_value();
         if (good) {
-            const Vector6 e = error_between(*answer.T_camera_body, trial.T_camera_body);
+            const Vector6 e = error_between(*result.T_camera_body, trial.T_camera_body);
             const double r = e.head<3>().norm() / trial.bound_rotation_rad;
             const double p = e.tail<3>().norm() / trial.bound_position_m;
             good = r <= kFailedAtBounds && p <= kFailedAtBounds;
             if (good) rotation.push_back(r), position.push_back(p);
         }
         failed += good ? 0 : 1;
-        flagged += !good && answer.flagged ? 1 : 0;
+        flagged += !good && result.flagged ? 1 : 0;
     }
     PnpRow row(const std::string& name) {
         PnpRow r{name, trials, 0, rms(rotation), 0, rms(position), 0, 0, 0};
-        r.rotation_median = median(rotation), r.position_median = median(position), r.median_us = median(us);
+        r.rotation_median = quantile(rotation, 0.5), r.position_median = quantile(position, 0.5),
+        r.median_us = quantile(us, 0.5);
         r.failed = trials > 0 ? static_cast<double>(failed) / trials : 0;
         r.flagged = failed > 0 ? static_cast<double>(flagged) / failed : 0;
         return r;
@@ -190,27 +179,31 @@ PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, cons
     const std::vector<Method> all = methods(setting);
     std::vector<Tally> tallies(all.size());
     std::vector<double> bound_rotation, bound_position;
-    // OpenCV takes milliseconds for each of these.
+    // OpenCV needs milliseconds for each trial with many outliers.
     const int trials = setting.outliers < 0.5 ? options.trials : (options.trials + 4) / 5;
-    int left = 1000 + 10 * trials;  // so far away that no pose is determined, no draw would do
+    int left = 1000 + 10 * trials;  // at ranges where no draw determines a pose, the loop still ends
     for (int done = 0; done < trials && left > 0 && !stop; --left) {
         const auto trial = draw_trial(setting, random);
         if (!trial) continue;
         const Rigid3 start = tracked_pose(*trial, random);
         for (std::size_t m = 0; m < all.size(); ++m) {
             const auto begin = Clock::now();
-            const Answer answer = all[m].solve(*trial, start);
+            const PoseResult result = all[m].solve(*trial, start);
             const std::chrono::duration<double, std::micro> took = Clock::now() - begin;
-            tallies[m].add(*trial, answer, took.count());
+            tallies[m].add(*trial, result, took.count());
         }
         bound_rotation.push_back(trial->bound_rotation_rad);
         bound_position.push_back(trial->bound_position_m / setting.range_m);
         ++done;
     }
-    PnpCell cell{in_words(setting.scene), setting.points,
-                 setting.noise_px,        setting.range_m,
-                 setting.outliers,        median(bound_rotation) * 180 / M_PI,
-                 median(bound_position),  {}};
+    PnpCell cell{in_words(setting.scene),
+                 setting.points,
+                 setting.noise_px,
+                 setting.range_m,
+                 setting.outliers,
+                 quantile(bound_rotation, 0.5) * 180 / M_PI,
+                 quantile(bound_position, 0.5),
+                 {}};
     for (std::size_t m = 0; m < all.size(); ++m) cell.rows.push_back(tallies[m].row(all[m].name));
     return cell;
 }
@@ -237,6 +230,16 @@ std::vector<PnpSetting> settings(const PnpBenchOptions& o) {
     return all;
 }
 
+bool is_nominal(const PnpCell& cell) {
+    return cell.name == "nominal" && cell.outliers == 0;
+}
+
+/// Whether `ours` fails more often, by three standard deviations of the difference between equal solvers.
+bool fails_more(const PnpRow& ours, const PnpRow& theirs) {
+    const double pooled = 0.5 * (ours.failed + theirs.failed), n = ours.trials;
+    return ours.failed - theirs.failed > 3 * std::sqrt(2 * pooled * (1 - pooled) / n);
+}
+
 }  // namespace
 
 const PnpRow* PnpCell::row(const std::string& method) const {
@@ -255,6 +258,25 @@ std::vector<PnpCell> run_pnp_bench(const PnpBenchOptions& options,
         cells.push_back(run_cell(setting, options, stop));
     }
     return cells;
+}
+
+PnpVerdict judge(const std::vector<PnpCell>& cells) {
+    PnpVerdict v;
+    for (const PnpCell& cell : cells) {
+        const PnpRow *cold = cell.row(kPnpCold), *warm = cell.row(kPnpWarm);
+        if (const PnpRow* peer = cell.row(kPnpPeerCold)) {
+            v.more_failures += fails_more(*cold, *peer) ? 1 : 0;
+            if (is_nominal(cell))
+                v.cold_time_ratio = std::max(v.cold_time_ratio, cold->median_us / peer->median_us);
+        }
+        if (const PnpRow* peer = cell.row(kPnpPeerWarm); peer != nullptr && is_nominal(cell))
+            v.warm_time_ratio = std::max(v.warm_time_ratio, warm->median_us / peer->median_us);
+        if (const PnpRow* peer = cell.row(kPnpPeerOutliers); peer != nullptr && cell.outliers <= 0.2)
+            v.outlier_time_ratio = std::max(v.outlier_time_ratio, cold->median_us / peer->median_us);
+        if (is_nominal(cell) && cell.points >= 10)
+            v.worst_rms = std::max({v.worst_rms, cold->rotation_rms, cold->position_rms});
+    }
+    return v;
 }
 
 }  // namespace narpa

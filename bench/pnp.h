@@ -1,5 +1,5 @@
-/// bench/pnp.h - poses from points: narpa's solver beside OpenCV's and Ceres's, error against the bound,
-/// failures, and time.
+/// bench/pnp.h - poses from points: narpa's solver beside OpenCV's and Ceres's, error against the Cramer-Rao
+/// bound, failures, and time.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct PnpRow {
     int trials = 0;
     double rotation_median = 0, rotation_rms = 0;
     double position_median = 0, position_rms = 0;
-    double failed = 0;   ///< part of the trials without an answer, or more than ten times the bound off in either
+    double failed = 0;   ///< part of the trials without a pose, or with an error above ten times either bound
     double flagged = 0;  ///< part of the failures that the solver itself called ambiguous or imprecise
     double median_us = 0;
 };
@@ -45,19 +45,20 @@ struct PnpCell {
     [[nodiscard]] const PnpRow* row(const std::string& method) const;
 };
 
-/// Names of the rows that conclusions are drawn from.
+/// Names of the rows that the verdict compares.
 inline constexpr const char* kPnpCold = "narpa cold";
 inline constexpr const char* kPnpWarm = "narpa warm";
 inline constexpr const char* kPnpPeerCold = "SQPNP + Ceres LM";
 inline constexpr const char* kPnpPeerWarm = "Ceres LM warm";
 inline constexpr const char* kPnpPeerOutliers = "RANSAC EPNP + RefineLM";
 
-/// `progress`: (cells done, cells in all), before each cell. What was done so far where `stop` is set.
+/// `progress` is called before each cell with the cells done and the total. Returns the cells so far once `stop` is
+/// set.
 [[nodiscard]] std::vector<PnpCell> run_pnp_bench(const PnpBenchOptions& options,
                                                  const std::function<void(std::size_t, std::size_t)>& progress,
                                                  const StopFlag& stop);
 
-/// What the cells show as a whole; ratios of times are of medians within a cell.
+/// Conclusions over all cells; ratios of times are of medians within a cell.
 struct PnpVerdict {
     double worst_rms = 0;           ///< narpa cold, nominal cells with ten points or more: either RMS, in bounds
     int more_failures = 0;          ///< cells where narpa cold fails more often than SQPNP and Ceres, beyond chance

@@ -3,16 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "emulator/world.h"
 #include "estimator/pose/pose_estimate.h"
-#include "plot/plot.h"
 #include "renderer/camera/camera_model.h"
 #include "renderer/camera/detector.h"
 #include "renderer/film/camera_image.h"
@@ -22,9 +19,6 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-using nlohmann::json;
-
-constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -85,16 +79,6 @@ Result<StereoBenchPoint> beside_truth(const StereoPair& pair, const Station& lef
     out.normalised_squared = std::pow(out.fine_error_m.z() / out.sigma_depth_m, 2);
     out.epipolar_sigmas = p.point.epipolar_sigmas;
     return out;
-}
-
-json to_json(const Spread& s) {
-    return {{"median", s.median},
-            {"lower_quartile", s.lower_quartile},
-            {"upper_quartile", s.upper_quartile},
-            {"whiskers", {s.low, s.high}},
-            {"outliers", s.outliers},
-            {"largest", s.largest},
-            {"rms", s.rms}};
 }
 
 }  // namespace
@@ -208,70 +192,6 @@ std::vector<std::string> stereo_faults(const StereoBench& bench, int points) {
         if (!(mean < kVarianceFactor * (1 + statistics) && mean > (1 - statistics) / kVarianceFactor))
             faults.push_back(fmt::format("{} of {:.2f} predicted variances, expected about 1", name, mean));
     return faults;
-}
-
-json to_json(const StereoBench& bench) {
-    json out{{"scene", bench.scene},
-             {"points", bench.points.size()},
-             {"gain", bench.gain()},
-             {"mean_normalised_squared", bench.mean_normalised_squared()},
-             {"mean_epipolar_squared", bench.mean_epipolar_squared()},
-             {"render_s", bench.render_s},
-             {"match_s", bench.match_s}};
-    for (const bool fine : {false, true})
-        for (int axis = 0; axis < 3; ++axis) {
-            json& at = out[fine ? "between_pixels" : "whole_pixels"][kAxes[static_cast<std::size_t>(axis)]];
-            at["absolute_m"] = to_json(bench.errors(fine, axis, false));
-            at["over_range"] = to_json(bench.errors(fine, axis, true));
-        }
-    const StereoCounts& n = bench.counts;
-    out["corners"] = {{"accepted", n.accepted},
-                      {"cut_off", n.cut_off},
-                      {"unlike", n.unlike},
-                      {"ambiguous", n.ambiguous},
-                      {"inconsistent", n.inconsistent},
-                      {"unsettled", n.unsettled},
-                      {"off_line", n.off_line},
-                      {"without_depth", n.without_depth}};
-    return out;
-}
-
-Status plot_stereo(const std::string& path, const StereoBench& bench) {
-    json document = to_json(bench), matches = json::array();
-    const auto of = [](const auto& v) { return std::vector<double>(v.data(), v.data() + v.size()); };
-    for (const StereoBenchPoint& p : bench.points)
-        matches.push_back({{"left_px", of(p.left_px)},
-                           {"right_px", of(p.right_px)},
-                           {"truth_m", of(p.truth_m)},
-                           {"whole_pixels_error_m", of(p.whole_error_m)},
-                           {"between_pixels_error_m", of(p.fine_error_m)}});
-    std::vector<std::uint8_t> grey;  // the square root of the DN, so that dark parts can be seen
-    for (const float dn : bench.left.dn)
-        grey.push_back(
-            static_cast<std::uint8_t>(255 * std::sqrt(std::clamp(dn / bench.left_top_dn, 0.0, 1.0)) + 0.5));
-    document["plot"] = "stereo";
-    document["matches"] = matches;
-    document["left"] = plot_image(bench.left.width, bench.left.height, 1, grey);
-    return write_plot(path, document);
-}
-
-std::string in_words(const StereoBench& bench) {
-    std::string out =
-        fmt::format("{:<16} {:>4} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>14}\n", "matching", "axis",
-                    "median m", "quartiles", "", "largest m", "RMS m", "outliers", "RMS/range %");
-    for (const bool fine : {false, true})
-        for (int axis = 0; axis < 3; ++axis) {
-            const Spread s = bench.errors(fine, axis, false);
-            out += fmt::format("{:<16} {:>4} {:>10.4f} {:>10.4f} {:>10.4f} {:>10.4f} {:>10.4f} {:>9} {:>14.5f}\n",
-                               fine ? "between pixels" : "whole pixels", kAxes[static_cast<std::size_t>(axis)],
-                               s.median, s.lower_quartile, s.upper_quartile, s.largest, s.rms, s.outliers,
-                               100 * bench.errors(fine, axis, true).rms);
-        }
-    out += fmt::format(
-        "{} points; depth over range {:.1f} times better between pixels; squared errors over predicted "
-        "variance: depth {:.2f}, across the epipolar line {:.2f}\n",
-        bench.points.size(), bench.gain(), bench.mean_normalised_squared(), bench.mean_epipolar_squared());
-    return out;
 }
 
 }  // namespace narpa

@@ -1,5 +1,5 @@
-/// bench/stereo.h - depth from two frames of a scene, to the whole pixel as in the paper's section V and
-/// between pixels, beside what the tracer knows.
+/// bench/stereo.h - depth from two frames of a scene, by whole pixels as in the paper's section V and by subpixel
+/// matches, against the tracer's ranges.
 #pragma once
 
 #include <functional>
@@ -63,9 +63,9 @@ struct StereoBench {
     [[nodiscard]] double mean_epipolar_squared() const;
 };
 
-/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches them. `tell` hears
-/// how far it is. Errors: no such cameras; no surface in the middle of the left frame; what match_stereo says; a
-/// match whose left pixel sees no surface.
+/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches them. `tell` is
+/// called with each step. Errors: no such cameras; no surface in the middle of the left frame; what match_stereo
+/// says; a match whose left pixel sees no surface.
 [[nodiscard]] Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings& settings,
                                                  const std::function<void(const std::string&)>& tell);
 

@@ -1,5 +1,5 @@
-// The bench of an approach: what it finds on the docking scene, on the real station before the Earth at the edge of
-// eclipse, and what it writes.
+// The approach bench: results on the docking scene and on a model of the ISS before the Earth at the edge of eclipse,
+// and its plots.
 #include "bench/approach.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ Result<std::vector<ApproachRun>> run(const World& world, const ApproachOptions& 
         world, 0, 0, options, threads, [](const std::string&) {}, stop);
 }
 
-TEST(BenchApproach, FindsTheDockingStationAllTheWay) {
+TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
     const auto world = small_world(NARPA_BUILD_DIR "/scenes/docking/docking.toml", 2);
     ASSERT_TRUE(world) << world.error().text();
     ApproachOptions options;
@@ -65,7 +65,7 @@ TEST(BenchApproach, FindsTheDockingStationAllTheWay) {
     EXPECT_NE(in_words(*runs).find("features"), std::string::npos);
 }
 
-TEST(BenchApproach, TheRealStationBeforeTheEarthAtTheEdgeOfEclipse) {
+TEST(BenchApproach, FindsTheIssBeforeTheEarthAtTheEdgeOfEclipse) {
     if (!std::filesystem::exists(kIss)) GTEST_SKIP() << "no station beside the project: ../shared/assets";
     TemporaryFolder folder;
     const std::string path = folder / "iss.toml";

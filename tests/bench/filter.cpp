@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-TEST(BenchFilter, ErrorsAreWhatTheCovarianceSays) {
+TEST(BenchFilter, ErrorsAreConsistentWithTheCovariance) {
     FilterBenchSettings settings;
     settings.runs = 40;
     settings.seconds = 30;
@@ -22,7 +22,7 @@ TEST(BenchFilter, ErrorsAreWhatTheCovarianceSays) {
         EXPECT_NEAR(r.nis, 6, 4 * std::sqrt(12.0 / static_cast<double>(r.updates)));
         EXPECT_NEAR(r.band(), 1.96 * std::sqrt(24.0 / 40), 1e-12);
         const FilterTime &first = r.times.front(), &last = r.times.back();
-        EXPECT_LT(last.position_rms_m, 0.8 * first.position_rms_m) << "it learns";
+        EXPECT_LT(last.position_rms_m, 0.8 * first.position_rms_m) << "the estimate improves";
         EXPECT_NEAR(last.position_rms_m / last.position_sigma_m, 1, 4 / std::sqrt(2.0 * 3 * settings.runs) + 0.1);
         EXPECT_LT(r.gated, 0.002 * static_cast<double>(r.updates) + 1);
         EXPECT_EQ(to_json(r).at("times").size(), 30u);

@@ -1,4 +1,4 @@
-// ICP of VLP-16 sweeps of the docking station: of the emulated instrument's own packets, and the bench in small.
+// ICP of VLP-16 sweeps of the docking station: of the emulator's packets, and the bench with few starts.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -19,8 +19,8 @@ Scene docking_scene() {
     return *std::move(scene);
 }
 
-/// From packets as the emulator sends them, without noise but for their rounding; the chaser coasts and turns.
-TEST(SweepPoints, OfTheEmulatedLidarFitTheStation) {
+/// Packets as the emulator sends them, with no noise but their rounding; the chaser drifts and rotates.
+TEST(SweepPoints, OfEmulatedPacketsLieOnTheStation) {
     Scene scene = docking_scene();
     scene.bodies[kChaser].can_id.reset();
     scene.bodies[kChaser].initial = {{{0, 0, 0, 1}, {30, 2, -1}}, {-1, 0.3, 0.2}, {0.02, -0.03, 0.05}};
@@ -28,7 +28,7 @@ TEST(SweepPoints, OfTheEmulatedLidarFitTheStation) {
     ASSERT_TRUE(world) << world.error().text();
     LidarUnit unit(**world, 0);
 
-    // Where the station is from the LiDAR as its rotor points ahead, and how it moves there.
+    // Pose and motion of the station in the LiDAR's frame when the rotor points forward.
     const std::int64_t turn_ns = 100'000'000;
     BodyPoses at(2);
     const auto pose_at = [&](std::int64_t t_ns) {
@@ -82,7 +82,7 @@ TEST(BenchIcp, FindsTheDockingStation) {
     for (const IcpRun& run : *runs) {
         EXPECT_EQ(run.found, run.starts.count);
         EXPECT_GT(run.points, 500);
-        // Three axes each, that are not independent: half of them count.
+        // The three axes are correlated: half the degrees of freedom.
         const double chance = 4 / std::sqrt(2.0 * 1.5 * run.starts.count);
         EXPECT_NEAR(run.rotation_to_bound, 1.03, chance);
         EXPECT_NEAR(run.translation_to_bound, 1.03, chance);
@@ -93,7 +93,7 @@ TEST(BenchIcp, FindsTheDockingStation) {
     EXPECT_NE(in_words(*runs).find("100.0%"), std::string::npos);
 }
 
-TEST(BenchIcp, SaysWhatIsWrong) {
+TEST(BenchIcp, BadSettingsAreErrors) {
     auto world = World::create(docking_scene());
     ASSERT_TRUE(world) << world.error().text();
     EXPECT_FALSE(run_icp(**world, 7, {}, {{5, 0.05, 1}}));

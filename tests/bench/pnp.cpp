@@ -1,4 +1,4 @@
-// `narpa bench estimate`, poses from points: what is drawn, what is counted, what is concluded; never times.
+// `narpa bench estimate --only pnp`: trials, tallies and verdict; no test depends on times.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -14,7 +14,7 @@
 namespace narpa {
 namespace {
 
-TEST(PnpBench, DrawsWhatTheSettingSays) {
+TEST(PnpBench, TrialsFollowTheSetting) {
     std::mt19937_64 random(4);
     for (const PnpScene scene : {PnpScene::nominal, PnpScene::half_turn, PnpScene::plane, PnpScene::plane_facing,
                                  PnpScene::line, PnpScene::tiny, PnpScene::camera_plane}) {
@@ -33,13 +33,13 @@ TEST(PnpBench, DrawsWhatTheSettingSays) {
                 squares += std::pow(trial->camera.fx * p.x / p.z + trial->camera.cx - trial->pixels[i].u, 2);
             }
         }
-        // The noise's variance, to four of its standard deviations.
+        // The variance of the noise, within four standard deviations.
         const double n = static_cast<double>(inliers);
         EXPECT_NEAR(squares / n, 0.25, 4 * 0.25 * std::sqrt(2 / n)) << in_words(scene);
     }
 }
 
-TEST(PnpBench, TalliesEveryMethodOnTheSameTrials) {
+TEST(PnpBench, EveryMethodSolvesTheSameTrials) {
     PnpBenchOptions options;
     options.trials = 60;
     options.points = {12};
@@ -58,7 +58,7 @@ TEST(PnpBench, TalliesEveryMethodOnTheSameTrials) {
         EXPECT_EQ(row->trials, 60);
         EXPECT_GT(row->median_us, 0);
     }
-    // All who refine end in the same minimum, at the bound: an RMS over 60 draws is within 0.3 of 1.
+    // All refining methods end in the same minimum, at the bound: an RMS over 60 trials is within 0.3 of 1.
     const PnpRow *cold = cells[0].row(kPnpCold), *peer = cells[0].row(kPnpPeerCold);
     EXPECT_EQ(cold->failed, 0);
     EXPECT_NEAR(cold->rotation_rms, 1, 0.3);
@@ -71,7 +71,7 @@ TEST(PnpBench, TalliesEveryMethodOnTheSameTrials) {
     EXPECT_NE(in_words(cells).find("12 points, 0.5 px, 20 m"), std::string::npos);
 }
 
-TEST(PnpBench, JudgesErrorsFailuresAndTimes) {
+TEST(PnpBench, VerdictComparesErrorsFailuresAndTimes) {
     PnpCell cell{"nominal", 10, 0.5, 30, 0, 1, 0.01, {}};
     cell.rows.push_back({kPnpCold, 1000, 0.9, 1.05, 0.9, 1.2, 0.02, 0, 10});
     cell.rows.push_back({kPnpWarm, 1000, 0.9, 1.05, 0.9, 1.05, 0, 0, 2});
@@ -109,11 +109,11 @@ TEST(PnpBench, RunsFromTheCommandLine) {
     EXPECT_EQ(done.status, done.document["passed"].get<bool>() ? 0 : 1);
 }
 
-TEST(PnpBench, RefusesNumbersThatMakeNoTrials) {
+TEST(PnpBench, RefusesSettingsWithoutTrials) {
     EXPECT_EQ(bench("--noise-px nan").status, 2);
     EXPECT_EQ(bench("--ranges inf").status, 2);
     EXPECT_EQ(bench("--points 3").status, 2);
-    // So far away nothing tells the pose: no trial, and not tried for ever.
+    // At this range no draw determines the pose: the cell ends without trials.
     PnpBenchOptions far;
     far.trials = 5, far.points = {6}, far.noise_px = {1}, far.ranges_m = {1e12}, far.hard_cases = false;
     const auto cells = run_pnp_bench(

@@ -1,4 +1,4 @@
-// The paper's stereo experiment: 100 points of cratered ground, by whole pixels and between them.
+// The paper's stereo experiment: 100 points of cratered ground, by whole pixels and by subpixel matches.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -23,7 +23,7 @@ std::string all(const std::vector<std::string>& faults) {
     return text;
 }
 
-TEST(StereoBench, DescentIsFiveTimesBetterThanWholePixelsAndAsPredicted) {
+TEST(StereoBench, SubpixelErrorsAreFiveTimesSmallerAndAsPredicted) {
     const auto scene = read_scene(kDescent);
     ASSERT_TRUE(scene) << scene.error().text();
     const auto bench = measure_stereo(*scene, {}, quietly);
@@ -40,12 +40,12 @@ TEST(StereoBench, DescentIsFiveTimesBetterThanWholePixelsAndAsPredicted) {
     EXPECT_LT(whole.rms, 0.4 * 22);
     for (const StereoBenchPoint& p : bench->points) {
         EXPECT_LT(std::abs(p.fine_error_m.z()), 6 * p.sigma_depth_m) << p.left_px.transpose();
-        // The left pixel is exact: the error lies along its ray.
+        // The left pixel is exact, so the error lies along its ray.
         EXPECT_LT(p.fine_error_m.cross(p.truth_m.normalized()).norm(), 1e-3);
     }
 }
 
-TEST(StereoBench, SpreadIsTukeys) {
+TEST(StereoBench, SpreadFollowsTukey) {
     const Spread s = spread({1, -2, 3, -4, 5, 6, 7, 8, -100});
     EXPECT_EQ(s.median, 5);
     EXPECT_EQ(s.lower_quartile, 3);
@@ -76,7 +76,7 @@ StereoBench made_up(double whole_m, double fine_m, double sigma_m) {
     return b;
 }
 
-TEST(StereoBench, TellsWhatIsWrong) {
+TEST(StereoBench, NamesItsFaults) {
     EXPECT_EQ(all(stereo_faults(made_up(5, 0.5, 0.5), 100)), "");
     EXPECT_EQ(all(stereo_faults(made_up(5, 0.5, 0.5), 120)), "100 points, expected 120\n");
     EXPECT_EQ(all(stereo_faults(made_up(2, 0.5, 0.5), 100)),
@@ -86,7 +86,7 @@ TEST(StereoBench, TellsWhatIsWrong) {
     EXPECT_EQ(stereo_faults({}, 1).size(), 1u);
 }
 
-TEST(StereoBench, DrawsWhatItFound) {
+TEST(StereoBench, PlotsItsMatches) {
     const test::TemporaryFolder folder;
     const std::string path = folder / "stereo.png";
     ASSERT_TRUE(plot_stereo(path, made_up(5, 0.5, 0.5)));
@@ -94,7 +94,7 @@ TEST(StereoBench, DrawsWhatItFound) {
     EXPECT_FALSE(plot_stereo(folder / "nowhere/stereo.png", made_up(5, 0.5, 0.5)));
 }
 
-TEST(StereoBench, SaysWhatItCannotMeasure) {
+TEST(StereoBench, ScenesItCannotMeasureAreErrors) {
     auto scene = read_scene(kDescent);
     ASSERT_TRUE(scene);
     auto changed = *scene;
@@ -139,13 +139,13 @@ Scene gale(const cv::Mat& height_mm, const Scene& like) {
     for (const Vec3& n : normals) m.normals.push_back(vec_cast<float>(normalized(n)));
     m.face_material.assign(m.faces.size(), 0);
     scene.meshes = {m};
-    // Nothing but shade shows this ground: 12 degrees above the horizon, and twice the exposure.
+    // Only shading gives contrast: the Sun 12 degrees above the horizon, and twice the exposure.
     scene.sun->direction = normalized(Vec3{-0.70, 0.58, 0.20});
     for (Camera& c : scene.cameras) c.detector->exposure_s *= 2;
     return scene;
 }
 
-TEST(StereoBench, RealGroundIsAsPredictedToo) {
+TEST(StereoBench, ErrorsOnRealGroundAreAsPredicted) {
     const std::string file = NARPA_SOURCE_DIR "/../shared/assets/dem/mars_gale/missionDEM_u16_mm.png";
     if (!std::filesystem::exists(file))
         GTEST_SKIP() << "no elevation model beside the project: ../shared/assets/dem/mars_gale";

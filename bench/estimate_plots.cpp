@@ -1,6 +1,4 @@
-// What the bench of the approach found: as JSON, as a table and as plots.
-#include <fmt/format.h>
-
+// The plots of the estimator benches: approach, frames of the approach, stereo.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -9,15 +7,12 @@
 
 #include "bench/approach.h"
 #include "bench/approach_frames.h"
+#include "bench/stereo.h"
 #include "estimator/features/feature_alignment.h"
 #include "plot/plot.h"
 
 namespace narpa {
 namespace {
-
-std::string name_of(EstimateMethod m) {
-    return std::string(kEstimateMethods[static_cast<std::size_t>(m)]);
-}
 
 /// A frame for a plot, 320 pixels wide: the square root of the DN, so that dark parts can be seen.
 template <class DnAt>
@@ -35,60 +30,6 @@ nlohmann::json thumbnail(int width, int height, const SensorModel& sensor, DnAt&
 }
 
 }  // namespace
-
-nlohmann::json to_json(const ApproachRun& run) {
-    nlohmann::json bands = nlohmann::json::array(), basin = bands, frames = bands;
-    for (const ApproachBand& b : run.bands)
-        bands.push_back({{"from_m", std::isfinite(b.from_m) ? nlohmann::json(b.from_m) : nlohmann::json(nullptr)},
-                         {"to_m", b.to_m},
-                         {"frames", b.frames},
-                         {"found", b.found},
-                         {"wrong", b.wrong},
-                         {"rotation_rms_rad", b.rotation_rms_rad},
-                         {"position_rms_m", b.position_rms_m},
-                         {"rotation_of_bound", b.rotation_of_bound},
-                         {"position_of_bound", b.position_of_bound},
-                         {"nees_median", b.nees_median},
-                         {"ms_median", b.ms_median},
-                         {"renders_mean", b.renders_mean}});
-    for (const BasinCell& c : run.basin)
-        basin.push_back({{"off_deg_and_percent", c.off}, {"trials", c.trials}, {"found", c.found}});
-    for (const ApproachFrame& f : run.frames)
-        frames.push_back({{"range_m", f.range_m},
-                          {"found", f.found},
-                          {"rotation_rad", f.rotation_rad},
-                          {"position_m", f.position_m},
-                          {"bound_rotation_rad", f.bound_rotation_rad},
-                          {"bound_position_m", f.bound_position_m},
-                          {"nees", f.nees},
-                          {"ms", f.ms}});
-    return {{"method", name_of(run.method)}, {"bands", bands}, {"basin", basin}, {"frames", frames}};
-}
-
-std::string in_words(const std::vector<ApproachRun>& runs) {
-    std::string out =
-        fmt::format("{:<10} {:>14} {:>9} {:>6} {:>11} {:>11} {:>15} {:>6} {:>8} {:>8}\n", "approach", "range, m",
-                    "found", "wrong", "RMS deg", "RMS m", "/ bound", "NEES", "renders", "ms");
-    for (const ApproachRun& run : runs) {
-        for (const ApproachBand& b : run.bands) {
-            const bool all = !std::isfinite(b.from_m) && b.to_m == 0;
-            const std::string range = all                       ? "all"
-                                      : std::isfinite(b.from_m) ? fmt::format("{:g} .. {:g}", b.from_m, b.to_m)
-                                                                : fmt::format("beyond {:g}", b.to_m);
-            out += fmt::format(
-                "{:<10} {:>14} {:>4}/{:<4} {:>6} {:>11.4f} {:>11.3g} {:>7.2f} {:>7.2f} {:>6.1f} {:>8.1f} "
-                "{:>8.0f}\n",
-                name_of(run.method), range, b.found, b.frames, b.wrong, b.rotation_rms_rad / kDegree,
-                b.position_rms_m, b.rotation_of_bound, b.position_of_bound, b.nees_median, b.renders_mean,
-                b.ms_median);
-        }
-        if (run.basin.empty()) continue;
-        out += fmt::format("{:<10} found from starts off by", name_of(run.method));
-        for (const BasinCell& c : run.basin) out += fmt::format("  {:g}: {}/{}", c.off, c.found, c.trials);
-        out += " (degrees and % of the range)\n";
-    }
-    return out;
-}
 
 Status plot_approach(const std::string& path, const std::string& title, const std::vector<ApproachRun>& runs) {
     nlohmann::json document{{"plot", "approach"}, {"title", title}, {"runs", nlohmann::json::array()}};
@@ -133,6 +74,25 @@ Status plot_approach_frames(const std::string& path, const World& world, std::si
                  {"matches_px", matches}});
         });
     }
+    return write_plot(path, document);
+}
+
+Status plot_stereo(const std::string& path, const StereoBench& bench) {
+    nlohmann::json document = to_json(bench), matches = nlohmann::json::array();
+    const auto of = [](const auto& v) { return std::vector<double>(v.data(), v.data() + v.size()); };
+    for (const StereoBenchPoint& p : bench.points)
+        matches.push_back({{"left_px", of(p.left_px)},
+                           {"right_px", of(p.right_px)},
+                           {"truth_m", of(p.truth_m)},
+                           {"whole_pixels_error_m", of(p.whole_error_m)},
+                           {"between_pixels_error_m", of(p.fine_error_m)}});
+    std::vector<std::uint8_t> grey;  // the square root of the DN, so that dark parts can be seen
+    for (const float dn : bench.left.dn)
+        grey.push_back(
+            static_cast<std::uint8_t>(255 * std::sqrt(std::clamp(dn / bench.left_top_dn, 0.0, 1.0)) + 0.5));
+    document["plot"] = "stereo";
+    document["matches"] = matches;
+    document["left"] = plot_image(bench.left.width, bench.left.height, 1, grey);
     return write_plot(path, document);
 }
 

@@ -1,0 +1,278 @@
+// The reports of the estimator benches: a JSON document and a table for each. One file, because JSON and fmt are
+// slow to compile.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "bench/approach.h"
+#include "bench/filter.h"
+#include "bench/icp.h"
+#include "bench/pnp.h"
+#include "bench/stereo.h"
+
+namespace narpa {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+
+json to_json(const Spread& s) {
+    return {{"median", s.median},
+            {"lower_quartile", s.lower_quartile},
+            {"upper_quartile", s.upper_quartile},
+            {"whiskers", {s.low, s.high}},
+            {"outliers", s.outliers},
+            {"largest", s.largest},
+            {"rms", s.rms}};
+}
+
+std::string name_of(EstimateMethod m) {
+    return std::string(kEstimateMethods[static_cast<std::size_t>(m)]);
+}
+
+}  // namespace
+
+// Poses from points
+
+std::string in_words(const std::vector<PnpCell>& cells) {
+    std::string out = fmt::format("{:<24} {:>13} {:>13} {:>9} {:>9} {:>9}\n", "", "rotation", "position", "failed",
+                                  "flagged", "time");
+    out += fmt::format("{:<24} {:>6} {:>6} {:>6} {:>6} {:>9} {:>9} {:>9}\n", "in units of the bound", "median",
+                       "rms", "median", "rms", "%", "% of them", "us");
+    for (const PnpCell& cell : cells) {
+        out += fmt::format("{}, {} points, {:g} px, {:g} m{}: bound {:.3g} deg, {:.3g} % of the range\n", cell.name,
+                           cell.points, cell.noise_px, cell.range_m,
+                           cell.outliers > 0 ? fmt::format(", {:g} % outliers", 100 * cell.outliers) : "",
+                           cell.bound_rotation_deg, 100 * cell.bound_position);
+        for (const PnpRow& r : cell.rows)
+            out += fmt::format("  {:<22} {:>6.2f} {:>6.2f} {:>6.2f} {:>6.2f} {:>9.2f} {:>9.0f} {:>9.1f}\n",
+                               r.method, r.rotation_median, r.rotation_rms, r.position_median, r.position_rms,
+                               100 * r.failed, 100 * r.flagged, r.median_us);
+    }
+    return out;
+}
+
+std::string in_words(const PnpVerdict& v) {
+    return fmt::format(
+        "points: worst RMS {:.3f} bounds from ten points up; {} cells with more failures than {}; time: cold "
+        "{:.2f} "
+        "of {}, warm {:.2f} of {}, outliers {:.2f} of {}\n",
+        v.worst_rms, v.more_failures, kPnpPeerCold, v.cold_time_ratio, kPnpPeerCold, v.warm_time_ratio,
+        kPnpPeerWarm, v.outlier_time_ratio, kPnpPeerOutliers);
+}
+
+json to_json(const std::vector<PnpCell>& cells) {
+    json all = json::array();
+    for (const PnpCell& cell : cells) {
+        json rows = json::array();
+        for (const PnpRow& r : cell.rows)
+            rows.push_back({{"method", r.method},
+                            {"trials", r.trials},
+                            {"rotation_median_bounds", r.rotation_median},
+                            {"rotation_rms_bounds", r.rotation_rms},
+                            {"position_median_bounds", r.position_median},
+                            {"position_rms_bounds", r.position_rms},
+                            {"failed", r.failed},
+                            {"flagged", r.flagged},
+                            {"median_us", r.median_us}});
+        all.push_back({{"name", cell.name},
+                       {"points", cell.points},
+                       {"noise_px", cell.noise_px},
+                       {"range_m", cell.range_m},
+                       {"outliers", cell.outliers},
+                       {"bound_rotation_deg", cell.bound_rotation_deg},
+                       {"bound_position_of_range", cell.bound_position},
+                       {"rows", rows}});
+    }
+    return all;
+}
+
+json to_json(const PnpVerdict& v) {
+    return {{"worst_rms_bounds", v.worst_rms},
+            {"cells_with_more_failures", v.more_failures},
+            {"cold_time_ratio", v.cold_time_ratio},
+            {"warm_time_ratio", v.warm_time_ratio},
+            {"outlier_time_ratio", v.outlier_time_ratio}};
+}
+
+// Approach
+
+json to_json(const ApproachRun& run) {
+    json bands = json::array(), basin = bands, frames = bands;
+    for (const ApproachBand& b : run.bands)
+        bands.push_back({{"from_m", std::isfinite(b.from_m) ? json(b.from_m) : json(nullptr)},
+                         {"to_m", b.to_m},
+                         {"frames", b.frames},
+                         {"found", b.found},
+                         {"wrong", b.wrong},
+                         {"rotation_rms_rad", b.rotation_rms_rad},
+                         {"position_rms_m", b.position_rms_m},
+                         {"rotation_of_bound", b.rotation_of_bound},
+                         {"position_of_bound", b.position_of_bound},
+                         {"nees_median", b.nees_median},
+                         {"ms_median", b.ms_median},
+                         {"renders_mean", b.renders_mean}});
+    for (const BasinCell& c : run.basin)
+        basin.push_back({{"off_deg_and_percent", c.off}, {"trials", c.trials}, {"found", c.found}});
+    for (const ApproachFrame& f : run.frames)
+        frames.push_back({{"range_m", f.range_m},
+                          {"found", f.found},
+                          {"rotation_rad", f.rotation_rad},
+                          {"position_m", f.position_m},
+                          {"bound_rotation_rad", f.bound_rotation_rad},
+                          {"bound_position_m", f.bound_position_m},
+                          {"nees", f.nees},
+                          {"ms", f.ms}});
+    return {{"method", name_of(run.method)}, {"bands", bands}, {"basin", basin}, {"frames", frames}};
+}
+
+std::string in_words(const std::vector<ApproachRun>& runs) {
+    std::string out =
+        fmt::format("{:<10} {:>14} {:>9} {:>6} {:>11} {:>11} {:>15} {:>6} {:>8} {:>8}\n", "approach", "range, m",
+                    "found", "wrong", "RMS deg", "RMS m", "/ bound", "NEES", "renders", "ms");
+    for (const ApproachRun& run : runs) {
+        for (const ApproachBand& b : run.bands) {
+            const bool all = !std::isfinite(b.from_m) && b.to_m == 0;
+            const std::string range = all                       ? "all"
+                                      : std::isfinite(b.from_m) ? fmt::format("{:g} .. {:g}", b.from_m, b.to_m)
+                                                                : fmt::format("beyond {:g}", b.to_m);
+            out += fmt::format(
+                "{:<10} {:>14} {:>4}/{:<4} {:>6} {:>11.4f} {:>11.3g} {:>7.2f} {:>7.2f} {:>6.1f} {:>8.1f} "
+                "{:>8.0f}\n",
+                name_of(run.method), range, b.found, b.frames, b.wrong, b.rotation_rms_rad / kDegree,
+                b.position_rms_m, b.rotation_of_bound, b.position_of_bound, b.nees_median, b.renders_mean,
+                b.ms_median);
+        }
+        if (run.basin.empty()) continue;
+        out += fmt::format("{:<10} found from starts off by", name_of(run.method));
+        for (const BasinCell& c : run.basin) out += fmt::format("  {:g}: {}/{}", c.off, c.found, c.trials);
+        out += " (degrees and % of the range)\n";
+    }
+    return out;
+}
+
+// Stereo
+
+json to_json(const StereoBench& bench) {
+    json out{{"scene", bench.scene},
+             {"points", bench.points.size()},
+             {"gain", bench.gain()},
+             {"mean_normalised_squared", bench.mean_normalised_squared()},
+             {"mean_epipolar_squared", bench.mean_epipolar_squared()},
+             {"render_s", bench.render_s},
+             {"match_s", bench.match_s}};
+    for (const bool fine : {false, true})
+        for (int axis = 0; axis < 3; ++axis) {
+            json& at = out[fine ? "between_pixels" : "whole_pixels"][kAxes[static_cast<std::size_t>(axis)]];
+            at["absolute_m"] = to_json(bench.errors(fine, axis, false));
+            at["over_range"] = to_json(bench.errors(fine, axis, true));
+        }
+    const StereoCounts& n = bench.counts;
+    out["corners"] = {{"accepted", n.accepted},
+                      {"cut_off", n.cut_off},
+                      {"unlike", n.unlike},
+                      {"ambiguous", n.ambiguous},
+                      {"inconsistent", n.inconsistent},
+                      {"unsettled", n.unsettled},
+                      {"off_line", n.off_line},
+                      {"without_depth", n.without_depth}};
+    return out;
+}
+
+std::string in_words(const StereoBench& bench) {
+    std::string out =
+        fmt::format("{:<16} {:>4} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>14}\n", "matching", "axis",
+                    "median m", "quartiles", "", "largest m", "RMS m", "outliers", "RMS/range %");
+    for (const bool fine : {false, true})
+        for (int axis = 0; axis < 3; ++axis) {
+            const Spread s = bench.errors(fine, axis, false);
+            out += fmt::format("{:<16} {:>4} {:>10.4f} {:>10.4f} {:>10.4f} {:>10.4f} {:>10.4f} {:>9} {:>14.5f}\n",
+                               fine ? "between pixels" : "whole pixels", kAxes[static_cast<std::size_t>(axis)],
+                               s.median, s.lower_quartile, s.upper_quartile, s.largest, s.rms, s.outliers,
+                               100 * bench.errors(fine, axis, true).rms);
+        }
+    out += fmt::format(
+        "{} points; depth over range {:.1f} times better between pixels; squared errors over predicted "
+        "variance: depth {:.2f}, across the epipolar line {:.2f}\n",
+        bench.points.size(), bench.gain(), bench.mean_normalised_squared(), bench.mean_epipolar_squared());
+    return out;
+}
+
+// ICP
+
+json to_json(const IcpRun& r) {
+    return {{"start_angle_deg", r.starts.angle_deg},
+            {"start_distance_fraction", r.starts.distance_fraction},
+            {"starts", r.starts.count},
+            {"found", r.found},
+            {"told", r.told},
+            {"unobserved", r.unobserved},
+            {"rotation_rms_deg", r.rotation_rms_deg},
+            {"translation_rms_m", r.translation_rms_m},
+            {"rotation_to_bound", r.rotation_to_bound},
+            {"translation_to_bound", r.translation_to_bound},
+            {"nees", r.nees},
+            {"points", r.points},
+            {"iterations", r.iterations},
+            {"microseconds_p50", r.microseconds_p50},
+            {"microseconds_p99", r.microseconds_p99}};
+}
+
+std::string in_words(const std::vector<IcpRun>& runs) {
+    std::string text =
+        "start deg      %  starts   found  silent  unseen  rot mdeg    mm  to bound: rot, trans  nees"
+        "  points  steps   us p50      p99\n";
+    for (const IcpRun& r : runs)
+        text += fmt::format(
+            "{:9.1f} {:6.1f} {:7} {:6.1f}% {:7} {:7} {:9.1f} {:5.1f} {:14.2f} {:6.2f} {:5.2f} {:7.0f} {:6.1f} "
+            "{:8.0f} {:8.0f}\n",
+            r.starts.angle_deg, 100 * r.starts.distance_fraction, r.starts.count, 100 * r.found_fraction(),
+            r.starts.count - r.found - r.told, r.unobserved, 1e3 * r.rotation_rms_deg, 1e3 * r.translation_rms_m,
+            r.rotation_to_bound, r.translation_to_bound, r.nees, r.points, r.iterations, r.microseconds_p50,
+            r.microseconds_p99);
+    return text;
+}
+
+// Filter
+
+json to_json(const FilterRun& r) {
+    json times = json::array();
+    for (const FilterTime& t : r.times)
+        times.push_back({{"t_s", t.t_s},
+                         {"nees", t.nees},
+                         {"position_rms_m", t.position_rms_m},
+                         {"position_sigma_m", t.position_sigma_m},
+                         {"attitude_rms_rad", t.attitude_rms_rad},
+                         {"attitude_sigma_rad", t.attitude_sigma_rad}});
+    return {{"name", r.name},
+            {"runs", r.runs},
+            {"nees", r.nees()},
+            {"band", {kFilterStates - r.band(), kFilterStates + r.band()}},
+            {"inside_band", r.inside_band()},
+            {"nis", r.nis},
+            {"updates", r.updates},
+            {"gated", r.gated},
+            {"update_microseconds", r.update_microseconds},
+            {"times", times}};
+}
+
+std::string in_words(const std::vector<FilterRun>& runs) {
+    std::string text =
+        fmt::format("{:<40} {:>5} {:>6} {:>13} {:>7} {:>6} {:>6} {:>20} {:>22} {:>7}\n", "case", "runs", "NEES",
+                    "band", "inside", "NIS", "gated", "last mm: rms, sigma", "last mrad: rms, sigma", "us");
+    for (const FilterRun& r : runs) {
+        const FilterTime& last = r.times.back();
+        text += fmt::format(
+            "{:<40} {:5} {:6.2f} {:6.2f}-{:5.2f} {:6.0f}% {:6.2f} {:6} {:12.2f} {:7.2f} {:14.3f} {:7.3f} "
+            "{:7.1f}\n",
+            r.name, r.runs, r.nees(), kFilterStates - r.band(), kFilterStates + r.band(), 100 * r.inside_band(),
+            r.nis, r.gated, 1e3 * last.position_rms_m, 1e3 * last.position_sigma_m, 1e3 * last.attitude_rms_rad,
+            1e3 * last.attitude_sigma_rad, r.update_microseconds);
+    }
+    return text;
+}
+
+}  // namespace narpa

@@ -1,4 +1,5 @@
-// narpa bench render --scenes - the standing scenes, one after another; --ablation - what each mechanism earns on them.
+// narpa bench render --scenes - the standing scenes, one after another; --ablation - what each mechanism earns on
+// them.
 #include "apps/bench_ladder.h"
 
 #include <fmt/format.h>
@@ -100,7 +101,7 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     }
     const Progress progress;
     l.ladder = measure_ladder(**world, camera, settings, loop ? &*loop : nullptr, threads,
-                     [&](const std::string& step) { progress.tell(std::string(s.name) + ": " + step); });
+                              [&](const std::string& step) { progress.tell(std::string(s.name) + ": " + step); });
     return l;
 }
 

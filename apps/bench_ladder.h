@@ -1,12 +1,12 @@
-/// apps/bench_ladder.h - `narpa bench render --scenes`: time and error at several budgets on the standing scenes, and the
-/// ratios that frames are judged by; --ablation: what each mechanism earns.
+/// apps/bench_ladder.h - `narpa bench render --scenes`: time and error at several budgets on the standing scenes,
+/// and the ratios that frames are judged by; --ablation: what each mechanism earns.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "bench/gates.h"
 #include "apps/cli.h"
+#include "bench/gates.h"
 
 namespace narpa::cli {
 

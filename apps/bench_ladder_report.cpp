@@ -55,11 +55,11 @@ void print_ratios(const CraftRatios& r) {
 }
 
 void print_ladder(const SceneLadder& l) {
-    say(
-        fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (subtracted); detector and "
-                    "conversion {:.3f} ms",
-                    l.scene, l.width, l.height, l.reference_spp, l.ladder.level, l.ladder.reference_noise,
-                    1e3 * l.ladder.detector_s));
+    say(fmt::format(
+        "{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr), noise {:.2g} (subtracted); detector and "
+        "conversion {:.3f} ms",
+        l.scene, l.width, l.height, l.reference_spp, l.ladder.level, l.ladder.reference_noise,
+        1e3 * l.ladder.detector_s));
     say(fmt::format("  {:<14} {:>10} {:>10} {:>12} {:>20} {:>9} {:>10} {:>9}  {}", "budget", "ms", "CPU ms", "rays",
                     "RMSE", "bias, %", "predicted", "to loop", "where the time goes"));
     for (const Rung& r : l.ladder.rungs) {
@@ -90,14 +90,14 @@ void print_ladder(const SceneLadder& l) {
 void print_ablation(const SceneLadder& l) {
     say(fmt::format("{}, {} x {}, reference {} spp: mean {:.5g} W/(m^2 sr)", l.scene, l.width, l.height,
                     l.reference_spp, l.ladder.level));
-    say(fmt::format("  {:<14} {:<20} {:>10} {:>20} {:>18} {:>9} {:>14}", "budget", "without", "CPU ms", "RMSE", "bias, %",
-                    "predicted", "at equal error"));
+    say(fmt::format("  {:<14} {:<20} {:>10} {:>20} {:>18} {:>9} {:>14}", "budget", "without", "CPU ms", "RMSE",
+                    "bias, %", "predicted", "at equal error"));
     for (const Rung& r : l.ladder.rungs) {
         const auto cost = r.without.empty() ? std::nullopt : cost_at_equal_error(l.ladder, r);
         const double percent = 100 / l.ladder.level;
-        say(fmt::format("  {:<14} {:<20} {:>10.3f} {:>10.4g} +- {:<6.1g} {:>+9.3f} +- {:<5.2g} {:>9} {:>14}", r.name,
-                        r.without, 1e3 * r.median_cpu_s(), r.rmse.value, r.rmse.standard_error, percent * r.bias.value,
-                        percent * r.bias.standard_error,
+        say(fmt::format("  {:<14} {:<20} {:>10.3f} {:>10.4g} +- {:<6.1g} {:>+9.3f} +- {:<5.2g} {:>9} {:>14}",
+                        r.name, r.without, 1e3 * r.median_cpu_s(), r.rmse.value, r.rmse.standard_error,
+                        percent * r.bias.value, percent * r.bias.standard_error,
                         r.predicted ? fmt::format("x {:.2f}", r.predicted_to_measured()) : "unknown",
                         cost ? fmt::format("x {:.2f}", *cost) : ""));
     }

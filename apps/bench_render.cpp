@@ -20,7 +20,7 @@ namespace narpa::cli {
 namespace {
 
 constexpr std::uint32_t kReferenceImages = 16;  // their scatter tells the reference's own noise
-constexpr int kDefaultSize = 64;                  // px, the longer side
+constexpr int kDefaultSize = 64;                // px, the longer side
 
 struct Options {
     std::string scene, camera, size, plot;
@@ -240,22 +240,28 @@ Command add_bench_render(Parser bench_command) {
         c.option("--size", o->size,
                  fmt::format("WxH: the camera's view with so many pixels (default: the longer side has {})",
                              kDefaultSize)),
-        c.option("--seeds", o->seeds, "Independent images at each number of samples").range(2, 65535).shows_default()};
+        c.option("--seeds", o->seeds, "Independent images at each number of samples")
+            .range(2, 65535)
+            .shows_default()};
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
-    const Option scenes = c.option("--scenes", o->ladder.scenes,
-                                   "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, "
-                                   "craft-paths, docking, docking-contact, cornell, craft-and-ball")
-                              .comma_separated()
-                              .one_of(standing_scenes());
-    const Option ablation = c.flag("--ablation", o->ladder.ablation,
-                                   "Instead: each adaptive mechanism switched off in turn, with time and error beside the "
-                                   "full renderer's, on the scenes of --scenes (default: all)");
+    const Option scenes =
+        c.option("--scenes", o->ladder.scenes,
+                 "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, "
+                 "craft-paths, docking, docking-contact, cornell, craft-and-ball")
+            .comma_separated()
+            .one_of(standing_scenes());
+    const Option ablation =
+        c.flag("--ablation", o->ladder.ablation,
+               "Instead: each adaptive mechanism switched off in turn, with time and error beside the "
+               "full renderer's, on the scenes of --scenes (default: all)");
     for (const Option& option : of_one_scene) {
         scenes.excludes(option);
         ablation.excludes(option);
     }
-    c.flag("--quick", o->ladder.quick, "With --scenes or --ablation: small images and few of them, to see that it works");
-    c.flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be").needs(scenes);
+    c.flag("--quick", o->ladder.quick,
+           "With --scenes or --ablation: small images and few of them, to see that it works");
+    c.flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be")
+        .needs(scenes);
     c.option("-o,--output", o->plot,
              "FILE.png: error over samples and over time; with --scenes error over time, and where time goes");
     c.footer(

@@ -93,7 +93,7 @@ void measure(View& v, Candidate& c, const ReferenceLoop* loop, std::uint32_t num
 }
 
 ImageMean reference_of(View& v, FrameSettings settings, int spp,
-                         const std::function<void(const std::string&)>& progress) {
+                       const std::function<void(const std::string&)>& progress) {
     ImageMean mean(v.image.pixels.size());
     settings.spp = std::max(2, spp / kReferenceImages);
     ++settings.seed;  // shares no random numbers with what is measured
@@ -125,8 +125,9 @@ double Rung::median_cpu_s() const {
     return median(cpu_seconds);
 }
 
-Ladder measure_ladder(const World& world, std::size_t camera_index, const LadderSettings& s, const ReferenceLoop* loop,
-             TracingThreads& threads, const std::function<void(const std::string&)>& progress) {
+Ladder measure_ladder(const World& world, std::size_t camera_index, const LadderSettings& s,
+                      const ReferenceLoop* loop, TracingThreads& threads,
+                      const std::function<void(const std::string&)>& progress) {
     const Camera& camera = world.scene().cameras[camera_index];
     View v{world, camera, BodyPoses(world.scene().bodies.size()), {}, {camera.width, camera.height}, threads};
     world.place(s.t_ns, camera.mount, v.at);

@@ -1,8 +1,9 @@
-/// bench/budget_ladder.h - time and error of one camera's frames at several budgets, beside those of the plain loop of
-/// reference_loop.h and of the renderer with one mechanism switched off, in one run.
+/// bench/budget_ladder.h - time and error of one camera's frames at several budgets, beside those of the plain loop
+/// of reference_loop.h and of the renderer with one mechanism switched off, in one run.
 ///
-/// Errors are those of the mean of the three bands, W m^-2 sr^-1, against a reference of many samples whose own noise is
-/// subtracted (convergence.h). All candidates take turns, so that other load on the machine affects all alike.
+/// Errors are those of the mean of the three bands, W m^-2 sr^-1, against a reference of many samples whose own
+/// noise is subtracted (convergence.h). All candidates take turns, so that other load on the machine affects all
+/// alike.
 #pragma once
 
 #include <array>
@@ -27,7 +28,8 @@ struct LadderSettings {
     std::vector<int> spp{1, 4, 16};
     std::vector<double> rays_per_pixel{2, 4, 8, 16};  ///< as FrameBudget::rays
     std::vector<int> loop_spp{1, 4, 16, 64, 256};     ///< of the plain loop, where there is one
-    /// Mechanisms to switch off one at a time, by name (kMechanisms), at the middle one of `spp` or `rays_per_pixel`.
+    /// Mechanisms to switch off one at a time, by name (kMechanisms), at the middle one of `spp` or
+    /// `rays_per_pixel`.
     std::vector<std::string> without{};
     int frames = 9;            ///< at each budget, each with random numbers of its own; >= 2
     int reference_spp = 4096;  ///< in sixteen images
@@ -39,14 +41,15 @@ struct NamedMechanism {
     const char* name;
     bool Mechanisms::*on;
 };
-inline constexpr std::array<NamedMechanism, 8> kMechanisms{{{"sample plan", &Mechanisms::sample_plan},
-                                                            {"edge classes", &Mechanisms::edge_classes},
-                                                            {"path reuse", &Mechanisms::path_reuse},
-                                                            {"small-body sampling", &Mechanisms::small_body_sampling},
-                                                            {"sun first", &Mechanisms::sun_first},
-                                                            {"shared variance", &Mechanisms::shared_variance},
-                                                            {"tile culling", &Mechanisms::tile_culling},
-                                                            {"coarse steps", &Mechanisms::coarse_steps}}};
+inline constexpr std::array<NamedMechanism, 8> kMechanisms{
+    {{"sample plan", &Mechanisms::sample_plan},
+     {"edge classes", &Mechanisms::edge_classes},
+     {"path reuse", &Mechanisms::path_reuse},
+     {"small-body sampling", &Mechanisms::small_body_sampling},
+     {"sun first", &Mechanisms::sun_first},
+     {"shared variance", &Mechanisms::shared_variance},
+     {"tile culling", &Mechanisms::tile_culling},
+     {"coarse steps", &Mechanisms::coarse_steps}}};
 
 /// One budget, or one number of samples of the plain loop.
 struct Rung {
@@ -78,17 +81,17 @@ double median(std::vector<double> values);
 
 /// `loop`: null where it cannot render the scene. `progress` is called with a line of text.
 [[nodiscard]] Ladder measure_ladder(const World& world, std::size_t camera, const LadderSettings& settings,
-                           const ReferenceLoop* loop, TracingThreads& threads,
-                           const std::function<void(const std::string&)>& progress);
+                                    const ReferenceLoop* loop, TracingThreads& threads,
+                                    const std::function<void(const std::string&)>& progress);
 
 /// Wall time, or CPU time of all threads.
 enum class TimeBy : std::uint8_t { wall, cpu };
 
-/// Time of the plain loop to the error of this rung, over that of the rung: along straight lines between the loop's rungs
-/// in the logarithms of time and error. None where its errors do not enclose the rung's.
+/// Time of the plain loop to the error of this rung, over that of the rung: along straight lines between the loop's
+/// rungs in the logarithms of time and error. None where its errors do not enclose the rung's.
 [[nodiscard]] std::optional<double> speed_up(const Ladder& ladder, const Rung& rung, TimeBy by = TimeBy::wall);
-/// CPU time of a rung without some mechanism over that of the full renderer to the same error; the outer lines go on
-/// beyond its rungs. Above 1: the mechanism earns the difference.
+/// CPU time of a rung without some mechanism over that of the full renderer to the same error; the outer lines go
+/// on beyond its rungs. Above 1: the mechanism earns the difference.
 [[nodiscard]] std::optional<double> cost_at_equal_error(const Ladder& ladder, const Rung& rung);
 
 /// Over the budgets that have one, without those whose frames left something out.

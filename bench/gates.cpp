@@ -12,9 +12,10 @@ std::optional<std::string> prediction_fault(const Rung& rung) {
     if (!rung.predicted)
         return rung.estimates_error() ? std::optional<std::string>("its frames have no error estimate")
                                       : std::nullopt;
-    if (rung.predicted_to_measured() >= kPredictedLeast && rung.predicted_to_measured() <= kPredictedMost) return {};
-    return fmt::format("the predicted error is {:.2f} of the measured, expected {} to {}", rung.predicted_to_measured(),
-                       kPredictedLeast, kPredictedMost);
+    if (rung.predicted_to_measured() >= kPredictedLeast && rung.predicted_to_measured() <= kPredictedMost)
+        return {};
+    return fmt::format("the predicted error is {:.2f} of the measured, expected {} to {}",
+                       rung.predicted_to_measured(), kPredictedLeast, kPredictedMost);
 }
 
 std::optional<std::string> speed_fault(const SceneLadder& scene) {

@@ -36,8 +36,8 @@ struct CraftRatios {
 inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
 inline constexpr double kPredictedLeast = 0.85, kPredictedMost = 1.40;
 
-/// Bounds that are missed, one sentence each. A rung without a predicted error is one of them, unless its frames left out
-/// pixels or indirect light.
+/// Bounds that are missed, one sentence each. A rung without a predicted error is one of them, unless its frames
+/// left out pixels or indirect light.
 [[nodiscard]] std::vector<std::string> bench_faults(const SceneLadder& scene);
 [[nodiscard]] std::vector<std::string> bench_faults(const CraftRatios& ratios);
 

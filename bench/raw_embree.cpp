@@ -119,7 +119,7 @@ std::uint64_t trace_primary(const RawAim& a, RTCScene scene, const Region& tile,
 
 /// Traces shadow rays from all hits of a tile that face the Sun, 4 x 4 pixels after 4 x 4 pixels.
 void trace_shadows(const RawAim& a, RTCScene scene, const Region& tile, const TileHits& hits, const Vec3f& sun,
-             ShadowRays& shadows) {
+                   ShadowRays& shadows) {
     const int width = static_cast<int>(tile.cols().size()), height = static_cast<int>(tile.rows().size());
     for (int y0 = 0; y0 < height; y0 += 4)
         for (int x0 = 0; x0 < width; x0 += 4)

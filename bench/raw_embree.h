@@ -1,7 +1,7 @@
 /// bench/raw_embree.h - the lower bound of a frame's cost: Embree's batch calls on its rays, and nothing else.
-/// Primary rays sixteen at a time, 4 x 4 pixels together; then, tile by tile, shadow rays from the hits that face the Sun,
-/// packed; all with the coherent flag. Setting up the rays and reading back the hits is part of the time; there is no
-/// shading.
+/// Primary rays sixteen at a time, 4 x 4 pixels together; then, tile by tile, shadow rays from the hits that face
+/// the Sun, packed; all with the coherent flag. Setting up the rays and reading back the hits is part of the time;
+/// there is no shading.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +26,8 @@ public:
     RawEmbree(RawEmbree&&) noexcept;
     ~RawEmbree();
 
-    /// Traces the rays through all pixel centres, and from their hits to the Sun's centre in direction `to_sun` (unit,
-    /// world). On the calling thread's TBB arena.
+    /// Traces the rays through all pixel centres, and from their hits to the Sun's centre in direction `to_sun`
+    /// (unit, world). On the calling thread's TBB arena.
     [[nodiscard]] RawCost trace(const Camera& camera, const Rigid3& T_world_camera, const Vec3& to_sun) const;
 
 private:

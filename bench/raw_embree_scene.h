@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "base/result.h"
-#include "renderer/scene/scene.h"
 #include "renderer/geometry/embree.h"
 #include "renderer/geometry/lanes.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa {
 

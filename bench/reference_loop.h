@@ -1,7 +1,7 @@
 /// bench/reference_loop.h - a plain renderer to measure narpa's against: the loop that one writes over Embree
-/// in an afternoon. Sixteen rays at a time; the same number of samples for each pixel, jittered in strata; counter-based
-/// random numbers; Lambert and Phong; Sun with shadows; paths with cosine-distributed directions and next-event
-/// estimation of the Sun and one emissive surface. No adaptive sampling, no low-discrepancy points.
+/// in an afternoon. Sixteen rays at a time; the same number of samples for each pixel, jittered in strata;
+/// counter-based random numbers; Lambert and Phong; Sun with shadows; paths with cosine-distributed directions and
+/// next-event estimation of the Sun and one emissive surface. No adaptive sampling, no low-discrepancy points.
 ///
 /// It converges to narpa's image of the same scene, which is what makes their times at equal error comparable.
 #pragma once

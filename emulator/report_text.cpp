@@ -104,9 +104,8 @@ std::string CameraSensor::in_words() const {
 
 std::string LidarSensor::in_words() const {
     const LidarStats& s = stats_;
-    std::string out =
-        fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n", name(),
-                    s.packets, sweeps(), s.skipped, s.returns, s.shots);
+    std::string out = fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
+                                  name(), s.packets, sweeps(), s.skipped, s.returns, s.shots);
     out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(s.fire), latency(s.hand_over));
     for (const auto& sink : sinks_)
         out += fmt::format("    -> {}: {} sent, {} dropped\n", sink->description(), sink->counters().sent,

@@ -8,8 +8,8 @@
 #include "emulator/camera_unit.h"
 #include "emulator/log/run_record.h"
 #include "protocols/video/embedded_line.h"
-#include "renderer/scene/scene_file.h"
 #include "renderer/camera/detector.h"
+#include "renderer/scene/scene_file.h"
 
 namespace narpa {
 namespace {

@@ -11,28 +11,29 @@ using Of = PassCosts::Of;
 using Stage = SamplePlan::Stage;
 using Tiles = FramePasses::Tiles;
 
-/// Textures are averaged over the beam that a sample has where a pixel gets so many. Centres are of a frame of two, so
-/// that each takes a point of its own of the lens and of the Sun and shows what these blur.
+/// Textures are averaged over the beam that a sample has where a pixel gets so many. Centres are of a frame of two,
+/// so that each takes a point of its own of the lens and of the Sun and shows what these blur.
 constexpr int kCentreBeam = 2, kBeamSamples = 4;
 /// What waking the threads and a preempted one may take: so long, or this part of the budget if that is more.
 constexpr std::int64_t kLeastSlack_ns = 300'000;
 constexpr std::int64_t kSlackPart = 40;
-/// Of the time left, the part of the first pass of samples beyond those of all pixels, so that there soon is an image to
-/// show, and that of each of the next.
+/// Of the time left, the part of the first pass of samples beyond those of all pixels, so that there soon is an
+/// image to show, and that of each of the next.
 constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
-/// Of the rays left. Their number follows nearly exactly from that of the samples by Sun-only direct lighting; of paths
-/// it varies by a tenth from one pass to the next.
+/// Of the rays left. Their number follows nearly exactly from that of the samples by Sun-only direct lighting; of
+/// paths it varies by a tenth from one pass to the next.
 constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
-/// Of the rays left, so much may be expected to go to one sample for each pixel: a part of the tiles shows how many rays
-/// that takes.
+/// Of the rays left, so much may be expected to go to one sample for each pixel: a part of the tiles shows how many
+/// rays that takes.
 constexpr double kSure = 0.85;
 /// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
 constexpr std::uint64_t kPixelsOfACoarseRay = 4;
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
 
-/// A frame begins with one sample for each pixel. Sun-only direct lighting takes the pixels' centres, plans from them and
-/// discards them where there are samples; all other light takes the first sample of each pixel's sequence and keeps it.
+/// A frame begins with one sample for each pixel. Sun-only direct lighting takes the pixels' centres, plans from
+/// them and discards them where there are samples; all other light takes the first sample of each pixel's sequence
+/// and keeps it.
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
@@ -160,12 +161,14 @@ private:
             case Kind::samples: break;
             case Kind::passes: take_as_told(); break;
             case Kind::time:
-                if (!coarse_steps()) take_one_sample({});
+                if (!coarse_steps())
+                    take_one_sample({});
                 else if (!take_if_half_fits(1))
                     from_coarse_to_fine();
                 break;
             case Kind::rays:
-                if (!coarse_steps() || (adaptive_ && 2 * passes_.pixels() <= rays_left()))  // the camera's and the Sun's
+                if (!coarse_steps() ||
+                    (adaptive_ && 2 * passes_.pixels() <= rays_left()))  // the camera's and the Sun's
                     take_one_sample(limit());
                 else if (adaptive_ || !begin_with_a_sixteenth())
                     from_coarse_to_fine();
@@ -198,8 +201,8 @@ private:
         }
     }
 
-    /// How many rays a sample takes is not known before: a sixteenth of the tiles shows it, and the others follow if they
-    /// are nearly sure to fit. Should they not, enough is kept for a coarse image.
+    /// How many rays a sample takes is not known before: a sixteenth of the tiles shows it, and the others follow
+    /// if they are nearly sure to fit. Should they not, enough is kept for a coarse image.
     bool begin_with_a_sixteenth() {
         if (passes_.pixels() > rays_left()) return false;
         PassLimit part = limit();
@@ -328,9 +331,9 @@ private:
 
 }  // namespace
 
-FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
-                                  const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
-                                  RadianceImage& out, std::vector<float>* variance) {
+FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene,
+                                  const Camera& camera, const BodyPoses& at, const Rigid3& T_world_camera,
+                                  const FrameSettings& settings, RadianceImage& out, std::vector<float>* variance) {
     return BudgetFrame(passes, costs, render_scene, camera, at, T_world_camera, settings, out, variance).make();
 }
 

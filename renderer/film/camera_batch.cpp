@@ -7,8 +7,8 @@
 namespace narpa {
 namespace {
 
-// Lanes from the batch's `n` on are computed along with the others and not read. Results are gathered in local arrays, of
-// which the compiler knows that they do not overlap with anything.
+// Lanes from the batch's `n` on are computed along with the others and not read. Results are gathered in local
+// arrays, of which the compiler knows that they do not overlap with anything.
 
 using Points = BatchSampler::Points;
 

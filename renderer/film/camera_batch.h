@@ -19,8 +19,8 @@ struct CameraSamples {
     Lanes<std::uint32_t> path;    ///< the same of the dimensions that belong to the path
 };
 
-/// Aims the samples' rays and finds what they meet, but for subpixel bodies. `bodies`: those that any of the rays may
-/// meet.
+/// Aims the samples' rays and finds what they meet, but for subpixel bodies. `bodies`: those that any of the rays
+/// may meet.
 void trace_rays(const Frame& f, const CameraSamples& samples, std::span<const std::uint32_t> bodies, Packet& p);
 
 /// The rays through the pixels' centres and what they meet, subpixel bodies included.

@@ -18,22 +18,24 @@ namespace narpa {
 /// where nothing is hit, and where mirrors and glass would show other surfaces. Method path: all light (path.h),
 /// with the ambient as a sky.
 ///
-/// One sample a pixel goes through the centres of the pixel and of the lens and, where the method is direct and the Sun
-/// the only light, to the centre of the Sun: the image of a pinhole, without noise, with hard shadows. With more, each
-/// takes a point of the pixel, of the lens and of the Sun: edges are smooth, what is out of focus is blurred, shadows
-/// have their penumbra.
+/// One sample a pixel goes through the centres of the pixel and of the lens and, where the method is direct and the
+/// Sun the only light, to the centre of the Sun: the image of a pinhole, without noise, with hard shadows. With
+/// more, each takes a point of the pixel, of the lens and of the Sun: edges are smooth, what is out of focus is
+/// blurred, shadows have their penumbra.
 ///
 /// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: subpixel_bodies.h.
 ///
-/// Runs on the calling thread's TBB arena. Same bytes on any number of threads. Allocates its memory with each call; for
-/// many frames use CameraRenderer. `aovs` may be null; they show a pinhole's view, subpixel bodies included.
+/// Runs on the calling thread's TBB arena. Same bytes on any number of threads. Allocates its memory with each
+/// call; for many frames use CameraRenderer. `aovs` may be null; they show a pinhole's view, subpixel bodies
+/// included.
 void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
                      const Rigid3& T_world_camera, const FrameSettings& settings, RadianceImage& out,
                      Aovs* aovs = nullptr);
 
-/// The same for a camera's frames one after another, within budgets: keeps memory and measured costs from frame to frame.
-/// With a budget in samples or rays, an image depends on neither. Allocates nothing after the first frame of a kind. Tiles
-/// that stay empty from frame to frame are not written again: nothing else may write to `out` in between.
+/// The same for a camera's frames one after another, within budgets: keeps memory and measured costs from frame to
+/// frame. With a budget in samples or rays, an image depends on neither. Allocates nothing after the first frame of
+/// a kind. Tiles that stay empty from frame to frame are not written again: nothing else may write to `out` in
+/// between.
 class CameraRenderer {
 public:
     /// Both outlive it.

@@ -1,5 +1,5 @@
-/// renderer/film/emitters_in_view.h - which tiles may show light where rays meet no body: the Sun's disc, lights with
-/// extent, a background that is not uniform, a medium.
+/// renderer/film/emitters_in_view.h - which tiles may show light where rays meet no body: the Sun's disc, lights
+/// with extent, a background that is not uniform, a medium.
 #pragma once
 
 #include <algorithm>

@@ -1,12 +1,12 @@
 /// renderer/film/frame_error.h - the standard error of a frame, estimated from its own samples.
 ///
-/// Sums over all pixels, by how each was made: its centre, one random sample (g_buffer.h estimates the error of both), or
-/// two samples and more. Of the latter, each doubling of the samples moves the mean by a step whose mean square is
-/// v(n/2) - v(n), v(n) being the variance of the mean of n: the halves of an Owen-scrambled sequence are each as good as
-/// the first, and the whole is their mean (A. Owen, "Scrambled net variance for integrals of smooth functions", Ann.
-/// Stat. 25, 1997). If v falls by the same ratio q each time, what is left after the last step is q / (1 - q) of it: all
-/// of it for independent samples (q = 1/2), 0.55 of it for edges (q = 2^-1.5). The last two steps, squared and summed
-/// over the pixels, give the ratio.
+/// Sums over all pixels, by how each was made: its centre, one random sample (g_buffer.h estimates the error of
+/// both), or two samples and more. Of the latter, each doubling of the samples moves the mean by a step whose mean
+/// square is v(n/2) - v(n), v(n) being the variance of the mean of n: the halves of an Owen-scrambled sequence are
+/// each as good as the first, and the whole is their mean (A. Owen, "Scrambled net variance for integrals of smooth
+/// functions", Ann. Stat. 25, 1997). If v falls by the same ratio q each time, what is left after the last step is
+/// q / (1 - q) of it: all of it for independent samples (q = 1/2), 0.55 of it for edges (q = 2^-1.5). The last two
+/// steps, squared and summed over the pixels, give the ratio.
 #pragma once
 
 #include <array>
@@ -22,8 +22,8 @@ class FrameError {
 public:
     /// A tile whose pixels show their centres, and that stands for so many.
     void add_centres(const TileContrast& contrast, double tiles = 1) noexcept;
-    /// A tile whose pixels have samples, as many as each has; a pixel without any shows its centre. `contrast`: null
-    /// where all have two samples or more.
+    /// A tile whose pixels have samples, as many as each has; a pixel without any shows its centre. `contrast`:
+    /// null where all have two samples or more.
     void add_tile(const TileContrast* contrast, const PerPixel<PixelMeans>& means) noexcept;
     /// A pixel of two samples or more.
     void add(const PixelMeans& means) noexcept;

@@ -44,7 +44,8 @@ FramePasses::FramePasses(const Tracer& tracer, const Camera& camera)
 }
 
 FramePasses::Tile FramePasses::tile(std::uint32_t index) const noexcept {
-    const int tx = static_cast<int>(index) % g_buffer_.tiles_x(), ty = static_cast<int>(index) / g_buffer_.tiles_x();
+    const int tx = static_cast<int>(index) % g_buffer_.tiles_x(),
+              ty = static_cast<int>(index) / g_buffer_.tiles_x();
     const int x = tx * kTile, y = ty * kTile;
     return {index,
             x,
@@ -188,10 +189,11 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
     const Frame& f = w.f;
     const auto row = [&](int y) { return &out.pixels[index_of(t.x, y, out.width)]; };
     if (!fills_g_buffer(t.index)) {
-        w.centres(t, out.width, out.height, 1, 0, [&](const SampleBatch& b, const Packet&, const PacketLight& light) {
-            for (std::size_t i = 0; i < b.samples.n; ++i)
-                row(b.samples.y[i])[b.samples.x[i] - t.x] = light(f, i);
-        });
+        w.centres(t, out.width, out.height, 1, 0,
+                  [&](const SampleBatch& b, const Packet&, const PacketLight& light) {
+                      for (std::size_t i = 0; i < b.samples.n; ++i)
+                          row(b.samples.y[i])[b.samples.x[i] - t.x] = light(f, i);
+                  });
         return;
     }
     w.centres(t, out.width, out.height, 1, 0, g_buffer_);
@@ -266,12 +268,14 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
         t.each_pixel([&](int, int, std::size_t at) {
             if (begin(at) == 0) means[at] = {};
         });
-        // The first samples of a uniform plan fill the G-buffer: until there are two, their error comes from contrasts.
+        // The first samples of a uniform plan fill the G-buffer: until there are two, their error comes from
+        // contrasts.
         const bool fill = plan_->is_uniform() && from == SamplePlan::none();
-        w.samples(t, camera_.width, begin, end, [&](const SampleBatch& b, const Packet& p, const PacketLight& light) {
-            add_samples(b, light, means);
-            if (fill) g_buffer_.store(f, p, light, b.place, t.index);
-        });
+        w.samples(t, camera_.width, begin, end,
+                  [&](const SampleBatch& b, const Packet& p, const PacketLight& light) {
+                      add_samples(b, light, means);
+                      if (fill) g_buffer_.store(f, p, light, b.place, t.index);
+                  });
     });
 }
 

@@ -1,7 +1,7 @@
 /// renderer/film/frame_passes.h - the passes of which a frame is made.
 ///
-/// A pass goes over the tiles in which something may be seen; the others show the background. It comes to its end or is
-/// discarded whole; its result goes to the image by `show_...`, afterwards.
+/// A pass goes over the tiles in which something may be seen; the others show the background. It comes to its end
+/// or is discarded whole; its result goes to the image by `show_...`, afterwards.
 #pragma once
 
 #include <atomic>
@@ -47,8 +47,8 @@ public:
 
     /// Which tiles a pass goes over: a sixteenth lie spread evenly.
     enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
-    /// Centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, but for those of an earlier pass of
-    /// stride `made` (0: there was none).
+    /// Centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, but for those of an earlier
+    /// pass of stride `made` (0: there was none).
     PassCount centres(const Frame& f, int stride, int made, const PassLimit& limit);
     void show_centres(const Frame& f, int stride, RadianceImage& out);
 

@@ -35,9 +35,10 @@ struct Pairs {
 struct alignas(64) GBuffer::Around {
     Grid<float> radiance{}, nx{}, ny{}, nz{}, depth{};
     Grid<std::uint32_t> surface{};
-    /// Of a pinhole: where a ray is one metre along the camera's axis, in the world's axes: ahead + x * right + y * down.
+    /// Of a pinhole: where a ray is one metre along the camera's axis, in the world's axes: ahead + x * right + y *
+    /// down.
     Vec3f ahead, right, down;
-    const Frame* frame = nullptr;  ///< of any other camera
+    const Frame* frame = nullptr;          ///< of any other camera
     int x_first, y_first, x_last, y_last;  ///< pixel of the corner of the rim; the image's last
 };
 
@@ -62,7 +63,8 @@ struct alignas(64) LaneSurfaces {
     Lanes<std::uint32_t> surface;
 };
 
-NARPA_EACH_ISA void store_surfaces(const Packet& p, const Vec3& axis, std::uint32_t lit, LaneSurfaces& out) noexcept {
+NARPA_EACH_ISA void store_surfaces(const Packet& p, const Vec3& axis, std::uint32_t lit,
+                                   LaneSurfaces& out) noexcept {
     const Lanes<int> shone = masks_of(lit), met = masks_of(p.hits.met);
     LaneSurfaces seen;
     for (std::size_t i = 0; i < kLanes; ++i) {
@@ -91,7 +93,7 @@ bool GBuffer::shows_background(const Frame& f, const Packet& p, const PacketLigh
 }
 
 void GBuffer::store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
-                       std::size_t tile_index) noexcept {
+                    std::size_t tile_index) noexcept {
     GBufferTile& tile = tiles_[tile_index];
     if (!shows_background(f, p, light)) known_[tile_index] = Known::something;
     LaneSurfaces seen;

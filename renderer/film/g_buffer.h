@@ -1,23 +1,24 @@
-/// renderer/film/g_buffer.h - what one sample of each pixel shows: radiance, normal, depth, surface. Its contrasts give
-/// the variance of a pixel's samples and the error of its centre, for adaptive sampling and for the frame's own error.
+/// renderer/film/g_buffer.h - what one sample of each pixel shows: radiance, normal, depth, surface. Its contrasts
+/// give the variance of a pixel's samples and the error of its centre, for adaptive sampling and for the frame's
+/// own error.
 ///
 /// Neighbours show the same surface if body, material and sunlight agree, their normals do, and the one lies in the
-/// other's tangent plane. Where they do not, an edge passes between them. An edge at a random place between two centres
-/// leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is represented by its centre, and of
-/// contrast^2 / 6 if by a random point.
+/// other's tangent plane. Where they do not, an edge passes between them. An edge at a random place between two
+/// centres leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is represented by its
+/// centre, and of contrast^2 / 6 if by a random point.
 ///
-/// What differs from both its neighbours is a detail, a bar of width w in pixels, with two such edges; but where w is
-/// less than 1 the centres meet it only now and then. Averaged over its place, it leaves in each row of pixels that it
-/// crosses contrast^2 times
+/// What differs from both its neighbours is a detail, a bar of width w in pixels, with two such edges; but where w
+/// is less than 1 the centres meet it only now and then. Averaged over its place, it leaves in each row of pixels
+/// that it crosses contrast^2 times
 ///     w - w^2 - w^3 / 3          for centres, w <= 1/2,
 ///     1/2 - w + w^2 - w^3 / 3    for centres, 1/2 <= w <= 1,
 ///     w - w^2 + w^3 / 3          for random points, w <= 1,
-/// and from w = 1 on what its two edges leave, 1/6 and 1/3. One centre alone meets it in w of the rows up to w = 1, in
-/// 2 - w up to w = 2. With all scales equally frequent, that is w distributed as dw / w, each such meeting stands for
-/// 0.230 contrast^2 beyond the edges' for centres and 0.200 contrast^2 for random points.
+/// and from w = 1 on what its two edges leave, 1/6 and 1/3. One centre alone meets it in w of the rows up to w = 1,
+/// in 2 - w up to w = 2. With all scales equally frequent, that is w distributed as dw / w, each such meeting
+/// stands for 0.230 contrast^2 beyond the edges' for centres and 0.200 contrast^2 for random points.
 ///
-/// What varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture: second differences of
-/// independent values of variance v have the mean square 6 v.
+/// What varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture: second differences
+/// of independent values of variance v have the mean square 6 v.
 #pragma once
 
 #include <algorithm>
@@ -26,12 +27,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "renderer/integrator/integrator.h"
 #include "renderer/film/tile_culling.h"
+#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 
-inline constexpr int kTile = kTileSize;                   ///< pixels a side
+inline constexpr int kTile = kTileSize;                    ///< pixels a side
 inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four batches of 4 x 4, one after another
 
 /// Place of a pixel of a tile, in the order of the batches.

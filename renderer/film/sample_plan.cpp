@@ -11,19 +11,20 @@
 namespace narpa {
 namespace {
 
-/// Edges move by less than a pixel, and centres meet thin parts only now and then: pixels beside an edge get this part of
-/// its variance, those next to them that.
+/// Edges move by less than a pixel, and centres meet thin parts only now and then: pixels beside an edge get this
+/// part of its variance, those next to them that.
 constexpr float kBeside = 0.05f, kNextButOne = 0.01f;
-/// The least weight of a pixel that differs from its neighbours, of a typical edge's. Where all is the very same, as in
-/// empty space, a pixel has an eighth of that (kEventful).
+/// The least weight of a pixel that differs from its neighbours, of a typical edge's. Where all is the very same,
+/// as in empty space, a pixel has an eighth of that (kEventful).
 constexpr double kLeast = 1.0 / 128;
-/// A pixel whose centre met nothing gets so many doublings of kLeast: thin parts of a body may pass between the centres,
-/// as its bounds are there, and to look for them costs one ray and no shading.
+/// A pixel whose centre met nothing gets so many doublings of kLeast: thin parts of a body may pass between the
+/// centres, as its bounds are there, and to look for them costs one ray and no shading.
 constexpr int kEmptyDoublings = 2;
-/// Along an edge of little contrast there may be a glint that no centre met: so much of a typical variance is assumed.
+/// Along an edge of little contrast there may be a glint that no centre met: so much of a typical variance is
+/// assumed.
 constexpr float kUnseen = 0.02f;
-/// The variance of edges, which falls as n^-1.5, counts to this power beside that of noise, which falls as 1/n: of the
-/// variances of one sample, weights of 2/5 and of 1/2.
+/// The variance of edges, which falls as n^-1.5, counts to this power beside that of noise, which falls as 1/n: of
+/// the variances of one sample, weights of 2/5 and of 1/2.
 constexpr double kEdgePower = 0.8;
 
 constexpr int kRim = 2;
@@ -43,11 +44,12 @@ constexpr auto kSum = [](float a, float b) { return a + b; };
 
 /// What a tile's pixels and their neighbours to two pixels' distance hold.
 struct Neighbourhood {
-    Grid edge{};           ///< variance
+    Grid edge{};            ///< variance
     Grid noise{}, known{};  ///< variance, where it is known: 1
 };
 
-Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& contrasts, int tx, int ty, float unseen) {
+Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& contrasts, int tx, int ty,
+                     float unseen) {
     Neighbourhood n;
     for (int y = 0; y < kSide; ++y)
         for (int x = 0; x < kSide; ++x) {

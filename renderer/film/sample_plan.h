@@ -1,19 +1,19 @@
 /// renderer/film/sample_plan.h - how many samples each pixel gets, in stages that a frame adds one after another.
 ///
-/// Adaptive sampling, for frames lit by the Sun alone, where edges make the error. For a given sum of samples the error
-/// is least where they are proportional to the standard deviation of a pixel's samples (J. Neyman, J. R. Stat. Soc. 97,
-/// 1934), and to a somewhat lower power of it where low-discrepancy points converge faster than random ones. The
-/// standard deviations come from the contrasts of the G-buffer, never from the samples that are counted, as these would
-/// be biased by their own number (D. Kirk, J. Arvo, "Unbiased sampling techniques for image synthesis", SIGGRAPH 1991).
-/// Numbers are powers of two, at which these points are at their best; between two powers a hash of the pixel decides, so
-/// that sums follow the budget smoothly.
+/// Adaptive sampling, for frames lit by the Sun alone, where edges make the error. For a given sum of samples the
+/// error is least where they are proportional to the standard deviation of a pixel's samples (J. Neyman, J. R.
+/// Stat. Soc. 97, 1934), and to a somewhat lower power of it where low-discrepancy points converge faster than
+/// random ones. The standard deviations come from the contrasts of the G-buffer, never from the samples that are
+/// counted, as these would be biased by their own number (D. Kirk, J. Arvo, "Unbiased sampling techniques for image
+/// synthesis", SIGGRAPH 1991). Numbers are powers of two, at which these points are at their best; between two
+/// powers a hash of the pixel decides, so that sums follow the budget smoothly.
 ///
-/// A pixel keeps its centre sample until it gets kFewest samples at once: where a centre leaves the squared error e of an
-/// edge, 1, 2, 4 or 8 samples leave 2 e, 0.7 e, 0.25 e or 0.09 e, and of these 4 gain most apiece.
+/// A pixel keeps its centre sample until it gets kFewest samples at once: where a centre leaves the squared error e
+/// of an edge, 1, 2, 4 or 8 samples leave 2 e, 0.7 e, 0.25 e or 0.09 e, and of these 4 gain most apiece.
 ///
-/// Uniform sampling, for all other frames: every pixel gets the same number, those of the tiles of a fixed pattern one
-/// more; whole tiles, as their paths are reused together. With paths, noise is everywhere, and an adaptive plan measured
-/// no better at equal error (docs/performance.md).
+/// Uniform sampling, for all other frames: every pixel gets the same number, those of the tiles of a fixed pattern
+/// one more; whole tiles, as their paths are reused together. With paths, noise is everywhere, and an adaptive plan
+/// measured no better at equal error (docs/performance.md).
 #pragma once
 
 #include <algorithm>
@@ -49,9 +49,7 @@ public:
     };
     /// No samples; uniform: so many for every pixel.
     [[nodiscard]] static constexpr Stage none() noexcept { return {}; }
-    [[nodiscard]] static constexpr Stage samples_each(int samples) noexcept {
-        return {samples * kRanks};
-    }
+    [[nodiscard]] static constexpr Stage samples_each(int samples) noexcept { return {samples * kRanks}; }
     /// Does every pixel of a uniform plan have so many samples?
     [[nodiscard]] static constexpr bool reaches(Stage stage, int samples) noexcept {
         return stage.level >= samples_each(samples).level;
@@ -109,9 +107,9 @@ private:
     std::array<std::uint64_t, kRanks> pixels_of_rank_{};  ///< of the tiles that are seen
 };
 
-/// How many of a pixel's first samples are followed by a path where the light has two parts (PacketLight): the first two,
-/// then the first half of each octave of its sequence from the fifth on, so that powers of two have half as many. The
-/// other samples show edges and sunlight alone.
+/// How many of a pixel's first samples are followed by a path where the light has two parts (PacketLight): the
+/// first two, then the first half of each octave of its sequence from the fifth on, so that powers of two have half
+/// as many. The other samples show edges and sunlight alone.
 [[nodiscard]] constexpr std::uint32_t paths_of(std::uint32_t samples) noexcept {
     if (samples <= 2) return samples;
     const std::uint32_t octave = std::bit_floor(samples - 1);  // octave < samples <= 2 octave

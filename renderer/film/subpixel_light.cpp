@@ -19,16 +19,16 @@ struct DiscPoint {
     double x, y, area;
 };
 
-/// One of n evenly spread points of the disc: a lattice by the golden section, whose error over outlines of bodies is half
-/// of that of a Sobol set as large (measured, 1024 points: 0.7 % of a rectangle's area).
+/// One of n evenly spread points of the disc: a lattice by the golden section, whose error over outlines of bodies
+/// is half of that of a Sobol set as large (measured, 1024 points: 0.7 % of a rectangle's area).
 DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
     const double turns = i / std::numbers::phi;
     const auto [x, y] = concentric_disc((i + 0.5) / n, turns - std::floor(turns));
     return {x, y, std::numbers::pi / n};
 }
 
-/// The part of the disc that the Sun can light gets half of the samples, however thin its crescent; the rest gets the
-/// other half. Each part is the disc, compressed along x.
+/// The part of the disc that the Sun can light gets half of the samples, however thin its crescent; the rest gets
+/// the other half. Each part is the disc, compressed along x.
 DiscPoint disc_point(double lit, std::uint32_t s, std::uint32_t samples) {
     constexpr double kMostlyLit = 0.75;
     const std::uint32_t half = samples / 2;
@@ -149,7 +149,8 @@ std::size_t PixelBlock::holding(double image_x, double image_y) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
 }
 
-void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance) {
+void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out,
+                         std::vector<float>* variance) {
     Collector collector(f, block);
     bool met = false;
     for (std::size_t body = 0; body < f.at.T_world_body.size(); ++body) {

@@ -24,11 +24,11 @@ struct PixelBlock {
 /// limits. Those of a disc that is spread over several blocks are divided among them.
 inline constexpr std::uint32_t kSubpixelSamplesLeast = 1024, kSubpixelSamplesMost = 16384;
 
-/// Adds the light of the subpixel bodies in the block to its pixels, which hold the light from behind them, and subtracts
-/// what they cover. Their points are fixed on the disc, whatever pixels it falls on, so that the light does not
-/// change while the body moves through the image. Each point represents its part of the solid angle, is traced like a
-/// camera ray and counts if it meets the body: nearer bodies hide it. `variance` may be null; it gets the variance of
-/// independent samples, an upper bound for stratified ones.
+/// Adds the light of the subpixel bodies in the block to its pixels, which hold the light from behind them, and
+/// subtracts what they cover. Their points are fixed on the disc, whatever pixels it falls on, so that the light
+/// does not change while the body moves through the image. Each point represents its part of the solid angle, is
+/// traced like a camera ray and counts if it meets the body: nearer bodies hide it. `variance` may be null; it gets
+/// the variance of independent samples, an upper bound for stratified ones.
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance);
 
 }  // namespace narpa

@@ -1,7 +1,7 @@
 /// renderer/film/tile_culling.h - which bodies each tile of the image may show.
 ///
-/// Rays are traced only through tiles that some body's surface may cover, and against those bodies alone: the cost of a
-/// frame is proportional to the pixels that bodies cover, not to the sensor's size.
+/// Rays are traced only through tiles that some body's surface may cover, and against those bodies alone: the cost
+/// of a frame is proportional to the pixels that bodies cover, not to the sensor's size.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ public:
     /// Lists all bodies in every tile: what frames cost without culling.
     void list_all() noexcept;
 
-    /// Bodies that rays through any of the tile's pixels may meet, in ascending order. All bodies where they are more than
-    /// kMostListed.
+    /// Bodies that rays through any of the tile's pixels may meet, in ascending order. All bodies where they are
+    /// more than kMostListed.
     [[nodiscard]] std::span<const std::uint32_t> bodies(int tile_x, int tile_y) const noexcept;
     static constexpr std::size_t kMostListed = 16;
 

@@ -1,5 +1,5 @@
-/// renderer/film/tile_output.h - from a tile's samples to the image: means, variances, light of subpixel bodies. Inside
-/// frame_passes.cpp alone.
+/// renderer/film/tile_output.h - from a tile's samples to the image: means, variances, light of subpixel bodies.
+/// Inside frame_passes.cpp alone.
 #pragma once
 
 #include "renderer/film/subpixel_light.h"

@@ -1,5 +1,5 @@
-/// renderer/film/tile_worker.h - takes a tile's samples through the renderer: gathers them into ray batches, traces them,
-/// lights several batches together and hands them to a sink. Inside frame_passes.cpp alone.
+/// renderer/film/tile_worker.h - takes a tile's samples through the renderer: gathers them into ray batches, traces
+/// them, lights several batches together and hands them to a sink. Inside frame_passes.cpp alone.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@ namespace narpa {
 
 /// Batches between two readings of the clock.
 inline constexpr std::uint32_t kBatchesPerClockRead = 16;
-/// First random sequence of centres in frames that add samples: none of a pixel's own, as the centres decide how many
-/// samples a pixel gets.
+/// First random sequence of centres in frames that add samples: none of a pixel's own, as the centres decide how
+/// many samples a pixel gets.
 inline constexpr std::uint32_t kFirstCentre = 0x40000000u;
 inline constexpr int kBlock = 4;
 
@@ -62,12 +62,9 @@ public:
     };
 
     template <std::size_t N>
-    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& stop, PhaseTimes* times, Storage<N>& storage)
-        : f(frame),
-          until_ns_(limit.until_ns),
-          stop_(stop),
-          packets_(storage.packets),
-          batches_(storage.batches) {
+    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& stop, PhaseTimes* times,
+           Storage<N>& storage)
+        : f(frame), until_ns_(limit.until_ns), stop_(stop), packets_(storage.packets), batches_(storage.batches) {
         for (Packet& p : packets_) p.times = times;
     }
 
@@ -82,12 +79,13 @@ public:
         return sum;
     }
     void read_clock() {
-        if (until_ns_ != PassLimit{}.until_ns && now_ns() >= until_ns_) stop_.store(true, std::memory_order_relaxed);
+        if (until_ns_ != PassLimit{}.until_ns && now_ns() >= until_ns_)
+            stop_.store(true, std::memory_order_relaxed);
     }
 
-    /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: its place in the tile. Paths are traced
-    /// together up to kOfAPixel samples a pixel, so that neighbours can reuse them. Calls `sink(batch, packet, light)`
-    /// for the samples in order.
+    /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: its place in the tile. Paths are
+    /// traced together up to kOfAPixel samples a pixel, so that neighbours can reuse them. Calls `sink(batch,
+    /// packet, light)` for the samples in order.
     template <class Begin, class End, class Sink>
     void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
         set_centres(false);
@@ -109,8 +107,8 @@ public:
         }
     }
 
-    /// Traces the centres of the pixels that represent squares of `stride` pixels, but for those of a pass of stride
-    /// `made` (0: none has been made).
+    /// Traces the centres of the pixels that represent squares of `stride` pixels, but for those of a pass of
+    /// stride `made` (0: none has been made).
     template <class Sink>
     void centres(const Tile& tile, int width, int height, int stride, int made, Sink&& sink) {
         set_centres(true);
@@ -133,9 +131,10 @@ public:
     }
     /// The same, stored in the G-buffer.
     void centres(const Tile& tile, int width, int height, int stride, int made, GBuffer& g_buffer) {
-        centres(tile, width, height, stride, made, [&](const SampleBatch& b, const Packet& p, const PacketLight& l) {
-            g_buffer.store(f, p, l, b.place, tile.index);
-        });
+        centres(tile, width, height, stride, made,
+                [&](const SampleBatch& b, const Packet& p, const PacketLight& l) {
+                    g_buffer.store(f, p, l, b.place, tile.index);
+                });
     }
 
 private:
@@ -212,7 +211,7 @@ private:
     std::atomic<bool>& stop_;  ///< the pass; read often, as a tile may hold many samples
     const std::span<Packet> packets_;
     const std::span<SampleBatch> batches_;
-    std::size_t full_ = 0;                 ///< of these
+    std::size_t full_ = 0;  ///< of these
     std::uint64_t samples_ = 0, paths_ = 0;
     std::uint32_t lit_ = 0;  ///< batches
 };

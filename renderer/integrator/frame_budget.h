@@ -1,12 +1,13 @@
 /// renderer/integrator/frame_budget.h - what a frame may cost, and what became of it.
 ///
-/// A frame is made in passes. The first takes one sample for each pixel; where even that may not fit, the frame goes from
-/// coarse to fine, so that there is a whole image from its first fraction on. With the Sun as the only light the first
-/// samples are the pixels' centres; their contrasts decide where further samples go, and they are discarded there, as
-/// numbers of samples that depend on these samples bias the mean (D. Kirk, J. Arvo, "Unbiased sampling techniques for
-/// image synthesis", SIGGRAPH 1991). All other light gets uniform passes, of which all samples count. Each pass has its
-/// number of samples fixed before it begins, and one that does not end in time is discarded whole. So a frame follows
-/// from the scene, the poses, its number, the seed and the sizes of its passes: the clock only chooses these.
+/// A frame is made in passes. The first takes one sample for each pixel; where even that may not fit, the frame
+/// goes from coarse to fine, so that there is a whole image from its first fraction on. With the Sun as the only
+/// light the first samples are the pixels' centres; their contrasts decide where further samples go, and they are
+/// discarded there, as numbers of samples that depend on these samples bias the mean (D. Kirk, J. Arvo, "Unbiased
+/// sampling techniques for image synthesis", SIGGRAPH 1991). All other light gets uniform passes, of which all
+/// samples count. Each pass has its number of samples fixed before it begins, and one that does not end in time is
+/// discarded whole. So a frame follows from the scene, the poses, its number, the seed and the sizes of its passes:
+/// the clock only chooses these.
 #pragma once
 
 #include <array>
@@ -30,8 +31,8 @@ enum class FrameStep : std::uint8_t {
 struct FrameBudget {
     enum class Kind : std::uint8_t {
         samples,  ///< FrameSettings::spp for each pixel, in one pass
-        rays,    ///< at most this many rays of all kinds, but for those of subpixel bodies (subpixel_bodies.h); the same bytes
-                 ///< on any machine under any load
+        rays,  ///< at most this many rays of all kinds, but for those of subpixel bodies (subpixel_bodies.h); the
+               ///< same bytes on any machine under any load
         time,    ///< the radiance is there at the deadline
         passes,  ///< those of an account: to make the same frame again
     };

@@ -100,9 +100,9 @@ struct Camera {
     int mount = -1;  ///< body it rides on; -1 is the world
     Rigid3 T_mount_camera{};
     int width = 640, height = 480;
-    double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px; the centre of the top-left pixel is (0, 0)
+    double fx = 0, fy = 0, cx = 0, cy = 0;       ///< px; the centre of the top-left pixel is (0, 0)
     std::shared_ptr<const CameraModel> model{};  ///< renderer/camera/camera_model.h; null: the pinhole of the above
-    std::int64_t period_ns = 100'000'000;   ///< 1 / rate_hz
+    std::int64_t period_ns = 100'000'000;        ///< 1 / rate_hz
     PixelFormat format = PixelFormat::grey;
     bool embedded_line = false;  ///< the last row carries the frame's identity and ledger
     LatePolicy late = LatePolicy::late;

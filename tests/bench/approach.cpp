@@ -1,5 +1,5 @@
-// The approach bench: results on the docking scene and on a model of the ISS before the Earth at the edge of eclipse,
-// and its plots.
+// The approach bench: results on the docking scene and on a model of the ISS before the Earth at the edge of
+// eclipse, and its plots.
 #include "bench/approach.h"
 
 #include <gtest/gtest.h>

@@ -52,7 +52,10 @@ TEST(BenchLadder, AMechanismEarnsWhatItsAbsenceCostsAtEqualError) {
     Rung off = rung("8 spp", 12, 0.5), far_off = rung("8 spp", 4, 0.125);
     off.without = far_off.without = "path reuse";
     const Ladder ladder{
-        10, 0.01, 1e-3, {rung("16 spp", 16, 0.25), rung("4 spp", 1, 1), rung("8 spp", 4, 0.5), off, loop_rung(1, 0.5)}};
+        10,
+        0.01,
+        1e-3,
+        {rung("16 spp", 16, 0.25), rung("4 spp", 1, 1), rung("8 spp", 4, 0.5), off, loop_rung(1, 0.5)}};
     ASSERT_TRUE(cost_at_equal_error(ladder, off));
     EXPECT_NEAR(*cost_at_equal_error(ladder, off), 3, 1e-12);
     EXPECT_NEAR(*cost_at_equal_error(ladder, far_off), 12.0 / 192, 1e-12);  // beyond the line

@@ -34,7 +34,7 @@ TEST(Check, TellsLightsMethodAndMaterialsByKind) {
     const Done said = run_check(std::string(kComplete) + " 2>&1 >/dev/null");
     EXPECT_EQ(said.status, 0) << said.out;
     for (const char* words :
-         {"render: path tracing over at most 12 surfaces, 4 samples a pixel\n",
+         {"render: path tracing over at most 12 surfaces, 4 samples per pixel\n",
           "materials: 1 dielectric, 1 ggx, 1 hapke, 2 lambert, 1 lommel_seeliger, 1 lunar_lambert, 1 mirror, 2 "
           "phong\n",
           "light beacon: point on body target\n", "light earthshine: directional\n",
@@ -63,8 +63,9 @@ TEST(Check, TellsTheBudget) {
                   .out.find("render: direct light, 60 ms from the end of an exposure to the hand-over\n"),
               std::string::npos);
     std::ofstream(file) << with_render(small_scene(), "budget_rays = 100000");
-    EXPECT_NE(run_check(file + " 2>&1 >/dev/null").out.find("render: direct light, at most 100000 rays a frame\n"),
-              std::string::npos);
+    EXPECT_NE(
+        run_check(file + " 2>&1 >/dev/null").out.find("render: direct light, at most 100000 rays per frame\n"),
+        std::string::npos);
     EXPECT_EQ(nlohmann::json::parse(run_check("--json " + file + " 2>/dev/null").out).at("scene").at("render"),
               (nlohmann::json{{"method", "direct"}, {"budget_rays", 100'000}}));
 }
@@ -78,7 +79,7 @@ TEST(Check, WarnsOfMirrorsInDirectLight) {
     EXPECT_NE(said.out.find("warning: black in direct light: \"ball\" (mirror); method = \"path\""),
               std::string::npos)
         << said.out;
-    EXPECT_NE(said.out.find("render: direct light, 2 samples a pixel\n"), std::string::npos) << said.out;
+    EXPECT_NE(said.out.find("render: direct light, 2 samples per pixel\n"), std::string::npos) << said.out;
 }
 
 }  // namespace

@@ -31,8 +31,8 @@ inline std::vector<std::uint8_t> frame(SceneModel& model, const Plant& plant, st
     settings.frame = number;
     settings.spp = 4;
     RadianceImage image(camera.width, camera.height);
-    render_radiance(model.render_scene(), at, camera, at.T_world_body[model.chaser()] * camera.T_mount_camera, settings,
-                    image);
+    render_radiance(model.render_scene(), at, camera, at.T_world_body[model.chaser()] * camera.T_mount_camera,
+                    settings, image);
     std::vector<std::uint8_t> bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
     expose(camera, image, 5, number, bytes);
     return bytes;

@@ -170,12 +170,13 @@ TEST(DetectorPackets, YuyvRoundsItsFormulaExactly) {
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // The inner loop as each instruction set has it; `expose` takes the widest that the machine knows.
 using Write = void(const DetectorConstants&, PixelFormat, std::span<const Rgb>, std::size_t, std::uint8_t*);
-[[gnu::flatten]] void on_base_line(const DetectorConstants& s, PixelFormat f, std::span<const Rgb> l, std::size_t first,
-                                   std::uint8_t* out) {
+[[gnu::flatten]] void on_base_line(const DetectorConstants& s, PixelFormat f, std::span<const Rgb> l,
+                                   std::size_t first, std::uint8_t* out) {
     write_pixels(s, f, l, first, out);
 }
-[[gnu::flatten, gnu::target("arch=x86-64-v3")]] void on_avx2(const DetectorConstants& s, PixelFormat f, std::span<const Rgb> l,
-                                                             std::size_t first, std::uint8_t* out) {
+[[gnu::flatten, gnu::target("arch=x86-64-v3")]] void on_avx2(const DetectorConstants& s, PixelFormat f,
+                                                             std::span<const Rgb> l, std::size_t first,
+                                                             std::uint8_t* out) {
     write_pixels(s, f, l, first, out);
 }
 TEST(DetectorPackets, SameBytesOnEachInstructionSet) {

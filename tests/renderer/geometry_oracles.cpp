@@ -5,11 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "renderer/geometry/ellipsoid.h"
+#include "renderer/geometry/sphere_roots.h"
+#include "renderer/integrator/shading.h"
 #include "renderer/material/bsdf.h"
 #include "renderer/material/texture_lookup.h"
-#include "renderer/geometry/ellipsoid.h"
-#include "renderer/integrator/shading.h"
-#include "renderer/geometry/sphere_roots.h"
 #include "tests/support/oracle.h"
 #include "tests/support/shapes.h"
 

@@ -1,6 +1,6 @@
 // Image files, read back by libraries that others wrote.
-#include "renderer/film/camera_image.h"
 #include "renderer/image/image_file.h"
+#include "renderer/film/camera_image.h"
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>

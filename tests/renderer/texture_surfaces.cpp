@@ -5,9 +5,9 @@
 #include <numbers>
 #include <random>
 
-#include "renderer/material/texture_lookup.h"
 #include "renderer/camera/camera_model.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/material/texture_lookup.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "renderer/scene/scene.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa::test {
 

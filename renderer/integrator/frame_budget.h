@@ -31,10 +31,9 @@ enum class FrameStep : std::uint8_t {
 struct FrameBudget {
     enum class Kind : std::uint8_t {
         samples,  ///< FrameSettings::spp for each pixel, in one pass
-        rays,  ///< at most this many rays of all kinds, but for those of subpixel bodies (subpixel_bodies.h); the
-               ///< same bytes on any machine under any load
-        time,    ///< the radiance is there at the deadline
-        passes,  ///< those of an account: to make the same frame again
+        rays,     ///< at most this many rays, those of subpixel bodies not counted; same bytes under any load
+        time,     ///< the radiance is there at the deadline
+        passes,   ///< those of an account: to make the same frame again
     };
     Kind kind = Kind::samples;
     std::uint64_t rays = 0;

@@ -83,8 +83,7 @@ struct AllResiduals {
     [[nodiscard]] int NumResiduals() const { return 2 * static_cast<int>(points.size()); }
 
     bool operator()(const double* x, double* residuals, double* jacobian) const {
-        Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>> all(jacobian, NumResiduals(),
-                                                                 jacobian != nullptr ? 6 : 0);
+        Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>> all(jacobian, NumResiduals(), 6);
         for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(points.size()); ++i) {
             Eigen::Vector2d residual;
             Matrix26 J;

@@ -37,8 +37,8 @@ constexpr double kRest = 0.05;
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
-                const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
-                RadianceImage& out, std::vector<float>* variance)
+                const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings, RadianceImage& out,
+                std::vector<float>* variance)
         : passes_(passes),
           costs_(costs),
           budget_(settings.budget),
@@ -46,8 +46,8 @@ public:
           slack_ns_(std::max(kLeastSlack_ns, (budget_.deadline_ns - start_ns_) / kSlackPart)),
           centre_settings_(by_direct_light(with_spp(settings, kCentreBeam))),
           sample_settings_(with_spp(settings, kBeamSamples)),
-          centre_(make_frame(render_scene, at, camera, T_world_camera, centre_settings_)),
-          sample_(make_frame(render_scene, at, camera, T_world_camera, sample_settings_)),
+          centre_(make_frame(render_scene, at, camera, pose, centre_settings_)),
+          sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
           has_indirect_(settings.method == RenderSettings::Method::path),
           adaptive_(sample_.quick && settings.mechanisms.sample_plan),
           out_(out),
@@ -332,9 +332,9 @@ private:
 }  // namespace
 
 FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene,
-                                  const Camera& camera, const BodyPoses& at, const Rigid3& T_world_camera,
+                                  const Camera& camera, const BodyPoses& at, const CameraPose& pose,
                                   const FrameSettings& settings, RadianceImage& out, std::vector<float>* variance) {
-    return BudgetFrame(passes, costs, render_scene, camera, at, T_world_camera, settings, out, variance).make();
+    return BudgetFrame(passes, costs, render_scene, camera, at, pose, settings, out, variance).make();
 }
 
 }  // namespace narpa

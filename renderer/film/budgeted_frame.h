@@ -8,7 +8,7 @@ namespace narpa {
 
 /// Makes the frame; its settings' budget is of any kind but `samples`. `variance` may be null.
 FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene,
-                                  const Camera& camera, const BodyPoses& at, const Rigid3& T_world_camera,
+                                  const Camera& camera, const BodyPoses& at, const CameraPose& pose,
                                   const FrameSettings& settings, RadianceImage& out, std::vector<float>* variance);
 
 }  // namespace narpa

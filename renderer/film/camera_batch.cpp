@@ -3,6 +3,7 @@
 #include "base/each_isa.h"
 #include "renderer/camera/lens.h"
 #include "renderer/integrator/batch_sampler.h"
+#include "renderer/integrator/path_dimensions.h"
 
 namespace narpa {
 namespace {
@@ -74,7 +75,7 @@ NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const
 constexpr std::uint32_t kPathsOwn = 2;
 
 /// Most paths choose their own points of the Sun.
-void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
+void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
     const bool sun = f.sun && (f.quick || f.sun_first);
     p.rays.n = s.n;
     if (s.centre && f.one_sample()) {
@@ -101,6 +102,28 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
     }
 }
 
+/// Moves rays from the camera's pose at mid-exposure to its pose at their own times. `u`: their places within the
+/// exposure of their row.
+void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& u, RayBatch& rays) noexcept {
+    for (std::size_t i = 0; i < s.n; ++i) {
+        const double time = f.pose.time(s.y[i], f.camera.height, u[i]);
+        const Rigid3 T = f.pose.at(time);
+        const Quat turn = T.q * conjugate(f.T_world_camera.q);
+        rays.put(i, {T.t + turn * (rays.origin[i] - f.T_world_camera.t), turn * rays.direction[i], time});
+    }
+}
+
+void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
+    aim_at_mid_exposure(f, s, p);
+    if (!f.over_time) return;
+    Points u;
+    if (s.centre && f.one_sample())
+        u[0] = kMidExposureLanes;
+    else
+        next_points(f, s, kTimeGroup, u);
+    move_to_times(f, s, u[0], p.rays);
+}
+
 }  // namespace
 
 void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p) {
@@ -119,6 +142,7 @@ void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uin
 void trace_centres(const Frame& f, const CameraSamples& s, Packet& p) {
     p.rays.n = s.n;
     aim_at_centres(f, s, p.rays);
+    if (f.over_time) move_to_times(f, s, kMidExposureLanes, p.rays);
     f.tracer.intersect(f.at, p.rays, f.tracer.all_bodies(), p.hits);
     p.rays_traced += s.n;
 }

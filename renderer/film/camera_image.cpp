@@ -54,7 +54,7 @@ struct CameraRenderer::Impl {
     Impl(const RenderScene& the_render_scene, const Camera& the_camera)
         : render_scene(the_render_scene), camera(the_camera), passes(the_render_scene.tracer(), the_camera) {}
 
-    FrameAccount render(const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+    FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& out, Aovs* aovs);
     FrameAccount render_uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
         passes.begin(f, f.lens);
@@ -77,32 +77,31 @@ CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& ca
     : impl_(std::make_unique<Impl>(render_scene, camera)) {}
 CameraRenderer::~CameraRenderer() = default;
 
-FrameAccount CameraRenderer::render(const BodyPoses& at, const Rigid3& T_world_camera,
-                                    const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
-    const FrameAccount account = impl_->render(at, T_world_camera, settings, out, aovs);
+FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
+                                    RadianceImage& out, Aovs* aovs) {
+    const FrameAccount account = impl_->render(at, pose, settings, out, aovs);
     blacken_unseen(impl_->camera, out);
     return account;
 }
 
-FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const Rigid3& T_world_camera,
+FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose,
                                           const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     if (!uniform && aovs == nullptr)
-        return render_within_budget(passes, costs, render_scene, camera, at, T_world_camera, settings, out,
-                                    nullptr);
-    const Frame frame = make_frame(render_scene, at, camera, T_world_camera, settings);
+        return render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, nullptr);
+    const Frame frame = make_frame(render_scene, at, camera, pose, settings);
     if (aovs != nullptr) {
         resize(*aovs, out.pixels.size());
         store_first_hits(frame, out.width, out.height, *aovs);
     }
     if (uniform) return render_uniform(frame, out, variance);
-    return render_within_budget(passes, costs, render_scene, camera, at, T_world_camera, settings, out, variance);
+    return render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, variance);
 }
 
 void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
-                     const Rigid3& T_world_camera, const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
-    CameraRenderer(render_scene, camera).render(at, T_world_camera, settings, out, aovs);
+                     const CameraPose& pose, const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
+    CameraRenderer(render_scene, camera).render(at, pose, settings, out, aovs);
 }
 
 }  // namespace narpa

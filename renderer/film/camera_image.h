@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "renderer/camera/camera_pose.h"
 #include "renderer/image/radiance_image.h"
 #include "renderer/integrator/frame_settings.h"
 #include "renderer/light/render_scene.h"
@@ -25,11 +26,15 @@ namespace narpa {
 ///
 /// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: subpixel_bodies.h.
 ///
+/// A pose that moves within the exposure, or bodies that do in a picture taken over time (CameraPose), are blurred:
+/// each sample takes a moment of its own, and one sample a pixel the middle of its row's exposure. Tile culling,
+/// sampling of subpixel bodies and, where bodies move, path reuse are then off.
+///
 /// Runs on the calling thread's TBB arena. Same bytes on any number of threads. Allocates its memory with each
 /// call; for many frames use CameraRenderer. `aovs` may be null; they show a pinhole's view, subpixel bodies
 /// included.
 void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
-                     const Rigid3& T_world_camera, const FrameSettings& settings, RadianceImage& out,
+                     const CameraPose& pose, const FrameSettings& settings, RadianceImage& out,
                      Aovs* aovs = nullptr);
 
 /// The same for a camera's frames one after another, within budgets: keeps memory and measured costs from frame to
@@ -42,7 +47,7 @@ public:
     CameraRenderer(const RenderScene& render_scene, const Camera& camera);
     ~CameraRenderer();
 
-    FrameAccount render(const BodyPoses& at, const Rigid3& T_world_camera, const FrameSettings& settings,
+    FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& out, Aovs* aovs = nullptr);
 
 private:

@@ -33,7 +33,7 @@ void store_first_hit(const Frame& f, const Ray& ray, const Hit& hit, std::size_t
     const bool seen = hit.body >= 0;
     aovs.body[pixel] = hit.body;
     aovs.range_m[pixel] = seen ? hit.range_m : kInfinity;
-    const Vec3 axis = f.T_world_camera.q * Vec3{0, 0, 1};
+    const Vec3 axis = f.pose.at(ray.time).q * Vec3{0, 0, 1};
     aovs.depth_m[pixel] = seen ? hit.range_m * dot(ray.direction, axis) : kInfinity;
     aovs.position[pixel] = seen ? hit.position : Vec3{};
     aovs.normal[pixel] = seen ? hit.shading_normal : Vec3{};

@@ -100,7 +100,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
 void FramePasses::begin(const Frame& f, const Lens* lens) {
     find_background(f);
     g_buffer_.begin_frame(background_);
-    if (f.settings.mechanisms.tile_culling)
+    if (f.settings.mechanisms.tile_culling && !f.over_time)
         culling_.update(f.at, f.T_world_camera, lens);
     else
         culling_.list_all();
@@ -109,7 +109,7 @@ void FramePasses::begin(const Frame& f, const Lens* lens) {
     pixels_ = 0;
     for (std::uint32_t i = 0; i < g_buffer_.tiles(); ++i) {
         const Tile t = tile(i);
-        if (t.bodies.empty() && !emitters.any(t.x, t.y)) continue;
+        if (t.bodies.empty() && !f.over_time && !emitters.any(t.x, t.y)) continue;
         tiles_.push_back(i);
         g_buffer_.set_traced(i);
         pixels_ += static_cast<std::uint64_t>(t.width * t.height);

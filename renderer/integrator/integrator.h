@@ -10,6 +10,7 @@
 #include <span>
 
 #include "renderer/camera/camera_model.h"
+#include "renderer/camera/camera_pose.h"
 #include "renderer/integrator/frame_settings.h"
 #include "renderer/integrator/path.h"
 #include "renderer/integrator/subpixel_bodies.h"
@@ -26,7 +27,9 @@ struct Frame {
     const Tracer& tracer;
     const BodyPoses& at;
     const Camera& camera;
-    const Rigid3& T_world_camera;
+    CameraPose pose;
+    Rigid3 T_world_camera;  ///< at mid-exposure
+    bool over_time;         ///< rays are taken at times of their own; else all at mid-exposure
     const FrameSettings& settings;
     CameraModelHandle model;
     const Lens* lens;  ///< null: none, all in focus
@@ -41,9 +44,9 @@ struct Frame {
     [[nodiscard]] bool one_sample() const { return settings.spp == 1; }
 };
 
-/// The arguments outlive the frame.
+/// All but the pose outlive the frame.
 [[nodiscard]] Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
-                               const Rigid3& T_world_camera, const FrameSettings& settings);
+                               const CameraPose& pose, const FrameSettings& settings);
 
 /// A batch of camera samples: their rays, and what they meet first.
 struct Packet {

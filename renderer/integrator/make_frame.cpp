@@ -17,8 +17,8 @@ const PathIntegrator kPathIntegrator;
 
 }  // namespace
 
-Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
-                 const Rigid3& T_world_camera, const FrameSettings& settings) {
+Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera, const CameraPose& pose,
+                 const FrameSettings& settings) {
     const Tracer& tracer = render_scene.tracer();
     const Scene& scene = render_scene.scene();
     const bool direct = settings.method == RenderSettings::Method::direct;
@@ -26,6 +26,9 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
     const Mechanisms& on = settings.mechanisms;
+    const bool over_time = pose.over_time() && (pose.moves() || at.moving());
+    // Paths of different moments see moving bodies at different places.
+    const bool reuse = on.path_reuse && !(over_time && at.moving());
     const bool small_bodies = !direct && on.small_body_sampling && SmallBodySampling::may_help(tracer, at);
     const bool sun_only = direct && SunDirectLighting::suffices(render_scene);
     const bool sun_first =
@@ -36,7 +39,9 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
             tracer,
             at,
             camera,
-            T_world_camera,
+            pose,
+            pose.middle(),
+            over_time,
             settings,
             model,
             lens,
@@ -45,8 +50,8 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
             sun_only,
             sun_first,
             {settings.max_depth, 1 / (model->pixels_per_radian() * std::sqrt(settings.spp)), direct, small_bodies,
-             sun_first && settings.spp > 1 ? 1 : kFewSurvive, on.path_reuse},
-            SubpixelBodies(tracer, at, camera, model, T_world_camera, lens)};
+             sun_first && settings.spp > 1 ? 1 : kFewSurvive, reuse},
+            SubpixelBodies(tracer, at, camera, model, pose.middle(), lens, over_time)};
 }
 
 }  // namespace narpa

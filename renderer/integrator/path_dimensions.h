@@ -37,5 +37,7 @@ constexpr std::uint32_t medium_group(int vertex) noexcept {
 constexpr std::uint32_t background_group(int vertex) noexcept {
     return medium_group(vertex) + 1;
 }
+/// 0: time of the camera's ray within the exposure of its row.
+inline constexpr std::uint32_t kTimeGroup = medium_group(kMostVertices);
 
 }  // namespace narpa

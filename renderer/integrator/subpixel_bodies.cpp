@@ -29,9 +29,10 @@ std::array<Vec3, 2> frame_about(const Vec3& z, const Vec3& towards) {
 }  // namespace
 
 SubpixelBodies::SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera,
-                               const CameraModelHandle& model, const Rigid3& T_world_camera, const Lens* lens)
+                               const CameraModelHandle& model, const Rigid3& T_world_camera, const Lens* lens,
+                               bool moving)
     : tracer_(tracer), at_(at), model_(model), T_world_camera_(T_world_camera), lens_(lens) {
-    for (std::size_t body = 0; body < at.T_world_body.size() && !any_; ++body)
+    for (std::size_t body = 0; body < at.T_world_body.size() && !any_ && !moving; ++body)
         any_ = disc_within(static_cast<int>(body), 0, 0, camera.width - 1, camera.height - 1).has_value();
 }
 

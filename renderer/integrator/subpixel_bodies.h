@@ -28,9 +28,10 @@ struct SubpixelDisc {
 
 class SubpixelBodies {
 public:
-    /// `lens` is null where all is in focus. All arguments but the model outlive this.
+    /// `lens` is null where all is in focus. Finds none where the camera or bodies move within the exposure: the
+    /// camera's regular rays then sample all. Tracer and poses outlive this.
     SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const CameraModelHandle& model,
-                   const Rigid3& T_world_camera, const Lens* lens);
+                   const Rigid3& T_world_camera, const Lens* lens, bool moving);
 
     /// Is there any in the image? If not, nobody asks further.
     [[nodiscard]] bool any() const noexcept { return any_; }
@@ -51,7 +52,7 @@ private:
     const Tracer& tracer_;
     const BodyPoses& at_;
     CameraModelHandle model_;
-    const Rigid3& T_world_camera_;
+    Rigid3 T_world_camera_;
     const Lens* lens_;
     bool any_ = false;
 };

@@ -77,7 +77,7 @@ TEST(TraceFar, OffsetThatIsExactInDoubleChangesNoBitOfTheRadiance) {
     settings.spp = 2;
     render_radiance(*render_scene, placed(s), c, T, settings, near);
     const Vec3 offset{0x1p28, -0x1p27, 0x1p20};
-    render_radiance(*render_scene, placed(s, offset), c, {T.q, T.t + offset}, settings, far);
+    render_radiance(*render_scene, placed(s, offset), c, Rigid3{T.q, T.t + offset}, settings, far);
     EXPECT_EQ(near.pixels, far.pixels);
 }
 

@@ -6,7 +6,8 @@
 #include <atomic>
 #include <csignal>
 #include <cstdint>
-#include <ctime>
+
+#include "base/time.h"
 
 namespace narpa {
 
@@ -25,13 +26,11 @@ inline void stop_on_signals() noexcept {
     struct sigaction action {};
     action.sa_handler = [](int) {
         static std::atomic<std::int64_t> first_ns{0};
-        timespec now{};
-        ::clock_gettime(CLOCK_MONOTONIC, &now);
-        const std::int64_t now_ns = std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+        const std::int64_t now_ns = monotonic_ns();
         std::int64_t before_ns = 0;
         if (first_ns.compare_exchange_strong(before_ns, now_ns))
             stop_flag() = true;
-        else if (now_ns - before_ns >= 2'000'000'000)
+        else if (now_ns - before_ns >= 2 * kSecond_ns)
             ::_exit(130);
     };
     ::sigaction(SIGINT, &action, nullptr);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <random>
 
+#include "base/time.h"
 #include "bench/approach_frames.h"
 #include "bench/statistics.h"
 #include "estimator/dense/dense_alignment.h"
@@ -17,7 +18,6 @@
 namespace narpa {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 /// Ends of the range bands, m.
 constexpr std::array kBandEnds{std::numeric_limits<double>::infinity(), 30.0, 10.0, 3.0, 0.0};
 /// A pose counts as found where at most this fraction of the start's error is left.
@@ -46,7 +46,7 @@ public:
     ApproachFrame estimate(const ApproachView& view, const Rigid3& guess, const Vector6& off, bool with_bound) {
         ApproachFrame out;
         out.range_m = norm(view.truth.t);
-        const auto start = Clock::now();
+        const std::int64_t start_ns = monotonic_ns();
         Rigid3 T{};
         Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
         if (method_ == EstimateMethod::features) {
@@ -57,7 +57,7 @@ public:
             out.claimed = e->status == DenseStatus::converged, out.renders = static_cast<int>(e->steps.size());
             T = e->T_camera_body, covariance = e->covariance;
         }
-        out.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        out.ms = seconds_since(start_ns) * 1e3;
         if (!out.claimed) return out;
         const Vector6 error = error_between(T, view.truth);
         out.rotation_rad = error.head<3>().norm(), out.position_m = error.tail<3>().norm();

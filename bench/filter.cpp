@@ -5,13 +5,12 @@
 #include <cmath>
 #include <random>
 
+#include "base/constants.h"
+#include "base/time.h"
 #include "bench/statistics.h"
 
 namespace narpa {
 namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr double kPi = 3.14159265358979323846;
 
 Matrix6 camera_covariance() {
     Vector6 sigma;
@@ -108,7 +107,7 @@ public:
         PoseFilter& filter = *made;
         const auto late_ns = static_cast<std::int64_t>(1e9 * case_.lidar_late_s);
         for (int s = 0; s < settings_.seconds; ++s) {
-            const std::int64_t t_ns = s * kSecond;
+            const std::int64_t t_ns = s * kSecond_ns;
             if (case_.camera) take(filter, flight.measure(t_ns, camera_covariance()));
             if (case_.lidar) {
                 const PoseMeasurement m = flight.measure(t_ns, lidar_covariance());
@@ -119,7 +118,7 @@ public:
             if (late_ns == 0) add(filter, flight.truth(), out_.times[static_cast<std::size_t>(s)]);
             flight.one_second();
             if (late_ns > 0) {
-                filter.predict(t_ns + kSecond);
+                filter.predict(t_ns + kSecond_ns);
                 add(filter, flight.truth(), out_.times[static_cast<std::size_t>(s)]);
             }
         }

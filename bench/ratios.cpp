@@ -10,10 +10,6 @@
 namespace narpa {
 namespace {
 
-double seconds_since(std::int64_t start_ns) {
-    return static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
-}
-
 /// A camera that makes frame after frame of one view: direct light, one sample a pixel.
 class Maker {
 public:

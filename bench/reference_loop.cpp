@@ -17,7 +17,7 @@
 namespace narpa {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>, kFar = std::numeric_limits<float>::infinity();
+constexpr float kPiFloat = std::numbers::pi_v<float>, kFarthest = std::numeric_limits<float>::infinity();
 constexpr float kLift_m = 2e-5f;  ///< above a surface: some ten roundings of a coordinate of a few metres
 
 /// Numbers in [0, 1), two for each call.
@@ -44,7 +44,7 @@ std::array<Vec3f, 2> across(const Vec3f& n) {
 /// The direction that stands `r` from the axis n at the angle 2 pi v.
 Vec3f about(const Vec3f& n, float r, float v) {
     const auto [t, b] = across(n);
-    const float angle = 2 * kPi * v;
+    const float angle = 2 * kPiFloat * v;
     return (r * std::cos(angle)) * t + (r * std::sin(angle)) * b + std::sqrt(std::max(0.0f, 1 - r * r)) * n;
 }
 
@@ -55,10 +55,10 @@ struct Point {
 
 Rgb brdf(const Point& p, const Vec3f& l) {
     const Material& m = *p.material;
-    Rgb f = (1 / kPi) * m.diffuse;
+    Rgb f = (1 / kPiFloat) * m.diffuse;
     if (m.kind == Material::Kind::phong) {
         const float cosine = 2 * dot(p.normal, l) * dot(p.normal, p.view) - dot(l, p.view);
-        if (cosine > 0) f += ((m.exponent + 2) / (2 * kPi) * std::pow(cosine, m.exponent)) * m.specular;
+        if (cosine > 0) f += ((m.exponent + 2) / (2 * kPiFloat) * std::pow(cosine, m.exponent)) * m.specular;
     }
     return f;
 }
@@ -76,7 +76,7 @@ struct Paths {
     void start(int i, const Vec3f& origin, const Vec3f& direction) {
         q.ray.org_x[i] = origin.x, q.ray.org_y[i] = origin.y, q.ray.org_z[i] = origin.z;
         q.ray.dir_x[i] = direction.x, q.ray.dir_y[i] = direction.y, q.ray.dir_z[i] = direction.z;
-        q.ray.tnear[i] = 0, q.ray.tfar[i] = kFar, q.ray.mask[i] = ~0u;
+        q.ray.tnear[i] = 0, q.ray.tfar[i] = kFarthest, q.ray.mask[i] = ~0u;
         q.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     }
 };
@@ -168,7 +168,7 @@ void ReferenceLoop::Impl::find_lamps() {
 Incident ReferenceLoop::Impl::from_sun(Counter& random) const {
     const auto irradiance = static_cast<float>(scene.sun->irradiance_w_m2);
     const auto [u, v] = random.two();
-    return {about(to_sun, sun_radius * std::sqrt(u), v), kFar, {irradiance, irradiance, irradiance}};
+    return {about(to_sun, sun_radius * std::sqrt(u), v), kFarthest, {irradiance, irradiance, irradiance}};
 }
 
 Incident ReferenceLoop::Impl::from_lamps(const Point& p, Counter& random) const {
@@ -249,7 +249,7 @@ std::uint64_t ReferenceLoop::Impl::trace(Paths& p, const FrameSettings& s) const
             if (p.valid[i] == 0) continue;
             const auto [u, v] = p.random[i].two();
             const Vec3f l = about(p.point[i].normal, std::sqrt(u), v);
-            p.throughput[i] = p.throughput[i] * (kPi * brdf(p.point[i], l));
+            p.throughput[i] = p.throughput[i] * (kPiFloat * brdf(p.point[i], l));
             p.start(k, p.point[i].position, l);
         }
     }

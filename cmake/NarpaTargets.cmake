@@ -11,6 +11,7 @@ if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
 endif()
 
+option(NARPA_UNITY "Compile several sources of a target at once: a faster whole build, slower single changes" OFF)
 set(NARPA_SANITIZE "" CACHE STRING "Sanitizers for every target: address,undefined or thread")
 find_program(NARPA_CCACHE ccache)
 if(NARPA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
@@ -18,8 +19,10 @@ if(NARPA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
 endif()
 
 function(narpa_compile_options target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${NARPA_UNITY} UNITY_BUILD_BATCH_SIZE 10)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
-                                           -Woverloaded-virtual $<$<BOOL:${NARPA_WERROR}>:-Werror>)
+                                           -Woverloaded-virtual $<$<BOOL:${NARPA_WERROR}>:-Werror>
+                                           $<$<BOOL:${NARPA_UNITY}>:-Wno-subobject-linkage>)
   # Same bytes on every machine with the same instruction set: no fused multiply-add behind our back. Nobody reads errno
   # after sqrt.
   target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno)
@@ -62,7 +65,8 @@ function(narpa_room folder)
   if(arg_SIMD)
     # GCC otherwise leaves most of these loops scalar. Neither option changes a result: no floating-point exception flag
     # is read, so both sides of a choice may be computed.
-    target_compile_options(narpa_${name} PRIVATE -O3 -fno-trapping-math)
+    target_compile_options(narpa_${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O3> -fno-trapping-math)
+    set_target_properties(narpa_${name} PROPERTIES UNITY_BUILD OFF)
   endif()
 endfunction()
 

@@ -12,15 +12,12 @@
 #include <cstring>
 #include <system_error>
 
+#include "base/time.h"
+
 namespace narpa {
 namespace {
 
-constexpr std::int64_t kFlushNs = 1'000'000'000;
-
-std::int64_t now_ns() {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
+constexpr std::int64_t kFlush_ns = kSecond_ns;
 
 // Signals belong to the thread that started the program; a reader that leaves must not raise SIGPIPE here.
 std::thread start_without_signals(auto body) {
@@ -71,7 +68,7 @@ bool WriteQueue::push(std::span<const std::uint8_t> item) noexcept {
 }
 
 void WriteQueue::flush() noexcept {
-    flush_deadline_ns_.store(now_ns() + kFlushNs, std::memory_order_release);
+    flush_deadline_ns_.store(monotonic_ns() + kFlush_ns, std::memory_order_release);
     // The ring is empty when every slot is free.
     for (std::size_t held = 0; held < slots_;) held += sem_wait(&free_slots_) == 0 ? 1 : 0;
     for (std::size_t held = slots_; held > 0; --held) sem_post(&free_slots_);
@@ -81,7 +78,7 @@ void WriteQueue::flush() noexcept {
 int WriteQueue::time_left_ms() const noexcept {
     const std::int64_t deadline_ns = flush_deadline_ns_.load(std::memory_order_acquire);
     if (deadline_ns == 0) return -1;
-    return static_cast<int>(std::max<std::int64_t>(0, (deadline_ns - now_ns()) / 1'000'000));
+    return static_cast<int>(std::max<std::int64_t>(0, (deadline_ns - monotonic_ns()) / 1'000'000));
 }
 
 void WriteQueue::run() noexcept {

@@ -4,6 +4,7 @@
 #include <ctime>
 #include <limits>
 
+#include "base/time.h"
 #include "protocols/can/candump.h"
 
 namespace narpa {
@@ -19,7 +20,7 @@ void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
     if (!waiting_) return bus_.wait(timeout_ns);
     // A recorded bus always has its next frame, so it would not wait for the frame's time.
     const std::int64_t ns = std::clamp<std::int64_t>(received_.t_received_ns - t_now_ns, 0, timeout_ns);
-    const timespec time{ns / 1'000'000'000, ns % 1'000'000'000};
+    const timespec time{ns / kSecond_ns, ns % kSecond_ns};
     ::clock_nanosleep(CLOCK_MONOTONIC, 0, &time, nullptr);
 }
 

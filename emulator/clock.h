@@ -8,14 +8,9 @@
 #include <limits>
 
 #include "base/stop.h"
+#include "base/time.h"
 
 namespace narpa {
-
-[[nodiscard]] inline std::int64_t monotonic_ns() noexcept {
-    timespec t{};
-    ::clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
-}
 
 /// What a sensor may read of the clock. One clock per run; any thread may read it.
 class Clock {
@@ -51,7 +46,7 @@ public:
             const std::int64_t now = now_ns();
             if (now >= t_ns) return true;
             const std::int64_t until = to_monotonic(std::min(t_ns, now + kSlice));
-            const timespec ts{until / 1'000'000'000, until % 1'000'000'000};
+            const timespec ts{until / kSecond_ns, until % kSecond_ns};
             ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &ts, nullptr);
         }
         return false;

@@ -5,13 +5,13 @@
 #include <chrono>
 #include <random>
 
+#include "base/time.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 
 namespace narpa {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 /// Of what is known about velocity and rate before a second frame has been seen.
 constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
 /// Standard deviations beyond which the target is lost: a render there would show something else. Shift is a part
@@ -119,7 +119,7 @@ const TrackerOptions& FrameTracker::options() const noexcept {
 TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
                                 const BodyPoses& at) {
     Impl& m = *impl_;
-    const auto start = Clock::now();
+    const std::int64_t start_ns = monotonic_ns();
     TrackedFrame out;
     out.frame = frame;
     out.t_ns = t_ns;
@@ -147,7 +147,7 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
         out.filtered_covariance = covariance_in_other_axes(T_camera_chaser.q, known.covariance);
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
-    out.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    out.ms = seconds_since(start_ns) * 1e3;
     // What follows looks at the truth: nothing of the estimate.
     if (m.by_pixels && out.measured)
         if (const auto bound = m.by_pixels->bound(at, out.truth, m.dense_used)) out.bound = *bound;

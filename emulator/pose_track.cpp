@@ -2,11 +2,13 @@
 
 #include <cstring>
 
+#include "base/time.h"
+
 namespace narpa {
 namespace {
 
 constexpr double kSecondsPerNs = 1e-9;
-constexpr std::int64_t kHistoryNs = 1'000'000'000;  // sensors look back by an exposure or a packet, never more
+constexpr std::int64_t kHistory_ns = kSecond_ns;  // sensors look back by an exposure or a packet, never more
 
 bool at_rest(const Motion& m) {
     return m.velocity_m_s == Vec3{};
@@ -48,7 +50,7 @@ TrackStatus PoseTrack::push(const PoseCommand& command, std::int64_t t_now_ns) n
     Slot& slot = slots_[count % kDepth];
     if (count >= kDepth - 1) {  // the oldest that must stay is the one after the slot that is given up
         Sample next_oldest;
-        if (slots_[(count + 1) % kDepth].load(next_oldest) && next_oldest.t_ns > t_now_ns - kHistoryNs)
+        if (slots_[(count + 1) % kDepth].load(next_oldest) && next_oldest.t_ns > t_now_ns - kHistory_ns)
             return TrackStatus::overrun;
     }
     slot.store({command.t_valid_ns, command.counter, command.motion});

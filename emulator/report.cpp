@@ -34,7 +34,7 @@ json of_estimator(const OnlineEstimator& estimator) {
             {"summary", to_json(summarise(estimator.frames()))}};
 }
 
-json of_bus(const CanNode& node) {
+json bus_document(const CanNode& node) {
     const CommandCounters c = node.counters();
     const CanCounters& b = node.bus().counters();
     json rejected = json::object();
@@ -124,7 +124,7 @@ json report(const Emulator& emulator) {
         {"cameras", json::array()},
         {"lidars", json::array()},
         {"estimate", emulator.estimator() ? of_estimator(*emulator.estimator()) : json(nullptr)},
-        {"can", emulator.can() ? of_bus(*emulator.can()) : json(nullptr)},
+        {"can", emulator.can() ? bus_document(*emulator.can()) : json(nullptr)},
         {"page_faults", {{"minor", emulator.page_faults().minor}, {"major", emulator.page_faults().major}}},
         {"notices", emulator.notices()},
         {"log", emulator.options().log_folder}};

@@ -28,7 +28,7 @@ std::string non_zero(const Counts& counts) {
     return text.empty() ? "none" : text;
 }
 
-std::string of_bus(const CanNode& node) {
+std::string bus_text(const CanNode& node) {
     const CommandCounters c = node.counters();
     const CanCounters& b = node.bus().counters();
     return fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", node.bus().description(), c.taken,
@@ -121,7 +121,7 @@ std::string in_words(const Emulator& emulator) {
     if (const OnlineEstimator* e = emulator.estimator())
         out += fmt::format("  estimate of {} from camera {}: {} frames skipped; {}", e->target(), e->camera().name,
                            e->skipped(), in_words(summarise(e->frames())));
-    if (emulator.can()) out += of_bus(*emulator.can());
+    if (emulator.can()) out += bus_text(*emulator.can());
     if (!lockstep)
         out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,
                            emulator.page_faults().major);

@@ -10,6 +10,8 @@
 #include <span>
 #include <utility>
 
+#include "base/time.h"
+
 namespace narpa {
 
 class Descriptor {
@@ -36,17 +38,6 @@ public:
 private:
     int fd_ = -1;
 };
-
-inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
-
-[[nodiscard]] inline std::int64_t clock_ns(clockid_t clock) noexcept {
-    timespec t{};
-    ::clock_gettime(clock, &t);
-    return t.tv_sec * kSecond_ns + t.tv_nsec;
-}
-[[nodiscard]] inline std::int64_t monotonic_ns() noexcept {
-    return clock_ns(CLOCK_MONOTONIC);
-}
 
 /// Waits until one is ready or the time is over; -1 waits for ever. A negative fd is skipped.
 inline void wait_ready(std::span<pollfd> fds, std::int64_t timeout_ns) noexcept {

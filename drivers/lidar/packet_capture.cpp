@@ -10,7 +10,6 @@
 namespace narpa {
 namespace {
 
-constexpr std::size_t kEthernetBytes = 14, kIpBytes = 20, kUdpBytes = 8;
 constexpr std::uint8_t kUdpProtocol = 17;
 
 std::size_t be16(const std::uint8_t* at) {

@@ -1,3 +1,4 @@
+#include "base/time.h"
 #include "drivers/lidar/backends.h"
 
 #ifdef NARPA_WITH_PCAP
@@ -12,16 +13,15 @@
 #include <cstdio>
 #include <cstring>
 
+#include "drivers/lidar/packet_capture.h"
 #include "drivers/write_queue.h"
 
 namespace narpa {
 namespace {
 
-constexpr std::size_t kEthernetBytes = 14, kIpBytes = 20, kUdpBytes = 8;
 constexpr std::size_t kHeaderBytes = kEthernetBytes + kIpBytes + kUdpBytes;  // 42
 constexpr std::size_t kPayloadMax = 1500 - kIpBytes - kUdpBytes;
 constexpr std::size_t kRecordSlots = 2048;  // 2.7 s of data packets: a disk may pause
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 
 // A record of the ring: when, then the Ethernet frame.
 constexpr std::size_t kStampBytes = sizeof(std::int64_t);
@@ -94,7 +94,7 @@ public:
         std::memcpy(&unix_ns, record.data(), kStampBytes);
         const auto length = static_cast<bpf_u_int32>(record.size() - kStampBytes);
         // With nanosecond precision libpcap keeps nanoseconds in tv_usec.
-        const pcap_pkthdr header{{unix_ns / kSecondNs, unix_ns % kSecondNs}, length, length};
+        const pcap_pkthdr header{{unix_ns / kSecond_ns, unix_ns % kSecond_ns}, length, length};
         ::pcap_dump(reinterpret_cast<u_char*>(dumper_), &header, record.data() + kStampBytes);
         if (::pcap_dump_flush(dumper_) != 0 || std::ferror(file_) != 0) return take_back();
         end_of_last_record_ = ::ftello(file_);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <numeric>
 
+#include "base/time.h"
 #include "drivers/video/backends.h"
 #include "drivers/video/v4l2_device.h"
 #include "drivers/write_queue.h"
@@ -19,13 +20,6 @@
 namespace narpa {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
-
-std::int64_t now_ns() noexcept {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
-
 enum class Step : std::uint8_t { open, query, output, format_call, format_kept, stream, started };
 
 // How far the start of a device came; made into words only when a person is there to read them.
@@ -37,11 +31,11 @@ struct Start {
 };
 
 void tell_frame_rate(int fd, std::int64_t period_ns) noexcept {
-    const std::int64_t common = std::gcd(period_ns, kSecondNs);
+    const std::int64_t common = std::gcd(period_ns, kSecond_ns);
     v4l2_streamparm parameters{};
     parameters.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     parameters.parm.output.timeperframe = {static_cast<std::uint32_t>(period_ns / common),
-                                           static_cast<std::uint32_t>(kSecondNs / common)};
+                                           static_cast<std::uint32_t>(kSecond_ns / common)};
     xioctl(fd, VIDIOC_S_PARM, &parameters);  // readers only show it, so a refusal costs nothing
 }
 
@@ -134,9 +128,9 @@ public:
 
 private:
     bool look_for_device() noexcept {
-        const std::int64_t now = now_ns();
+        const std::int64_t now = monotonic_ns();
         if (now < next_look_ns_) return false;
-        next_look_ns_ = now + kSecondNs;
+        next_look_ns_ = now + kSecond_ns;
         fd_ = start_device(path_.c_str(), format_).fd;
         if (fd_ < 0) return false;
         reconnects.fetch_add(1, std::memory_order_relaxed);
@@ -145,7 +139,7 @@ private:
     void close_device() noexcept {
         if (fd_ >= 0) ::close(fd_);
         fd_ = -1;
-        next_look_ns_ = now_ns() + kSecondNs;
+        next_look_ns_ = monotonic_ns() + kSecond_ns;
     }
 
     std::string path_;

@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t kLongestLine = 256;
 constexpr int kPipeBytes = 1 << 20;  // an unprivileged process may have this: a frame goes in at once
-constexpr std::int64_t kPollPeriod_ns = 1'000'000;  // between two checks for a writer, which poll() does not report
+constexpr std::int64_t kWriterPollPeriod_ns =
+    1'000'000;  // between two checks for a writer, which poll() does not report
 
 class Y4mSource final : public VideoSource {
 public:
@@ -36,7 +37,7 @@ public:
             const std::int64_t left_ns = until_ns - monotonic_ns();
             if (left_ns <= 0) return false;
             if (progress == Progress::end) {
-                wait_ready({}, std::min(left_ns, kPollPeriod_ns));
+                wait_ready({}, std::min(left_ns, kWriterPollPeriod_ns));
             } else {
                 std::array<pollfd, 1> fds{{{fd_.get(), POLLIN, 0}}};
                 wait_ready(fds, left_ns);

@@ -23,10 +23,6 @@ struct Biweight {
     }
 };
 
-std::string number(double v) {
-    return std::to_string(v);
-}
-
 Status check(std::span<const RangePoint> points) {
     for (std::size_t i = 0; i < points.size(); ++i) {
         const RangePoint& p = points[i];
@@ -36,9 +32,9 @@ Status check(std::span<const RangePoint> points) {
         if (!is_finite(p.origin_m) || !is_finite(p.direction) || !std::isfinite(p.t_s))
             return error("origin, direction or time is not finite");
         if (std::abs(dot(p.direction, p.direction) - 1) > 1e-6)
-            return error("expected a direction of length 1, not " + number(norm(p.direction)));
+            return error("expected a direction of length 1, not " + std::to_string(norm(p.direction)));
         if (!(p.range_m > 0 && std::isfinite(p.range_m)))
-            return error("expected a range > 0, not " + number(p.range_m) + " m");
+            return error("expected a range > 0, not " + std::to_string(p.range_m) + " m");
     }
     return Ok{};
 }
@@ -55,7 +51,7 @@ Status check(const Rigid3& T, const SweepMotion& motion) {
 
 Status check(const IcpSettings& s) {
     const auto wrong = [](const char* name, double value, const char* expected) {
-        return Error{std::string(name) + " = " + number(value) + ": expected " + expected};
+        return Error{std::string(name) + " = " + std::to_string(value) + ": expected " + expected};
     };
     if (!(s.noise.range_m > 0 && std::isfinite(s.noise.range_m)))
         return wrong("noise.range_m", s.noise.range_m, "a standard deviation > 0 m");
@@ -203,7 +199,7 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
     if (auto good = check(points); !good) return good.error();
     if (auto good = check(start, motion); !good) return good.error();
     if (!(search_m >= 0 && std::isfinite(search_m)))
-        return Error{"search_m = " + number(search_m) + ": expected a distance >= 0 m"};
+        return Error{"search_m = " + std::to_string(search_m) + ": expected a distance >= 0 m"};
     association_.take(points, motion);
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());

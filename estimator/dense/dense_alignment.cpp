@@ -15,11 +15,8 @@ namespace {
 /// The coarsest level shows the target no smaller than this.
 constexpr double kLeastExtent_px = 16;
 
-std::string number(double v) {
-    return std::to_string(v);
-}
 Error wrong(const std::string& field, double value, const std::string& expected) {
-    return Error{field + " = " + number(value) + ", expected " + expected};
+    return Error{field + " = " + std::to_string(value) + ", expected " + expected};
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "base/constants.h"
 #include "estimator/dense/pixel_patch.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/camera_model.h"
@@ -17,7 +17,6 @@ namespace {
 
 using Row = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
 constexpr double kSurfaceSteps = 2.5;
 /// Lower limit of the cosine between ray and normal in that prediction.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "base/constants.h"
 #include "renderer/camera/camera_model.h"
 
 namespace narpa {
@@ -57,7 +57,6 @@ std::optional<Window> window_about(const Tracer& tracer, const Camera& camera, s
     const CameraModelHandle model(camera);
     const auto corners = outline(tracer.bounds(target), T_camera_target);
     if (!corners) return whole;
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     double left = kInfinity, right = -kInfinity, top = kInfinity, bottom = -kInfinity;
     std::size_t without_image = 0;
     for (const Vec3& corner : *corners) {

@@ -1,6 +1,6 @@
 #include "estimator/dense/pixel_patch.h"
 
-#include <limits>
+#include "base/constants.h"
 
 namespace narpa {
 namespace {
@@ -49,7 +49,6 @@ void PixelPatch::trace(const FineGrid& grid, const SensorModel& sensor, int x, i
         trace_rays(f, samples, f.tracer.all_bodies(), p);
         f.integrator.radiance(f, p, radiance);
         for (std::size_t i = 0; i < samples.n; ++i) {
-            constexpr double kInfinity = std::numeric_limits<double>::infinity();
             RaySample& seen = points_[place[i]];
             seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
             if (p.hits.body[i] < 0) continue;

@@ -5,19 +5,14 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
+#include "base/constants.h"
+#include "base/time.h"
 #include "estimator/features/flow_noise.h"
 #include "estimator/pose/reprojection.h"
 
 namespace narpa {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 /// Half the window over which a match's noise is summed: that of the optical flow.
 constexpr int kHalfWindow_px = 10;
@@ -44,7 +39,6 @@ PixelCovariance with_floor(const PixelCovariance& c, double floor_px) {
 
 /// Infinite where the point has no image.
 Pixel project(const CameraModel& camera, const Vec3& p) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const auto image = camera.project(p);
     return image ? Pixel{image->x, image->y} : Pixel{kInfinity, kInfinity};
 }
@@ -232,13 +226,13 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     Points points;
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();
-        auto start = Clock::now();
+        std::int64_t start_ns = monotonic_ns();
         view_.render(estimate.T_camera_target, render_settings, false);
-        round.render_ms = ms_since(start);
-        start = Clock::now();
+        round.render_ms = seconds_since(start_ns) * 1e3;
+        start_ns = monotonic_ns();
         gather(frame, toned_frame, tones, points, round);
-        round.match_ms = ms_since(start);
-        start = Clock::now();
+        round.match_ms = seconds_since(start_ns) * 1e3;
+        start_ns = monotonic_ns();
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;
             return estimate;
@@ -283,7 +277,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         round.before_px = root_mean_square(points.residuals_px(camera, estimate.T_camera_target));
         round.after_px = root_mean_square(points.residuals_px(camera, fit.T_camera_body));
         round.moved_px = root_mean_square(moved);
-        round.solve_ms = ms_since(start);
+        round.solve_ms = seconds_since(start_ns) * 1e3;
         const Vector6 step = error_between(estimate.T_camera_target, fit.T_camera_body);
         estimate.T_camera_target = fit.T_camera_body;
         estimate.floor_px = floor_px = points.floor_px(camera, fit.T_camera_body);

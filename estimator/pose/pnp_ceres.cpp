@@ -139,11 +139,6 @@ Rigid3 pose_of(const Quat& start, const double* x) {
     return {normalized(exp_rotation({x[0], x[1], x[2]}) * start), {x[3], x[4], x[5]}};
 }
 
-bool is_usable(const Rigid3& T) {
-    const double n = dot(T.q, T.q);
-    return std::isfinite(n) && n > 0 && is_finite(T.t);
-}
-
 }  // namespace
 
 PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const RobustLoss& loss) {

@@ -16,12 +16,12 @@ struct Problem {
     }
 };
 
+}  // namespace
+
 bool is_usable(const Rigid3& T) {
     const double n = dot(T.q, T.q);
     return std::isfinite(n) && n > 0 && is_finite(T.t);
 }
-
-}  // namespace
 
 void refine(const PnpPoints& points, const Rigid3& start, const RefineOptions& options, PnpFit& fit) {
     fit.T_camera_body = start;

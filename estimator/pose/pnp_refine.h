@@ -36,6 +36,9 @@ struct PnpFit {
     }
 };
 
+/// Whether a start can be refined: finite, with a rotation.
+bool is_usable(const Rigid3& T);
+
 /// Refines from `start`; `fit` is filled in place. `points` holds what was assigned to it. Every point stays in
 /// front of the camera.
 void refine(const PnpPoints& points, const Rigid3& start, const RefineOptions& options, PnpFit& fit);

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 /// Shift (2), slopes (2) and curvatures (3) of the inverse depth over the patch, gain, offset.
 using Vector = Eigen::Matrix<double, 9, 1>;
-using Matrix = Eigen::Matrix<double, 9, 9>;
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
 constexpr int kIterationsMax = 20;
 constexpr double kSettled_px = 1e-4, kFarthest_px = 1.5;
@@ -73,8 +73,8 @@ std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, 
 
 /// Sums of a step of the fit.
 struct Normal {
-    Matrix H = Matrix::Zero();      ///< weighted by window and noise
-    Matrix noise = Matrix::Zero();  ///< covariance of `b`
+    Matrix9 H = Matrix9::Zero();      ///< weighted by window and noise
+    Matrix9 noise = Matrix9::Zero();  ///< covariance of `b`
     Vector b = Vector::Zero();
     double squares = 0, expected_squares = 0;  ///< of the residuals
     Correlation correlation;
@@ -224,12 +224,12 @@ std::optional<SubPixelMatch> fit_patch(const Patch& patch, const StereoView& her
     for (int iteration = 0; iteration <= kIterationsMax; ++iteration) {
         const auto n = fit.linearise(p);
         if (!n) return {};
-        const Eigen::LDLT<Matrix> factors(n->H);
+        const Eigen::LDLT<Matrix9> factors(n->H);
         if (!factors.isPositive()) return {};
         const Vector step = factors.solve(n->b);
         if (!step.allFinite()) return {};
         if (step.head<2>().norm() < kSettled_px) {
-            const Matrix C = factors.solve(factors.solve(n->noise).transpose());
+            const Matrix9 C = factors.solve(factors.solve(n->noise).transpose());
             const double misfit = n->squares / n->expected_squares;
             return SubPixelMatch{px0 + p.head<2>(), std::max(1.0, misfit) * C.topLeftCorner<2, 2>(),
                                  n->correlation.value(), misfit};

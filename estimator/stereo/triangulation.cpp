@@ -17,7 +17,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
-constexpr int kIterationsMax = 20, kHalvingsMax = 10;
+constexpr int kNewtonStepsMax = 20, kHalvingsMax = 10;
 /// What cancels to this part of its terms is rounding.
 constexpr double kRounding = 1e-12;
 
@@ -133,7 +133,7 @@ TriangulatedPoint triangulate(const StereoPair& pair, const PixelMeasurement& le
     Vector3d s = views.first_guess(), gradient;
     Matrix3d information, C;
     double cost = views.cost(s);
-    for (int i = 0; i < kIterationsMax; ++i) {
+    for (int i = 0; i < kNewtonStepsMax; ++i) {
         views.linearise(s, information, gradient);
         if (!solve(information, Matrix3d::Identity(), C)) return out;
         Vector3d step = C * gradient;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/time.h"
 #include "protocols/little_endian.h"
 
 namespace narpa {
@@ -32,7 +33,7 @@ constexpr std::uint8_t kPpsLocked = 2;
 constexpr double kRangeQuantumM = 0.002, kRangeMaxM = 65535 * kRangeQuantumM;
 constexpr double kRadPerDeg = std::numbers::pi / 180;
 constexpr int kAzimuthTurn = 36'000;  // hundredths of a degree
-constexpr std::int64_t kSecondNs = 1'000'000'000, kHourNs = 3600 * kSecondNs, kHourUs = kHourNs / 1000;
+constexpr std::int64_t kHour_ns = 3600 * kSecond_ns, kHour_us = kHour_ns / 1000;
 
 /// Elevation in degrees by laser number, which is also the firing order (table 9-1).
 constexpr std::array<double, kLasers> kElevationDeg{-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
@@ -76,8 +77,8 @@ constexpr std::int64_t shot_offset_ns(int shot) {
 
 /// Azimuth of the rotor in revolutions, [0, 1). Whole seconds are taken apart, so that a long run keeps its angle.
 double rotor_revolutions(std::int64_t t_ns, double rotation_hz) {
-    const double whole = std::fmod(static_cast<double>(t_ns / kSecondNs) * rotation_hz, 1.0);
-    const double turns = whole + static_cast<double>(t_ns % kSecondNs) * rotation_hz * 1e-9;
+    const double whole = std::fmod(static_cast<double>(t_ns / kSecond_ns) * rotation_hz, 1.0);
+    const double turns = whole + static_cast<double>(t_ns % kSecond_ns) * rotation_hz * 1e-9;
     const double fraction = turns - std::floor(turns);
     return fraction < 1 ? fraction : 0.0;
 }
@@ -97,8 +98,8 @@ std::uint8_t to_percent(float reflectivity) {
 }
 
 std::uint32_t past_hour_us(std::int64_t unix_ns) {
-    const std::int64_t ns = unix_ns % kHourNs;
-    return static_cast<std::uint32_t>((ns < 0 ? ns + kHourNs : ns) / 1000);
+    const std::int64_t ns = unix_ns % kHour_ns;
+    return static_cast<std::uint32_t>((ns < 0 ? ns + kHour_ns : ns) / 1000);
 }
 
 std::uint16_t azimuth_cdeg(std::span<const std::uint8_t> packet, int block) {
@@ -114,7 +115,7 @@ bool is_data_packet(std::span<const std::uint8_t> packet) {
         const std::uint8_t* flag = &packet[block_offset(block)];
         if (flag[0] != 0xFF || flag[1] != 0xEE || azimuth_cdeg(packet, block) >= kAzimuthTurn) return false;
     }
-    return get_le<std::uint32_t>(&packet[kTimeOffset]) < kHourUs;
+    return get_le<std::uint32_t>(&packet[kTimeOffset]) < kHour_us;
 }
 
 /// From this block's azimuth to the next one's; the last block has no next and takes the gap before it.
@@ -214,9 +215,9 @@ public:
                                             std::int64_t near_unix_ns) const noexcept override {
         if (!is_data_packet(bytes)) return std::nullopt;
         const std::int64_t stamp_ns = 1000 * std::int64_t{get_le<std::uint32_t>(&bytes[kTimeOffset])};
-        std::int64_t off_ns = (stamp_ns - near_unix_ns) % kHourNs;
-        if (off_ns < -kHourNs / 2) off_ns += kHourNs;
-        if (off_ns >= kHourNs / 2) off_ns -= kHourNs;
+        std::int64_t off_ns = (stamp_ns - near_unix_ns) % kHour_ns;
+        if (off_ns < -kHour_ns / 2) off_ns += kHour_ns;
+        if (off_ns >= kHour_ns / 2) off_ns -= kHour_ns;
         return near_unix_ns + off_ns;
     }
 

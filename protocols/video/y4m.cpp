@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <numeric>
 
+#include "base/time.h"
+
 namespace narpa {
 namespace {
 
@@ -50,10 +52,9 @@ Result<std::string> y4m_stream_header(const VideoFormat& format) {
         return Error{"Y4M needs a positive width, height and frame period"};
     if (format.pixel == PixelFormat::yuyv && format.width % 2 != 0)
         return Error{"YUYV needs an even width, not " + std::to_string(format.width)};
-    constexpr std::int64_t second = 1'000'000'000;
-    const std::int64_t common = std::gcd(second, format.period_ns);
+    const std::int64_t common = std::gcd(kSecond_ns, format.period_ns);
     return "YUV4MPEG2 W" + std::to_string(format.width) + " H" + std::to_string(format.height) + " F" +
-           std::to_string(second / common) + ":" + std::to_string(format.period_ns / common) + " Ip A1:1 C" +
+           std::to_string(kSecond_ns / common) + ":" + std::to_string(format.period_ns / common) + " Ip A1:1 C" +
            std::string(colour) + "\n";
 }
 

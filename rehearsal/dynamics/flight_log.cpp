@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "base/time.h"
 #include "rehearsal/dynamics/random_streams.h"
 
 namespace narpa::rehearsal {
@@ -32,10 +33,6 @@ nlohmann::json to_json(const PortState& p) {
             {"rate_deg_s", numbers(p.rate_rad_s, 1 / kRadPerDeg)}};
 }
 
-double seconds(std::int64_t ns) {
-    return static_cast<double>(ns) * 1e-9;
-}
-
 }  // namespace
 
 Result<TruthLog> TruthLog::create(const std::string& folder) {
@@ -52,7 +49,7 @@ void TruthLog::append(const Simulation& s) {
     const PortState p = s.port();
     const ActuatorCommand& c = s.command();
     const Loads& fired = s.fired();
-    file_ << fmt::format("{:.9f}", seconds(s.t_ns())) << fields(p.position_m()) << fields(p.velocity_m_s)
+    file_ << fmt::format("{:.9f}", to_seconds(s.t_ns())) << fields(p.position_m()) << fields(p.velocity_m_s)
           << fields(p.misalignment_rad(), 1 / kRadPerDeg) << fields(p.rate_rad_s, 1 / kRadPerDeg)
           << fmt::format(",{},{},{},{}", kDynamicsPhases[static_cast<std::size_t>(s.phase())],
                          kGuidancePhases[static_cast<std::size_t>(c.phase)], c.leg,
@@ -74,7 +71,7 @@ nlohmann::json summary(const Simulation& s, const Scenario& scenario, std::uint6
     nlohmann::json contact;
     if (s.contact()) {
         contact = to_json(s.contact()->port);
-        contact["t_s"] = seconds(s.contact()->t_ns);
+        contact["t_s"] = to_seconds(s.contact()->t_ns);
         contact["captured"] = s.contact()->captured;
     }
     return {{"scenario", scenario.name},
@@ -87,7 +84,7 @@ nlohmann::json summary(const Simulation& s, const Scenario& scenario, std::uint6
               {"thruster_directions", std::move(directions)}}},
             {"contact", std::move(contact)},
             {"ending", kEndings[static_cast<std::size_t>(s.ending())]},
-            {"end_s", seconds(s.t_ns())},
+            {"end_s", to_seconds(s.t_ns())},
             {"port_at_end", to_json(s.port())},
             {"impulse_n_s", numbers(s.fired().force_n)},
             {"angular_impulse_n_m_s", numbers(s.fired().torque_n_m)}};

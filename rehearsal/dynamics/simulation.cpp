@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/time.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/dynamics/random_streams.h"
 
@@ -16,10 +17,6 @@ constexpr double kPortRadiusM = 1;                   // with more lateral distan
 constexpr double kRestitution = 0.3;
 constexpr std::int64_t kAfterCaptureNs = 2'000'000'000, kAfterBounceNs = 10'000'000'000;
 constexpr double kLeftDistances = 2;  // of the start's distance
-
-double seconds(std::int64_t ns) {
-    return static_cast<double>(ns) * 1e-9;
-}
 
 /// A motion in the steps of a pose command; as it is where it does not fit one.
 Motion as_transmitted(const Motion& motion) {
@@ -153,14 +150,14 @@ void Simulation::change_target_rate(std::int64_t after_ns, std::int64_t until_ns
 }
 
 void Simulation::fire_for(const Loads& loads, std::int64_t dt_ns) {
-    fired_.force_n += seconds(dt_ns) * loads.force_n;
-    fired_.torque_n_m += seconds(dt_ns) * loads.torque_n_m;
+    fired_.force_n += to_seconds(dt_ns) * loads.force_n;
+    fired_.torque_n_m += to_seconds(dt_ns) * loads.torque_n_m;
 }
 
 // --- Motion ---------------------------------------------------------------------------------------------------
 
 Simulation::State Simulation::after(const State& from, const Loads& loads, std::int64_t dt_ns) const {
-    const double dt_s = seconds(dt_ns);
+    const double dt_s = to_seconds(dt_ns);
     State to;
     to.t_ns = from.t_ns + dt_ns;
     to.target = target_after(from, dt_s);
@@ -177,7 +174,7 @@ Simulation::State Simulation::after(const State& from, const Loads& loads, std::
         const Attitude middle = chaser_body_.turned(from.chaser, loads.torque_n_m, 0.5 * dt_s);
         acceleration_m_s2 = middle.q_world_body * loads.force_n / scenario_.chaser.mass_kg;
     }
-    to.translation = propagated(scenario_.orbit, seconds(from.t_ns), dt_s, acceleration_m_s2, from.translation);
+    to.translation = propagated(scenario_.orbit, to_seconds(from.t_ns), dt_s, acceleration_m_s2, from.translation);
     return to;
 }
 
@@ -185,10 +182,11 @@ Simulation::State Simulation::after(const State& from, const Loads& loads, std::
 Attitude Simulation::target_after(const State& from, double dt_s) const {
     if (!scenario_.target_motion.with_lvlh) return target_body_.turned(from.target, {}, dt_s);
     const Vec3 orbit_rate{0, 0, scenario_.orbit.rate_rad_s()};
-    const Quat q_lvlh_body = conjugate(scenario_.orbit.q_world_lvlh(seconds(from.t_ns))) * from.target.q_world_body;
+    const Quat q_lvlh_body =
+        conjugate(scenario_.orbit.q_world_lvlh(to_seconds(from.t_ns))) * from.target.q_world_body;
     const Vec3 rate = from.target.rate_rad_s - conjugate(q_lvlh_body) * orbit_rate;
     const Quat q_lvlh_then = q_lvlh_body * exp_rotation(dt_s * rate);
-    return {normalized(scenario_.orbit.q_world_lvlh(seconds(from.t_ns) + dt_s) * q_lvlh_then),
+    return {normalized(scenario_.orbit.q_world_lvlh(to_seconds(from.t_ns) + dt_s) * q_lvlh_then),
             rate + conjugate(q_lvlh_then) * orbit_rate};
 }
 
@@ -275,8 +273,8 @@ AttitudeReport Simulation::measure_attitude() {
 }
 
 Truth Simulation::truth() const {
-    return {attractor_motion(scenario_.orbit, scenario_.q_world_attractor, seconds(t_ns())), target_motion(state_),
-            chaser_motion_of(state_)};
+    return {attractor_motion(scenario_.orbit, scenario_.q_world_attractor, to_seconds(t_ns())),
+            target_motion(state_), chaser_motion_of(state_)};
 }
 
 PortState Simulation::port() const {

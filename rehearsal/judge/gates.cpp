@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
+#include "base/constants.h"
 
 namespace narpa::rehearsal {
 namespace {
-
-constexpr double kDeg = 180 / std::numbers::pi;
 
 std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
     return t_ns == BusRecord::kNever ? "never" : fmt::format("at t = {:.3f} s", bus.seconds(t_ns));
@@ -18,7 +16,7 @@ std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
 
 double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& p) {
     if (p.x < 0) return corridor.radius_m - norm(p);
-    const double allowed = corridor.radius_m + p.x * std::tan(corridor.half_angle_deg / kDeg);
+    const double allowed = corridor.radius_m + p.x * std::tan(corridor.half_angle_deg / kDegreesPerRadian);
     return allowed - std::hypot(p.y, p.z);
 }
 

@@ -4,16 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include "base/constants.h"
 
 #include "drivers/can/can_bus.h"
 
 namespace narpa::rehearsal {
-namespace {
-
-constexpr double kDeg = 180 / std::numbers::pi;
-
-}  // namespace
+namespace {}  // namespace
 
 Judge::Judge(const Scenario& scenario, Failure on_failure)
     : scenario_(scenario), on_failure_(std::move(on_failure)) {}
@@ -71,7 +67,7 @@ void Judge::check(const JudgedEstimate& estimate) {
     if (!measured_) return;  // until then the estimate is the scenario's start
     const bool too_far = position_.check(estimate, limits.position_m - norm(estimate.position_error_m));
     const bool too_turned =
-        attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDeg);
+        attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDegreesPerRadian);
     if (scenario_.gates.navigation && (too_far || too_turned) && !reported) report(navigation());
 }
 
@@ -94,7 +90,7 @@ NavigationStatistics Judge::navigation_statistics() const {
         measured |= e.frames + e.sweeps > 0;
         if (!measured) continue;
         position.push_back(norm(e.position_error_m));
-        attitude.push_back(norm(e.rotation_error_rad) * kDeg);
+        attitude.push_back(norm(e.rotation_error_rad) * kDegreesPerRadian);
     }
     if (s.estimates > 0) {
         s.share_within = static_cast<double>(within) / static_cast<double>(s.estimates);

@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include "base/constants.h"
 
 #include "rehearsal/judge/judge.h"
 
 namespace narpa::rehearsal {
 namespace {
-
-constexpr double kDeg = 180 / std::numbers::pi;
 
 /// State, margin and times from a monitor; the caller adds the reason.
 template <class Sample>
@@ -105,8 +103,9 @@ GateResult Judge::navigation() const {
     };
     const auto attitude = [](const JudgedEstimate& e) {
         return fmt::format("{:.3f} deg off, standard deviations {:.3f}, {:.3f}, {:.3f} deg",
-                           norm(e.rotation_error_rad) * kDeg, e.sigma_rotation_rad.x * kDeg,
-                           e.sigma_rotation_rad.y * kDeg, e.sigma_rotation_rad.z * kDeg);
+                           norm(e.rotation_error_rad) * kDegreesPerRadian,
+                           e.sigma_rotation_rad.x * kDegreesPerRadian, e.sigma_rotation_rad.y * kDegreesPerRadian,
+                           e.sigma_rotation_rad.z * kDegreesPerRadian);
     };
     const auto sigmas = [](const JudgedEstimate& e) {
         return fmt::format("{:.2f} standard deviations", e.largest_in_sigmas());

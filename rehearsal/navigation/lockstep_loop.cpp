@@ -8,8 +8,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
-constexpr std::int64_t kPatience_ns = 600 * kSecond_ns;  // the emulator may render large frames
+constexpr std::int64_t kEmulatorPatience_ns = 600 * kSecond_ns;  // the emulator may render large frames
 constexpr std::int64_t kFrameWait_ns = 10 * kSecond_ns, kPacketWait_ns = 1 * kSecond_ns;
 
 class LockstepLoop {
@@ -40,14 +39,14 @@ private:
 
     template <class Condition>
     Status wait_for(const Condition& met, const std::string& what) {
-        const std::int64_t deadline = monotonic_ns() + kPatience_ns;
+        const std::int64_t deadline = monotonic_ns() + kEmulatorPatience_ns;
         while (!met() && !loop_.over()) {
-            loop_.link.receive(20 * kMs);
+            loop_.link.receive(kSecond_ns / 50);
             if (auto read = read_frames(); !read) return read;
             read_packets();
             if (monotonic_ns() > deadline)
                 return Error{fmt::format("no {} in {} s: are `narpa run --lockstep` and the dynamics there?", what,
-                                         kPatience_ns / kSecond_ns),
+                                         kEmulatorPatience_ns / kSecond_ns),
                              loop_.link.description(), 0, 0, ErrorKind::failed};
         }
         return Ok{};

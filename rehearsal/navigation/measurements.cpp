@@ -6,16 +6,11 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/time.h"
 #include "estimator/view/measured_image.h"
 
 namespace narpa::rehearsal {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 FeatureSettings feature_settings(std::uint64_t seed) {
     FeatureSettings f;
@@ -45,7 +40,7 @@ CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, 
 
 MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
                                                const Quat& q_world_chaser, const Rigid3& T_chaser_target) {
-    const auto start = Clock::now();
+    const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
     const auto image = measured_image(camera_, bytes);
     if (!image) {
@@ -56,7 +51,7 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
         model_.place(t_s, normalized(q_world_chaser * T_chaser_target.q), inverse(T_chaser_target));
     const FeatureEstimate e = alignment_.align(*image, at, inverse(camera_.T_mount_camera) * T_chaser_target);
     out.points = e.agreeing;
-    out.ms = ms_since(start);
+    out.ms = seconds_since(start_ns) * 1e3;
     if (!e.ok()) {
         out.why = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
         return out;
@@ -92,7 +87,7 @@ void LidarPoseEstimator::remove_own_body(std::span<const RangePoint> points) {
 MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points, std::int64_t t_ns,
                                               const SweepMotion& motion, const Rigid3& T_chaser_target,
                                               double position_sigma_m, double rotation_sigma_rad) {
-    const auto start = Clock::now();
+    const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
     remove_own_body(points);
     const Quat q_lidar_chaser = conjugate(lidar_.T_mount_lidar.q);
@@ -101,7 +96,7 @@ MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points
     const double off_m = kSearchSigmas * (position_sigma_m + rotation_sigma_rad * reach_m);
     const auto e =
         icp_.align(points_, in_lidar, inverse(lidar_.T_mount_lidar) * T_chaser_target, off_m > kNear_m ? off_m : 0);
-    out.ms = ms_since(start);
+    out.ms = seconds_since(start_ns) * 1e3;
     if (!e) {
         out.why = e.error().what;
         return out;

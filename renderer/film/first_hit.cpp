@@ -1,7 +1,6 @@
 #include "renderer/film/first_hit.h"
 
-#include <limits>
-
+#include "base/constants.h"
 #include "renderer/integrator/shading.h"
 
 namespace narpa {
@@ -29,7 +28,6 @@ void resize(Aovs& a, std::size_t n) {
 }
 
 void store_first_hit(const Frame& f, const Ray& ray, const Hit& hit, std::size_t pixel, Aovs& aovs) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const bool seen = hit.body >= 0;
     aovs.body[pixel] = hit.body;
     aovs.range_m[pixel] = seen ? hit.range_m : kInfinity;

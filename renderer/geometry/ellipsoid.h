@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/constants.h"
 #include "renderer/geometry/shape.h"
 #include "renderer/geometry/sphere_roots.h"
 
@@ -70,8 +71,6 @@ public:
 private:
     std::uint32_t nearest(const ShapeRays& rays, std::uint32_t wanted, ShapeHits& hits) const noexcept;
     void fill_surface(const ShapeHits& found, HitBatch& hits) const noexcept;
-
-    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
     Vec3 semi_axes_m_;
     double radius_m_;  ///< largest semi-axis

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
+
+#include "base/constants.h"
 
 namespace narpa {
 namespace {
@@ -22,7 +23,6 @@ public:
             cumulative_.push_back(sum += area * radiance);
         }
         if (faces_.empty()) return;
-        constexpr double kInfinity = std::numeric_limits<double>::infinity();
         Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
         const auto for_each_corner = [&](const auto& visit) {
             for (const std::uint32_t face : faces_)

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "base/constants.h"
 #include "renderer/geometry/box_tree.h"
 #include "renderer/geometry/mesh_topology.h"
 
@@ -38,7 +38,6 @@ Status check_mesh(const Scene& scene, const Mesh& mesh) {
 /// a box its outline is up to 2.4 times as large as the box's own. A flat mesh keeps a thousandth of its largest
 /// extent in thickness.
 BodyBounds ellipsoid_about(const Mesh& mesh) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
     const auto for_each_vertex = [&](const auto& f) {
         for (const auto& face : mesh.faces)

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <limits>
 
+#include "base/constants.h"
 #include "base/each_isa.h"
 #include "renderer/geometry/sphere_roots.h"
 #include "renderer/geometry/tracer_impl.h"
@@ -41,7 +41,6 @@ struct NearestHits {
 namespace {
 
 constexpr std::size_t kSortedBodies = 32;  ///< bodies that are sorted at a time
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Lanes<double> for_all(double value) {
     Lanes<double> lanes;

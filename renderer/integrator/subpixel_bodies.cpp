@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "base/constants.h"
 #include "renderer/camera/lens.h"
 
 namespace narpa {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double largest(const Vec3& v) {
     return std::max({v.x, v.y, v.z});

@@ -4,13 +4,13 @@
 #include <array>
 #include <optional>
 
+#include "base/constants.h"
 #include "base/each_isa.h"
 #include "renderer/integrator/path_dimensions.h"
 
 namespace narpa {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Russian roulette: a path whose throughput is less than this may end; one that has found no light yet, as on
 /// night sides, only at less, and only behind so many vertices.
 constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;

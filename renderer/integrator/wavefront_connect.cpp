@@ -2,13 +2,12 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/constants.h"
 #include "renderer/integrator/path_dimensions.h"
 #include "renderer/integrator/wavefront.h"
 
 namespace narpa {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// At a second vertex what counts is the light that falls in.
 void receive(SecondVertex& second, std::size_t kind, const Vec3& from, const Rgb& light, ShadowRay& ray) {

@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "base/constants.h"
 #include "renderer/light/concentric_disc.h"
 #include "renderer/light/medium.h"
 
 namespace narpa {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Occluders so close to a light are taken for its mounting: relative to the size of both, for rounding in single
 /// precision, and to the distance, for rounding in double.
 constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;

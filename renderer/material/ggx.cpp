@@ -75,10 +75,6 @@ double spread(double alpha, double mu) {
     return std::sqrt(alpha * alpha + (1 - alpha * alpha) * mu * mu);
 }
 
-double mean(const Rgb& c) {
-    return static_cast<double>(c.x + c.y + c.z) / 3;
-}
-
 /// The material seen from one side.
 struct SeenGgx : Ggx {
     Vec3 n, v;

@@ -5,16 +5,18 @@
 /// well. Phong's f stands in bsdf.cpp itself.
 #pragma once
 
-#include <numbers>
-
+#include "base/constants.h"
 #include "renderer/material/bsdf.h"
 
 namespace narpa::lobes {
 
-inline constexpr double kPi = std::numbers::pi;
 using Random3 = std::array<double, 3>;
 /// Directions of less density are never drawn but by rounding, and could overflow the weight.
 inline constexpr double kLeastDensity = 1e-30;
+
+inline double mean(const Rgb& c) noexcept {
+    return static_cast<double>(c.x + c.y + c.z) / 3;
+}
 
 double phong_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
 Vec3 phong_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept;

@@ -8,10 +8,6 @@
 namespace narpa::lobes {
 namespace {
 
-double mean(const Rgb& c) {
-    return static_cast<double>(c.x + c.y + c.z) / 3;
-}
-
 /// Share of the samples that the lobe takes: by the albedos, each at its largest. A wide lobe leaves more to the
 /// cosine, which keeps the largest weight below twice the mean down to n = 0.
 double lobe_share(const Surface& s) {

@@ -9,12 +9,12 @@ namespace {
 /// CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
 constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
 
-constexpr Range kLength{.low = 0, .high = 1e15, .low_open = true};
+constexpr Range kBodyLength{.low = 0, .high = 1e15, .low_open = true};
 
 Sphere read_sphere(TableReader& table, int material) {
     Sphere sphere{.material = material};
     table.require("radius_m", "a number > 0");
-    sphere.radius_m = table.number("radius_m", kLength).value_or(sphere.radius_m);
+    sphere.radius_m = table.number("radius_m", kBodyLength).value_or(sphere.radius_m);
     table.finish();
     return sphere;
 }
@@ -22,7 +22,7 @@ Sphere read_sphere(TableReader& table, int material) {
 Ellipsoid read_ellipsoid(TableReader& table, int material) {
     Ellipsoid ellipsoid{.material = material};
     table.require("semi_axes_m", "[a, b, c], the half lengths along the body's x, y and z");
-    ellipsoid.semi_axes_m = table.vec3("semi_axes_m", kLength).value_or(ellipsoid.semi_axes_m);
+    ellipsoid.semi_axes_m = table.vec3("semi_axes_m", kBodyLength).value_or(ellipsoid.semi_axes_m);
     table.finish();
     return ellipsoid;
 }

@@ -8,7 +8,7 @@ namespace narpa {
 
 namespace {
 
-constexpr Range kLength{.low = 0, .high = 1e12, .low_open = true};
+constexpr Range kLightLength{.low = 0, .high = 1e12, .low_open = true};
 
 /// The key for the brightness of a light of this kind.
 const char* emission_key(Light::Kind kind) {
@@ -46,12 +46,12 @@ void read_emission(TableReader& table, Light& light) {
 void read_size(TableReader& table, Light& light) {
     if (light.kind == Light::Kind::rectangle) {
         table.require("size_m", "[width, height]");
-        if (const auto size = table.pair("size_m", kLength))
+        if (const auto size = table.pair("size_m", kLightLength))
             light.width_m = (*size)[0], light.height_m = (*size)[1];
     }
     if (light.kind == Light::Kind::disc) {
         table.require("radius_m", "a number > 0");
-        light.radius_m = table.number("radius_m", kLength).value_or(light.radius_m);
+        light.radius_m = table.number("radius_m", kLightLength).value_or(light.radius_m);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "base/constants.h"
 #include "renderer/material/albedo.h"
 #include "renderer/scene/kind_names.h"
 #include "renderer/scene/scene_parts.h"
@@ -10,7 +11,6 @@ namespace narpa {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr Range kRadiance{.low = 0, .high = 1e30};
 
 /// Keys of each kind beside those that all have: emission, normals, heights.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/read_mounting.h"
 #include "renderer/scene/scene_parts.h"
@@ -11,8 +12,6 @@
 namespace narpa {
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 void read_resolution(TableReader& table, Camera& camera) {
     constexpr int kMostPixels = 16384;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/constants.h"
 #include "renderer/scene/kind_names.h"
 #include "renderer/scene/scene_parts.h"
 #include "renderer/scene/sun_direction.h"
@@ -12,7 +13,6 @@ namespace narpa {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kMaxBudgetMs = 1e6;
 constexpr std::int64_t kMaxBudgetRays = 1'000'000'000'000;
 constexpr int kFirstYear = 1900, kLastYear = 2100;  // where ERFA's Earth is good, and int64 nanoseconds hold

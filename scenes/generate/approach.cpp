@@ -1,3 +1,4 @@
+#include "base/constants.h"
 #include "scenes/generate/scenes.h"
 
 #include <charconv>
@@ -6,8 +7,6 @@
 
 namespace narpa::scenes {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// A value and its derivative in time.
 struct Dual {

@@ -6,11 +6,11 @@
 #include <functional>
 #include <vector>
 
+#include "base/constants.h"
 #include "scenes/generate/mesh.h"
 
 namespace narpa::scenes {
 
-inline constexpr double kPi = 3.14159265358979323846;
 /// Texture scale where nothing else is said: 1 cm a texel in a 1024-texel picture.
 inline constexpr double kMetresPerTile = 10.24;
 

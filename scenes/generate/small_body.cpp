@@ -1,3 +1,4 @@
+#include "base/constants.h"
 #include "scenes/generate/scenes.h"
 
 #include <cmath>
@@ -7,7 +8,6 @@
 namespace narpa::scenes {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr Vec3 kSemiAxes{28, 20, 17};
 constexpr int kMeridians = 360, kParallels = 180;
 

@@ -1,4 +1,5 @@
 #include "base/pose.h"
+#include "base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +10,6 @@
 
 namespace narpa {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Rotation angles where formulas break: none, tiny, ordinary, next to half a turn.
 constexpr double kAngles[] = {0,   1e-150, 1e-16, 1e-12,      1e-9,        1e-8, 1e-4,

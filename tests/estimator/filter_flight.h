@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "../support/shapes.h"
+#include "base/constants.h"
 #include "estimator/filter/pose_filter.h"
 
 namespace narpa::test {
 
 inline constexpr std::int64_t kSecond = 1'000'000'000;
-inline constexpr double kPi = 3.14159265358979323846;
 
 inline double normal(std::mt19937_64& random) {
     return std::normal_distribution<double>()(random);

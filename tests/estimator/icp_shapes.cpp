@@ -6,12 +6,12 @@
 #include <random>
 
 #include "../support/shapes.h"
+#include "base/constants.h"
 #include "estimator/cloud/cloud_icp.h"
 
 namespace narpa {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 const Rigid3 kTruth{normalized(Quat{0.8, 0.3, -0.4, 0.2}), {1.0, 12.0, -0.5}};
 
 struct SurfacePoint {

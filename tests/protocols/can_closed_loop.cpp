@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "base/constants.h"
+#include "base/time.h"
 #include "protocols/can/closed_loop_signals.h"
 #include "protocols/can/crc.h"
 #include "protocols/can/messages.h"
@@ -17,9 +19,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(),
-                 kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class Random {
 public:

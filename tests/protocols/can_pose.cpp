@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 
+#include "base/constants.h"
 #include "protocols/can/candump.h"
 #include "protocols/can/crc.h"
 #include "tests/protocols/can_support.h"
@@ -13,7 +14,6 @@ namespace narpa {
 namespace {
 
 constexpr std::uint32_t kBase = 0x100;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 PoseCommand command_at(std::int64_t t_valid_ns, std::uint8_t counter) {
     PoseCommand c{counter, t_valid_ns, {}};

@@ -4,8 +4,8 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "base/constants.h"
 #include "rehearsal/navigation/relative_motion.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/rehearsal/judge_support.h"
@@ -61,7 +61,6 @@ TEST(DockingGeometry, DynamicsAndJudgeAgreeAtEveryLimit) {
     std::array<double, 8> values{first.contact->conditions[0].value};
     for (std::size_t i = 0; i < 7; ++i) values[i + 1] = first.contact->conditions[i].value;
 
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     for (std::size_t limit = 0; limit < values.size(); ++limit) {
         EXPECT_GT(values[limit], 0);
         const double outwards = limit == 0 ? -kInfinity : kInfinity;

@@ -1,8 +1,7 @@
 // Light through the whole camera where it has a closed form, by both methods.
 #include <gtest/gtest.h>
 
-#include <numbers>
-
+#include "base/constants.h"
 #include "renderer/film/camera_image.h"
 #include "tests/renderer/camera_support.h"
 #include "tests/support/shapes.h"
@@ -12,7 +11,6 @@ namespace {
 
 using namespace test;
 using Method = RenderSettings::Method;
-constexpr double kPi = std::numbers::pi;
 constexpr double kSolar = 1361;
 
 RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, const FrameSettings& settings) {

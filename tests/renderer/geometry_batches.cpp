@@ -3,13 +3,12 @@
 
 #include <random>
 
+#include "base/constants.h"
 #include "renderer/geometry/tracer.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A smooth and a faceted mesh, two spheres and two ellipsoids, turned and moved at random, two of them planets.
 Scene crowd(std::mt19937_64& rng) {

@@ -1,8 +1,7 @@
 // Ellipsoids: planets as they are, solved in double; and how textures lie on them and on meshes.
 #include <gtest/gtest.h>
 
-#include <numbers>
-
+#include "base/constants.h"
 #include "renderer/camera/camera_model.h"
 #include "renderer/geometry/ellipsoid.h"
 #include "tests/support/shapes.h"
@@ -12,7 +11,6 @@ namespace {
 
 using namespace test;
 using Wide = Vec<long double>;
-constexpr double kPi = std::numbers::pi;
 
 /// World Geodetic System 1984: equatorial radius and 1 / flattening (NGA.STND.0036, 2014).
 constexpr double kEquator = 6378137, kFlattening = 1 / 298.257223563, kPole = kEquator * (1 - kFlattening);

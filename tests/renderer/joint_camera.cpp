@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numbers>
 
+#include "base/constants.h"
 #include "renderer/camera/lens.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/film/tile_culling.h"
@@ -14,8 +14,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-
-constexpr double kPi = std::numbers::pi;
 
 const Pinhole kPinhole{400, 440, 130, 95};
 const EquidistantCamera kEquidistant{150, 140, 130, 95};

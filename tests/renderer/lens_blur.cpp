@@ -3,8 +3,8 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "base/constants.h"
 #include "renderer/camera/lens.h"
 #include "renderer/film/camera_image.h"
 #include "tests/support/shapes.h"
@@ -13,7 +13,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 
 TEST(ThinLens, OracleOfImageDistanceAndCircleOfConfusion) {
     std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/thin_lens.json");

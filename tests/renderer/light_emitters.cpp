@@ -1,4 +1,5 @@
 // What emitters send to a surface, against the closed forms of radiometry.
+#include "base/constants.h"
 #include "renderer/light/lights.h"
 #include "tests/renderer/path_support.h"
 
@@ -6,7 +7,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 const PathSettings kDirectLight{.max_depth = 1};
 
 Light lamp(Light::Kind kind, const Rigid3& T, const Rgb& emission) {

@@ -3,18 +3,16 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <ostream>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "base/constants.h"
 #include "renderer/material/bsdf.h"
 #include "renderer/material/directions.h"
 
 namespace narpa::test {
-
-inline constexpr double kPi = std::numbers::pi;
 
 /// A surface with the material it points to.
 struct TestMaterial {

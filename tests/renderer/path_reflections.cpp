@@ -1,4 +1,5 @@
 // Paths over glossy surfaces, mirrors and glass, against quadrature and the formulas of ray optics.
+#include "base/constants.h"
 #include "renderer/material/bsdf.h"
 #include "tests/renderer/path_support.h"
 
@@ -6,7 +7,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 const PathSettings kDirectLight{.max_depth = 1};
 
 Material metal(float roughness) {

@@ -2,6 +2,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "base/constants.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/light/lights.h"
 #include "renderer/material/bsdf.h"
@@ -12,7 +13,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 constexpr double kSolar = 1361;
 const PathSettings kDirectLight{.max_depth = 1};
 

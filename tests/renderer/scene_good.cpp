@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
@@ -10,7 +11,6 @@
 namespace narpa {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 using test::data_file;
 using test::TemporaryFolder;
 

@@ -5,8 +5,8 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "base/constants.h"
 #include "renderer/camera/camera_model.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/subpixel_bodies.h"
@@ -18,7 +18,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 constexpr double kFocal = 1319.4792168823421;  // 30 degrees across the diagonal of 500 x 500
 
 RadianceImage render(const RenderScene& render_scene, const Camera& c, const Rigid3& T,

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
+#include "base/constants.h"
 #include "renderer/camera/camera_model.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/texture_lookup.h"
@@ -14,7 +14,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 
 template <class Value>  // (x, y) -> 0..1
 Texture make(int width, int height, Value value) {

@@ -1,8 +1,7 @@
 // Light on shapes with closed forms.
 #include <gtest/gtest.h>
 
-#include <numbers>
-
+#include "base/constants.h"
 #include "renderer/camera/camera_model.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/sampler.h"
@@ -17,7 +16,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr double kPi = std::numbers::pi;
 constexpr double kSolar = 1361;
 
 RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, int spp = 1) {

@@ -4,19 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/constants.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa::test {
-
-inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A geodesic sphere of 20 * 4^level triangles; `smooth` gives it the sphere's own normals at the vertices.
 inline Mesh icosphere(int level, double radius_m, bool smooth = false) {

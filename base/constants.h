@@ -1,0 +1,13 @@
+/// base/constants.h - numbers used everywhere.
+#pragma once
+
+#include <limits>
+#include <numbers>
+
+namespace narpa {
+
+inline constexpr double kPi = std::numbers::pi;
+inline constexpr double kDegreesPerRadian = 180 / kPi;
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace narpa

@@ -1,11 +1,12 @@
 /// renderer/material/ggx_albedo.h - how much light a rough GGX surface sends back on the first bounce.
 ///
 /// What is missing to 1 with F = 1 bounced between the facets; C. Kulla, A. Conty, "Revisiting Physically Based
-/// Shading at Imageworks" (SIGGRAPH 2017 course) give it back. The tables are integrals over the visible normals,
-/// with Smith's height-correlated masking, written by make_ggx_albedo.py. They err upwards, by at most 0.006 (E)
-/// and 0.015 (with Fresnel's equations, grazing at roughness below 0.3): so the sum of all that is reflected never
-/// exceeds 1.
+/// Shading at Imageworks" (SIGGRAPH 2017 course) give it back. Looked up in the tables of ggx_table.h, which assume
+/// Smith's height-correlated masking. They err upwards, by at most 0.006 (E) and 0.015 (with Fresnel's equations,
+/// grazing at roughness below 0.3): so the sum of all that is reflected never exceeds 1.
 #pragma once
+
+#include "renderer/material/fresnel.h"
 
 namespace narpa {
 
@@ -36,20 +37,9 @@ private:
 
 /// Fresnel's reflectance averaged over a hemisphere, cosine-weighted: Schlick's form by its integral, the exact one
 /// by Kulla and Conty's fit (within 0.001).
-[[nodiscard]] double mean_fresnel(GgxAlbedo::Interface i) noexcept;
-
-/// Table layout. A roughness r in 0..1 lies on even steps; a cosine mu on even steps of sqrt(mu (1 + a) / (mu + a))
-/// with a = r^2, dense where masking sets in; an index n on even steps of sqrt((n - 1) / (n + 1)), n = 1..3,
-/// Schlick after the last.
-namespace ggx_table {
-inline constexpr int kRoughnessNodes = 32, kMuNodes = 32;
-inline constexpr int kCosineRoughnessNodes = 16, kCosineMuNodes = 24, kIndexNodes = 6;
-extern const float kAlbedo[kRoughnessNodes * kMuNodes];
-extern const float kMeanAlbedo[kRoughnessNodes];
-/// Cosine at which Fresnel's reflectance is the first bounce's mean, over (mu + a).
-extern const float kCosine[(kIndexNodes + 1) * kCosineRoughnessNodes * kCosineMuNodes];
-/// The first bounce's hemispherical mean: over `mean_fresnel` for an index, of (1 - cosine)^5 for Schlick.
-extern const float kMeanReflected[(kIndexNodes + 1) * kCosineRoughnessNodes];
-}  // namespace ggx_table
+[[nodiscard]] inline double mean_fresnel(GgxAlbedo::Interface i) noexcept {
+    if (i.schlick) return (1 + 20 * normal_reflectance(i.ior)) / 21;
+    return (i.ior - 1) / (4.08567 + 1.00071 * i.ior);
+}
 
 }  // namespace narpa

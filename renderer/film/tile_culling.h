@@ -8,14 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "renderer/film/tile_mask.h"
+#include "renderer/film/body_culling.h"
 #include "renderer/geometry/tracer.h"
 
 namespace narpa {
-
-inline constexpr int kTileSize = 8;  ///< pixels a side
-
-class Pinhole;
 
 class TileCulling {
 public:
@@ -38,10 +34,6 @@ public:
     [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
 
 private:
-    void update_pinhole(const Pinhole& pinhole, const BodyPoses& at, const Rigid3& T_world_camera,
-                        const Lens* lens) noexcept;
-    void update_by_cones(const CameraModel& model, const BodyPoses& at, const Rigid3& T_world_camera,
-                         const Lens* lens) noexcept;
     void list(std::uint32_t body) noexcept;
     [[nodiscard]] std::size_t index(int tile_x, int tile_y) const noexcept {
         return static_cast<std::size_t>(tile_y) * static_cast<std::size_t>(tiles_x_) +

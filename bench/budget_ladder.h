@@ -41,13 +41,12 @@ struct NamedMechanism {
     const char* name;
     bool Mechanisms::*on;
 };
-inline constexpr std::array<NamedMechanism, 8> kMechanisms{
+inline constexpr std::array<NamedMechanism, 7> kMechanisms{
     {{"sample plan", &Mechanisms::sample_plan},
      {"edge classes", &Mechanisms::edge_classes},
      {"path reuse", &Mechanisms::path_reuse},
      {"small-body sampling", &Mechanisms::small_body_sampling},
-     {"sun first", &Mechanisms::sun_first},
-     {"shared variance", &Mechanisms::shared_variance},
+     {"separate sun", &Mechanisms::separate_sun},
      {"tile culling", &Mechanisms::tile_culling},
      {"coarse steps", &Mechanisms::coarse_steps}}};
 

@@ -31,6 +31,11 @@ constexpr std::uint64_t kPixelsOfACoarseRay = 4;
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
 
+/// Doubt lowers an estimate by this factor, to no less than that part of the last measurement.
+constexpr double kDoubt = 0.95, kLeastBelieved = 0.25;
+/// The time of passes of fewer samples is mostly that of their start and end: it is an upper bound only.
+constexpr std::uint64_t kLeastPieces = 1000;
+
 /// A frame begins with one sample for each pixel. Sun-only direct lighting takes the pixels' centres, plans from
 /// them and discards them where there are samples; all other light takes the first sample of each pixel's sequence
 /// and keeps it.
@@ -49,7 +54,7 @@ public:
           centre_(make_frame(render_scene, at, camera, pose, centre_settings_)),
           sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
           has_indirect_(settings.method == RenderSettings::Method::path),
-          adaptive_(sample_.quick && settings.mechanisms.sample_plan),
+          adaptive_(sample_.sun_only && settings.mechanisms.sample_plan),
           out_(out),
           variance_(variance) {}
 
@@ -159,7 +164,7 @@ private:
     void take_first_image() {
         switch (budget_.kind) {
             case Kind::samples: break;
-            case Kind::passes: take_as_told(); break;
+            case Kind::passes: replay_first_image(); break;
             case Kind::time:
                 if (!coarse_steps())
                     take_one_sample({});
@@ -189,9 +194,9 @@ private:
         return stride == 1 ? take_one_sample(most) : take_centres(stride, 0, FrameStep::coarse_2, most);
     }
 
-    [[nodiscard]] FrameStep step_told() const { return static_cast<FrameStep>(budget_.step); }
-    void take_as_told() {
-        switch (step_told()) {
+    [[nodiscard]] FrameStep recorded_step() const { return static_cast<FrameStep>(budget_.step); }
+    void replay_first_image() {
+        switch (recorded_step()) {
             case FrameStep::refined:
             case FrameStep::one_sample: take_one_sample({}); break;
             case FrameStep::no_indirect: take_centres(1, 0, FrameStep::no_indirect); break;
@@ -275,7 +280,7 @@ private:
         constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
         const SamplePlan& plan = passes_.plan();
         if (budget_.kind == Kind::passes)
-            return step_told() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
+            return recorded_step() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
         if (budget_.kind == Kind::rays) {
             const auto left = static_cast<double>(rays_left());
             if (left < kRest * static_cast<double>(budget_.rays)) return stage_;
@@ -330,6 +335,29 @@ private:
 };
 
 }  // namespace
+
+void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept {
+    if (pieces == 0) return;
+    double& ns = ns_[index(what)];
+    const double now = static_cast<double>(wall_ns) / static_cast<double>(pieces);
+    if (pieces < kLeastPieces && !(known(what) && now < ns)) return;
+    // A frame that something delayed predicts little of the next.
+    switch (measurements_[index(what)]) {
+        case 0: ns = now; break;
+        case 1: ns = std::min(ns, now); break;
+        default: ns += 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns);
+    }
+    if (measurements_[index(what)] < 2) ++measurements_[index(what)];
+    least_ns_[index(what)] = kLeastBelieved * ns;
+}
+
+void PassCosts::doubt(Of what) noexcept {
+    ns_[index(what)] = std::max(kDoubt * ns_[index(what)], least_ns_[index(what)]);
+}
+
+std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {
+    return static_cast<std::uint64_t>(static_cast<double>(std::max<std::int64_t>(wall_ns, 0)) / ns_[index(what)]);
+}
 
 FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene,
                                   const Camera& camera, const BodyPoses& at, const CameraPose& pose,

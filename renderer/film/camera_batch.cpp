@@ -75,13 +75,13 @@ NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const
 constexpr std::uint32_t kPathsOwn = 2;
 
 /// Most paths choose their own points of the Sun.
-void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
-    const bool sun = f.sun && (f.quick || f.sun_first);
+void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
+    const bool sun = f.sun && (f.sun_only || f.separate_sun);
     p.rays.n = s.n;
     if (s.centre && f.one_sample()) {
         aim_at_centres(f, s, p.rays);
-        if (f.quick && sun) p.to_sun.fill(f.sun->centre());
-        if (f.quick || !sun) return;
+        if (f.sun_only && sun) p.to_sun.fill(f.sun->centre());
+        if (f.sun_only || !sun) return;
         Points u;
         next_points(f, s, kPathsOwn, u);
         aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
@@ -113,7 +113,7 @@ void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& 
     }
 }
 
-void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
+void aim(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
     aim_at_mid_exposure(f, s, p);
     if (!f.over_time) return;
     Points u;
@@ -126,20 +126,20 @@ void aim(const Frame& f, const CameraSamples& s, Packet& p) noexcept {
 
 }  // namespace
 
-void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, Packet& p) {
+void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, CameraBatch& p) {
     PhaseClock clock(p.times);
     aim(f, s, p);
     p.number = s.number;
-    p.sample = s.path;
+    p.sample = s.sample;
     clock.ends(Phase::aim);
     f.tracer.intersect(f.at, p.rays, bodies, p.hits);
     p.rays_traced += s.n;
-    if (f.tiny.any())
-        for (std::size_t i = 0; i < s.n; ++i) p.hits.put(i, f.tiny.beyond(p.rays[i], p.hits[i]));
+    if (f.subpixel_bodies.any())
+        for (std::size_t i = 0; i < s.n; ++i) p.hits.put(i, f.subpixel_bodies.beyond(p.rays[i], p.hits[i]));
     clock.ends(Phase::rays);
 }
 
-void trace_centres(const Frame& f, const CameraSamples& s, Packet& p) {
+void trace_centres(const Frame& f, const CameraSamples& s, CameraBatch& p) {
     p.rays.n = s.n;
     aim_at_centres(f, s, p.rays);
     if (f.over_time) move_to_times(f, s, kMidExposureLanes, p.rays);

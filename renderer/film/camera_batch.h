@@ -16,14 +16,14 @@ struct CameraSamples {
     Lanes<int> x, y;              ///< pixels
     Lanes<std::uint32_t> number;  ///< of the pixel, row by row
     Lanes<std::uint32_t> sample;  ///< place in the pixel's own sequence; of centres 0
-    Lanes<std::uint32_t> path;    ///< the same of the dimensions that belong to the path
 };
 
 /// Aims the samples' rays and finds what they meet, but for subpixel bodies. `bodies`: those that any of the rays
 /// may meet.
-void trace_rays(const Frame& f, const CameraSamples& samples, std::span<const std::uint32_t> bodies, Packet& p);
+void trace_rays(const Frame& f, const CameraSamples& samples, std::span<const std::uint32_t> bodies,
+                CameraBatch& p);
 
 /// The rays through the pixels' centres and what they meet, subpixel bodies included.
-void trace_centres(const Frame& f, const CameraSamples& samples, Packet& p);
+void trace_centres(const Frame& f, const CameraSamples& samples, CameraBatch& p);
 
 }  // namespace narpa

@@ -4,19 +4,55 @@
 
 #include <algorithm>
 
+#include "base/constants.h"
 #include "renderer/film/budgeted_frame.h"
 #include "renderer/film/camera_batch.h"
-#include "renderer/film/first_hit.h"
 #include "renderer/geometry/flush_denormals.h"
+#include "renderer/integrator/shading.h"
 
 namespace narpa {
 namespace {
+
+/// What the surface does to the colour of light at first sight.
+Rgb base_colour(const Surface& s) {
+    switch (s.material->kind) {
+        case Material::Kind::mirror: return s.specular;
+        case Material::Kind::dielectric: return {1, 1, 1};
+        default: return s.diffuse;
+    }
+}
+
+void resize(Aovs& a, std::size_t n) {
+    a.range_m.resize(n);
+    a.depth_m.resize(n);
+    a.position.resize(n);
+    a.normal.resize(n);
+    a.body.resize(n);
+    a.albedo.resize(n);
+    a.variance.resize(n);
+}
+
+/// Writes all but the variance, which is made 0.
+void store_first_hit(const Frame& f, const Ray& ray, const Hit& hit, std::size_t pixel, Aovs& aovs) {
+    const bool seen = hit.body >= 0;
+    aovs.body[pixel] = hit.body;
+    aovs.range_m[pixel] = seen ? hit.range_m : kInfinity;
+    const Vec3 axis = f.pose.at(ray.time).q * Vec3{0, 0, 1};
+    aovs.depth_m[pixel] = seen ? hit.range_m * dot(ray.direction, axis) : kInfinity;
+    aovs.position[pixel] = seen ? hit.position : Vec3{};
+    aovs.normal[pixel] = seen ? hit.shading_normal : Vec3{};
+    aovs.variance[pixel] = 0;
+    aovs.albedo[pixel] = {};
+    if (seen)
+        aovs.albedo[pixel] =
+            base_colour(surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m / f.model->pixels_per_radian()));
+}
 
 /// The outputs beside the radiance come from the rays through the pixels' centres.
 void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
     tbb::parallel_for(0, (height + kTile - 1) / kTile, [&](int row) {
         const FlushDenormals flush;
-        Packet p;
+        CameraBatch p;
         CameraSamples s;
         s.centre = true;
         s.sample.fill(0);

@@ -36,8 +36,8 @@ void FrameError::Part::add(const PixelMean& mean) noexcept {
 }
 
 void FrameError::add(const PixelMeans& means) noexcept {
-    if (means.first.count() > 0) first_.add(means.first);
-    if (means.by_paths.count() > 0) by_paths_.add(means.by_paths);
+    if (means.direct.count() > 0) direct_.add(means.direct);
+    if (means.path.count() > 0) path_.add(means.path);
 }
 
 void FrameError::add_tile(const TileContrast* contrast, const PerPixel<PixelMeans>& means) noexcept {
@@ -62,8 +62,8 @@ FrameError::Part& FrameError::Part::operator+=(const Part& b) noexcept {
 
 FrameError& FrameError::operator+=(const FrameError& b) noexcept {
     from_contrasts_ += b.from_contrasts_;
-    first_ += b.first_;
-    by_paths_ += b.by_paths_;
+    direct_ += b.direct_;
+    path_ += b.path_;
     return *this;
 }
 
@@ -80,7 +80,7 @@ double FrameError::Part::squared_error() const noexcept {
 }
 
 double FrameError::standard_error(std::size_t pixels) const noexcept {
-    const double sum = from_contrasts_ + first_.squared_error() + by_paths_.squared_error();
+    const double sum = from_contrasts_ + direct_.squared_error() + path_.squared_error();
     return std::sqrt(sum / static_cast<double>(pixels));
 }
 

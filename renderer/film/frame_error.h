@@ -50,7 +50,7 @@ private:
     };
 
     double from_contrasts_ = 0;  ///< squared errors
-    Part first_, by_paths_;
+    Part direct_, path_;
 };
 
 }  // namespace narpa

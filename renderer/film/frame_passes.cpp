@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/film/emitters_in_view.h"
-#include "renderer/film/tile_output.h"
 #include "renderer/film/tile_worker.h"
 #include "renderer/geometry/flush_denormals.h"
 
@@ -23,6 +21,34 @@ constexpr std::size_t kManyTiles = 4096;
 int representative(int x, int width, int stride) {
     return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
 }
+
+/// Which tiles may show light where rays meet no body: the Sun's disc, lights with extent, a background that is not
+/// uniform, a medium.
+class EmittersInView {
+public:
+    EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
+        everywhere_ = !f.sun_only && (f.render_scene.lights().any_with_extent() ||
+                                      !f.render_scene.background().uniform() || f.render_scene.medium() != nullptr);
+        if (f.sun_only || f.path.direct || !f.sun || f.sun->is_point()) return;
+        // Generous bounds of half the disc and of the way from point to point of a lens.
+        const double disc_rad = f.tracer.scene().sun->angular_diameter_rad;
+        const double lens_rad = lens != nullptr ? lens->aperture_diameter_m / lens->focus_distance_m : 0;
+        within_rad_ = disc_rad + lens_rad;
+        sun_ = true;
+    }
+    /// Through a tile that begins here.
+    [[nodiscard]] bool any(int x, int y) const {
+        if (everywhere_ || !sun_) return everywhere_;
+        const DirectionCone tile = f_.model->bounds({x - 0.5, y - 0.5, x + kTile - 0.5, y + kTile - 0.5});
+        const Vec3 to_tile = f_.T_world_camera.q * tile.axis, &to_sun = f_.sun->centre();
+        return std::atan2(norm(cross(to_tile, to_sun)), dot(to_tile, to_sun)) < within_rad_ + tile.half_angle_rad;
+    }
+
+private:
+    const Frame& f_;
+    bool everywhere_ = false, sun_ = false;
+    double within_rad_ = 0;
+};
 
 // Lattices of tiles, the first of squares of 4 x 4.
 bool in_a_fifth(int tx, int ty) {
@@ -72,7 +98,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
         }
         samples.fetch_add(w.samples_traced(), std::memory_order_relaxed);
         paths.fetch_add(w.paths_traced(), std::memory_order_relaxed);
-        path_rays.fetch_add(w.rays_traced(&Packet::path_rays), std::memory_order_relaxed);
+        path_rays.fetch_add(w.rays_traced(&CameraBatch::path_rays), std::memory_order_relaxed);
         if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
             stop.store(true, std::memory_order_relaxed);
         if (sums == Sums::errors) errors_[chunk] = w.error;
@@ -88,10 +114,10 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
         [&](const tbb::blocked_range<std::size_t>& one) {
             if (stop.load(std::memory_order_relaxed)) return;
             const FlushDenormals flush;
-            if (f.quick)
+            if (f.sun_only)
                 over_chunk(one.begin(), Worker::Storage<1>());
             else
-                over_chunk(one.begin(), Worker::Storage<kTogether>());
+                over_chunk(one.begin(), Worker::Storage<kMaxBatches>());
         },
         tbb::simple_partitioner());
     return {!stop, samples, rays, paths, path_rays, now_ns() - start};
@@ -118,7 +144,7 @@ void FramePasses::begin(const Frame& f, const Lens* lens) {
 
 /// What a ray sees that meets nothing, and that looks away from the Sun.
 void FramePasses::find_background(const Frame& f) {
-    Packet p;
+    CameraBatch p;
     RgbLanes radiance;
     p.rays.n = 1;
     p.rays.put(0, {f.T_world_camera.t, f.sun ? -f.sun->centre() : f.T_world_camera.q * Vec3{0, 0, 1}});
@@ -172,11 +198,11 @@ void FramePasses::show_samples(Worker& w, const Tile& t, RadianceImage& out, std
     PerPixel<PixelSamples> spread, spread_by_paths;
     const auto none = [](std::size_t) { return 0u; };
     const auto all = [&](std::size_t) { return static_cast<std::uint32_t>(w.f.settings.spp); };
-    w.samples(t, out.width, none, all, [&](const SampleBatch& b, const Packet&, const PacketLight& light) {
+    w.samples(t, out.width, none, all, [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
         add_samples(b, light, means);
         if (variance == nullptr) return;
-        for_each_lane(b.first, [&](std::size_t i) { spread[b.place[i]].add(light.first[i]); });
-        for_each_lane(b.by_paths, [&](std::size_t i) { spread_by_paths[b.place[i]].add(light.by_paths[i]); });
+        for_each_lane(b.direct_lanes, [&](std::size_t i) { spread[b.place[i]].add(light.direct[i]); });
+        for_each_lane(b.path_lanes, [&](std::size_t i) { spread_by_paths[b.place[i]].add(light.path[i]); });
     });
     t.each_pixel([&](int x, int y, std::size_t at) {
         out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
@@ -190,7 +216,7 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
     const auto row = [&](int y) { return &out.pixels[index_of(t.x, y, out.width)]; };
     if (!fills_g_buffer(t.index)) {
         w.centres(t, out.width, out.height, 1, 0,
-                  [&](const SampleBatch& b, const Packet&, const PacketLight& light) {
+                  [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
                       for (std::size_t i = 0; i < b.samples.n; ++i)
                           row(b.samples.y[i])[b.samples.x[i] - t.x] = light(f, i);
                   });
@@ -272,7 +298,7 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
         // contrasts.
         const bool fill = plan_->is_uniform() && from == SamplePlan::none();
         w.samples(t, camera_.width, begin, end,
-                  [&](const SampleBatch& b, const Packet& p, const PacketLight& light) {
+                  [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& light) {
                       add_samples(b, light, means);
                       if (fill) g_buffer_.store(f, p, light, b.place, t.index);
                   });

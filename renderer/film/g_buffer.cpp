@@ -21,9 +21,9 @@ constexpr float kMostContrast = 2e9f;  // W m^-2 sr^-1
 /// What a detail that one centre has met stands for, of all scales together.
 constexpr float kDetailInCentres = 0.230f, kDetailInSamples = 0.200f;
 
-/// Rows one after another, and what a step to the right or down from the last needs.
+/// Row by row.
 template <class T>
-using Grid = std::array<T, (kSide + 2) * kRow>;
+using Grid = std::array<T, kSide * kRow>;
 
 /// Comparisons of each pixel with the next, to the right or below.
 struct Pairs {
@@ -63,7 +63,7 @@ struct alignas(64) LaneSurfaces {
     Lanes<std::uint32_t> surface;
 };
 
-NARPA_EACH_ISA void store_surfaces(const Packet& p, const Vec3& axis, std::uint32_t lit,
+NARPA_EACH_ISA void store_surfaces(const CameraBatch& p, const Vec3& axis, std::uint32_t lit,
                                    LaneSurfaces& out) noexcept {
     const Lanes<int> shone = masks_of(lit), met = masks_of(p.hits.met);
     LaneSurfaces seen;
@@ -85,20 +85,20 @@ NARPA_EACH_ISA void store_surfaces(const Packet& p, const Vec3& axis, std::uint3
 
 }  // namespace
 
-bool GBuffer::shows_background(const Frame& f, const Packet& p, const PacketLight& light) const noexcept {
+bool GBuffer::shows_background(const Frame& f, const CameraBatch& p, const BatchRadiance& light) const noexcept {
     if (p.hits.met != 0) return false;
     for (std::size_t i = 0; i < p.rays.n; ++i)
         if (light(f, i) != background_) return false;
     return true;
 }
 
-void GBuffer::store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
-                    std::size_t tile_index) noexcept {
+void GBuffer::store(const Frame& f, const CameraBatch& p, const BatchRadiance& light,
+                    const Lanes<std::uint8_t>& place, std::size_t tile_index) noexcept {
     GBufferTile& tile = tiles_[tile_index];
     if (!shows_background(f, p, light)) known_[tile_index] = Known::something;
     LaneSurfaces seen;
     if (p.hits.met != 0)
-        store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.quick ? p.lit : 0, seen);
+        store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.sun_only ? p.lit : 0, seen);
     else
         seen = {};
     // The batches of a whole tile are its blocks of 4 x 4 pixels.
@@ -109,8 +109,8 @@ void GBuffer::store(const Frame& f, const Packet& p, const PacketLight& light, c
         else
             for (std::size_t i = 0; i < p.rays.n; ++i) to[place[i]] = from[i];
     };
-    if (f.quick) {
-        put(light.first.r, tile.r), put(light.first.g, tile.g), put(light.first.b, tile.b);
+    if (f.sun_only) {
+        put(light.direct.r, tile.r), put(light.direct.g, tile.g), put(light.direct.b, tile.b);
     } else {
         RgbLanes whole;
         for (std::size_t i = 0; i < p.rays.n; ++i) whole.put(i, light(f, i));
@@ -118,7 +118,7 @@ void GBuffer::store(const Frame& f, const Packet& p, const PacketLight& light, c
     }
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
-    if (!f.quick) put(p.variance, tile.reused);
+    if (!f.sun_only) put(p.variance, tile.reused);
 }
 
 namespace {
@@ -209,7 +209,7 @@ template <class Around>
     const Vec3 axis = a.frame->T_world_camera.q * Vec3{0, 0, 1};
     Lanes<double> x, y;
     Vec3Lanes direction;
-    for (int row = 0; row < kSide + 2; ++row) {
+    for (int row = 0; row < kSide; ++row) {
         for (int column = 0; column < kRow; ++column)
             x[static_cast<std::size_t>(column)] = std::clamp(a.x_first + column, 0, a.x_last);
         y.fill(std::clamp(a.y_first + row, 0, a.y_last));
@@ -225,7 +225,7 @@ template <class Around>
 template <class Around>
 [[gnu::always_inline]] inline void locate(const Around& a, Positions& p) {
     if (a.frame != nullptr) return locate_by_model(a, p);
-    for (int row = 0; row < kSide + 2; ++row)
+    for (int row = 0; row < kSide; ++row)
         for (int column = 0; column < kRow; ++column) {
             const auto at = static_cast<std::size_t>(row * kRow + column);
             const auto x = static_cast<float>(std::clamp(a.x_first + column, 0, a.x_last));
@@ -236,10 +236,10 @@ template <class Around>
         }
 }
 
-/// Compares each with the one `step` further on.
+/// Compares each with the one `step` further on: of all rows but the last.
 template <class Around>
 [[gnu::always_inline]] inline void compare(const Around& a, const Positions& p, std::size_t step, Pairs& pairs) {
-    for (std::size_t at = 0; at < kSide * kRow; ++at) {
+    for (std::size_t at = 0; at < (kSide - 1) * kRow; ++at) {
         const std::size_t next = at + step;
         const float turn = a.nx[at] * a.nx[next] + a.ny[at] * a.ny[next] + a.nz[at] * a.nz[next];
         const float dx = p.x[next] - p.x[at], dy = p.y[next] - p.y[at], dz = p.z[next] - p.z[at];
@@ -321,11 +321,12 @@ void GBuffer::contrast(const Frame& f, std::size_t tile, TileContrast& out) cons
     Around a;
     gather(f, tile, a);
     measure_contrasts(a, out);
-    const bool reuses = !f.quick && !f.path.direct && f.settings.mechanisms.shared_variance;
-    for (std::size_t i = 0; i < kTilePixels; ++i) {
-        out.reused[i] = reuses && tiles_[tile].surface[i] != 0 ? tiles_[tile].reused[i] : 0;
-        out.centre[i] += out.reused[i];
-    }
+    out.reused.fill(0);
+    if (!f.sun_only && !f.path.direct)
+        for (std::size_t i = 0; i < kTilePixels; ++i) {
+            if (tiles_[tile].surface[i] != 0) out.reused[i] = tiles_[tile].reused[i];
+            out.centre[i] += out.reused[i];
+        }
     const int x_end = width_ - static_cast<int>(tile) % tiles_x_ * kTile;
     const int y_end = height_ - static_cast<int>(tile) / tiles_x_ * kTile;
     if (x_end >= kTile && y_end >= kTile) return;

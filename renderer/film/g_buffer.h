@@ -84,7 +84,7 @@ public:
     [[nodiscard]] bool is_traced(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
 
     /// Stores one sample of each of a batch's pixels. `place`: of each lane in the tile.
-    void store(const Frame& f, const Packet& p, const PacketLight& light, const Lanes<std::uint8_t>& place,
+    void store(const Frame& f, const CameraBatch& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
                std::size_t tile) noexcept;
 
     /// From a tile and its neighbours.
@@ -95,7 +95,8 @@ public:
 
 private:
     void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
-    [[nodiscard]] bool shows_background(const Frame& f, const Packet& p, const PacketLight& light) const noexcept;
+    [[nodiscard]] bool shows_background(const Frame& f, const CameraBatch& p,
+                                        const BatchRadiance& light) const noexcept;
     [[nodiscard]] bool in_empty_space(std::size_t tile) const noexcept;
 
     int width_, height_, tiles_x_, tiles_y_;

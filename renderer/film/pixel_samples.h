@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -39,7 +38,8 @@ class PixelMean {
 public:
     void add(const Rgb& radiance) {
         sum_ += vec_cast<double>(radiance);
-        if (!std::has_single_bit(++n_)) return;
+        ++n_;
+        if ((n_ & (n_ - 1)) != 0) return;  // std::has_single_bit calls a function on plain x86-64
         const float now = static_cast<float>(mean_band(mean()));
         step_before_ = step_;
         step_ = now - at_power_;
@@ -60,12 +60,12 @@ private:
 
 /// Of light in two parts, each with samples of its own number.
 struct PixelMeans {
-    PixelMean first, by_paths;
+    PixelMean direct, path;
 
-    [[nodiscard]] std::uint32_t count() const { return std::max(first.count(), by_paths.count()); }
+    [[nodiscard]] std::uint32_t count() const { return std::max(direct.count(), path.count()); }
     [[nodiscard]] Vec3 mean() const {
-        if (by_paths.count() == 0) return first.mean();
-        return first.count() == 0 ? by_paths.mean() : first.mean() + by_paths.mean();
+        if (path.count() == 0) return direct.mean();
+        return direct.count() == 0 ? path.mean() : direct.mean() + path.mean();
     }
 };
 

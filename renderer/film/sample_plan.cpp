@@ -176,7 +176,7 @@ void SamplePlan::weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t
 void SamplePlan::make_uniform(const Frame& f, std::span<const std::uint32_t> tiles) {
     const int width = f.camera.width, height = f.camera.height;
     uniform_ = true;
-    all_by_paths_ = !f.sun_first;
+    all_by_paths_ = !f.separate_sun;
     pixels_of_rank_.fill(0);
     const int tiles_x = (width + kTile - 1) / kTile;
     for (const std::uint32_t tile : tiles) {

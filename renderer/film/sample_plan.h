@@ -107,7 +107,7 @@ private:
     std::array<std::uint64_t, kRanks> pixels_of_rank_{};  ///< of the tiles that are seen
 };
 
-/// How many of a pixel's first samples are followed by a path where the light has two parts (PacketLight): the
+/// How many of a pixel's first samples are followed by a path where the light has two parts (BatchRadiance): the
 /// first two, then the first half of each octave of its sequence from the fifth on, so that powers of two have half
 /// as many. The other samples show edges and sunlight alone.
 [[nodiscard]] constexpr std::uint32_t paths_of(std::uint32_t samples) noexcept {

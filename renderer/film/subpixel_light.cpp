@@ -60,7 +60,7 @@ private:
 
     const Frame& f_;
     const PixelBlock& block_;
-    Packet packet_;
+    CameraBatch batch_;
     Lanes<std::size_t> pixel_{};  ///< of each ray: place in the block
     Lanes<double> area_px2_{};    ///< of the image, that each ray stands for
     Lanes<Vec3> light_{};         ///< of each pixel
@@ -74,9 +74,9 @@ void Collector::sample(const SubpixelDisc& disc) {
     const std::uint32_t samples = samples_of(disc, f_.settings.spp);
     for (std::uint32_t s = 0; s < samples; ++s) {
         add(disc, s, samples);
-        if (packet_.rays.n == kLanes) trace(disc.body);
+        if (batch_.rays.n == kLanes) trace(disc.body);
     }
-    if (packet_.rays.n > 0) trace(disc.body);
+    if (batch_.rays.n > 0) trace(disc.body);
     for (std::size_t i = 0; i < block_.n; ++i)
         variance_[i] += body_squares_[i] - body_sum_[i] * body_sum_[i] / samples;
 }
@@ -99,26 +99,26 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
     const std::size_t pixel = block_.holding(image->x, image->y);
     if (pixel == block_.n) return;
 
-    const std::size_t i = packet_.rays.n++;
+    const std::size_t i = batch_.rays.n++;
     const double solid_angle = at.area * std::abs(dot(cross(disc.right, disc.up), direction)) / (range * range);
     pixel_[i] = pixel;
     const double tilt = chief.z / seen.z;  // solid angles of the two rays on the plane of focus
     area_px2_[i] = solid_angle * f_.model->pixels_per_sr(chief) * (tilt * tilt * tilt);
-    packet_.rays.put(i, {f_.T_world_camera.t + start, direction});
-    packet_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kSubpixelSamplesMost + s;
+    batch_.rays.put(i, {f_.T_world_camera.t + start, direction});
+    batch_.number[i] = kFirstNumber + static_cast<std::uint32_t>(disc.body) * kSubpixelSamplesMost + s;
     if (!f_.sun) return;
     const SamplePoint u = numbers.point(s, 1);
-    packet_.to_sun.put(i, f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]));
+    batch_.to_sun.put(i, f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]));
 }
 
 void Collector::trace(std::size_t body) {
-    f_.tracer.intersect(f_.at, packet_.rays, f_.tracer.all_bodies(), packet_.hits);
-    for (std::size_t i = 0; i < packet_.rays.n; ++i)
-        if (packet_.hits.body[i] != static_cast<int>(body)) packet_.hits.put(i, {});
+    f_.tracer.intersect(f_.at, batch_.rays, f_.tracer.all_bodies(), batch_.hits);
+    for (std::size_t i = 0; i < batch_.rays.n; ++i)
+        if (batch_.hits.body[i] != static_cast<int>(body)) batch_.hits.put(i, {});
     RgbLanes radiance;
-    f_.integrator.radiance(f_, packet_, radiance);
-    for (std::size_t i = 0; i < packet_.rays.n; ++i) {
-        if (packet_.hits.body[i] < 0) continue;
+    f_.integrator.radiance(f_, batch_, radiance);
+    for (std::size_t i = 0; i < batch_.rays.n; ++i) {
+        if (batch_.hits.body[i] < 0) continue;
         const std::size_t pixel = pixel_[i];
         const Vec3 share = area_px2_[i] * vec_cast<double>(radiance[i]);
         covered_[pixel] += area_px2_[i];
@@ -126,7 +126,7 @@ void Collector::trace(std::size_t body) {
         body_sum_[pixel] += mean_band(share);
         body_squares_[pixel] += mean_band(share) * mean_band(share);
     }
-    packet_.rays.n = 0;
+    batch_.rays.n = 0;
 }
 
 void Collector::put_into(RadianceImage& out, std::vector<float>* variance) const {
@@ -154,8 +154,9 @@ void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage&
     Collector collector(f, block);
     bool met = false;
     for (std::size_t body = 0; body < f.at.T_world_body.size(); ++body) {
-        const auto disc = f.tiny.disc_within(static_cast<int>(body), block.x_first, block.y_first,
-                                             block.x_first + block.width - 1, block.y_first + block.height - 1);
+        const auto disc =
+            f.subpixel_bodies.disc_within(static_cast<int>(body), block.x_first, block.y_first,
+                                          block.x_first + block.width - 1, block.y_first + block.height - 1);
         if (!disc) continue;
         collector.sample(*disc);
         met = true;

@@ -10,6 +10,7 @@
 
 #include "renderer/film/camera_batch.h"
 #include "renderer/film/frame_passes.h"
+#include "renderer/film/subpixel_light.h"
 
 namespace narpa {
 
@@ -45,10 +46,9 @@ struct FramePasses::Tile {
 /// Samples that have been traced together.
 struct SampleBatch {
     CameraSamples samples;
-    Lanes<std::uint8_t> place;              ///< of each sample's pixel in the tile
-    std::uint32_t first = 0, by_paths = 0;  ///< the lanes that count for this part of the light (PacketLight)
-
-    void clear() { samples.n = 0, first = by_paths = 0; }
+    Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
+    std::uint32_t direct_lanes = 0,
+                  path_lanes = 0;  ///< the lanes that count for this part of the light (BatchRadiance)
 };
 
 /// Of a thread, for several tiles: large.
@@ -57,15 +57,15 @@ public:
     /// Memory for batches that are lit together.
     template <std::size_t N>
     struct Storage {
-        std::array<Packet, N> packets;
+        std::array<CameraBatch, N> traced;
         std::array<SampleBatch, N> batches;
     };
 
     template <std::size_t N>
     Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& stop, PhaseTimes* times,
            Storage<N>& storage)
-        : f(frame), until_ns_(limit.until_ns), stop_(stop), packets_(storage.packets), batches_(storage.batches) {
-        for (Packet& p : packets_) p.times = times;
+        : f(frame), until_ns_(limit.until_ns), stop_(stop), traced_(storage.traced), batches_(storage.batches) {
+        for (CameraBatch& p : traced_) p.times = times;
     }
 
     const Frame& f;
@@ -73,9 +73,9 @@ public:
 
     [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
     [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
-    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t Packet::*of = &Packet::rays_traced) const {
+    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t CameraBatch::*of = &CameraBatch::rays_traced) const {
         std::uint64_t sum = 0;
-        for (const Packet& p : packets_) sum += p.*of;
+        for (const CameraBatch& p : traced_) sum += p.*of;
         return sum;
     }
     void read_clock() {
@@ -84,12 +84,12 @@ public:
     }
 
     /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: its place in the tile. Paths are
-    /// traced together up to kOfAPixel samples a pixel, so that neighbours can reuse them. Calls `sink(batch,
-    /// packet, light)` for the samples in order.
+    /// traced together up to kMaxPixelSamples samples a pixel, so that neighbours can reuse them. Calls
+    /// `sink(batch, batch, light)` for the samples in order.
     template <class Begin, class End, class Sink>
     void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
         set_centres(false);
-        const std::uint32_t most = f.quick ? PixelRange::kAll : kOfAPixel;
+        const std::uint32_t most = f.sun_only ? PixelRange::kAll : kMaxPixelSamples;
         bool left = true;
         for (std::uint32_t done = 0; left; done += most) {
             left = false;
@@ -97,11 +97,8 @@ public:
                 const PixelRange range{begin(at), end(at)};
                 const auto number = static_cast<std::uint32_t>(y * image_width + x);
                 left = left || range.size() > done + most;
-                for (std::uint32_t s = range.from(done); s < range.from(done + most); ++s) {
-                    const bool by_path = !f.quick && (!f.sun_first || has_path(s));
-                    const std::uint32_t path = f.sun_first ? paths_of(s) : s;
-                    add(tile, x, y, at, number, s, path, {f.quick || f.sun_first, by_path}, sink);
-                }
+                for (std::uint32_t s = range.from(done); s < range.from(done + most); ++s)
+                    add(tile, x, y, at, number, s, sink);
             });
             finish(tile, sink);
         }
@@ -117,7 +114,7 @@ public:
             for (int block = 0; block < 4; ++block) {
                 put_block(tile, block, first, width, batches_[full_]);
                 trace(tile);
-                if (full_ == packets_.size()) light(sink);
+                if (full_ == traced_.size()) light(sink);
             }
             light(sink);
             return;
@@ -125,14 +122,14 @@ public:
         tile.each_pixel([&](int x, int y, std::size_t at) {
             if (!represents(x, width, stride) || !represents(y, height, stride)) return;
             if (made > 0 && represents(x, width, made) && represents(y, height, made)) return;
-            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, 0, {true, true}, sink);
+            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, sink);
         });
         finish(tile, sink);
     }
     /// The same, stored in the G-buffer.
     void centres(const Tile& tile, int width, int height, int stride, int made, GBuffer& g_buffer) {
         centres(tile, width, height, stride, made,
-                [&](const SampleBatch& b, const Packet& p, const PacketLight& l) {
+                [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& l) {
                     g_buffer.store(f, p, l, b.place, tile.index);
                 });
     }
@@ -145,41 +142,43 @@ private:
         [[nodiscard]] std::uint32_t size() const { return end - begin; }
         [[nodiscard]] std::uint32_t from(std::uint32_t n) const { return begin + std::min(n, size()); }
     };
-    /// The parts of the light that a sample counts for.
-    struct Parts {
-        bool first, by_paths;
-    };
     template <class Sink>
     void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
-             std::uint32_t path, Parts parts, Sink&& sink) {
+             Sink&& sink) {
         SampleBatch& b = batches_[full_];
         const std::size_t i = b.samples.n++;
-        b.first |= static_cast<std::uint32_t>(parts.first) << i;
-        b.by_paths |= static_cast<std::uint32_t>(parts.by_paths) << i;
         b.samples.x[i] = x, b.samples.y[i] = y;
-        b.samples.number[i] = number, b.samples.sample[i] = sample, b.samples.path[i] = path;
+        b.samples.number[i] = number, b.samples.sample[i] = sample;
         b.place[i] = static_cast<std::uint8_t>(at);
         if (b.samples.n < kLanes) return;
         trace(tile);
-        if (full_ == packets_.size()) light(sink);
+        if (full_ == traced_.size()) light(sink);
     }
     void trace(const Tile& tile) {
         SampleBatch& b = batches_[full_];
-        if (stop_.load(std::memory_order_relaxed)) b.clear();
+        if (stop_.load(std::memory_order_relaxed)) b.samples.n = 0;
         if (b.samples.n == 0) return;
-        trace_rays(f, b.samples, tile.bodies, packets_[full_]);
-        packets_[full_].by_paths = b.by_paths;
-        ++full_;
+        CameraBatch& p = traced_[full_++];
+        trace_rays(f, b.samples, tile.bodies, p);
+        const std::uint32_t all = lanes_below(b.samples.n);
+        b.direct_lanes = f.sun_only || f.separate_sun ? all : 0;
+        b.path_lanes = f.sun_only ? 0 : all;
+        if (f.separate_sun)
+            for_each_lane(all, [&](std::size_t i) {
+                if (!has_path(b.samples.sample[i])) b.path_lanes &= ~(1u << i);
+                p.sample[i] = paths_of(b.samples.sample[i]);
+            });
+        p.path_lanes = b.path_lanes;
     }
     template <class Sink>
     void light(Sink&& sink) {
-        std::array<PacketLight, kTogether> lights;
-        if (full_ > 0) f.integrator.radiance(f, packets_.first(full_), lights);
+        std::array<BatchRadiance, kMaxBatches> lights;
+        if (full_ > 0) f.integrator.radiance(f, traced_.first(full_), lights);
         for (std::size_t k = 0; k < full_; ++k) {
-            sink(batches_[k], packets_[k], lights[k]);
+            sink(batches_[k], traced_[k], lights[k]);
             samples_ += batches_[k].samples.n;
-            paths_ += static_cast<std::uint64_t>(std::popcount(batches_[k].by_paths));
-            batches_[k].clear();
+            if (!f.sun_only) paths_ += static_cast<std::uint64_t>(std::popcount(batches_[k].path_lanes));
+            batches_[k].samples.n = 0;
             if (++lit_ % kBatchesPerClockRead == 0) read_clock();
         }
         full_ = 0;
@@ -200,20 +199,93 @@ private:
             b.samples.x[lane] = x + i % kBlock, b.samples.y[lane] = y + i / kBlock;
             b.samples.number[lane] =
                 first + static_cast<std::uint32_t>(b.samples.y[lane] * width + b.samples.x[lane]);
-            b.samples.sample[lane] = b.samples.path[lane] = 0;
+            b.samples.sample[lane] = 0;
             b.place[lane] = static_cast<std::uint8_t>(block * static_cast<int>(kLanes) + i);
         }
         b.samples.n = kLanes;
-        b.first = b.by_paths = lanes_below(kLanes);
     }
 
     const std::int64_t until_ns_;
     std::atomic<bool>& stop_;  ///< the pass; read often, as a tile may hold many samples
-    const std::span<Packet> packets_;
+    const std::span<CameraBatch> traced_;
     const std::span<SampleBatch> batches_;
     std::size_t full_ = 0;  ///< of these
     std::uint64_t samples_ = 0, paths_ = 0;
     std::uint32_t lit_ = 0;  ///< batches
 };
+
+// From a tile's samples to the image.
+
+inline std::size_t index_of(int x, int y, int width) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
+/// A square of a tile's pixels, from (x, y) in it on.
+template <class Tile>
+PixelBlock block_of(const Tile& t, int x, int y) {
+    PixelBlock b;
+    b.x_first = t.x + x, b.y_first = t.y + y;
+    b.width = std::min(kBlock, t.width - x), b.height = std::min(kBlock, t.height - y);
+    for (int py = b.y_first; py < b.y_first + b.height; ++py)
+        for (int px = b.x_first; px < b.x_first + b.width; ++px) b.x[b.n] = px, b.y[b.n] = py, ++b.n;
+    return b;
+}
+
+template <class Tile>
+void add_subpixel_light(const Frame& f, const Tile& t, RadianceImage& out, std::vector<float>* variance) {
+    if (!f.subpixel_bodies.any()) return;
+    for (int y = 0; y < t.height; y += kBlock)
+        for (int x = 0; x < t.width; x += kBlock) add_subpixel_bodies(f, block_of(t, x, y), out, variance);
+}
+
+/// Of each pixel's mean, block by block.
+template <class Tile>
+void put_variances(const Tile& t, const PerPixel<PixelSamples>& direct, const PerPixel<PixelSamples>& path,
+                   int image_width, std::vector<float>& variance) {
+    for (int by = 0; by < t.height; by += kBlock)
+        for (int bx = 0; bx < t.width; bx += kBlock) {
+            const PixelBlock block = block_of(t, bx, by);
+            for (std::size_t i = 0; i < block.n; ++i) variance[block.index(i, image_width)] = 0;
+            for (const auto* part : {&direct, &path}) {
+                Lanes<PixelSamples> of_block;
+                Lanes<double> of_means;
+                for (std::size_t i = 0; i < block.n; ++i)
+                    of_block[i] = (*part)[place_in_tile(block.x[i] - t.x, block.y[i] - t.y)];
+                if (of_block[0].count() == 0) continue;
+                variances_of_means(std::span(of_block).first(block.n), of_means);
+                for (std::size_t i = 0; i < block.n; ++i)
+                    variance[block.index(i, image_width)] += static_cast<float>(of_means[i]);
+            }
+        }
+}
+
+/// The same where pixels have samples of their own number, or show their centres.
+template <class Tile>
+void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, int image_width,
+                   std::vector<float>& variance) {
+    const auto at_least = [](const PixelMean& mean, float one) {
+        if (mean.count() == 0) return 0.0f;
+        const float step = mean.count() == 1 ? 0 : mean.step();
+        return std::max(step * step, one / static_cast<float>(mean.count()));
+    };
+    t.each_pixel([&](int x, int y, std::size_t at) {
+        const auto& [direct, path] = means[at];
+        const float reused = contrast.reused[at], one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f);
+        const bool alone = direct.count() == 0;
+        variance[index_of(x, y, image_width)] =
+            means[at].count() > 0 ? at_least(direct, one) + at_least(path, alone ? one + reused : reused)
+                                  : contrast.centre[at];
+    });
+}
+
+inline Rgb radiance_at(const GBufferTile& tile, std::size_t place) {
+    return {tile.r[place], tile.g[place], tile.b[place]};
+}
+
+/// Adds the samples of a batch to their pixels.
+inline void add_samples(const SampleBatch& b, const BatchRadiance& light, PerPixel<PixelMeans>& means) {
+    for_each_lane(b.direct_lanes, [&](std::size_t i) { means[b.place[i]].direct.add(light.direct[i]); });
+    for_each_lane(b.path_lanes, [&](std::size_t i) { means[b.place[i]].path.add(light.path[i]); });
+}
 
 }  // namespace narpa

@@ -1,7 +1,6 @@
 #include <cmath>
 
-#include "renderer/integrator/path_integrator.h"
-#include "renderer/integrator/sun_direct_lighting.h"
+#include "renderer/integrator/integrator.h"
 #include "renderer/light/small_body_sampling.h"
 
 namespace narpa {
@@ -9,7 +8,7 @@ namespace {
 
 /// PathSettings::first_survival where edges make most of the error: in frames of one sample a pixel, and where
 /// paths are traced from all samples.
-constexpr float kFewSurvive = 0.5f;
+constexpr float kReducedSurvival = 0.5f;
 
 const SunDirectLighting kSunDirectLighting;
 const DirectIntegrator kDirectIntegrator;
@@ -31,8 +30,8 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const bool reuse = on.path_reuse && !(over_time && at.moving());
     const bool small_bodies = !direct && on.small_body_sampling && SmallBodySampling::may_help(tracer, at);
     const bool sun_only = direct && SunDirectLighting::suffices(render_scene);
-    const bool sun_first =
-        !direct && on.sun_first && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
+    const bool separate_sun =
+        !direct && on.separate_sun && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
     const Integrator& by_waves = direct ? static_cast<const Integrator&>(kDirectIntegrator) : kPathIntegrator;
     const CameraModelHandle model(camera);
     return {render_scene,
@@ -48,9 +47,9 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
             scene.sun ? std::optional<SunDisc>(*scene.sun) : std::nullopt,
             sun_only ? kSunDirectLighting : by_waves,
             sun_only,
-            sun_first,
+            separate_sun,
             {settings.max_depth, 1 / (model->pixels_per_radian() * std::sqrt(settings.spp)), direct, small_bodies,
-             sun_first && settings.spp > 1 ? 1 : kFewSurvive, reuse},
+             separate_sun && settings.spp > 1 ? 1 : kReducedSurvival, reuse},
             SubpixelBodies(tracer, at, camera, model, pose.middle(), lens, over_time)};
 }
 

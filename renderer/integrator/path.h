@@ -48,7 +48,7 @@ std::uint64_t path_radiance(const RenderScene& render_scene, const BodyPoses& at
                             std::span<Rgb> radiance) noexcept;
 
 /// Lanes of a batch of first hits whose emission and direct sunlight are in the radiance already
-/// (sun_direct_lighting.h), and the colours of these surfaces: flat, of Lambert's or Phong's material.
+/// (integrator.h), and the colours of these surfaces: flat, of Lambert's or Phong's material.
 struct LitSurfaces {
     std::uint32_t lanes = 0;
     RgbLanes diffuse, specular;
@@ -81,8 +81,8 @@ std::uint64_t reused_path_radiance(const RenderScene& render_scene, const BodyPo
 inline constexpr double kNarrowSun_rad = 0.2;
 /// A lobe with a greater exponent finds a narrow Sun better than the Sun's points find the lobe.
 inline constexpr float kSharpLobe = 1000;
-/// May sun_direct_lighting.h add the direct light of first surfaces? The Sun is narrow, nothing else emits, and
-/// there is no medium.
+/// True where the direct light of first surfaces may be added apart (Frame::separate_sun): The Sun is narrow,
+/// nothing else emits, and there is no medium.
 [[nodiscard]] bool sun_alone_lights_first_surfaces(const RenderScene& render_scene) noexcept;
 /// Radiance along a camera ray that escapes, without a medium: the background and the Sun's disc.
 [[nodiscard]] Rgb escaped_radiance(const RenderScene& render_scene, const Vec3& direction) noexcept;

@@ -1,15 +1,13 @@
-#include "renderer/integrator/path_integrator.h"
-
 #include <array>
 #include <limits>
 
-#include "renderer/integrator/sun_direct_lighting.h"
+#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 namespace {
 
 /// Each ray by itself: of lanes `lanes` of one batch.
-void trace_paths(const Frame& f, Packet& p, std::uint32_t lanes, RgbLanes& radiance) {
+void trace_paths(const Frame& f, CameraBatch& p, std::uint32_t lanes, RgbLanes& radiance) {
     PhaseClock clock(p.times);
     Lanes<Ray> rays;
     Lanes<Hit> hits;
@@ -31,12 +29,12 @@ void trace_paths(const Frame& f, Packet& p, std::uint32_t lanes, RgbLanes& radia
 
 /// A sample of a pixel.
 struct SamplePlace {
-    std::uint8_t packet, lane;
+    std::uint8_t batch, lane;
 };
 
 /// One sample of each of some pixels, with path reuse.
-void trace_reused(const Frame& f, std::span<Packet> packets, std::span<const SamplePlace> places,
-                  std::span<PacketLight> light) {
+void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<const SamplePlace> places,
+                  std::span<BatchRadiance> light) {
     std::array<SamplePlace, kReuseGroup> from;
     std::array<PathStart, kReuseGroup> starts;
     std::array<Rgb, kReuseGroup> radiance;
@@ -46,71 +44,68 @@ void trace_reused(const Frame& f, std::span<Packet> packets, std::span<const Sam
     for (std::size_t colour = 0; colour < 2; ++colour)
         for (std::size_t i = 0; i < places.size(); ++i) {
             if (((i ^ i >> 2) & 1) != colour) continue;
-            const auto [packet, lane] = places[i];
-            const Packet& p = packets[packet];
-            if (f.sun_first && !is_set(p.hits.met, lane)) continue;
+            const auto [batch, lane] = places[i];
+            const CameraBatch& p = batches[batch];
+            if (f.separate_sun && !is_set(p.hits.met, lane)) continue;
             from[n] = places[i];
-            const bool sunlit = light[packet].first[lane] != Rgb{};
+            const bool sunlit = light[batch].direct[lane] != Rgb{};
             starts[n++] = {&p.rays, &p.hits, &p.first, lane, p.number[lane], p.sample[lane], sunlit};
         }
     const std::uint64_t rays =
         reused_path_radiance(f.render_scene, f.at, f.path, std::span(starts).first(n), f.settings.seed,
                              f.settings.frame, std::span(radiance).first(n), std::span(variance).first(n));
-    packets.front().rays_traced += rays;
-    packets.front().path_rays += rays;
+    batches.front().rays_traced += rays;
+    batches.front().path_rays += rays;
     for (std::size_t i = 0; i < n; ++i) {
-        light[from[i].packet].by_paths.put(from[i].lane, radiance[i]);
-        packets[from[i].packet].variance[from[i].lane] = variance[i];
+        light[from[i].batch].path.put(from[i].lane, radiance[i]);
+        batches[from[i].batch].variance[from[i].lane] = variance[i];
     }
 }
 
 }  // namespace
 
-void DirectIntegrator::radiance(const Frame& f, Packet& p, RgbLanes& radiance) const noexcept {
+void DirectIntegrator::radiance(const Frame& f, CameraBatch& p, RgbLanes& radiance) const noexcept {
     trace_paths(f, p, lanes_below(p.rays.n), radiance);
 }
-void DirectIntegrator::radiance(const Frame& f, std::span<Packet> packets,
-                                std::span<PacketLight> light) const noexcept {
-    for (std::size_t k = 0; k < packets.size(); ++k) {
-        light[k].first.fill({});
-        light[k].by_paths.fill({});
-        packets[k].variance.fill(0);
-        trace_paths(f, packets[k], packets[k].by_paths & lanes_below(packets[k].rays.n), light[k].by_paths);
+void DirectIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
+                                std::span<BatchRadiance> light) const noexcept {
+    for (std::size_t k = 0; k < batches.size(); ++k) {
+        light[k].direct.fill({});
+        light[k].path.fill({});
+        batches[k].variance.fill(0);
+        trace_paths(f, batches[k], batches[k].path_lanes & lanes_below(batches[k].rays.n), light[k].path);
     }
 }
 
-void PathIntegrator::radiance(const Frame& f, Packet& p, RgbLanes& radiance) const noexcept {
-    trace_paths(f, p, lanes_below(p.rays.n), radiance);
-}
-void PathIntegrator::radiance(const Frame& f, std::span<Packet> packets,
-                              std::span<PacketLight> light) const noexcept {
-    for (std::size_t k = 0; k < packets.size(); ++k) {
-        Packet& p = packets[k];
+void PathIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
+                              std::span<BatchRadiance> light) const noexcept {
+    for (std::size_t k = 0; k < batches.size(); ++k) {
+        CameraBatch& p = batches[k];
         p.lit = p.first.lanes = 0;
-        light[k].first.fill({});
-        light[k].by_paths.fill({});
+        light[k].direct.fill({});
+        light[k].path.fill({});
         p.variance.fill(0);
-        if (!f.sun_first) continue;
-        if (p.hits.met != 0) light_first_surfaces(f, p, light[k].first);
+        if (!f.separate_sun) continue;
+        if (p.hits.met != 0) add_first_hit_sunlight(f, p, light[k].direct);
         for_each_lane(lanes_below(p.rays.n) & ~p.hits.met, [&](std::size_t i) {
-            light[k].first.put(i, escaped_radiance(f.render_scene, p.rays.direction[i]));
+            light[k].direct.put(i, escaped_radiance(f.render_scene, p.rays.direction[i]));
         });
     }
-    if (packets.empty()) return;
-    PhaseClock clock(packets.front().times);
+    if (batches.empty()) return;
+    PhaseClock clock(batches.front().times);
     // One sample of each pixel together, then the next of each: those of a pixel stay independent.
-    std::array<std::array<SamplePlace, kReuseGroup>, kOfAPixel> places;
-    std::array<std::size_t, kOfAPixel> n{};
+    std::array<std::array<SamplePlace, kReuseGroup>, kMaxPixelSamples> places;
+    std::array<std::size_t, kMaxPixelSamples> n{};
     std::size_t rank = 0;
     std::uint32_t pixel = std::numeric_limits<std::uint32_t>::max();
-    for (std::size_t k = 0; k < packets.size(); ++k)
-        for_each_lane(packets[k].by_paths & lanes_below(packets[k].rays.n), [&](std::size_t i) {
-            rank = packets[k].number[i] == pixel ? rank + 1 : 0;
-            pixel = packets[k].number[i];
+    for (std::size_t k = 0; k < batches.size(); ++k)
+        for_each_lane(batches[k].path_lanes & lanes_below(batches[k].rays.n), [&](std::size_t i) {
+            rank = batches[k].number[i] == pixel ? rank + 1 : 0;
+            pixel = batches[k].number[i];
             places[rank][n[rank]++] = {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(i)};
         });
-    for (std::size_t r = 0; r < kOfAPixel && n[r] > 0; ++r)
-        trace_reused(f, packets, std::span(places[r]).first(n[r]), light);
+    for (std::size_t r = 0; r < kMaxPixelSamples && n[r] > 0; ++r)
+        trace_reused(f, batches, std::span(places[r]).first(n[r]), light);
     clock.ends(Phase::indirect);
 }
 

@@ -20,10 +20,6 @@ constexpr std::size_t kBlocksOfAGroup = 2;
 constexpr double kGrazing = 1e-3;
 constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
 
-float brightness(const Rgb& c) {
-    return std::max({c.x, c.y, c.z});
-}
-
 }  // namespace
 
 SecondVertex::SecondVertex(const Tracer& tracer, const PathVertex& a_vertex, const Hit& hit,
@@ -36,12 +32,12 @@ bool SecondVertex::is_reusable(const PathVertex& p) noexcept {
     // A lobe alone reflects along its mirror direction, which is another for each receiver.
     const Material::Kind kind = p.surface().material->kind;
     return (kind == Material::Kind::lambert || kind == Material::Kind::phong) && !p.bent() &&
-           brightness(p.surface().diffuse) > 0;
+           max_component(p.surface().diffuse) > 0;
 }
 
-bool SecondVertex::leave(Path& p, const BsdfSample& s, float made_up) noexcept {
+bool SecondVertex::leave(Path& p, const BsdfSample& s, float inverse_survival) noexcept {
     if (!(s.pdf > 0)) return false;
-    const float before = brightness(p.throughput), per_pdf = made_up / static_cast<float>(s.pdf);
+    const float before = max_component(p.throughput), per_pdf = inverse_survival / static_cast<float>(s.pdf);
     p.throughput = {per_pdf, per_pdf, per_pdf};
     p.radiance_scale *= per_pdf / before;
     incident[path].from = s.l;
@@ -204,7 +200,7 @@ std::uint64_t FirstVertices::gather(const Tracer& tracer, const BodyPoses& at, s
     double sum = 0;
     for (std::size_t i = 0; i < second.size(); ++i) {
         const SecondVertex& v = second[i];
-        bright[i] = brightness(v.radiance(v.vertex.view()));
+        bright[i] = max_component(v.radiance(v.vertex.view()));
         sum += static_cast<double>(bright[i]);
     }
     if (sum == 0) return 0;

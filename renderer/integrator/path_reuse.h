@@ -14,7 +14,6 @@
 #include <span>
 
 #include "renderer/integrator/path.h"
-#include "renderer/integrator/path_state.h"
 #include "renderer/integrator/path_vertex.h"
 #include "renderer/integrator/uninitialized_array.h"
 
@@ -38,9 +37,9 @@ struct SecondVertex {
 
     /// True for BSDFs that scatter over the whole hemisphere.
     [[nodiscard]] static bool is_reusable(const PathVertex& vertex) noexcept;
-    /// Lets a path go on in the direction s: what it finds then falls in here. `made_up`: 1 / probability with
-    /// which it survived. False: the direction has no density.
-    [[nodiscard]] bool leave(Path& path, const BsdfSample& s, float made_up) noexcept;
+    /// Lets a path go on in the direction s: what it finds then falls in here. `inverse_survival`: 1 / probability
+    /// with which it survived. False: the direction has no density.
+    [[nodiscard]] bool leave(Path& path, const BsdfSample& s, float inverse_survival) noexcept;
     /// Radiance towards a unit direction on its side.
     [[nodiscard]] Rgb radiance(const Vec3& direction) const noexcept;
 };

@@ -1,14 +1,19 @@
-/// renderer/integrator/path_vertex.h - a vertex of a path: the surface that it meets, and its BSDF there.
+/// renderer/integrator/path_vertex.h - a vertex of a path, and the state of the path between its vertices.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <numbers>
 
 #include "renderer/integrator/shading.h"
+#include "renderer/light/lights.h"
+#include "renderer/light/small_body_sampling.h"
 #include "renderer/material/directions.h"
 
 namespace narpa {
 
+/// A vertex: the surface that a path meets, and its BSDF there.
+///
 /// Light falls in from one side of a plane: that of the face, or of the smooth surface that vertex normals describe
 /// where rays leave from that surface (Hit::departure_body).
 ///
@@ -109,5 +114,28 @@ private:
     Vec3 plane_{}, view_{};
     bool bent_ = false, plain_ = false;
 };
+
+/// A path between its vertices.
+struct Path {
+    std::uint32_t ray = 0;  ///< of the camera
+    Rgb throughput{1, 1, 1};
+    Rgb* to = nullptr;         ///< where its light is added: to the camera's ray, or to a second vertex
+    float radiance_scale = 1;  ///< part of the throughput that is undone on leaving a dense medium, or that is no
+                               ///< part of what the path brings to the camera: not for the roulette
+    double direction_pdf = std::numeric_limits<double>::infinity();  ///< of the ray, per solid angle
+    double length_m = 0;                                             ///< from the camera to the vertex
+    Receiver start{};                  ///< of the ray, or of shadow rays; where anything needs it
+    SmallBodySampling small_bodies{};  ///< part in the choice of the next ray
+    bool sun_sampled = false;          ///< next-event estimation has found all sunlight along the ray
+    // Path reuse:
+    bool lit = false;        ///< the direct light of its first surface is known, and it has survived there
+    bool sunlit = false;     ///< that light is not zero
+    int first_vertex = -1;   ///< number among FirstVertices; -1: none
+    int second_vertex = -1;  ///< number among the second vertices; -1: none
+};
+
+inline float max_component(const Rgb& c) noexcept {
+    return std::max({c.x, c.y, c.z});
+}
 
 }  // namespace narpa

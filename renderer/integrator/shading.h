@@ -20,9 +20,7 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
     const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];
     const bool no_lobe = m.kind == Material::Kind::lambert;
     Surface s{m.diffuse, no_lobe ? Rgb{} : m.specular, m.emission, m.exponent, &m, hit.shading_normal, hit.outside};
-    const bool textured =
-        m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0;
-    if (textured) apply_textures(tracer, at, hit, ray_direction, width_m, s);
+    if (is_textured(m)) apply_textures(tracer, at, hit, ray_direction, width_m, s);
     return s;
 }
 

@@ -1,10 +1,9 @@
-#include "renderer/integrator/sun_direct_lighting.h"
-
 #include <algorithm>
 #include <bit>
 #include <numbers>
 
 #include "base/each_isa.h"
+#include "renderer/integrator/integrator.h"
 #include "renderer/integrator/shading.h"
 
 namespace narpa {
@@ -26,12 +25,8 @@ struct Sunlight {
     std::uint32_t lanes = 0;  ///< where it is not zero
 };
 
-Surface surface_of(const Frame& f, const Packet& p, std::size_t i) {
+Surface surface_of(const Frame& f, const CameraBatch& p, std::size_t i) {
     return surface_at(f.tracer, f.at, p.hits[i], p.rays.direction[i], p.hits.range_m[i] * f.path.pixel_angle_rad);
-}
-
-bool has_textures(const Material& m) {
-    return m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0;
 }
 
 void put(SurfaceLanes& surfaces, std::size_t i, const Rgb& diffuse, const Rgb& specular, const Rgb& emission,
@@ -50,7 +45,7 @@ void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& specular) {
 }
 
 /// Material by material, of which a batch seldom meets more than two.
-void gather_surfaces(const Frame& f, const Packet& p, SurfaceLanes& surfaces) {
+void gather_surfaces(const Frame& f, const CameraBatch& p, SurfaceLanes& surfaces) {
     const Scene& scene = f.tracer.scene();
     fill(surfaces, kPlainMaterial, {});
     surfaces.normal = p.hits.shading_normal;
@@ -70,19 +65,17 @@ void gather_surfaces(const Frame& f, const Packet& p, SurfaceLanes& surfaces) {
         const Rgb specular = m.kind == Material::Kind::lambert ? Rgb{} : m.specular;
         surfaces.lanes |= same;
         if (specular != Rgb{}) surfaces.shiny |= same;
-        if (has_textures(m)) {
-            for (std::uint32_t rest = same; rest != 0; rest &= rest - 1) {
-                const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+        if (is_textured(m)) {
+            for_each_lane(same, [&](std::size_t i) {
                 const Surface s = surface_of(f, p, i);
                 put(surfaces, i, s.diffuse, s.specular, s.emission, s.exponent);
                 surfaces.normal.put(i, s.normal);
-            }
+            });
         } else if (alone) {
             fill(surfaces, m, specular);
         } else {
-            for (std::uint32_t rest = same; rest != 0; rest &= rest - 1)
-                put(surfaces, static_cast<std::size_t>(std::countr_zero(rest)), m.diffuse, specular, m.emission,
-                    m.exponent);
+            for_each_lane(same,
+                          [&](std::size_t i) { put(surfaces, i, m.diffuse, specular, m.emission, m.exponent); });
         }
     }
 }
@@ -152,7 +145,7 @@ NARPA_EACH_ISA void reflect_sun(const SurfaceLanes& surfaces, const Vec3Lanes& d
 }
 
 /// The same for one lane of another material.
-void light_other(const Frame& f, const Packet& p, std::size_t i, RgbLanes& radiance, Sunlight& sunlight) {
+void light_other(const Frame& f, const CameraBatch& p, std::size_t i, RgbLanes& radiance, Sunlight& sunlight) {
     const Surface surface = surface_of(f, p, i);
     radiance.put(i, surface.emission + f.render_scene.background().ambient() * ambient_reflectance(surface));
     if (!f.sun) return;
@@ -178,7 +171,7 @@ NARPA_EACH_ISA void add_sunlight(const Sunlight& sunlight, std::uint32_t lit, Rg
 }
 
 /// Traces the shadow rays of the lanes set, and adds what arrives.
-void add_sun(const Frame& f, Packet& p, Sunlight& sunlight, PhaseClock& clock, RgbLanes& radiance) {
+void add_sun(const Frame& f, CameraBatch& p, Sunlight& sunlight, PhaseClock& clock, RgbLanes& radiance) {
     clock.ends(Phase::shading);
     if (sunlight.lanes == 0) return;
     p.lit = sunlight.lanes & ~f.tracer.occluded(f.at, p.hits, p.to_sun, sunlight.lanes);
@@ -188,7 +181,7 @@ void add_sun(const Frame& f, Packet& p, Sunlight& sunlight, PhaseClock& clock, R
 }
 
 /// Flat faces without too sharp a lobe: next-event estimation alone finds the Sun's light there.
-NARPA_EACH_ISA std::uint32_t lit_by_sun_alone(const HitBatch& hits, const SurfaceLanes& surfaces) noexcept {
+NARPA_EACH_ISA std::uint32_t sunlit_by_nee_alone(const HitBatch& hits, const SurfaceLanes& surfaces) noexcept {
     const Vec3Lanes &flat = hits.geometric_normal, &n = surfaces.normal;
     Lanes<int> are;
     for (std::size_t i = 0; i < kLanes; ++i) {
@@ -205,7 +198,7 @@ bool SunDirectLighting::suffices(const RenderScene& render_scene) noexcept {
            render_scene.medium() == nullptr;
 }
 
-void SunDirectLighting::radiance(const Frame& f, Packet& p, RgbLanes& radiance) const noexcept {
+void SunDirectLighting::radiance(const Frame& f, CameraBatch& p, RgbLanes& radiance) const noexcept {
     p.lit = 0;
     if (p.hits.met == 0) {
         radiance.fill({});
@@ -222,17 +215,17 @@ void SunDirectLighting::radiance(const Frame& f, Packet& p, RgbLanes& radiance) 
     add_sun(f, p, sunlight, clock, radiance);
 }
 
-void SunDirectLighting::radiance(const Frame& f, std::span<Packet> packets,
-                                 std::span<PacketLight> light) const noexcept {
-    for (std::size_t k = 0; k < packets.size(); ++k) radiance(f, packets[k], light[k].first);
+void SunDirectLighting::radiance(const Frame& f, std::span<CameraBatch> batches,
+                                 std::span<BatchRadiance> light) const noexcept {
+    for (std::size_t k = 0; k < batches.size(); ++k) radiance(f, batches[k], light[k].direct);
 }
 
-void light_first_surfaces(const Frame& f, Packet& p, RgbLanes& radiance) noexcept {
+void add_first_hit_sunlight(const Frame& f, CameraBatch& p, RgbLanes& radiance) noexcept {
     PhaseClock clock(p.times);
     SurfaceLanes surfaces;
     Sunlight sunlight;
     gather_surfaces(f, p, surfaces);
-    surfaces.lanes = lit_by_sun_alone(p.hits, surfaces);
+    surfaces.lanes = sunlit_by_nee_alone(p.hits, surfaces);
     if (surfaces.lanes == 0) return;
     p.first.lanes = surfaces.lanes;
     p.first.diffuse = surfaces.diffuse;

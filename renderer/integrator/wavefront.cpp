@@ -6,19 +6,14 @@
 
 #include "base/constants.h"
 #include "base/each_isa.h"
-#include "renderer/integrator/path_dimensions.h"
 
 namespace narpa {
 namespace {
 
 /// Russian roulette: a path whose throughput is less than this may end; one that has found no light yet, as on
 /// night sides, only at less, and only behind so many vertices.
-constexpr float kFaint = 0.5f, kFaintInTheDark = 0.25f;
-constexpr int kVerticesInTheDark = 4;
-
-float greatest(const Rgb& c) {
-    return std::max({c.x, c.y, c.z});
-}
+constexpr float kFaint = 0.5f, kFaintUnlit = 0.25f;
+constexpr int kUnlitVertices = 4;
 
 NARPA_EACH_ISA void draw_points(const PathNumbers& from, std::size_t n, const Lanes<std::uint32_t>& pixel,
                                 const Lanes<std::uint32_t>& sample, std::uint32_t group,
@@ -183,13 +178,13 @@ void Wavefront::scatter(int vertex, bool last) {
             const std::size_t i = first + k;
             Path& path = paths_[i];
             if (last && sun_alone_ && path.sun_sampled) continue;
-            float made_up = 1;
+            float inverse_survival = 1;
             const auto survives = [&](float probability) {
                 if (probability >= 1) return true;
                 if (!drawn) draw(first, roulette_group(vertex), roulette);
                 drawn = true;
                 if (roulette[roulette_dimension(vertex)][k] >= static_cast<double>(probability)) return false;
-                made_up = 1 / probability;
+                inverse_survival = 1 / probability;
                 path.throughput = path.throughput / probability;
                 return true;
             };
@@ -209,7 +204,7 @@ void Wavefront::scatter(int vertex, bool last) {
             if (path.throughput == Rgb{} || !is_finite(path.throughput)) continue;
             if (!is_first && !survives(survival(path, vertex + 1))) continue;
             if (SecondVertex* const second = second_vertex(path, vertex);
-                second != nullptr && !second->leave(path, s, made_up))
+                second != nullptr && !second->leave(path, s, inverse_survival))
                 continue;
             path.direction_pdf = s.pdf;
             directions_[i] = s.l;
@@ -250,15 +245,14 @@ double Wavefront::scatter_pdf(const Path& path, const Vec3& direction, double bs
 float Wavefront::survival(const Path& path, int vertices) const {
     // What a wide Sun sends comes by two ways that make up for each other: neither is left to chance.
     const bool nothing_yet = radiance_[path.ray] == Rgb{} && !path.sunlit;
-    const bool in_the_dark = nothing_yet || (sun_has_extent_ && !narrow_sun_);
-    if (in_the_dark && vertices < kVerticesInTheDark) return 1;
-    return std::min(1.0f,
-                    greatest(path.throughput) / path.radiance_scale / (in_the_dark ? kFaintInTheDark : kFaint));
+    const bool unlit = nothing_yet || (sun_has_extent_ && !narrow_sun_);
+    if (unlit && vertices < kUnlitVertices) return 1;
+    return std::min(1.0f, max_component(path.throughput) / path.radiance_scale / (unlit ? kFaintUnlit : kFaint));
 }
 /// The same of a path that is reused, at its first vertex, before the direction is known.
-float Wavefront::first_survival(const Rgb& albedo, bool in_the_dark) const {
+float Wavefront::first_survival(const Rgb& albedo, bool unlit) const {
     if (finds_alone_) return 1;
-    return settings_.first_survival * std::min(1.0f, greatest(albedo) / (in_the_dark ? kFaintInTheDark : kFaint));
+    return settings_.first_survival * std::min(1.0f, max_component(albedo) / (unlit ? kFaintUnlit : kFaint));
 }
 
 void Wavefront::begin_reused(std::span<const PathStart> starts) {

@@ -15,6 +15,7 @@
 
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/path.h"
+#include "renderer/integrator/path_dimensions.h"
 #include "renderer/integrator/path_reuse.h"
 #include "renderer/integrator/path_vertex.h"
 #include "renderer/integrator/uninitialized_array.h"
@@ -80,7 +81,7 @@ private:
     [[nodiscard]] BsdfSample next_direction(std::size_t i, const SamplePoint& numbers) const;
     [[nodiscard]] double scatter_pdf(const Path& path, const Vec3& direction, double bsdf_pdf) const;
     [[nodiscard]] float survival(const Path& path, int vertices) const;
-    [[nodiscard]] float first_survival(const Rgb& albedo, bool in_the_dark) const;
+    [[nodiscard]] float first_survival(const Rgb& albedo, bool unlit) const;
 
     // Path reuse.
     void begin_reused(std::span<const PathStart> starts);

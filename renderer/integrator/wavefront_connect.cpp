@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "base/constants.h"
-#include "renderer/integrator/path_dimensions.h"
 #include "renderer/integrator/wavefront.h"
 
 namespace narpa {

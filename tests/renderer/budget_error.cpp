@@ -109,7 +109,7 @@ TEST(BudgetError, IsNotEstimatedWhereLightIsLeftOutOrPixelsAreCoarse) {
          {FrameStep::no_indirect, FrameStep::coarse_2, FrameStep::coarse_4, FrameStep::nothing}) {
         FrameAccount account;
         account.step = step;
-        EXPECT_LT(render(v, as_told(rays_a_pixel(v, 0, 1, Method::path), account)).account.standard_error, 0);
+        EXPECT_LT(render(v, replay_of(rays_a_pixel(v, 0, 1, Method::path), account)).account.standard_error, 0);
     }
 }
 

@@ -95,7 +95,7 @@ TEST(BudgetFrame, NeverMoreRaysThanTheBudget) {
 Shown at_step(const BudgetView& v, FrameStep step, Method method, std::uint32_t frame) {
     FrameAccount account;
     account.step = step;
-    return render(v, as_told(rays_a_pixel(v, 0, frame, method), account));
+    return render(v, replay_of(rays_a_pixel(v, 0, frame, method), account));
 }
 
 /// Budgets, in rays a pixel, that end at all steps one after another.
@@ -116,7 +116,7 @@ TEST(BudgetFrame, IsMadeAnewFromItsAccount) {
         for (const double rays : ladder_of(v, method, 9)) {
             const FrameSettings s = rays_a_pixel(v, rays, 9, method);
             const Shown shown = render(renderer, v, s);
-            const Shown again = render(v, as_told(s, shown.account));
+            const Shown again = render(v, replay_of(s, shown.account));
             EXPECT_TRUE(same_bytes(shown.image, again.image)) << rays;
             EXPECT_EQ(shown.account.step, again.account.step) << rays;
             EXPECT_EQ(shown.account.passes, again.account.passes) << rays;
@@ -215,7 +215,7 @@ TEST(BudgetFrame, WhatTheClockCutsOffLeavesNoTrace) {
             const Shown shown = render(renderer, v, s);
             cut += shown.account.rays_discarded > 0;
             EXPECT_TRUE(is_whole(shown.image));
-            EXPECT_TRUE(same_bytes(shown.image, render(v, as_told(s, shown.account)).image)) << run;
+            EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(s, shown.account)).image)) << run;
         }
     EXPECT_GT(cut, 0);
 }

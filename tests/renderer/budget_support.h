@@ -77,7 +77,7 @@ inline FrameSettings samples_a_pixel(const BudgetView& v, int spp, std::uint32_t
     return s;
 }
 /// To make the frame anew that an account tells of.
-inline FrameSettings as_told(FrameSettings s, const FrameAccount& account) {
+inline FrameSettings replay_of(FrameSettings s, const FrameAccount& account) {
     s.budget = {};
     s.budget.kind = Kind::passes;
     s.budget.passes = account.passes;

@@ -23,7 +23,7 @@ struct Picture {
     }
 };
 
-/// What the pixels' middles see, in packets.
+/// What the pixels' middles see, in batches.
 struct View {
     std::array<Ray, kPixels> rays;
     std::array<Hit, kPixels> first;

@@ -22,8 +22,8 @@ TEST(PathShortcuts, TheLastRayIsSkippedOnlyWhereItFindsNothing) {
     for (const double diameter : {0.0, 0.0093}) {
         Scene dark = facing_plates(diameter), glimmering = dark;
         glimmering.ambient = {1e-20f, 1e-20f, 1e-20f};  // to be looked for, but too faint to count
-        const auto in_the_dark = RenderScene::create(dark, 1), all_the_way = RenderScene::create(glimmering, 1);
-        ASSERT_TRUE(in_the_dark && all_the_way);
+        const auto unlit = RenderScene::create(dark, 1), all_the_way = RenderScene::create(glimmering, 1);
+        ASSERT_TRUE(unlit && all_the_way);
         const BodyPoses at = placed(dark);
         std::uint64_t few = 0, many = 0;
         double sum = 0;
@@ -31,14 +31,14 @@ TEST(PathShortcuts, TheLastRayIsSkippedOnlyWhereItFindsNothing) {
             const PathSettings settings{.max_depth = depth};
             for (std::uint32_t pixel = 0; pixel < 64; ++pixel) {
                 const Ray ray = ray_to({-1, -3, 2}, {0.02 * pixel - 0.6, 0.1, 0});
-                const Hit first = in_the_dark->tracer().intersect(at, ray, kInfinity);
+                const Hit first = unlit->tracer().intersect(at, ray, kInfinity);
                 const std::uint32_t sample = 5;
                 Rgb less, more;
                 const auto trace = [&](const RenderScene& render_scene, Rgb& out) {
                     return path_radiance(render_scene, at, settings, std::span(&ray, 1), std::span(&first, 1),
                                          {1, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&out, 1));
                 };
-                few += trace(*in_the_dark, less);
+                few += trace(*unlit, less);
                 many += trace(*all_the_way, more);
                 EXPECT_NEAR(less.x, more.x, 1e-6f * more.x + 1e-15f) << depth << ' ' << pixel;
                 sum += static_cast<double>(less.x);

@@ -224,7 +224,7 @@ TEST(PathRadiance, OfARayDoesNotDependOnItsNeighboursNorOnThreads) {
         lit += p != Rgb{};
     }
     EXPECT_GT(lit, 100);
-    // Within a packet, within what travels together, and beyond.
+    // Within a batch, within what travels together, and beyond.
     for (const std::size_t together : {1UL, 3UL, 8UL, 40UL, 128UL, 144UL})
         EXPECT_EQ(picture(*render_scene, at, {}, together), expected) << together;
     for (const int threads : {1, 2, 7}) {

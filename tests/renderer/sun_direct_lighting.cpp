@@ -86,7 +86,7 @@ TEST(BatchSampler, GivesTheNumbersOfThePixelsOwnSamplers) {
         }
 }
 
-/// A sphere and plates of every kind of material, so that packets see several at once.
+/// A sphere and plates of every kind of material, so that batches see several at once.
 Scene motley() {
     Scene s;
     Material m = lambert(0.6f);
@@ -144,7 +144,7 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
     for (const Camera& c : {pinhole, lens}) {
         const Stage stage(c);
         const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-        auto p = std::make_unique<Packet>();
+        auto p = std::make_unique<CameraBatch>();
         for (int round = 0; round < 200; ++round) {
             CameraSamples s = some_samples(1 + random() % kLanes, c, 40, random);
             s.centre = round % 4 == 0;
@@ -178,7 +178,7 @@ TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
     Stage stage(c);
     stage.settings.spp = 1;
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-    auto p = std::make_unique<Packet>();
+    auto p = std::make_unique<CameraBatch>();
     CameraSamples s = some_samples(kLanes, c, 1, random);
     s.centre = true;
     trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
@@ -190,12 +190,12 @@ TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
     }
 }
 
-TEST(PacketLight, IsThatOfOneRayAtATime) {
+TEST(BatchRadiance, IsThatOfOneRayAtATime) {
     std::mt19937_64 random(5);
     const Stage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-    ASSERT_TRUE(f.quick);
-    auto p = std::make_unique<Packet>();
+    ASSERT_TRUE(f.sun_only);
+    auto p = std::make_unique<CameraBatch>();
     int lit = 0, shaded = 0, background = 0;
     for (int round = 0; round < 1500; ++round) {
         const CameraSamples s = some_samples(1 + random() % kLanes, stage.view, 16, random);
@@ -240,11 +240,11 @@ TEST(PacketLight, IsThatOfOneRayAtATime) {
     EXPECT_GT(background, 1000);
 }
 
-TEST(PacketLight, TimesOfThePhasesAddUpWhereTheyAreMeasured) {
+TEST(BatchRadiance, TimesOfThePhasesAddUpWhereTheyAreMeasured) {
     std::mt19937_64 random(6);
     const Stage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-    auto p = std::make_unique<Packet>();
+    auto p = std::make_unique<CameraBatch>();
     PhaseTimes times{};
     p->times = &times;
     RgbLanes radiance;

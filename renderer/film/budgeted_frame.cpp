@@ -1,6 +1,7 @@
 #include "renderer/film/budgeted_frame.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace narpa {
@@ -277,7 +278,7 @@ private:
     }
     /// Where the next pass shall lead; no further than the last: there is none.
     [[nodiscard]] Stage wanted(std::size_t pass) const {
-        constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
+        constexpr double kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
         const SamplePlan& plan = passes_.plan();
         if (budget_.kind == Kind::passes)
             return recorded_step() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
@@ -285,12 +286,11 @@ private:
             const auto left = static_cast<double>(rays_left());
             if (left < kRest * static_cast<double>(budget_.rays)) return stage_;
             const double part = adaptive_ ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
-            return plan.reach(stage_, std::min(part * left, static_cast<double>(kMost)), each_.sample, each_.path);
+            return plan.reach(stage_, std::min(part * left, kMost), each_.sample, each_.path);
         }
         if (!worth_a_pass()) return stage_;
         const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_left()));
-        return plan.reach(
-            stage_, std::min(static_cast<std::uint64_t>((pass == 0 ? kFirstPart : kNextPart) * fitting), kMost));
+        return plan.reach(stage_, std::min(std::floor((pass == 0 ? kFirstPart : kNextPart) * fitting), kMost));
     }
     [[nodiscard]] bool worth_a_pass() const {
         return static_cast<double>(ns_left()) >= kRest * static_cast<double>(time_given());

@@ -84,55 +84,50 @@ void blacken_unseen(const Camera& camera, RadianceImage& out) {
                            static_cast<std::size_t>(x)] = {};
 }
 
+FrameAccount render_uniform(FramePasses& passes, const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+    passes.begin(f, f.lens);
+    const PassCount count = passes.uniform(f, out, variance);
+    FrameAccount account;
+    account.samples = count.samples;
+    account.rays = count.rays;
+    account.standard_error = passes.standard_error();
+    account.phase_ns = passes.times();
+    return account;
+}
+
 }  // namespace
 
 struct CameraRenderer::Impl {
-    Impl(const RenderScene& the_render_scene, const Camera& the_camera)
-        : render_scene(the_render_scene), camera(the_camera), passes(the_render_scene.tracer(), the_camera) {}
-
-    FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
-                        RadianceImage& out, Aovs* aovs);
-    FrameAccount render_uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
-        passes.begin(f, f.lens);
-        const PassCount count = passes.uniform(f, out, variance);
-        FrameAccount account;
-        account.samples = count.samples;
-        account.rays = count.rays;
-        account.standard_error = passes.standard_error();
-        account.phase_ns = passes.times();
-        return account;
-    }
-
     const RenderScene& render_scene;
     const Camera& camera;
-    FramePasses passes;
-    PassCosts costs;
+    FramePasses passes{render_scene.tracer(), camera};
+    PassCosts costs{};
 };
 
 CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera)
-    : impl_(std::make_unique<Impl>(render_scene, camera)) {}
+    : impl_(new Impl{render_scene, camera}) {}
 CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                                     RadianceImage& out, Aovs* aovs) {
-    const FrameAccount account = impl_->render(at, pose, settings, out, aovs);
-    blacken_unseen(impl_->camera, out);
-    return account;
-}
-
-FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose,
-                                          const FrameSettings& settings, RadianceImage& out, Aovs* aovs) {
+    const RenderScene& render_scene = impl_->render_scene;
+    const Camera& camera = impl_->camera;
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
-    if (!uniform && aovs == nullptr)
-        return render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, nullptr);
-    const Frame frame = make_frame(render_scene, at, camera, pose, settings);
-    if (aovs != nullptr) {
-        resize(*aovs, out.pixels.size());
-        store_first_hits(frame, out.width, out.height, *aovs);
+    FrameAccount account;
+    if (uniform || aovs != nullptr) {
+        const Frame frame = make_frame(render_scene, at, camera, pose, settings);
+        if (aovs != nullptr) {
+            resize(*aovs, out.pixels.size());
+            store_first_hits(frame, out.width, out.height, *aovs);
+        }
+        if (uniform) account = render_uniform(impl_->passes, frame, out, variance);
     }
-    if (uniform) return render_uniform(frame, out, variance);
-    return render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, variance);
+    if (!uniform)
+        account = render_within_budget(impl_->passes, impl_->costs, render_scene, camera, at, pose, settings, out,
+                                       variance);
+    blacken_unseen(camera, out);
+    return account;
 }
 
 void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,

@@ -149,7 +149,7 @@ constexpr std::size_t cell(int row, int column) {
 
 }  // namespace
 
-/// Beyond the image its last pixels are repeated: no edge there. The rim's corners are nobody's neighbours.
+/// Beyond the image its last pixels are repeated: no edge there. The rim's corners are not used.
 void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
     if (const Pinhole* pinhole = f.model->pinhole()) {

@@ -207,29 +207,19 @@ std::uint64_t SamplePlan::total_paths(Stage stage) const noexcept {
     return sum;
 }
 
-template <class Fits>
-SamplePlan::Stage SamplePlan::furthest(Stage from, Fits&& fits) const noexcept {
+SamplePlan::Stage SamplePlan::reach(Stage from, double rays, double each_sample, double each_path) const noexcept {
+    const auto rays_of = [&](Stage stage) {
+        const double paths = uniform_ && each_path > 0 ? static_cast<double>(total_paths(stage)) : 0;
+        return each_sample * static_cast<double>(total(stage)) + each_path * paths;
+    };
+    const double most = rays_of(from) + rays;
     int within = std::max(from.level, uniform_ ? 0 : -kWeights);
     int beyond = uniform_ ? samples_each(kMostEach).level + 1 : kFull + 1;
     while (within + 1 < beyond) {
         const int middle = within + (beyond - within) / 2;
-        (fits(Stage{middle}) ? within : beyond) = middle;
+        (rays_of({middle}) <= most ? within : beyond) = middle;
     }
     return {within};
-}
-
-SamplePlan::Stage SamplePlan::reach(Stage from, std::uint64_t samples) const noexcept {
-    const std::uint64_t most = total(from) + samples;
-    return furthest(from, [&](Stage stage) { return total(stage) <= most; });
-}
-
-SamplePlan::Stage SamplePlan::reach(Stage from, double rays, double each_sample, double each_path) const noexcept {
-    const auto rays_of = [&](Stage stage) {
-        return each_sample * static_cast<double>(total(stage)) +
-               (uniform_ ? each_path * static_cast<double>(total_paths(stage)) : 0);
-    };
-    const double most = rays_of(from) + rays;
-    return furthest(from, [&](Stage stage) { return rays_of(stage) <= most; });
 }
 
 }  // namespace narpa

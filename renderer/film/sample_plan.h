@@ -62,10 +62,9 @@ public:
     [[nodiscard]] std::uint64_t total(Stage stage) const noexcept;
     /// Of these the samples that paths follow; uniform only.
     [[nodiscard]] std::uint64_t total_paths(Stage stage) const noexcept;
-    /// The furthest stage that takes no more than this many samples beyond those of `from`.
-    [[nodiscard]] Stage reach(Stage from, std::uint64_t samples) const noexcept;
-    /// The same of rays, so many for each sample and each path.
-    [[nodiscard]] Stage reach(Stage from, double rays, double each_sample, double each_path) const noexcept;
+    /// The furthest stage that takes no more than this many rays beyond those of `from`, so many for each sample
+    /// and each path.
+    [[nodiscard]] Stage reach(Stage from, double rays, double each_sample = 1, double each_path = 0) const noexcept;
 
     [[nodiscard]] const TileContrast& contrast(std::size_t tile) const noexcept { return contrasts_[tile]; }
 
@@ -90,8 +89,6 @@ private:
     [[nodiscard]] static std::uint32_t of_rank(int rank, Stage stage) noexcept {
         return stage.level <= rank ? 0 : static_cast<std::uint32_t>((stage.level - rank - 1) / kRanks + 1);
     }
-    template <class Fits>
-    [[nodiscard]] Stage furthest(Stage from, Fits&& fits) const noexcept;
     void contrast_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile) noexcept;
     using Histogram = std::array<std::uint32_t, kWeights>;  ///< pixels of each weight
     void weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,

@@ -31,7 +31,7 @@ struct SecondVertex {
 
     PathVertex vertex;
     Vec3 position;           ///< world
-    double touching_m;       ///< closer surfaces cannot be told from it
+    double touching_m;       ///< closer surfaces are the same to rounding
     std::size_t found_from;  ///< number of its path's first vertex
     std::array<Incident, kIncidents> incident{};
 

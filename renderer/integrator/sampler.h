@@ -6,7 +6,7 @@
 /// hash of the pixel (A. Owen 1995; B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Any power
 /// of two of samples is stratified in each dimension, and in both of the pixel at once. Paths need more dimensions
 /// than that: they take further groups of four, each the same sequence in an order and a scrambling of its own
-/// (Burley's padding), so that every group is as well stratified and no group knows of another.
+/// (Burley's padding), so that every group is as well stratified and groups are independent.
 #pragma once
 
 #include <array>

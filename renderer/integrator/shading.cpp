@@ -102,8 +102,8 @@ float widened(float exponent, const Rgb& mean_normal) {
     return exponent * length / (length + exponent * (1 - length));
 }
 
-/// A normal that points away from the viewer is turned back just so far that he sees it at a grazing angle: in the
-/// plane of the two, so that what it tells of the side on which the surface is lit stays.
+/// A normal that points away from the viewer is turned back just so far that it is seen at a grazing angle: in the
+/// plane of the two, so that the side on which the surface is lit stays the same.
 Vec3 towards_viewer(const Vec3& n, const Vec3& v, const Vec3& geometric) {
     const double facing = dot(n, v);
     if (facing >= kLeastFacing) return n;

@@ -33,7 +33,7 @@ public:
     SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const CameraModelHandle& model,
                    const Rigid3& T_world_camera, const Lens* lens, bool moving);
 
-    /// Is there any in the image? If not, nobody asks further.
+    /// True where there is any in the image.
     [[nodiscard]] bool any() const noexcept { return any_; }
     [[nodiscard]] bool contains(int body) const noexcept;
     /// The disc of a body, if it is tiny and its circle meets this rectangle of pixels.

@@ -194,7 +194,7 @@ NARPA_EACH_ISA std::uint32_t sunlit_by_nee_alone(const HitBatch& hits, const Sur
 }  // namespace
 
 bool SunDirectLighting::suffices(const RenderScene& render_scene) noexcept {
-    return !render_scene.lights().beyond_the_sun() && render_scene.background().uniform() &&
+    return !render_scene.lights().any(Lights::Group::lights) && render_scene.background().uniform() &&
            render_scene.medium() == nullptr;
 }
 

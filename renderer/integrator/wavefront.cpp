@@ -55,7 +55,7 @@ void Wavefront::run(std::span<const Ray> rays, std::span<const Hit> first, std::
         paths_[i] = Path{};
         paths_[i].ray = static_cast<std::uint32_t>(i);
         paths_[i].to = &radiance_[i];
-        if (receivers_) paths_[i].start = receiver_at(rays[i].origin), paths_[i].start.time = rays[i].time;
+        if (receivers_) paths_[i].start = {.anchor = rays[i].origin, .time = rays[i].time};
     }
     run_rounds();
 }
@@ -288,8 +288,7 @@ void Wavefront::begin_reused(std::span<const PathStart> starts) {
             path.lit = path.sun_sampled = s.lit();
             path.sunlit = s.lit() && s.sunlit;
             path.throughput = Rgb{1, 1, 1} / probability;
-            if (receivers_)
-                path.start = receiver_at(s.rays->origin[s.lane]), path.start.time = s.rays->time[s.lane];
+            if (receivers_) path.start = {.anchor = s.rays->origin[s.lane], .time = s.rays->time[s.lane]};
             hits_[n_] = (*s.hits)[s.lane];
             directions_[n_] = s.rays->direction[s.lane];
             ++n_;

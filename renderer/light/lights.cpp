@@ -43,9 +43,6 @@ EmitterView view_of(const Receiver& to, const Rigid3& T_world_body, int body) {
 
 }  // namespace
 
-Receiver receiver_at(const Vec3& position) noexcept {
-    return {position, {}, {}, -1};
-}
 Receiver receiver_at(const BodyPoses& at, const Hit& from, const Vec3& up) noexcept {
     const Rigid3 T = at.T_world_body_at(static_cast<std::size_t>(from.body), from.time);
     return {T.t, T.q * from.departure_body, up, from.body, from.time};

@@ -26,8 +26,6 @@ struct Receiver {
     int body = -1;  ///< whose surface it is on; -1: none
     double time = kMidExposure;
 };
-/// At a camera, for instance.
-[[nodiscard]] Receiver receiver_at(const Vec3& position) noexcept;
 /// Where rays leave the hit.
 [[nodiscard]] Receiver receiver_at(const BodyPoses& at, const Hit& from, const Vec3& up) noexcept;
 
@@ -55,14 +53,11 @@ public:
     /// The tracer's scene must outlive it, the tracer itself need not.
     explicit Lights(const Tracer& tracer);
 
-    /// True where the scene has lights beside the Sun and the ambient. Method "direct" then needs DirectIntegrator.
-    /// Emissive surfaces do not count: they light nothing in that method.
-    [[nodiscard]] bool beyond_the_sun() const noexcept { return lights_ > 0; }
     /// True where a ray can meet a light.
     [[nodiscard]] bool any_with_extent() const noexcept { return any_with_extent_; }
     [[nodiscard]] const std::optional<SunDisc>& sun() const noexcept { return sun_; }
 
-    /// Which emitters beside the Sun take part.
+    /// Which emitters beside the Sun take part. Emissive surfaces light nothing in method "direct".
     enum class Group : std::uint8_t { lights, all };
     [[nodiscard]] bool any(Group group) const noexcept { return !emitters(group).empty(); }
 

@@ -70,13 +70,9 @@ RoughGeometry rough_geometry(double roughness_rad, double n_l, double n_v, doubl
     return {mu_l, mu_v, shadowing};
 }
 
-double mean_w(const Surface& s) {
-    return static_cast<double>(s.diffuse.x + s.diffuse.y + s.diffuse.z) / 3;
-}
-
 /// Share of the samples that go by the cosine: about that of light which was scattered more than once.
 double multiple_share(const Surface& s) {
-    return 0.15 + 0.6 * std::clamp(mean_w(s), 0.0, 1.0);
+    return 0.15 + 0.6 * std::clamp(mean(s.diffuse), 0.0, 1.0);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ using Random3 = std::array<double, 3>;
 /// Directions of less density are never drawn but by rounding, and could overflow the weight.
 inline constexpr double kLeastDensity = 1e-30;
 
+/// Of the bands.
 inline double mean(const Rgb& c) noexcept {
     return static_cast<double>(c.x + c.y + c.z) / 3;
 }

@@ -53,7 +53,7 @@ inline Between between(double place, int n, bool repeat) {
     return {first, second, part};
 }
 
-/// Three bands and a fourth number that nobody looks at: what one instruction works on.
+/// Three bands and an unused fourth number: what one instruction works on.
 using Bands [[gnu::vector_size(16)]] = float;
 using Codes [[gnu::vector_size(16)]] = std::int32_t;
 using Halves [[gnu::vector_size(16)]] = std::uint16_t;
@@ -227,11 +227,6 @@ bool can_look_up(const Texture& t, float u, float v) {
 }
 
 }  // namespace
-
-Rgb texture_lookup(const Texture& texture, float u, float v, TextureLayout layout) noexcept {
-    if (!can_look_up(texture, u, v)) return {1, 1, 1};
-    return filtered(texture, edges_of(texture, layout), Filter{}, static_cast<double>(u), static_cast<double>(v));
-}
 
 Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootprint& footprint,
                    TextureLayout layout) noexcept {

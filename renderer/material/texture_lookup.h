@@ -17,10 +17,6 @@ enum class TextureLayout : std::uint8_t {
     globe,  ///< u goes around; over v = 1 and v = 0, the poles, the way leads to the other side, u + 1/2
 };
 
-/// Bilinear in the finest level.
-[[nodiscard]] Rgb texture_lookup(const Texture& texture, float u, float v,
-                                 TextureLayout layout = TextureLayout::flat) noexcept;
-
 /// The area of the texture that a pixel sees: an ellipse about (u, v) with these two half axes' ends, in texture
 /// coordinates (not texels). Any two conjugate half axes will do: the images of two perpendicular radii of a
 /// circle.
@@ -31,7 +27,7 @@ struct TextureFootprint {
 /// Mean over the footprint: several trilinear lookups along its longer axis, up to 15, so that it may be 15 times
 /// as long as wide before its width is blurred too (anisotropic filtering). It is the bilinear value where the
 /// footprint is a texel or less, goes over from one to the other without a step, and keeps the image's mean.
-[[nodiscard]] Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootprint& footprint,
+[[nodiscard]] Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootprint& footprint = {},
                                  TextureLayout layout = TextureLayout::flat) noexcept;
 
 /// Change of the mean of the three bands per unit of u and of v.

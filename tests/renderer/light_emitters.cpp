@@ -286,9 +286,9 @@ TEST(Lights, WithoutLightsSunOnlyDirectLightingSuffices) {
     Scene s = floor_scene();
     add_sun(s, {0, 0, 1});
     s.materials[0].emission = {1, 1, 1};
-    EXPECT_FALSE(RenderScene::create(s, 1)->lights().beyond_the_sun());
+    EXPECT_FALSE(RenderScene::create(s, 1)->lights().any(Lights::Group::lights));
     s.lights.push_back(lamp(Light::Kind::point, {}, {1, 1, 1}));
-    EXPECT_TRUE(RenderScene::create(s, 1)->lights().beyond_the_sun());
+    EXPECT_TRUE(RenderScene::create(s, 1)->lights().any(Lights::Group::lights));
 }
 
 }  // namespace

@@ -60,12 +60,12 @@ TEST(SamplePlan, UniformPlansReachNoMoreThanTheSamplesAllowed) {
     const UniformPlan p;
     const SamplePlan::Stage one = SamplePlan::samples_each(1);
     for (const std::uint64_t samples : {0ULL, 100ULL, 1000ULL, 5000ULL, 100000ULL}) {
-        const SamplePlan::Stage stage = p.plan.reach(one, samples);
+        const SamplePlan::Stage stage = p.plan.reach(one, static_cast<double>(samples));
         EXPECT_LE(p.plan.total(stage), p.plan.total(one) + samples);
         EXPECT_GT(p.plan.total({stage.level + 8}), p.plan.total(one) + samples);
         // What an account holds leads to the same stage: the frame can be made again.
         const std::uint64_t taken = p.plan.total(stage) - p.plan.total(one);
-        EXPECT_EQ(p.plan.total(p.plan.reach(one, taken)), p.plan.total(stage));
+        EXPECT_EQ(p.plan.total(p.plan.reach(one, static_cast<double>(taken))), p.plan.total(stage));
     }
 }
 

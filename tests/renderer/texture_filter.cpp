@@ -202,13 +202,13 @@ TEST(TextureGlobe, PolesMeetTheirOtherSideAndNeverEachOther) {
             EXPECT_EQ(texture_lookup(halves, u, 1, f, TextureLayout::globe).x, 1) << width;
             EXPECT_EQ(texture_lookup(halves, u, 0, f, TextureLayout::globe).x, 0) << width;
         }
-    EXPECT_EQ(texture_lookup(halves, 0.3f, 1, TextureLayout::globe).x, 1);
+    EXPECT_EQ(texture_lookup(halves, 0.3f, 1, {}, TextureLayout::globe).x, 1);
     EXPECT_NEAR(texture_lookup(halves, 0.3f, 1).x, 0.5f, 1e-5f) << "flat and repeated";
 
     const Texture t = noise(64, 32);
     for (const float beyond : {0.01f, 0.1f, 0.37f})
         for (const float u : {0.1f, 0.6f}) {
-            const auto look = [&](float x, float y) { return texture_lookup(t, x, y, TextureLayout::globe).x; };
+            const auto look = [&](float x, float y) { return texture_lookup(t, x, y, {}, TextureLayout::globe).x; };
             EXPECT_NEAR(look(u, 1 + beyond), look(u + 0.5f, 1 - beyond), 1e-4f);
             EXPECT_NEAR(look(u, -beyond), look(u + 0.5f, beyond), 1e-4f);
             EXPECT_NEAR(look(u, 2 + beyond), look(u, beyond), 1e-4f);

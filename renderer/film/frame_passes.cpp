@@ -17,7 +17,7 @@ constexpr std::size_t kChunk = 8;
 /// From so many tiles on, the error of a frame of centres is estimated from a fifth of them.
 constexpr std::size_t kManyTiles = 4096;
 
-/// Which pixel represents this one.
+/// The pixel that represents this one.
 int representative(int x, int width, int stride) {
     return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
 }
@@ -142,7 +142,7 @@ void FramePasses::begin(const Frame& f, const Lens* lens) {
     }
 }
 
-/// What a ray sees that meets nothing, and that looks away from the Sun.
+/// Radiance of an escaped ray that points away from the Sun.
 void FramePasses::find_background(const Frame& f) {
     CameraBatch p;
     RgbLanes radiance;

@@ -140,7 +140,7 @@ public:
     }
 
     /// Calls f(row, x_low, x_high) with the part of each row of tiles that the outline of a box in front spans.
-    /// Each point of the lens sees the box in a perspective of its own, in which it is as convex as before.
+    /// From each point of the lens the box is a convex shape in the image.
     template <class F>
     void for_each_row(const TileRect& rect, const F& f) const {
         const double blur = widest_blur();

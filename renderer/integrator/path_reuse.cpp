@@ -13,8 +13,8 @@ namespace {
 constexpr double kTouchingFarOff = 1e-15;
 /// Second vertices that are joined, on average; of more the brightest are likeliest.
 constexpr double kJoined = 16;
-/// First vertices among which paths are reused, in blocks of sixteen. Light from far off, which is alike for all,
-/// wants many; light from close by, and the cost of shadow rays, few.
+/// First vertices among which paths are reused, in blocks of sixteen. For distant light, which is alike for all,
+/// more are better; for near light, and for the cost of shadow rays, fewer.
 constexpr std::size_t kBlocksOfAGroup = 2;
 /// Least cosine by which `touching_m` is divided: a grazing ray passes more of it.
 constexpr double kGrazing = 1e-3;
@@ -218,7 +218,7 @@ std::uint64_t FirstVertices::gather(const Tracer& tracer, const BodyPoses& at, s
         if (passed >= 1) passed -= 1;
         rays += gather(tracer, at, second[i], static_cast<float>(1 / chance), radiance);
     }
-    // Each path that survived brought its part, most of them none: their scatter is that of the sum.
+    // The scatter of what the surviving paths found, most of them nothing, is that of the sum.
     double survivors = 0;
     for (std::size_t k = 0; k < n_; ++k) survivors += static_cast<double>(block_[k / kLanes].survival[k % kLanes]);
     const auto n = static_cast<float>(std::max(survivors, 2.0));

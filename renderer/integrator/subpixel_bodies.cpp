@@ -74,7 +74,7 @@ std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, i
 
 void SubpixelBodies::span_disc(SubpixelDisc& disc) const noexcept {
     // In the space where the bounds are a unit sphere: the plane of the sphere's outline as the camera sees it, and
-    // the Sun. Lines stay lines, and what is lit or hidden stays so.
+    // the Sun. Straight lines, light and occlusion are preserved.
     const BodyBounds& bounds = tracer_.bounds(disc.body);
     const Rigid3& T = at_.T_world_body[disc.body];
     const Vec3 eye_body = conjugate(T.q) * (T_world_camera_.t - T.t) - bounds.centre_m;
@@ -97,8 +97,8 @@ void SubpixelBodies::span_disc(SubpixelDisc& disc) const noexcept {
 }
 
 Hit SubpixelBodies::beyond(const Ray& ray, Hit hit) const noexcept {
-    // From each tiny body the ray goes on as if that body were not there. It may meet others, even the first again
-    // behind a second; a ray through more surfaces of them than this sees nothing.
+    // From each subpixel body the ray goes on as if that body were not there. It may meet others, even the first
+    // again behind a second; a ray through more surfaces of them than this sees nothing.
     constexpr int kSurfaces = 64;
     double travelled_m = 0;
     for (int i = 0; i < kSurfaces && hit.body >= 0 && contains(hit.body); ++i) {

@@ -44,7 +44,7 @@ void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& specular) {
     surfaces.exponent.fill(m.exponent);
 }
 
-/// Material by material, of which a batch seldom meets more than two.
+/// Material by material: a batch rarely meets more than two.
 void gather_surfaces(const Frame& f, const CameraBatch& p, SurfaceLanes& surfaces) {
     const Scene& scene = f.tracer.scene();
     fill(surfaces, kPlainMaterial, {});

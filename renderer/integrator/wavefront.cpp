@@ -243,7 +243,7 @@ double Wavefront::scatter_pdf(const Path& path, const Vec3& direction, double bs
 
 /// Probability with which a path survives the roulette behind so many vertices.
 float Wavefront::survival(const Path& path, int vertices) const {
-    // What a wide Sun sends comes by two ways that make up for each other: neither is left to chance.
+    // Light of a wide Sun is found by two techniques, weighted by MIS: roulette would make one of them noisy.
     const bool nothing_yet = radiance_[path.ray] == Rgb{} && !path.sunlit;
     const bool unlit = nothing_yet || (sun_has_extent_ && !narrow_sun_);
     if (unlit && vertices < kUnlitVertices) return 1;

@@ -42,7 +42,7 @@ BudgetView tilted_boxes() {
     add_sun(s, {0.3, 0.4, 1});
     return {std::move(s), 64, 48, 60, looking({0, 0, 15}, {0, 0, 0}, {0, 1, 0})};
 }
-/// Struts that taper from two pixels to nothing: details of all widths, and few that no middle meets at all.
+/// Struts that taper from two pixels to nothing: details of all widths, of which the pixel centres miss some.
 BudgetView tapering_struts() {
     Scene s;
     s.materials.push_back(lambert(0.5f));
@@ -134,7 +134,7 @@ TEST(BudgetError, FallsAsTheBudgetGrows) {
 }
 
 /// A floor of many bodies, edge to edge, under a sky that a grid of slats nearly hides: one path in sixteen finds
-/// it. The light is smooth over every pixel, so that a middle is as good a sample as any and nothing but a bias
+/// it. The light is smooth over every pixel, so that a centre is as good a sample as any and nothing but a bias
 /// remains in the mean of many frames; and the edges are of no contrast but that of the noise.
 BudgetView slatted_court() {
     Scene s;

@@ -142,7 +142,7 @@ TEST(BudgetFrame, StepsGoDownOneByOneAndEachShowsAWholeImage) {
         }
         std::vector<Step> all{Step::nothing,     Step::coarse_4,   Step::coarse_2,
                               Step::no_indirect, Step::one_sample, Step::refined};
-        // Direct light has no indirect to leave out; where middles of paths are sure to fit, rays are left for
+        // Direct light has no indirect to leave out; where centres by paths are sure to fit, rays are left for
         // samples.
         all.erase(all.begin() + (method == Method::direct ? 3 : 4));
         EXPECT_EQ(seen, all);

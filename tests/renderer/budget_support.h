@@ -76,7 +76,7 @@ inline FrameSettings samples_a_pixel(const BudgetView& v, int spp, std::uint32_t
     s.spp = spp;
     return s;
 }
-/// To make the frame anew that an account tells of.
+/// Settings that make a frame again from its account.
 inline FrameSettings replay_of(FrameSettings s, const FrameAccount& account) {
     s.budget = {};
     s.budget.kind = Kind::passes;

@@ -125,7 +125,7 @@ TEST(ClosedForm, SkySunAndLampsThatTheCameraLooksAt) {
 }
 
 TEST(ClosedForm, DirectLightOfALampIsThatOfPathsWithOneSurface) {
-    // A lamp 1 m square, 2 m above the floor; and what the quick way does where there is only a Sun.
+    // A lamp 1 m square, 2 m above the floor; and Sun-only direct lighting.
     Scene s;
     s.materials.push_back(lambert(0.6f));
     add_mesh(s, plate(10, 10));

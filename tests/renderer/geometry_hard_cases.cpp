@@ -32,7 +32,7 @@ Scene bumpy_body_in_the_sun() {
     return s;
 }
 
-TEST(TraceFar, CommonOffsetChangesNoRangeAndNoPixel) {
+TEST(FarFromTheOrigin, CommonOffsetChangesNoRangeAndNoPixel) {
     const Scene s = bumpy_body_in_the_sun();
     const auto render_scene = render_scene_of(s);
     ASSERT_TRUE(render_scene) << render_scene.error().text();
@@ -66,7 +66,7 @@ TEST(TraceFar, CommonOffsetChangesNoRangeAndNoPixel) {
     }
 }
 
-TEST(TraceFar, OffsetThatIsExactInDoubleChangesNoBitOfTheRadiance) {
+TEST(FarFromTheOrigin, OffsetThatIsExactInDoubleChangesNoBitOfTheRadiance) {
     Scene s = bumpy_body_in_the_sun();
     const auto render_scene = render_scene_of(s);
     ASSERT_TRUE(render_scene);
@@ -98,7 +98,7 @@ long double nearest_by_hand(const Mesh& m, const Vec3& origin, const Vec3& direc
     return best;
 }
 
-TEST(TraceFar, RangeOfASmallBodyIsExactToTenMicrometresAtAnyDistance) {
+TEST(FarFromTheOrigin, RangeOfASmallBodyIsExactToTenMicrometresAtAnyDistance) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, bumpy(3, 4, 0.3));
@@ -128,7 +128,7 @@ TEST(TraceFar, RangeOfASmallBodyIsExactToTenMicrometresAtAnyDistance) {
     }
 }
 
-TEST(TraceFar, MeshModelledFarFromItsOwnOriginKeepsItsPrecision) {
+TEST(FarFromTheOrigin, MeshModelledFarFromItsOwnOriginKeepsItsPrecision) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     Mesh m = icosphere(4, 1);
@@ -149,7 +149,7 @@ TEST(TraceFar, MeshModelledFarFromItsOwnOriginKeepsItsPrecision) {
     EXPECT_LE(worst, 1e-5);
 }
 
-TEST(TraceFar, AnEarthBehindChangesNoNearRange) {
+TEST(FarFromTheOrigin, AnEarthBehindChangesNoNearRange) {
     Scene alone = bumpy_body_in_the_sun(), with_earth = bumpy_body_in_the_sun();
     add_sphere(with_earth, 6378137, {0, 0, -6778137});
     const auto a = render_scene_of(alone), b = render_scene_of(with_earth);
@@ -172,7 +172,7 @@ TEST(TraceFar, AnEarthBehindChangesNoNearRange) {
     EXPECT_GT(earth, 100);
 }
 
-TEST(TraceFar, OneMillimetreFeaturesBesideAPlanetOfAMillionKilometres) {
+TEST(FarFromTheOrigin, OneMillimetreFeaturesBesideAPlanetOfAMillionKilometres) {
     Scene alone, both;
     for (Scene* s : {&alone, &both}) {
         s->materials.push_back(lambert(0.4f));
@@ -216,7 +216,7 @@ TEST(TraceFar, OneMillimetreFeaturesBesideAPlanetOfAMillionKilometres) {
     EXPECT_GT(shadows, 1'000);
 }
 
-TEST(TraceShadow, LitFacetsOfAConvexBodyAreNeverDark) {
+TEST(ShadowRays, LitFacetsOfAConvexBodyAreNeverDark) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     std::mt19937_64 random(3);
@@ -243,7 +243,7 @@ TEST(TraceShadow, LitFacetsOfAConvexBodyAreNeverDark) {
     }
 }
 
-TEST(TraceShadow, APlateOneMillimetreAboveAFacetAlwaysBlocks) {
+TEST(ShadowRays, APlateOneMillimetreAboveAFacetAlwaysBlocks) {
     const auto blocked_everywhere = [](const Scene& s, const Vec3& offset) {
         const auto tracer = tracer_of(s);
         ASSERT_TRUE(tracer);
@@ -286,7 +286,7 @@ TEST(TraceShadow, APlateOneMillimetreAboveAFacetAlwaysBlocks) {
     }
 }
 
-TEST(TraceShadow, AnOverhangOneMillimetreUpHidesTheSunAtAnyDistanceOfTheCamera) {
+TEST(ShadowRays, AnOverhangOneMillimetreUpHidesTheSunAtAnyDistanceOfTheCamera) {
     // The overhang ends at x = 0. Points of the facet within 2 mm of its foot, seen from above and from far; the
     // Sun stands behind a point of the overhang that is at least 0.1 mm inside it, and then as far outside.
     Scene s;
@@ -340,7 +340,7 @@ Leaks leaks_of(const Scene& s, int rays, Aim&& aim) {
     return leaks;
 }
 
-TEST(TraceWatertight, RandomEdgeAndVertexRaysAreNotLost) {
+TEST(Watertight, RandomEdgeAndVertexRaysAreNotLost) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, icosphere(5, 4));
@@ -369,7 +369,7 @@ TEST(TraceWatertight, RandomEdgeAndVertexRaysAreNotLost) {
     EXPECT_LE(vertices.lost, 2e-5 * vertices.rays);
 }
 
-TEST(TraceWatertight, NoneOfTenMillionRandomRaysInPacketsIsLost) {
+TEST(Watertight, NoneOfTenMillionRandomRaysInBatchesIsLost) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, icosphere(5, 4));
@@ -394,7 +394,7 @@ TEST(TraceWatertight, NoneOfTenMillionRandomRaysInPacketsIsLost) {
     EXPECT_EQ(lost, 0) << "of " << rays;
 }
 
-TEST(TraceWatertight, PixelsThatMeetAGridsVerticesAreNotLost) {
+TEST(Watertight, PixelsThatMeetAGridsVerticesAreNotLost) {
     // A camera above terrain whose posts project onto pixel centres: robust mode alone loses 0.4 % of them.
     Scene s;
     s.materials.push_back(lambert(0.4f));
@@ -417,7 +417,7 @@ TEST(TraceWatertight, PixelsThatMeetAGridsVerticesAreNotLost) {
     EXPECT_LE(lost, 2e-5 * rays);
 }
 
-TEST(TracePose, SignOfTheQuaternionChangesNothing) {
+TEST(BodyPose, SignOfTheQuaternionChangesNothing) {
     Scene s = bumpy_body_in_the_sun();
     const auto render_scene = render_scene_of(s);
     ASSERT_TRUE(render_scene);
@@ -434,7 +434,7 @@ TEST(TracePose, SignOfTheQuaternionChangesNothing) {
     EXPECT_EQ(plus.pixels, minus.pixels);
 }
 
-TEST(TraceBodies, NearestOfManyWins) {
+TEST(ManyBodies, NearestOfManyWins) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     std::mt19937_64 random(7);
@@ -484,7 +484,7 @@ TEST(TraceBodies, NearestOfManyWins) {
     EXPECT_GT(hits, 100);
 }
 
-TEST(TraceErrors, BadLightsAreToldByName) {
+TEST(TracerErrors, BadLightsAreNamed) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, box(1, 1, 1));
@@ -498,7 +498,7 @@ TEST(TraceErrors, BadLightsAreToldByName) {
     EXPECT_TRUE(render_scene_of(s));
 }
 
-TEST(TraceErrors, BadMeshesAreToldByName) {
+TEST(TracerErrors, BadMeshesAreNamed) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, box(1, 1, 1));
@@ -532,7 +532,7 @@ TEST(TraceErrors, BadMeshesAreToldByName) {
     EXPECT_NE(tracer.error().what.find("texture 4"), std::string::npos);
 }
 
-TEST(TraceErrors, AnEmptyMeshIsInvisible) {
+TEST(TracerErrors, AnEmptyMeshIsInvisible) {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     add_mesh(s, Mesh{});

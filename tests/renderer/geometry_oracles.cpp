@@ -23,7 +23,7 @@ Vec3 vec(const json& j) {
     return {j[0], j[1], j[2]};
 }
 
-TEST(TraceOracle, RaySphere) {
+TEST(TracerOracle, RaySphere) {
     NEED_ORACLE(reference, "ray_sphere");
     int judged = 0;
     for (const json& c : reference["cases"]) {
@@ -51,7 +51,7 @@ TEST(TraceOracle, RaySphere) {
     EXPECT_GT(judged, 40);
 }
 
-TEST(TraceOracle, RaySphereThroughTheTracer) {
+TEST(TracerOracle, RaySphereThroughTheTracer) {
     NEED_ORACLE(reference, "ray_sphere");
     int judged = 0;
     for (const json& c : reference["cases"]) {
@@ -79,7 +79,7 @@ TEST(TraceOracle, RaySphereThroughTheTracer) {
     EXPECT_GT(judged, 40);
 }
 
-TEST(TraceOracle, RayTriangleAndTheRaysThatEmbreeLoses) {
+TEST(TracerOracle, RayTriangleAndTheRaysThatEmbreeLoses) {
     NEED_ORACLE(reference, "ray_triangle");
     int judged = 0, leaks = 0;
     for (const json& c : reference["cases"]) {
@@ -140,7 +140,7 @@ TEST(TraceOracle, RayTriangleAndTheRaysThatEmbreeLoses) {
     EXPECT_GE(leaks, 24);
 }
 
-TEST(TraceOracle, SphereUv) {
+TEST(TracerOracle, SphereUv) {
     NEED_ORACLE(reference, "sphere_uv");
     int judged = 0, turned = 0;
     for (const json& c : reference["cases"]) {
@@ -179,7 +179,7 @@ double albedo(const Surface& s, double theta) {
     return sum / (static_cast<double>(steps) * steps);
 }
 
-TEST(TraceOracle, PhongAlbedo) {
+TEST(TracerOracle, PhongAlbedo) {
     NEED_ORACLE(reference, "phong_albedo");
     int judged = 0;
     for (const json& c : reference["cases"]) {

@@ -333,7 +333,7 @@ TEST(PathRadiance, EqualsThatOfBsdfSamplingAlone) {
 }
 
 TEST(PathRadiance, MethodDirectAddsTheLightsToSunOnlyDirectLighting) {
-    // Plate and Sun as the quick path has them; even ambient; the body's own glow; one point light on top.
+    // Plate and Sun as in Sun-only direct lighting; even ambient; the body's own glow; one point light on top.
     Scene s;
     s.materials.push_back(shining(0.5f, {1, 2, 3}));
     s.ambient = {10, 20, 30};

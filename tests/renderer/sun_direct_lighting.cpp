@@ -1,4 +1,4 @@
-// Packets aim and shade sixteen lanes together: as the functions for one ray do.
+// Batches aim and shade sixteen lanes together with the results of the functions for one ray.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -67,7 +67,7 @@ CameraSamples some_samples(std::size_t n, const Camera& c, std::uint32_t most, s
     return s;
 }
 
-TEST(BatchSampler, GivesTheNumbersOfThePixelsOwnSamplers) {
+TEST(BatchSampler, EqualsThePixelSamplers) {
     std::mt19937_64 random(3);
     for (const std::uint64_t most : {1ull, 7ull, 300ull, 1ull << 32})
         for (const std::uint32_t group : {0u, 1u, 9u}) {
@@ -137,7 +137,7 @@ struct Stage {
     }
 };
 
-TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
+TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
     std::mt19937_64 random(4);
     Camera pinhole = camera(200, 160, 400), lens = pinhole;
     lens.lens = Lens{0.05, 6};
@@ -171,7 +171,7 @@ TEST(PacketAim, RaysAreThoseOfOnePixelAtATime) {
     }
 }
 
-TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
+TEST(CameraBatch, OneSampleGoesThroughAllCentres) {
     std::mt19937_64 random(7);
     Camera c = camera(200, 160, 400);
     c.lens = Lens{0.05, 6};
@@ -190,7 +190,7 @@ TEST(PacketAim, OneSampleGoesThroughTheMiddleOfAll) {
     }
 }
 
-TEST(BatchRadiance, IsThatOfOneRayAtATime) {
+TEST(BatchRadiance, EqualsThatOfOneRayAtATime) {
     std::mt19937_64 random(5);
     const Stage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);

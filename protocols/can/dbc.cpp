@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <string_view>
 
-#include "protocols/can/closed_loop_signals.h"
 #include "protocols/can/messages.h"
 
 namespace narpa {

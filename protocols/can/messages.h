@@ -1,7 +1,7 @@
 /// protocols/can/messages.h - all messages on CAN: pose commands; heartbeat, frame ledgers and estimates of narpa;
 /// and those of a closed loop.
 ///
-/// Wire layout: signals.h, ledger_fields.h, closed_loop_signals.h and README.md; narpa.dbc is written from the same
+/// Wire layout: signals.h, ledger_fields.h and README.md; narpa.dbc is written from the same
 /// tables. Nothing here allocates (except texts of errors), blocks or throws.
 #pragma once
 

@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "protocols/can/identifiers.h"
+#include "protocols/closed_loop.h"
 #include "protocols/estimate.h"
 
 namespace narpa {
@@ -68,6 +69,17 @@ struct SetLayout {
     std::uint16_t fd_counter_bit = 0;  ///< where the counter lies in the FD frame; 0: no FD form
 };
 
+/// Signals follow each other on CAN FD: sets their places. One that states no length is as long as on classic CAN.
+template <std::size_t N>
+[[nodiscard]] constexpr std::array<Signal, N> laid_out(std::array<Signal, N> signals) {
+    std::uint16_t bit = 0;
+    for (Signal& s : signals) {
+        s.fd = {0, bit, s.fd.length > 0 ? s.fd.length : s.classic.length};
+        bit = static_cast<std::uint16_t>(bit + s.fd.length);
+    }
+    return signals;
+}
+
 inline constexpr std::size_t kClassicBytes = 8, kFdBytes = 64;
 inline constexpr int kClassicPayloadBits = 48;
 inline constexpr int kClassicCounterByte = 6, kClassicCrcByte = 7, kFdCrcByte = 62;
@@ -79,35 +91,25 @@ inline constexpr double kAttitudeSteps = 4194304.0;  ///< 2^22: 1 and -1 fit exa
 inline constexpr double kVelocitySteps_per_m_s = 5e4;
 inline constexpr double kRateSteps_per_rad_s = 5e4;
 
-/// Index of each quantity in `kPoseSignals`; the three or four components follow each other.
-enum PoseSignal : std::size_t {
-    kPoseTime = 0,
-    kPosePosition = 1,
-    kPoseAttitude = 4,
-    kPoseVelocity = 8,
-    kPoseRate = 11,
-    kPoseSignalCount = 14
-};
-
 inline constexpr std::array<std::string_view, 9> kPoseFrames{
     "Time", "PositionX", "PositionY", "PositionZ", "AttitudeWX", "AttitudeYZ", "MotionX", "MotionY", "MotionZ"};
 
-inline constexpr std::array<Signal, kPoseSignalCount> kPoseSignals{{
-    {"Time", "ns", "Time of validity: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}, {0, 0, 48}},
-    {"PositionX", "m", "Body origin in world axes", kPositionSteps_per_m, true, {1, 0, 48}, {0, 48, 48}},
-    {"PositionY", "m", "Body origin in world axes", kPositionSteps_per_m, true, {2, 0, 48}, {0, 96, 48}},
-    {"PositionZ", "m", "Body origin in world axes", kPositionSteps_per_m, true, {3, 0, 48}, {0, 144, 48}},
-    {"AttitudeW", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 0, 24}, {0, 192, 24}},
-    {"AttitudeX", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 24, 24}, {0, 216, 24}},
-    {"AttitudeY", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 0, 24}, {0, 240, 24}},
-    {"AttitudeZ", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 24, 24}, {0, 264, 24}},
-    {"VelocityX", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {6, 0, 30}, {0, 288, 32}},
-    {"VelocityY", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {7, 0, 30}, {0, 320, 32}},
-    {"VelocityZ", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {8, 0, 30}, {0, 352, 32}},
-    {"RateX", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {6, 30, 18}, {0, 384, 24}},
-    {"RateY", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {7, 30, 18}, {0, 408, 24}},
-    {"RateZ", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {8, 30, 18}, {0, 432, 24}},
-}};
+inline constexpr auto kPoseSignals = laid_out(std::to_array<Signal>({
+    {"Time", "ns", "Time of validity: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+    {"PositionX", "m", "Body origin in world axes", kPositionSteps_per_m, true, {1, 0, 48}},
+    {"PositionY", "m", "Body origin in world axes", kPositionSteps_per_m, true, {2, 0, 48}},
+    {"PositionZ", "m", "Body origin in world axes", kPositionSteps_per_m, true, {3, 0, 48}},
+    {"AttitudeW", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 0, 24}},
+    {"AttitudeX", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 24, 24}},
+    {"AttitudeY", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 0, 24}},
+    {"AttitudeZ", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 24, 24}},
+    {"VelocityX", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {6, 0, 30}, {0, 0, 32}},
+    {"VelocityY", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {7, 0, 30}, {0, 0, 32}},
+    {"VelocityZ", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {8, 0, 30}, {0, 0, 32}},
+    {"RateX", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {6, 30, 18}, {0, 0, 24}},
+    {"RateY", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {7, 30, 18}, {0, 0, 24}},
+    {"RateZ", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {8, 30, 18}, {0, 0, 24}},
+}));
 
 inline constexpr SetLayout kPoseLayout{
     "Pose", "Commanded pose: on classic CAN the nine frames of one counter take effect together", kPoseFrames,
@@ -115,91 +117,146 @@ inline constexpr SetLayout kPoseLayout{
 
 // --- Telemetry: the pose that narpa estimates from its own frames -----------------------------------------------
 
-/// Index of each quantity in `kEstimateSignals`; components follow each other.
-enum EstimateSignal : std::size_t {
-    kEstimateTime = 0,
-    kEstimatePosition = 1,
-    kEstimateAttitude = 4,
-    kEstimateSigmaPosition = 8,
-    kEstimateSigmaRotation = 11,
-    kEstimateFrame = 14,
-    kEstimateCamera = 15,
-    kEstimateState = 16,
-    kEstimateSignalCount = 17
-};
-
 inline constexpr double kSigmaRotationSteps_per_rad = 1e7;
+inline constexpr std::string_view kAboutCameraAxis = "Standard deviation of the attitude about the camera's axis",
+                                  kAboutChaserAxis = "Standard deviation of the attitude about the chaser's axis";
 inline constexpr auto kEstimateStateChoices = numbered(kEstimateStates);
 
 inline constexpr std::array<std::string_view, 10> kEstimateFrames{
     "EstimateTime",       "EstimatePositionX", "EstimatePositionY",  "EstimatePositionZ",  "EstimateAttitudeWX",
     "EstimateAttitudeYZ", "EstimateSigmaXY",   "EstimateSigmaZRotX", "EstimateSigmaRotYZ", "EstimateState"};
 
-inline constexpr std::array<Signal, kEstimateSignalCount> kEstimateSignals{{
-    {"Time", "ns", "Middle of the exposure: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}, {0, 0, 48}},
-    {"PositionX", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {1, 0, 48}, {0, 48, 48}},
-    {"PositionY", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {2, 0, 48}, {0, 96, 48}},
-    {"PositionZ", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {3, 0, 48}, {0, 144, 48}},
-    {"AttitudeW", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 0, 24}, {0, 192, 24}},
-    {"AttitudeX", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 24, 24}, {0, 216, 24}},
-    {"AttitudeY", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 0, 24}, {0, 240, 24}},
-    {"AttitudeZ", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 24, 24}, {0, 264, 24}},
-    {"SigmaX", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 0, 24}, {0, 288, 24}},
-    {"SigmaY", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 24, 24}, {0, 312, 24}},
-    {"SigmaZ", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {7, 0, 24}, {0, 336, 24}},
-    {"SigmaRotX",
-     "rad",
-     "Standard deviation of the attitude about the camera's axis",
-     kSigmaRotationSteps_per_rad,
-     false,
-     {7, 24, 24},
-     {0, 360, 24}},
-    {"SigmaRotY",
-     "rad",
-     "Standard deviation of the attitude about the camera's axis",
-     kSigmaRotationSteps_per_rad,
-     false,
-     {8, 0, 24},
-     {0, 384, 24}},
-    {"SigmaRotZ",
-     "rad",
-     "Standard deviation of the attitude about the camera's axis",
-     kSigmaRotationSteps_per_rad,
-     false,
-     {8, 24, 24},
-     {0, 408, 24}},
-    {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}, {0, 432, 32}},
-    {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}, {0, 464, 8}},
-    {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {0, 472, 3}, kEstimateStateChoices},
-}};
+inline constexpr auto kEstimateSignals = laid_out(std::to_array<Signal>({
+    {"Time", "ns", "Middle of the exposure: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+    {"PositionX", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {1, 0, 48}},
+    {"PositionY", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {2, 0, 48}},
+    {"PositionZ", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {3, 0, 48}},
+    {"AttitudeW", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 0, 24}},
+    {"AttitudeX", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 24, 24}},
+    {"AttitudeY", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 0, 24}},
+    {"AttitudeZ", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 24, 24}},
+    {"SigmaX", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 0, 24}},
+    {"SigmaY", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 24, 24}},
+    {"SigmaZ", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {7, 0, 24}},
+    {"SigmaRotX", "rad", kAboutCameraAxis, kSigmaRotationSteps_per_rad, false, {7, 24, 24}},
+    {"SigmaRotY", "rad", kAboutCameraAxis, kSigmaRotationSteps_per_rad, false, {8, 0, 24}},
+    {"SigmaRotZ", "rad", kAboutCameraAxis, kSigmaRotationSteps_per_rad, false, {8, 24, 24}},
+    {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}},
+    {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}},
+    {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {}, kEstimateStateChoices},
+}));
 
 inline constexpr SetLayout kEstimateLayout{"Estimate",
                                            "Pose of the target that narpa estimates from its own frames",
                                            kEstimateFrames, kEstimateSignals, 480};
 
-enum HeartbeatSignal : std::size_t {
-    kHeartbeatTime,
-    kHeartbeatState,
-    kHeartbeatNoCommand,
-    kHeartbeatStale,
-    kHeartbeatDeadlineMissed,
-    kHeartbeatOutputDropped,
-    kHeartbeatSignalCount
-};
-
 inline constexpr std::array<Choice, 4> kRunStates{
     {{0, "starting"}, {1, "running"}, {2, "lockstep"}, {3, "stopping"}}};
 inline constexpr std::array<std::string_view, 1> kHeartbeatFrames{"Heartbeat"};
 
-inline constexpr std::array<Signal, kHeartbeatSignalCount> kHeartbeatSignals{{
-    {"Time", "us", "Simulation clock modulo 2^40 us", 1, false, {0, 0, 40}, {}},
+inline constexpr auto kHeartbeatSignals = std::to_array<Signal>({
+    {"Time", "us", "Simulation clock modulo 2^40 us", 1, false, {0, 0, 40}},
     {"State", "", "What the emulator is doing", 1, false, {0, 40, 4}, {}, kRunStates},
-    {"NoCommand", "", "A commanded body never had a command", 1, false, {0, 44, 1}, {}},
-    {"Stale", "", "A commanded body's last command is too old", 1, false, {0, 45, 1}, {}},
-    {"DeadlineMissed", "", "A frame was late since the last heartbeat", 1, false, {0, 46, 1}, {}},
-    {"OutputDropped", "", "An output dropped data since the last heartbeat", 1, false, {0, 47, 1}, {}},
-}};
+    {"NoCommand", "", "A commanded body never had a command", 1, false, {0, 44, 1}},
+    {"Stale", "", "A commanded body's last command is too old", 1, false, {0, 45, 1}},
+    {"DeadlineMissed", "", "A frame was late since the last heartbeat", 1, false, {0, 46, 1}},
+    {"OutputDropped", "", "An output dropped data since the last heartbeat", 1, false, {0, 47, 1}},
+});
 
 inline constexpr SetLayout kHeartbeatLayout{"Heartbeat", "narpa is alive", kHeartbeatFrames, kHeartbeatSignals, 0};
+
+// --- What the thrusters are to do -------------------------------------------------------------------------------
+
+inline constexpr double kImpulseSteps_per_N_s = 1e3;  ///< also of one N m s
+inline constexpr std::string_view kTorqueTimesTime = "Torque about the centre of mass times time, body axes";
+inline constexpr auto kGuidancePhaseChoices = numbered(kGuidancePhases);
+inline constexpr auto kAbortReasonChoices = numbered(kAbortReasons);
+
+inline constexpr std::array<std::string_view, 5> kActuatorFrames{
+    "ActuatorTime", "ActuatorImpulseXY", "ActuatorImpulseZAngX", "ActuatorAngYZ", "ActuatorPhase"};
+
+inline constexpr auto kActuatorSignals = laid_out(std::to_array<Signal>({
+    {"Time", "ns", "Of force: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+    {"ImpulseX", "N s", "Force times time, body axes", kImpulseSteps_per_N_s, true, {1, 0, 24}},
+    {"ImpulseY", "N s", "Force times time, body axes", kImpulseSteps_per_N_s, true, {1, 24, 24}},
+    {"ImpulseZ", "N s", "Force times time, body axes", kImpulseSteps_per_N_s, true, {2, 0, 24}},
+    {"AngularImpulseX", "N m s", kTorqueTimesTime, kImpulseSteps_per_N_s, true, {2, 24, 24}},
+    {"AngularImpulseY", "N m s", kTorqueTimesTime, kImpulseSteps_per_N_s, true, {3, 0, 24}},
+    {"AngularImpulseZ", "N m s", kTorqueTimesTime, kImpulseSteps_per_N_s, true, {3, 24, 24}},
+    {"Leg", "", "Index in the scenario", 1, false, {4, 0, 8}},
+    {"Phase", "", "What the navigation is doing", 1, false, {4, 8, 4}, {}, kGuidancePhaseChoices},
+    {"Abort", "", "Why the navigation has given up", 1, false, {4, 12, 4}, {}, kAbortReasonChoices},
+}));
+
+inline constexpr SetLayout kActuatorLayout{"Actuator", "What the thrusters are to do within one control period",
+                                           kActuatorFrames, kActuatorSignals, 208};
+
+// --- Where the navigation estimates the target
+// --------------------------------------------------------------------
+
+inline constexpr std::array<std::string_view, 10> kNavigationFrames{
+    "NavigationTime",       "NavigationPositionX",  "NavigationPositionY", "NavigationPositionZ",
+    "NavigationAttitudeWX", "NavigationAttitudeYZ", "NavigationSigmaXY",   "NavigationSigmaZRotX",
+    "NavigationSigmaRotYZ", "NavigationCycle"};
+
+inline constexpr auto kNavigationSignals = laid_out(std::to_array<Signal>({
+    {"Time", "ns", "Of validity: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+    {"PositionX", "m", "Target's origin in the chaser's axes", kPositionSteps_per_m, true, {1, 0, 48}},
+    {"PositionY", "m", "Target's origin in the chaser's axes", kPositionSteps_per_m, true, {2, 0, 48}},
+    {"PositionZ", "m", "Target's origin in the chaser's axes", kPositionSteps_per_m, true, {3, 0, 48}},
+    {"AttitudeW", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {4, 0, 24}},
+    {"AttitudeX", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {4, 24, 24}},
+    {"AttitudeY", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {5, 0, 24}},
+    {"AttitudeZ", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {5, 24, 24}},
+    {"SigmaX", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 0, 24}},
+    {"SigmaY", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 24, 24}},
+    {"SigmaZ", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {7, 0, 24}},
+    {"SigmaRotX", "rad", kAboutChaserAxis, kSigmaRotationSteps_per_rad, false, {7, 24, 24}},
+    {"SigmaRotY", "rad", kAboutChaserAxis, kSigmaRotationSteps_per_rad, false, {8, 0, 24}},
+    {"SigmaRotZ", "rad", kAboutChaserAxis, kSigmaRotationSteps_per_rad, false, {8, 24, 24}},
+    {"Cycle", "", "Number of the control period", 1, false, {9, 0, 32}},
+    {"Frames", "", "Camera frames taken since the estimate before", 1, false, {9, 32, 8}},
+    {"Sweeps", "", "LiDAR sweeps taken since the estimate before", 1, false, {9, 40, 8}},
+}));
+
+inline constexpr SetLayout kNavigationLayout{"Navigation",
+                                             "The target beside the chaser as the navigation believes it",
+                                             kNavigationFrames, kNavigationSignals, 480};
+
+// --- What star tracker and gyroscope measure --------------------------------------------------------------------
+
+inline constexpr double kGyroscopeSteps_per_rad_s = 1e6;
+
+inline constexpr std::array<std::string_view, 5> kAttitudeFrames{"AttitudeTime", "AttitudeWX", "AttitudeYZ",
+                                                                 "AttitudeRateXY", "AttitudeRateZ"};
+
+inline constexpr auto kAttitudeSignals = laid_out(std::to_array<Signal>({
+    {"Time", "ns", "Of the measurement: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+    {"AttitudeW", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {1, 0, 24}},
+    {"AttitudeX", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {1, 24, 24}},
+    {"AttitudeY", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {2, 0, 24}},
+    {"AttitudeZ", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {2, 24, 24}},
+    {"RateX", "rad/s", "Angular rate in body axes", kGyroscopeSteps_per_rad_s, true, {3, 0, 24}},
+    {"RateY", "rad/s", "Angular rate in body axes", kGyroscopeSteps_per_rad_s, true, {3, 24, 24}},
+    {"RateZ", "rad/s", "Angular rate in body axes", kGyroscopeSteps_per_rad_s, true, {4, 0, 24}},
+}));
+
+inline constexpr SetLayout kAttitudeLayout{"Attitude", "What the chaser's star tracker and gyroscope measure",
+                                           kAttitudeFrames, kAttitudeSignals, 216};
+
+// --- What the dynamics are doing --------------------------------------------------------------------------------
+
+inline constexpr auto kDynamicsPhaseChoices = numbered(kDynamicsPhases);
+
+inline constexpr std::array<std::string_view, 3> kDynamicsFrames{"DynamicsTime", "DynamicsStart", "DynamicsPhase"};
+
+inline constexpr auto kDynamicsSignals = laid_out(std::to_array<Signal>({
+    {"Time", "ns", "Simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+    {"Start", "ns", "The scenario's time 0: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
+    {"Phase", "", "What the dynamics are doing", 1, false, {2, 0, 4}, {}, kDynamicsPhaseChoices},
+}));
+
+inline constexpr SetLayout kDynamicsLayout{"Dynamics", "Before the pose commands of the same time", kDynamicsFrames,
+                                           kDynamicsSignals, 104};
 
 }  // namespace narpa

@@ -12,7 +12,6 @@
 
 #include "base/constants.h"
 #include "base/time.h"
-#include "protocols/can/closed_loop_signals.h"
 #include "protocols/can/crc.h"
 #include "protocols/can/messages.h"
 

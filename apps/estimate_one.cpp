@@ -7,7 +7,7 @@
 #include <iterator>
 #include <random>
 
-#include "drivers/lidar/packet_capture.h"
+#include "drivers/lidar/packet_source.h"
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/sweep_points.h"

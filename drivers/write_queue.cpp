@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <system_error>
 
@@ -17,7 +16,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::int64_t kFlush_ns = kSecond_ns;
+constexpr std::int64_t kFlushNs = 1'000'000'000;
 
 // Signals belong to the thread that started the program; a reader that leaves must not raise SIGPIPE here.
 std::thread start_without_signals(auto body) {
@@ -68,7 +67,7 @@ bool WriteQueue::push(std::span<const std::uint8_t> item) noexcept {
 }
 
 void WriteQueue::flush() noexcept {
-    flush_deadline_ns_.store(monotonic_ns() + kFlush_ns, std::memory_order_release);
+    flush_deadline_ns_.store(monotonic_ns() + kFlushNs, std::memory_order_release);
     // The ring is empty when every slot is free.
     for (std::size_t held = 0; held < slots_;) held += sem_wait(&free_slots_) == 0 ? 1 : 0;
     for (std::size_t held = slots_; held > 0; --held) sem_post(&free_slots_);

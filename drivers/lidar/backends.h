@@ -12,6 +12,5 @@ namespace narpa {
 Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network);
 Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork& network,
                                                    std::int64_t epoch_unix_ns, bool wait_when_full);
-Result<std::unique_ptr<PacketSink>> open_null_packet_sink();
 
 }  // namespace narpa

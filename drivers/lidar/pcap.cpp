@@ -1,5 +1,6 @@
 #include "base/time.h"
 #include "drivers/lidar/backends.h"
+#include "drivers/lidar/packet_source.h"
 
 #ifdef NARPA_WITH_PCAP
 
@@ -13,12 +14,15 @@
 #include <cstdio>
 #include <cstring>
 
-#include "drivers/lidar/packet_capture.h"
+#include "drivers/can/descriptor.h"
 #include "drivers/write_queue.h"
 
 namespace narpa {
 namespace {
 
+constexpr std::size_t kEthernetBytes = 14, kIpBytes = 20, kUdpBytes = 8;
+constexpr std::uint8_t kUdpProtocol = 17;
+constexpr std::size_t kIpv4 = 0x0800;                                        // of Ethernet
 constexpr std::size_t kHeaderBytes = kEthernetBytes + kIpBytes + kUdpBytes;  // 42
 constexpr std::size_t kPayloadMax = 1500 - kIpBytes - kUdpBytes;
 constexpr std::size_t kRecordSlots = 2048;  // 2.7 s of data packets: a disk may pause
@@ -46,22 +50,20 @@ std::uint16_t checksum(std::uint32_t sum) noexcept {
 std::size_t put_frame(std::uint8_t* frame, const LidarNetwork& from, int port,
                       std::span<const std::uint8_t> payload) noexcept {
     constexpr std::array<std::uint8_t, 6> broadcast{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
-    constexpr std::size_t ipv4 = 0x0800;
     const auto& a = from.address;
     const std::array<std::uint8_t, 8> addresses{a[0], a[1], a[2], a[3], 255, 255, 255, 255};
-    constexpr std::uint8_t udp_protocol = 17;
     const std::size_t udp_length = kUdpBytes + payload.size();
 
     std::memcpy(frame, broadcast.data(), broadcast.size());
     std::memcpy(frame + broadcast.size(), from.mac.data(), from.mac.size());
-    put_be16(frame + kEthernetBytes - 2, ipv4);
+    put_be16(frame + kEthernetBytes - 2, kIpv4);
     std::uint8_t* ip = frame + kEthernetBytes;
     std::memset(ip, 0, kIpBytes);
     ip[0] = 0x45;  // version 4, five words
     put_be16(ip + 2, kIpBytes + udp_length);
     put_be16(ip + 6, 0x4000);  // do not fragment
     ip[8] = 255;               // time to live
-    ip[9] = udp_protocol;
+    ip[9] = kUdpProtocol;
     std::memcpy(ip + 12, addresses.data(), addresses.size());
     put_be16(ip + 10, checksum(add_words(ip, kIpBytes, 0)));
 
@@ -72,7 +74,7 @@ std::size_t put_frame(std::uint8_t* frame, const LidarNetwork& from, int port,
     put_be16(udp + 6, 0);
     std::memcpy(udp + kUdpBytes, payload.data(), payload.size());
     const std::uint32_t pseudo_header =
-        add_words(addresses.data(), addresses.size(), static_cast<std::uint32_t>(udp_protocol + udp_length));
+        add_words(addresses.data(), addresses.size(), static_cast<std::uint32_t>(kUdpProtocol + udp_length));
     const std::uint16_t sum = checksum(add_words(udp, udp_length, pseudo_header));
     put_be16(udp + 6, sum == 0 ? 0xFFFF : sum);  // RFC 768: 0 would mean "no checksum"
     return kHeaderBytes + payload.size();
@@ -98,12 +100,11 @@ public:
         ::pcap_dump(reinterpret_cast<u_char*>(dumper_), &header, record.data() + kStampBytes);
         if (::pcap_dump_flush(dumper_) != 0 || std::ferror(file_) != 0) return take_back();
         end_of_last_record_ = ::ftello(file_);
-        sent.fetch_add(1, std::memory_order_relaxed);
+        ++sent;
     }
-    void abandon(std::span<const std::uint8_t>) noexcept override { lost_.fetch_add(1, std::memory_order_relaxed); }
-    [[nodiscard]] std::uint64_t lost_packets() const noexcept { return lost_.load(std::memory_order_relaxed); }
+    void abandon(std::span<const std::uint8_t>) noexcept override { ++lost; }
 
-    std::atomic<std::uint64_t> sent{0};
+    std::atomic<std::uint64_t> sent{0}, lost{0};
 
 private:
     void take_back() noexcept {
@@ -117,7 +118,6 @@ private:
     pcap_dumper_t* dumper_;
     std::FILE* file_;
     off_t end_of_last_record_;
-    std::atomic<std::uint64_t> lost_{0};
 };
 
 class PcapSink final : public PacketSink {
@@ -143,9 +143,7 @@ public:
         return queue_.push(std::span(record).first(size));
     }
     void flush() noexcept override { queue_.flush(); }
-    PacketCounters counters() const noexcept override {
-        return {writer_.sent.load(std::memory_order_relaxed), queue_.dropped() + writer_.lost_packets()};
-    }
+    PacketCounters counters() const noexcept override { return {writer_.sent, queue_.dropped() + writer_.lost}; }
     std::string description() const override { return description_; }
 
 private:
@@ -155,6 +153,23 @@ private:
     PcapWriter writer_;
     WriteQueue queue_;
 };
+
+std::size_t be16(const std::uint8_t* at) {
+    return static_cast<std::size_t>(at[0] << 8 | at[1]);
+}
+
+/// Offset of the payload of a whole UDP datagram of this size; 0: the frame is not one.
+std::size_t payload_at(const std::uint8_t* frame, std::size_t size, std::size_t payload_bytes) {
+    constexpr std::size_t kOffsetMask = 0x3FFF;  // more fragments, or not the first
+    if (size < kEthernetBytes + kIpBytes + kUdpBytes || be16(frame + 12) != kIpv4) return 0;
+    const std::uint8_t* ip = frame + kEthernetBytes;
+    const std::size_t header = static_cast<std::size_t>(ip[0] & 0xF) * 4;
+    if (ip[0] >> 4 != 4 || header < kIpBytes || ip[9] != kUdpProtocol || (be16(ip + 6) & kOffsetMask) != 0)
+        return 0;
+    const std::size_t at = kEthernetBytes + header + kUdpBytes;
+    if (size < at + payload_bytes || be16(ip + header + 4) != kUdpBytes + payload_bytes) return 0;
+    return at;
+}
 
 }  // namespace
 
@@ -175,20 +190,50 @@ Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, cons
         std::make_unique<PcapSink>(path, network, epoch_unix_ns, wait_when_full, pcap, dumper));
 }
 
+Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string& path, std::size_t payload_bytes) {
+    std::array<char, PCAP_ERRBUF_SIZE> why{};
+    const std::unique_ptr<pcap_t, void (*)(pcap_t*)> file(::pcap_open_offline(path.c_str(), why.data()),
+                                                          ::pcap_close);
+    if (!file) return Error{std::string(why.data()) + "; expected a capture (pcap)", path};
+    if (::pcap_datalink(file.get()) != DLT_EN10MB) return Error{"not captured from Ethernet, expected that", path};
+    std::vector<std::vector<std::uint8_t>> payloads;
+    pcap_pkthdr* header = nullptr;
+    const u_char* frame = nullptr;
+    int read = 0;
+    while ((read = ::pcap_next_ex(file.get(), &header, &frame)) == 1)
+        if (const std::size_t at = payload_at(frame, header->caplen, payload_bytes); at > 0)
+            payloads.emplace_back(frame + at, frame + at + payload_bytes);
+    if (read == PCAP_ERROR) return Error{::pcap_geterr(file.get()), path};
+    if (payloads.empty())
+        return Error{"holds no UDP datagram of " + std::to_string(payload_bytes) + " bytes, expected a LiDAR's",
+                     path};
+    return payloads;
+}
+
 }  // namespace narpa
 
 #else
 
 namespace narpa {
+namespace {
+
+Error built_without(const std::string& path) {
+    return {"this narpa was built without captures",
+            path,
+            0,
+            0,
+            ErrorKind::missing,
+            "cmake -DNARPA_WITH_PCAP=ON ... (needs libpcap-dev), and build again"};
+}
+
+}  // namespace
 
 Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork&, std::int64_t,
                                                    bool) {
-    return Error{"this narpa was built without captures",
-                 path,
-                 0,
-                 0,
-                 ErrorKind::missing,
-                 "cmake -DNARPA_WITH_PCAP=ON ... (needs libpcap-dev), and build again"};
+    return built_without(path);
+}
+Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string& path, std::size_t) {
+    return built_without(path);
 }
 
 }  // namespace narpa

@@ -1,7 +1,6 @@
 #include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -10,8 +9,13 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
+#include <utility>
 
+#include "drivers/can/datagram.h"
+#include "drivers/can/descriptor.h"
 #include "drivers/lidar/backends.h"
+#include "drivers/lidar/packet_source.h"
 
 namespace narpa {
 namespace {
@@ -33,8 +37,8 @@ struct Destination {
 class UdpSink final : public PacketSink {
 public:
     /// `position_port_offset`: 0 where there are no position packets.
-    UdpSink(int fd, const Destination& data, int port, int position_port_offset, const std::string& host)
-        : fd_(fd),
+    UdpSink(Descriptor fd, const Destination& data, int port, int position_port_offset, const std::string& host)
+        : fd_(std::move(fd)),
           destinations_{data, data},
           description_("UDP to " + host + ", data port " + std::to_string(port)) {
         destinations_[0].set_port(port);
@@ -42,39 +46,50 @@ public:
         if (position_port_offset != 0)
             description_ += ", position port " + std::to_string(port + position_port_offset);
     }
-    ~UdpSink() override { ::close(fd_); }
-    UdpSink(const UdpSink&) = delete;
-    UdpSink& operator=(const UdpSink&) = delete;
 
     bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t) noexcept override {
         const Destination& to = destinations_[kind == PacketKind::data ? 0 : 1];
         ssize_t n = 0;
         do
-            n = ::sendto(fd_, payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+            n = ::sendto(fd_.get(), payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
                          reinterpret_cast<const sockaddr*>(&to.address), to.size);
         while (n < 0 && errno == EINTR);
         const bool sent = n == static_cast<ssize_t>(payload.size());
-        (sent ? sent_ : dropped_).fetch_add(1, std::memory_order_relaxed);
+        ++(sent ? sent_ : dropped_);
         return sent;
     }
     void flush() noexcept override {}
-    PacketCounters counters() const noexcept override {
-        return {sent_.load(std::memory_order_relaxed), dropped_.load(std::memory_order_relaxed)};
-    }
+    PacketCounters counters() const noexcept override { return {sent_, dropped_}; }
     std::string description() const override { return description_; }
 
 private:
-    int fd_;
+    Descriptor fd_;
     std::array<Destination, 2> destinations_;
     std::string description_;
     std::atomic<std::uint64_t> sent_{0}, dropped_{0};
 };
 
-Result<int> port_from(std::string_view text, const std::string& address, int position_port_offset) {
-    int port = 0;
+/// "HOST:PORT", "[HOST]:PORT" or "PORT".
+std::pair<std::string, std::string> split_port(std::string_view text) {
+    const std::size_t colon = text.rfind(':');
+    if (colon == text.npos) return {"", std::string(text)};
+    std::string_view host = text.substr(0, colon);
+    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+    return {std::string(host), std::string(text.substr(colon + 1))};
+}
+
+/// 1 to 65535, or nothing.
+std::optional<int> port_number(std::string_view text) {
+    std::uint16_t port = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+    if (error != std::errc{} || end != text.data() + text.size() || port == 0) return std::nullopt;
+    return port;
+}
+
+Result<int> data_port(std::string_view text, const std::string& address, int position_port_offset) {
     const int least = std::max(1, 1 - position_port_offset), most = std::min(65535, 65535 - position_port_offset);
-    if (error == std::errc{} && end == text.data() + text.size() && port >= least && port <= most) return port;
+    const std::optional<int> port = port_number(text);
+    if (port && *port >= least && *port <= most) return *port;
     std::string what =
         "udp:" + address + ": expected a data port from " + std::to_string(least) + " to " + std::to_string(most);
     if (position_port_offset != 0)
@@ -95,27 +110,89 @@ Result<Destination> resolve(const std::string& host, const std::string& address)
     return destination;
 }
 
+class UdpSource final : public PacketSource {
+public:
+    UdpSource(Descriptor fd, std::string description) : fd_(std::move(fd)), description_(std::move(description)) {}
+
+    [[nodiscard]] std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t timeout_ns) noexcept override {
+        const std::int64_t until_ns = monotonic_ns() + timeout_ns;
+        for (;;) {
+            const Datagram d = receive_datagram(fd_.get(), bytes);
+            if (d.bytes >= 0) {
+                note_lost(d.lost);
+                const bool good = d.bytes > 0 && !d.truncated;
+                ++(good ? counters_.received : counters_.refused);
+                if (good) return static_cast<std::size_t>(d.bytes);
+                continue;
+            }
+            const std::int64_t left_ns = until_ns - monotonic_ns();
+            if (left_ns <= 0) return 0;
+            std::array<pollfd, 1> fds{{{fd_.get(), POLLIN, 0}}};
+            wait_ready(fds, left_ns);
+        }
+    }
+    [[nodiscard]] std::string description() const override { return description_; }
+
+private:
+    /// The kernel's count has 32 bits and wraps.
+    void note_lost(std::uint32_t total) noexcept {
+        if (total == 0) return;
+        counters_.lost += static_cast<std::uint32_t>(total - lost_);
+        lost_ = total;
+    }
+
+    Descriptor fd_;
+    std::string description_;
+    std::uint32_t lost_ = 0;
+};
+
 }  // namespace
 
 Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network) {
-    const std::size_t colon = address.rfind(':');
-    std::string host = address.substr(0, colon);
-    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-    if (colon == address.npos || host.empty())
-        return Error{"udp:" + address + ": expected udp:HOST:PORT, as in udp:127.0.0.1:2368"};
-    const Result<int> port =
-        port_from(std::string_view(address).substr(colon + 1), address, network.position_port_offset());
+    const auto [host, port_text] = split_port(address);
+    if (host.empty()) return Error{"udp:" + address + ": expected udp:HOST:PORT, as in udp:127.0.0.1:2368"};
+    const Result<int> port = data_port(port_text, address, network.position_port_offset());
     if (!port) return port.error();
     const Result<Destination> destination = resolve(host, address);
     if (!destination) return destination.error();
 
     // Not connected: on a connected socket an ICMP "port unreachable" makes the next send fail.
-    const int fd = ::socket(destination->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (fd < 0) return Error{"udp:" + address + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
+    Descriptor fd(::socket(destination->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    if (!fd) return Error{"udp:" + address + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
     const int on = 1;  // as the instrument does
-    ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
+    ::setsockopt(fd.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
     return std::unique_ptr<PacketSink>(
-        std::make_unique<UdpSink>(fd, *destination, *port, network.position_port_offset(), host));
+        std::make_unique<UdpSink>(std::move(fd), *destination, *port, network.position_port_offset(), host));
+}
+
+Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) {
+    constexpr std::string_view scheme = "udp:";
+    const std::string name = "packet source \"" + std::string(spec) + "\"";
+    const std::string_view rest = spec.starts_with(scheme) ? spec.substr(scheme.size()) : std::string_view{};
+    const auto [host, port] = split_port(rest);
+    const std::string address = rest.find(':') == rest.npos ? "0.0.0.0" : host;
+    if (address.empty() || !port_number(port))
+        return Error{name + ": expected udp:PORT or udp:ADDRESS:PORT with a port from 1 to 65535, as in udp:2368"};
+
+    addrinfo hints{}, *found = nullptr;
+    hints.ai_socktype = SOCK_DGRAM;
+    hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
+    if (const int failure = ::getaddrinfo(address.c_str(), port.c_str(), &hints, &found); failure != 0)
+        return Error{name + ": \"" + address + "\" is not an address: " + ::gai_strerror(failure)};
+    Descriptor fd(::socket(found->ai_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const bool bound = fd && ::bind(fd.get(), found->ai_addr, found->ai_addrlen) == 0;
+    const int reason = errno;
+    ::freeaddrinfo(found);
+    if (!bound) {
+        Error error{name + ": cannot listen: " + std::strerror(reason), {}, 0, 0, ErrorKind::missing};
+        if (reason == EADDRINUSE)
+            error.remedy = "another port, or see who has it: ss -lunp 'sport = :" + port + "'";
+        if (reason == EADDRNOTAVAIL) error.remedy = "ip -br address   (the addresses of this machine)";
+        return error;
+    }
+    prepare_for_bursts(fd.get());
+    return std::unique_ptr<PacketSource>(
+        std::make_unique<UdpSource>(std::move(fd), "UDP at " + address + ", port " + port));
 }
 
 }  // namespace narpa

@@ -1,16 +1,26 @@
 /// drivers/video/backends.h - the video sinks and sources behind open_video_sink and open_video_source.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 
 #include "drivers/video/video_sink.h"
 #include "drivers/video/video_source.h"
+#include "drivers/write_queue.h"
 
 namespace narpa {
 
-/// Frames that the ring of a sink holds: 0.8 s at 10 Hz, so a disk may pause.
-inline constexpr std::size_t kVideoSlots = 8;
+/// Writes the frames of a queue and counts them.
+class VideoWriter : public QueueWriter {
+public:
+    void abandon(std::span<const std::uint8_t>) noexcept override { ++failed; }
+
+    std::atomic<std::uint64_t> written{0}, no_reader{0}, failed{0}, reconnects{0};
+};
+/// The sink of a writer, which gets frames of the format alone.
+std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,
+                                       WhenFull full, std::string description);
 
 /// Checks the device, its format and starts it; a device that vanishes later is looked for once a second.
 Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
@@ -18,7 +28,6 @@ Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const
 /// `fifo`: the path is a FIFO; else a file, made or emptied.
 Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool fifo, const VideoFormat& format,
                                                  WhenFull full);
-Result<std::unique_ptr<VideoSink>> open_null_sink(const VideoFormat& format);
 
 /// A device that is no camera yet (v4l2loopback before its writer's first frame) is looked at again.
 Result<std::unique_ptr<VideoSource>> open_v4l2_source(const std::string& path, const VideoFormat& format);

@@ -1,16 +1,12 @@
 #include <fcntl.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <numeric>
 
-#include "base/time.h"
+#include "drivers/can/descriptor.h"
 #include "drivers/video/backends.h"
 #include "drivers/video/v4l2_device.h"
-#include "drivers/write_queue.h"
 
 // v4l2loopback 0.12.7 (Debian 12) decides the way here: memory-mapped output always returns the same buffer, so
 // frames go by write(); an unknown format is "accepted" as another, so the result is compared; without
@@ -27,10 +23,10 @@ struct Start {
     Step step = Step::open;
     int error = 0;
     v4l2_pix_format got{};
-    int fd = -1;
+    Descriptor fd{};
 };
 
-void tell_frame_rate(int fd, std::int64_t period_ns) noexcept {
+void set_frame_rate(int fd, std::int64_t period_ns) noexcept {
     const std::int64_t common = std::gcd(period_ns, kSecond_ns);
     v4l2_streamparm parameters{};
     parameters.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
@@ -49,21 +45,17 @@ Start start_steps(int fd, const VideoFormat& format) noexcept {
     f.fmt.pix = v4l2_wanted_format(format);
     if (xioctl(fd, VIDIOC_S_FMT, &f) < 0) return {Step::format_call, errno};
     if (!is_same_format(f.fmt.pix, v4l2_wanted_format(format))) return {Step::format_kept, 0, f.fmt.pix};
-    tell_frame_rate(fd, format.period_ns);
+    set_frame_rate(fd, format.period_ns);
     int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     if (xioctl(fd, VIDIOC_STREAMON, &type) < 0 && errno != EINVAL) return {Step::stream, errno};
     return {Step::started, 0};
 }
 
 Start start_device(const char* path, const VideoFormat& format) noexcept {
-    const int fd = ::open(path, O_RDWR | O_CLOEXEC);
-    if (fd < 0) return {Step::open, errno};
-    Start start = start_steps(fd, format);
-    if (start.step == Step::started) {
-        start.fd = fd;
-    } else {
-        ::close(fd);
-    }
+    Descriptor fd(::open(path, O_RDWR | O_CLOEXEC));
+    if (!fd) return {Step::open, errno};
+    Start start = start_steps(fd.get(), format);
+    if (start.step == Step::started) start.fd = std::move(fd);
     return start;
 }
 
@@ -102,86 +94,49 @@ Error describe(const std::string& path, const VideoFormat& format, const Start& 
     return error;
 }
 
-class V4l2Writer final : public QueueWriter {
+class V4l2Writer final : public VideoWriter {
 public:
-    V4l2Writer(std::string path, const VideoFormat& format, int fd)
-        : path_(std::move(path)), format_(format), fd_(fd) {}
-    ~V4l2Writer() override { close_device(); }
+    V4l2Writer(std::string path, const VideoFormat& format, Descriptor fd)
+        : path_(std::move(path)), format_(format), fd_(std::move(fd)) {}
 
     void write(std::span<const std::uint8_t> frame, const WriteQueue&) noexcept override {
-        if (fd_ < 0 && !look_for_device()) return abandon(frame);
+        if (!fd_ && !reopen()) return abandon(frame);
         ssize_t n = 0;
-        do n = ::write(fd_, frame.data(), frame.size());
+        do n = ::write(fd_.get(), frame.data(), frame.size());
         while (n < 0 && errno == EINTR);
         if (n == static_cast<ssize_t>(frame.size())) {
-            written.fetch_add(1, std::memory_order_relaxed);
+            ++written;
             return;
         }
-        if (n < 0 && errno != EAGAIN) close_device();
+        if (n < 0 && errno != EAGAIN) {
+            fd_.reset();
+            (void)retry_.due();  // not before a second has passed
+        }
         abandon(frame);
     }
-    void abandon(std::span<const std::uint8_t>) noexcept override {
-        failed.fetch_add(1, std::memory_order_relaxed);
-    }
-
-    std::atomic<std::uint64_t> written{0}, failed{0}, reconnects{0};
 
 private:
-    bool look_for_device() noexcept {
-        const std::int64_t now = monotonic_ns();
-        if (now < next_look_ns_) return false;
-        next_look_ns_ = now + kSecond_ns;
+    bool reopen() noexcept {
+        if (!retry_.due()) return false;
         fd_ = start_device(path_.c_str(), format_).fd;
-        if (fd_ < 0) return false;
-        reconnects.fetch_add(1, std::memory_order_relaxed);
-        return true;
-    }
-    void close_device() noexcept {
-        if (fd_ >= 0) ::close(fd_);
-        fd_ = -1;
-        next_look_ns_ = monotonic_ns() + kSecond_ns;
+        if (fd_) ++reconnects;
+        return static_cast<bool>(fd_);
     }
 
     std::string path_;
     VideoFormat format_;
-    int fd_;
-    std::int64_t next_look_ns_ = 0;
-};
-
-class V4l2Sink final : public VideoSink {
-public:
-    V4l2Sink(const std::string& path, const VideoFormat& format, WhenFull full, int fd)
-        : description_("V4L2 output " + path + ", " + format_text(v4l2_wanted_format(format))),
-          frame_size_(frame_bytes(format)),
-          writer_(path, format, fd),
-          queue_(writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
-
-    bool send(std::span<const std::uint8_t> frame) noexcept override {
-        if (frame.size() == frame_size_) return queue_.push(frame);
-        writer_.abandon(frame);
-        return false;
-    }
-    void flush() noexcept override { queue_.flush(); }
-    VideoCounters counters() const noexcept override {
-        return {writer_.written.load(std::memory_order_relaxed), queue_.dropped(), 0,
-                writer_.failed.load(std::memory_order_relaxed), writer_.reconnects.load(std::memory_order_relaxed)};
-    }
-    std::string description() const override { return description_; }
-
-private:
-    std::string description_;
-    std::size_t frame_size_;
-    V4l2Writer writer_;
-    WriteQueue queue_;
+    Descriptor fd_;
+    RetryTimer retry_{};
 };
 
 }  // namespace
 
 Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
                                                   WhenFull full) {
-    const Start start = start_device(path.c_str(), format);
+    Start start = start_device(path.c_str(), format);
     if (start.step != Step::started) return describe(path, format, start);
-    return std::unique_ptr<VideoSink>(std::make_unique<V4l2Sink>(path, format, full, start.fd));
+    return queued_sink(std::make_unique<V4l2Writer>(path, format, std::move(start.fd)), format, full,
+                       "V4L2 output " + path + ", " + format_text(v4l2_wanted_format(format)));
 }
 
 }  // namespace narpa

@@ -1,29 +1,22 @@
 #include "protocols/video/y4m.h"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <sys/stat.h>
 #include <sys/uio.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <vector>
 
+#include "drivers/can/descriptor.h"
 #include "drivers/video/backends.h"
-#include "drivers/write_queue.h"
 
 namespace narpa {
 namespace {
 
 constexpr int kPollPeriodMs = 20;  // between two checks of the deadline while a reader blocks or is away
-
-void add_one(std::atomic<std::uint64_t>& counter) noexcept {
-    counter.fetch_add(1, std::memory_order_relaxed);
-}
 
 // A frame with its header, and the stream's header before the first, in pieces for writev.
 class Pieces {
@@ -52,15 +45,11 @@ private:
     std::size_t first_ = 0, last_ = 0;
 };
 
-class Y4mWriter : public QueueWriter {
+class Y4mWriter : public VideoWriter {
 public:
     Y4mWriter(const VideoFormat& format, std::string header) : format_(format), header_(std::move(header)) {
         if (!y4m_is_verbatim(format.pixel)) planar_.resize(frame_bytes(format));
     }
-
-    void abandon(std::span<const std::uint8_t>) noexcept override { add_one(failed); }
-
-    std::atomic<std::uint64_t> written{0}, no_reader{0}, failed{0}, reconnects{0};
 
 protected:
     std::span<const std::uint8_t> samples(std::span<const std::uint8_t> frame) noexcept {
@@ -86,31 +75,30 @@ private:
 // A file always ends with a whole frame: one that a full disk cut short is removed.
 class FileWriter final : public Y4mWriter {
 public:
-    FileWriter(int fd, const VideoFormat& format, std::string header)
-        : Y4mWriter(format, std::move(header)), fd_(fd) {}
-    ~FileWriter() override { ::close(fd_); }
+    FileWriter(Descriptor fd, const VideoFormat& format, std::string header)
+        : Y4mWriter(format, std::move(header)), fd_(std::move(fd)) {}
 
     void write(std::span<const std::uint8_t> frame, const WriteQueue&) noexcept override {
         Pieces left = pieces(samples(frame), end_of_last_frame_ == 0);
         off_t end = end_of_last_frame_;
         while (!left.empty()) {
-            const ssize_t n = left.write_to(fd_);
+            const ssize_t n = left.write_to(fd_.get());
             if (n < 0 && errno == EINTR) continue;
             if (n <= 0) return take_back();
             left.consume(static_cast<std::size_t>(n));
             end += n;
         }
         end_of_last_frame_ = end;
-        add_one(written);
+        ++written;
     }
 
 private:
     void take_back() noexcept {
-        add_one(failed);
-        if (::ftruncate(fd_, end_of_last_frame_) == 0) ::lseek(fd_, end_of_last_frame_, SEEK_SET);
+        ++failed;
+        if (::ftruncate(fd_.get(), end_of_last_frame_) == 0) ::lseek(fd_.get(), end_of_last_frame_, SEEK_SET);
     }
 
-    int fd_;
+    Descriptor fd_;
     off_t end_of_last_frame_ = 0;
 };
 
@@ -120,40 +108,36 @@ class FifoWriter final : public Y4mWriter {
 public:
     FifoWriter(std::string path, const VideoFormat& format, std::string header, bool wait_for_reader)
         : Y4mWriter(format, std::move(header)), path_(std::move(path)), wait_for_reader_(wait_for_reader) {}
-    ~FifoWriter() override { lost(); }
 
     void write(std::span<const std::uint8_t> frame, const WriteQueue& queue) noexcept override {
         const std::span<const std::uint8_t> data = samples(frame);
         for (;;) {
-            if (!reach_reader(queue)) return add_one(no_reader);
+            if (!reach_reader(queue)) return void(++no_reader);
             switch (write_to_reader(data, queue)) {
-                case Outcome::written: return add_one(written);
+                case Outcome::written: return void(++written);
                 case Outcome::out_of_time:
                     lost();  // what follows would continue half a frame
-                    return add_one(failed);
+                    return void(++failed);
                 case Outcome::reader_left:
                     lost();
-                    if (!wait_for_reader_) return add_one(no_reader);
+                    if (!wait_for_reader_) return void(++no_reader);
             }
         }
     }
-    void abandon(std::span<const std::uint8_t>) noexcept override { add_one(fd_ < 0 ? no_reader : failed); }
-    int watched() const noexcept override { return fd_; }
-    void lost() noexcept override {
-        if (fd_ >= 0) ::close(fd_);
-        fd_ = -1;
-    }
+    void abandon(std::span<const std::uint8_t>) noexcept override { ++(fd_ ? failed : no_reader); }
+    int watched() const noexcept override { return fd_.get(); }
+    void lost() noexcept override { fd_.reset(); }
 
 private:
     enum class Outcome { written, reader_left, out_of_time };
 
     // A FIFO opens for writing without blocking only while somebody reads it.
     bool reach_reader(const WriteQueue& queue) noexcept {
-        while (fd_ < 0) {
-            fd_ = ::open(path_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
-            if (fd_ >= 0) {
+        while (!fd_) {
+            fd_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC));
+            if (fd_) {
                 stream_header_due_ = true;
-                if (had_reader_) add_one(reconnects);
+                if (had_reader_) ++reconnects;
                 had_reader_ = true;
             } else if (!wait_for_reader_ || queue.time_left_ms() == 0) {
                 return false;
@@ -167,12 +151,12 @@ private:
     Outcome write_to_reader(std::span<const std::uint8_t> data, const WriteQueue& queue) noexcept {
         Pieces left = pieces(data, stream_header_due_);
         while (!left.empty()) {
-            const ssize_t n = left.write_to(fd_);
+            const ssize_t n = left.write_to(fd_.get());
             if (n > 0) {
                 left.consume(static_cast<std::size_t>(n));
             } else if (n < 0 && errno == EAGAIN) {
                 if (queue.time_left_ms() == 0) return Outcome::out_of_time;
-                pollfd fd{fd_, POLLOUT, 0};
+                pollfd fd{fd_.get(), POLLOUT, 0};
                 ::poll(&fd, 1, kPollPeriodMs);
             } else if (n == 0 || errno != EINTR) {
                 return Outcome::reader_left;
@@ -184,35 +168,7 @@ private:
 
     std::string path_;
     bool wait_for_reader_, had_reader_ = false, stream_header_due_ = true;
-    int fd_ = -1;
-};
-
-class Y4mSink final : public VideoSink {
-public:
-    Y4mSink(std::unique_ptr<Y4mWriter> writer, const VideoFormat& format, WhenFull full, std::string description)
-        : writer_(std::move(writer)),
-          frame_size_(frame_bytes(format)),
-          description_(std::move(description)),
-          queue_(*writer_, kVideoSlots, frame_size_, full == WhenFull::wait) {}
-
-    bool send(std::span<const std::uint8_t> frame) noexcept override {
-        if (frame.size() == frame_size_) return queue_.push(frame);
-        add_one(writer_->failed);
-        return false;
-    }
-    void flush() noexcept override { queue_.flush(); }
-    VideoCounters counters() const noexcept override {
-        return {writer_->written.load(std::memory_order_relaxed), queue_.dropped(),
-                writer_->no_reader.load(std::memory_order_relaxed), writer_->failed.load(std::memory_order_relaxed),
-                writer_->reconnects.load(std::memory_order_relaxed)};
-    }
-    std::string description() const override { return description_; }
-
-private:
-    std::unique_ptr<Y4mWriter> writer_;
-    std::size_t frame_size_;
-    std::string description_;
-    WriteQueue queue_;
+    Descriptor fd_{};
 };
 
 }  // namespace
@@ -221,17 +177,15 @@ Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool f
                                                  WhenFull full) {
     Result<std::string> header = y4m_stream_header(format);
     if (!header) return Error{header.error().what, path};
-    std::unique_ptr<Y4mWriter> writer;
+    std::unique_ptr<VideoWriter> writer;
     if (fifo) {
         writer = std::make_unique<FifoWriter>(path, format, *header, full == WhenFull::wait);
     } else {
-        const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-        if (fd < 0)
-            return Error{std::string("cannot write: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
-        writer = std::make_unique<FileWriter>(fd, format, *header);
+        Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+        if (!fd) return Error{std::string("cannot write: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
+        writer = std::make_unique<FileWriter>(std::move(fd), format, *header);
     }
-    return std::unique_ptr<VideoSink>(
-        std::make_unique<Y4mSink>(std::move(writer), format, full, (fifo ? "Y4M to FIFO " : "Y4M to ") + path));
+    return queued_sink(std::move(writer), format, full, (fifo ? "Y4M to FIFO " : "Y4M to ") + path);
 }
 
 }  // namespace narpa

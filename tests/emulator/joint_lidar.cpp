@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/lidar/packet_capture.h"
+#include "drivers/lidar/packet_source.h"
 #include "emulator/lidar_unit.h"
 #include "protocols/little_endian.h"
 #include "rehearsal/navigation/sweep_buffer.h"

@@ -69,7 +69,7 @@ public:
     SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
 
 private:
-    /// Hands the frame just rendered over as the late policy says, and completes its ledger.
+    /// Hands over the frame just rendered, by the late policy, and completes its ledger.
     void hand_over(FrameLedger& ledger, const Clock& clock) noexcept;
     /// Of the hand-over: the end of the time budget, or the middle of the next exposure.
     [[nodiscard]] std::int64_t deadline_ns(std::uint32_t frame) const noexcept;

@@ -98,14 +98,14 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     ledger.pose_counter = source.counter;
     ledger.pose_stale = source.stale;
     ledger.t_pose_ns = source.t_pose_ns;
-    tell_cost(account, ledger);
+    put_cost(account, ledger);
     ledger.t_exposure_mid_ns = t_mid_ns;
     ledger.t_exposure_start_ns = t_mid_ns - exposure_ns() / 2;
     ledger.t_exposure_end_ns = ledger.t_exposure_start_ns + exposure_ns();
     return ledger;
 }
 
-void CameraUnit::tell_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept {
+void CameraUnit::put_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept {
     const RenderSettings& render = world_.scene().render;
     if (render.budget_rays > 0) {
         ledger.budget_kind = BudgetKind::rays;

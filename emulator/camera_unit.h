@@ -56,7 +56,7 @@ public:
                        Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);
     /// Renders a frame of maximum work and discards it: triggers one-time allocations and calibrates the renderer.
     void warm_up();
-    /// Writes the ledger into the last row, where the scene asks for it.
+    /// Writes the ledger into the last row, if the scene has embedded_line.
     void embed(const FrameLedger& ledger) noexcept;
     /// The last frame was handed over at this time, CLOCK_MONOTONIC.
     void handed_over(std::int64_t t_ns) noexcept { allowance_.add(t_ns - t_radiance_ns_); }
@@ -73,7 +73,7 @@ private:
     [[nodiscard]] FrameBudget budget(std::int64_t deadline_ns) const noexcept;
     FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, const FrameBudget& budget, Aovs* aovs,
                        std::atomic<std::size_t>* pixels_done);
-    void tell_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept;
+    void put_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept;
 
     const World& world_;
     Camera camera_;

@@ -17,7 +17,6 @@
 
 namespace narpa {
 
-class Telemetry;
 struct TracingThreads;
 
 struct RunOptions {
@@ -78,6 +77,11 @@ private:
     void run_bus(RealTimeRun& run, const StopFlag& stop);
     void run_estimator(const StopFlag& stop);
 
+    /// On the CAN bus, if there is one: what sensors and estimator have gathered; the state with the faults since
+    /// the last heartbeat. One thread calls them.
+    void send_telemetry(std::int64_t t_ns) noexcept;
+    void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
+
     void run_lockstep(const StopFlag& stop);
     void advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFlag& stop);
 
@@ -89,7 +93,8 @@ private:
     std::unique_ptr<CanNode> can_;
     std::vector<std::unique_ptr<Sensor>> sensors_;
     std::unique_ptr<OnlineEstimator> estimator_;
-    std::unique_ptr<Telemetry> telemetry_;
+    Heartbeat faults_{};  ///< since the last heartbeat
+    std::uint64_t drops_reported_ = 0;
     std::unique_ptr<TracingThreads> threads_;
     std::atomic<std::int64_t> t_ns_{0};
     std::atomic<bool> no_priority_{false};

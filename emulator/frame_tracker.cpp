@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <random>
 
 #include "base/time.h"
@@ -66,101 +65,77 @@ EstimateReport TrackedFrame::report(std::uint8_t camera) const {
             {deviation(3), deviation(4), deviation(5)}};
 }
 
-struct FrameTracker::Impl {
-    Impl(const World& w, const Camera& c, std::size_t body, const TrackerOptions& o)
-        : world(w), camera(c), target(body), options(o), random(o.seed), tracker(tracker_settings(o)) {}
-
-    /// What one frame says, from a guess.
-    void measure(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
-    void measure_by_points(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
-    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
-    void fuse(const PoseMeasurement& measurement, TrackedFrame& out);
-    /// Well enough for a render to be compared from there.
-    [[nodiscard]] bool knows_where(const Quat& q_frame_chaser) const;
-    /// The chaser is the body that carries the camera, or the camera itself.
-    [[nodiscard]] Rigid3 T_chaser_camera() const { return camera.mount < 0 ? Rigid3{} : camera.T_mount_camera; }
-
-    const World& world;
-    const Camera camera;
-    std::size_t target;
-    TrackerOptions options;
-    std::mt19937_64 random;
-    std::optional<FeatureAlignment> by_points;
-    std::optional<DenseAlignment> by_pixels;
-    DenseOptions dense_used;  ///< with the last frame
-    PoseTracker tracker;
-};
-
-Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, std::size_t camera_index,
-                                                           const TrackerOptions& options) {
-    const Camera& camera = world.scene().cameras[camera_index];
-    const auto target = target_of(world, camera.mount, camera.name, options.target);
-    if (!target) return target.error();
-    auto impl = std::make_unique<Impl>(world, camera, *target, options);
+FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t target,
+                           const TrackerOptions& options)
+    : world_(world),
+      camera_(world.scene().cameras[camera]),
+      target_(target),
+      options_(options),
+      random_(options.seed),
+      tracker_(tracker_settings(options)) {
     FeatureSettings features;
     features.spp = options.spp;
     features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
-    impl->by_points.emplace(world.render_scene(), camera, *target, BodyPoses(world.scene().bodies.size()),
-                            features);
-    if (options.method == EstimateMethod::dense) impl->by_pixels.emplace(world.render_scene(), camera, *target);
-    return std::unique_ptr<FrameTracker>(new FrameTracker(std::move(impl)));
+    features_ = std::make_unique<FeatureAlignment>(world.render_scene(), camera_, target,
+                                                   BodyPoses(world.scene().bodies.size()), features);
+    if (options.method == EstimateMethod::dense)
+        pixels_ = std::make_unique<DenseAlignment>(world.render_scene(), camera_, target);
 }
-
-FrameTracker::FrameTracker(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 FrameTracker::~FrameTracker() = default;
 
-std::size_t FrameTracker::target() const noexcept {
-    return impl_->target;
-}
-const TrackerOptions& FrameTracker::options() const noexcept {
-    return impl_->options;
+Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, std::size_t camera,
+                                                           const TrackerOptions& options) {
+    const Camera& c = world.scene().cameras[camera];
+    const auto target = target_of(world, c.mount, c.name, options.target);
+    if (!target) return target.error();
+    return std::unique_ptr<FrameTracker>(new FrameTracker(world, camera, *target, options));
 }
 
 TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
                                 const BodyPoses& at) {
-    Impl& m = *impl_;
     const std::int64_t start_ns = monotonic_ns();
     TrackedFrame out;
     out.frame = frame;
     out.t_ns = t_ns;
-    const Rigid3 T_world_camera = m.world.sensor_pose(m.camera.mount, m.camera.T_mount_camera, at);
-    out.truth = inverse(T_world_camera) * at.T_world_body[m.target];
-    const Quat q_frame_chaser = (T_world_camera * inverse(m.T_chaser_camera())).q;
-    if (m.tracker.started()) m.tracker.filter().predict(t_ns);
-    if (m.tracker.started() && !m.knows_where(q_frame_chaser)) m.tracker.stop();
-    if (m.tracker.started()) {
-        out.guess = inverse(m.T_chaser_camera()) * m.tracker.filter().pose(q_frame_chaser).T_chaser_target;
+    const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, at);
+    out.truth = inverse(T_world_camera) * at.T_world_body[target_];
+    const Quat q_frame_chaser = (T_world_camera * inverse(T_chaser_camera())).q;
+    if (tracker_.started()) tracker_.filter().predict(t_ns);
+    if (tracker_.started() && !is_tracked(q_frame_chaser)) tracker_.stop();
+    if (tracker_.started()) {
+        out.guess = inverse(T_chaser_camera()) * tracker_.filter().pose(q_frame_chaser).T_chaser_target;
     } else {
-        out.guess = off_truth(out.truth, m.options, m.random);
+        out.guess = off_truth(out.truth, options_, random_);
     }
-    if (const auto image = measured_image(m.camera, bytes)) {
-        m.measure(*image, at, out);
+    if (const auto image = measured_image(camera_, bytes)) {
+        measure_by_features(*image, at, out);
+        if (pixels_) measure_by_pixels(*image, at, out);
     } else {
         out.why = image.error().what;
     }
-    if (out.measured) m.fuse({t_ns, *out.measured, out.covariance, m.T_chaser_camera(), q_frame_chaser}, out);
-    if (m.tracker.started()) {
+    if (out.measured) {
+        const UpdateResult update =
+            tracker_.update({t_ns, *out.measured, out.covariance, T_chaser_camera(), q_frame_chaser});
+        out.nis = update.nis;
+        out.why = update.why;
+        if (update.outcome == UpdateOutcome::taken) out.state = EstimateState::measured;
+    }
+    if (tracker_.started()) {
         // Chaser axes to camera axes: the mounting is exact.
-        const PoseFilter::Pose known = m.tracker.filter().pose(q_frame_chaser);
-        const Rigid3 T_camera_chaser = inverse(m.T_chaser_camera());
+        const PoseFilter::Pose known = tracker_.filter().pose(q_frame_chaser);
+        const Rigid3 T_camera_chaser = inverse(T_chaser_camera());
         out.filtered = T_camera_chaser * known.T_chaser_target;
         out.filtered_covariance = covariance_in_other_axes(T_camera_chaser.q, known.covariance);
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
     out.ms = seconds_since(start_ns) * 1e3;
-    // What follows looks at the truth: nothing of the estimate.
-    if (m.by_pixels && out.measured)
-        if (const auto bound = m.by_pixels->bound(at, out.truth, m.dense_used)) out.bound = *bound;
+    if (pixels_ && out.measured)  // at the truth: after the estimate, and not part of its time
+        if (const auto bound = pixels_->bound(at, out.truth, dense_options())) out.bound = *bound;
     return out;
 }
 
-void FrameTracker::Impl::measure(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
-    measure_by_points(image, at, out);
-    if (by_pixels) measure_by_pixels(image, at, out);
-}
-
-void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
-    const FeatureEstimate e = by_points->align(image, at, out.guess);
+void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
+    const FeatureEstimate e = features_->align(image, at, out.guess);
     out.matches = e.agreeing;
     out.renders = static_cast<int>(e.rounds.size());
     if (!e.ok()) {
@@ -172,14 +147,11 @@ void FrameTracker::Impl::measure_by_points(const MeasuredImage& image, const Bod
     out.bound = e.bound;
 }
 
-/// From where the points lead; from the guess where they lead nowhere.
-void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
-    DenseOptions dense;
-    dense.seed = ~options.seed;
-    dense.method = world.scene().render.method;
-    dense.max_depth = world.scene().render.max_depth;
+/// Starts from the pose by features; without one, from the guess.
+void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
+    DenseOptions dense = dense_options();
     if (out.measured) dense.coarsest = 1;
-    const auto e = by_pixels->align(image, at, out.measured.value_or(out.guess), dense);
+    const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense);
     out.measured.reset();
     if (!e) {
         out.why = e.error().what;
@@ -193,20 +165,20 @@ void FrameTracker::Impl::measure_by_pixels(const MeasuredImage& image, const Bod
     }
     out.measured = e->T_camera_body;
     out.covariance = e->covariance;
-    dense_used = dense;
 }
 
-bool FrameTracker::Impl::knows_where(const Quat& q_frame_chaser) const {
-    const PoseFilter::Pose known = tracker.filter().pose(q_frame_chaser);
+DenseOptions FrameTracker::dense_options() const {
+    DenseOptions dense;
+    dense.seed = ~options_.seed;
+    dense.method = world_.scene().render.method;
+    dense.max_depth = world_.scene().render.max_depth;
+    return dense;
+}
+
+bool FrameTracker::is_tracked(const Quat& q_frame_chaser) const {
+    const PoseFilter::Pose known = tracker_.filter().pose(q_frame_chaser);
     return rotation_sigma(known.covariance) < kMostTurn_rad &&
            position_sigma(known.covariance) < kMostShift * norm(known.T_chaser_target.t);
-}
-
-void FrameTracker::Impl::fuse(const PoseMeasurement& measurement, TrackedFrame& out) {
-    const UpdateResult update = tracker.update(measurement);
-    out.nis = update.nis;
-    out.why = update.why;
-    if (update.outcome == UpdateOutcome::taken) out.state = EstimateState::measured;
 }
 
 }  // namespace narpa

@@ -24,8 +24,13 @@ enum class EstimateMethod : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 2> kEstimateMethods{"features", "dense"};
 
+class DenseAlignment;
+struct DenseOptions;
+class FeatureAlignment;
+struct MeasuredImage;
+
 struct TrackerOptions {
-    std::string target;  ///< name of the body; empty: the first with a mesh that the camera does not ride on
+    std::string target;  ///< name of the body; empty: the first with a mesh that does not carry the camera
     EstimateMethod method = EstimateMethod::features;
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
     std::uint64_t seed = 1;                   ///< of the first guess's direction
@@ -35,23 +40,23 @@ struct TrackerOptions {
     double acceleration_psd = 1e-3, angular_acceleration_psd = 1e-5;
 };
 
-/// The body whose pose is meant, for a sensor that rides on `mount`. Errors list the bodies there are.
+/// The body whose pose is estimated by a sensor on the body `mount`. Errors list the names of all bodies.
 [[nodiscard]] Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor,
                                             const std::string& name);
-/// Off the truth as the options say, each in a direction drawn at random.
+/// The truth displaced by the start errors of the options, in directions drawn at random.
 [[nodiscard]] Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& options, std::mt19937_64& random);
 
-/// What one frame told. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
+/// The result of one frame. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
 struct TrackedFrame {
     std::uint32_t frame = 0;
     std::int64_t t_ns = 0;
     EstimateState state = EstimateState::lost;
-    std::string why;  ///< where the frame gave no pose: what was missing
+    std::string why;  ///< why the frame gave no pose
     Rigid3 truth{};
-    Rigid3 guess{};                        ///< from where the frame was looked at
+    Rigid3 guess{};                        ///< the pose of the first render
     std::optional<Rigid3> measured;        ///< by this frame alone
     Matrix6 covariance = Matrix6::Zero();  ///< of `measured`
-    Matrix6 bound = Matrix6::Zero();       ///< Cramer-Rao, for the sensor's noise and what the method looks at
+    Matrix6 bound = Matrix6::Zero();       ///< Cramer-Rao, for the sensor's noise and the method's measurements
     Rigid3 filtered{};                     ///< by all frames so far; where the state is not lost
     Matrix6 filtered_covariance = Matrix6::Zero();
     double nis = 0;   ///< normalised innovation squared of `measured`; 0 for the first
@@ -69,20 +74,33 @@ public:
                                                         const TrackerOptions& options);
     ~FrameTracker();
 
-    [[nodiscard]] std::size_t target() const noexcept;
-    [[nodiscard]] const TrackerOptions& options() const noexcept;
+    [[nodiscard]] std::size_t target() const noexcept { return target_; }
+    [[nodiscard]] const TrackerOptions& options() const noexcept { return options_; }
 
     /// Takes a frame as the camera put it out. `at`: where the bodies were; of it only the light on the target, the
-    /// bodies beside it, the camera's own attitude, and the truth that errors are told against are used. Until a
-    /// frame has given a pose, guesses lie off the truth as the options say. Runs on the calling
-    /// thread's TBB arena.
+    /// bodies beside it, the camera's own attitude, and the truth for the errors are used. Until a frame has given
+    /// a pose, guesses are the truth displaced as the options state. Runs on the calling thread's TBB arena.
     TrackedFrame take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
                       const BodyPoses& at);
 
 private:
-    struct Impl;
-    explicit FrameTracker(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    FrameTracker(const World& world, std::size_t camera, std::size_t target, const TrackerOptions& options);
+    void measure_by_features(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
+    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
+    [[nodiscard]] DenseOptions dense_options() const;
+    /// The pose is known well enough for a render to be compared from there.
+    [[nodiscard]] bool is_tracked(const Quat& q_frame_chaser) const;
+    /// The chaser is the body that carries the camera, or the camera itself.
+    [[nodiscard]] Rigid3 T_chaser_camera() const { return camera_.mount < 0 ? Rigid3{} : camera_.T_mount_camera; }
+
+    const World& world_;
+    const Camera camera_;
+    std::size_t target_;
+    TrackerOptions options_;
+    std::mt19937_64 random_;
+    std::unique_ptr<FeatureAlignment> features_;
+    std::unique_ptr<DenseAlignment> pixels_;  ///< by method `dense`
+    PoseTracker tracker_;
 };
 
 }  // namespace narpa

@@ -9,7 +9,6 @@
 
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
-#include "emulator/telemetry.h"
 #include "emulator/threads.h"
 #include "estimator/features/feature_matcher.h"
 
@@ -40,6 +39,26 @@ struct Emulator::RealTimeRun {
     RealTimeClock clock;
     std::barrier<StartClock> start;
 };
+
+// --- Telemetry ------------------------------------------------------------
+
+void Emulator::send_telemetry(std::int64_t t_ns) noexcept {
+    if (!can_) return;
+    for (const auto& sensor : sensors_) sensor->send_telemetry(*can_, t_ns, faults_);
+    for (EstimateReport report; estimator_ && estimator_->reports().pop(report);) can_->send(report, t_ns);
+}
+
+void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
+    if (!can_) return;
+    std::uint64_t drops = 0;
+    for (const auto& sensor : sensors_) drops += sensor->drops();
+    Heartbeat heartbeat = std::exchange(faults_, {});
+    heartbeat.t_ns = t_ns;
+    heartbeat.state = state;
+    heartbeat.no_command = !can_->commanded();
+    heartbeat.output_dropped = std::exchange(drops_reported_, drops) != drops;
+    can_->send(heartbeat, t_ns);
+}
 
 // --- Real time ------------------------------------------------------------
 
@@ -99,17 +118,17 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         bool moved = false;
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
         }
-        telemetry_->send(now);
+        send_telemetry(now);
         // A recorded bus has ended: so does the run. Set once, because an overloaded camera never reaches an end
         // that advances with the time.
         if (clock.end_ns() == Clock::kNever && can_->ended()) clock.end_at(now);
         if (now >= next_heartbeat) {
-            telemetry_->send_heartbeat(now, RunState::running);
+            send_heartbeat(now, RunState::running);
             next_heartbeat += kHeartbeatPeriodNs;
         }
     }
-    telemetry_->send(clock.now_ns());
-    telemetry_->send_heartbeat(clock.now_ns(), RunState::stopping);
+    send_telemetry(clock.now_ns());
+    send_heartbeat(clock.now_ns(), RunState::stopping);
 }
 
 /// Without real-time priority, on one thread: it uses the time that the sensors leave.
@@ -126,7 +145,7 @@ void Emulator::run_lockstep(const StopFlag& stop) {
     LockstepClock clock;
     clock.end_at(end_ns_);
     bool started = false, moved = false;
-    telemetry_->send_heartbeat(0, RunState::starting);
+    send_heartbeat(0, RunState::starting);
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
         if (!can_->receive(t_ns(), moved)) {
             if (can_->bus().ended()) break;
@@ -137,9 +156,9 @@ void Emulator::run_lockstep(const StopFlag& stop) {
         if (!std::exchange(started, true))
             for (const auto& sensor : sensors_) sensor->start_at(can_->first_ns());
         advance_to(std::min(can_->granted_ns(), end_ns_), clock, stop);
-        telemetry_->send_heartbeat(t_ns(), RunState::lockstep);
+        send_heartbeat(t_ns(), RunState::lockstep);
     }
-    telemetry_->send_heartbeat(t_ns(), RunState::stopping);
+    send_heartbeat(t_ns(), RunState::stopping);
 }
 
 /// Makes every item whose poses are commanded by `t_ns`, in the order of time.
@@ -151,7 +170,7 @@ void Emulator::advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFla
         if (t_pose > t_ns || t_pose >= clock.end_ns()) break;
         clock.set(next.due_ns());
         execute(next, *threads_, [&] { next.make_next(clock); });
-        telemetry_->send(t_pose);
+        send_telemetry(t_pose);
     }
     t_ns_.store(std::max(this->t_ns(), t_ns), std::memory_order_relaxed);
 }

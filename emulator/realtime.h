@@ -1,5 +1,5 @@
-/// emulator/realtime.h - what a real-time run asks of the kernel: locked memory, real-time priority, processors of
-/// its own, and no page faults once it runs.
+/// emulator/realtime.h - what a real-time run needs from the kernel: locked memory, real-time priority, processors
+/// of its own, and no page faults once it runs.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,13 @@
-// emulator/report.cpp - the statistics of a run as JSON.
+// The statistics of a run as JSON and as text.
 #include "emulator/report.h"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/constants.h"
 #include "emulator/camera_sensor.h"
 #include "emulator/lidar_sensor.h"
 #include "emulator/log/estimate_report.h"
@@ -131,6 +135,126 @@ json report(const Emulator& emulator) {
     for (const auto& sensor : emulator.sensors())
         document[std::string(sensor->kind()) + "s"].push_back(sensor->report());
     return document;
+}
+
+// --- Text -------------------------------------------------------------------------------------------------------
+
+namespace {
+
+std::string latency(const Histogram& h) {
+    return fmt::format("{:.2f} / {:.2f} / {:.2f} ms", h.percentile_ns(0.5) * 1e-6, h.percentile_ns(0.99) * 1e-6,
+                       h.max_ns() * 1e-6);
+}
+
+using Counts = std::vector<std::pair<std::string_view, std::uint64_t>>;
+
+/// "3 bad_checksum, 1 past", or "none".
+std::string non_zero(const Counts& counts) {
+    std::string text;
+    for (const auto& [name, n] : counts)
+        if (n > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n, name);
+    return text.empty() ? "none" : text;
+}
+
+std::string bus_in_words(const CanNode& node) {
+    const CommandCounters c = node.counters();
+    const CanCounters& b = node.bus().counters();
+    return fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", node.bus().description(), c.taken,
+                       c.missed, non_zero(c.rejected())) +
+           fmt::format("    {} frames received ({} foreign), {} sent, {} not sent; trouble: {}\n", b.received,
+                       c.foreign, b.sent, b.send_drops,
+                       non_zero({{"receive overflow", b.receive_overflow},
+                                 {"malformed", b.malformed},
+                                 {"error frames", b.error_frames},
+                                 {"bus-off", b.bus_off},
+                                 {"connection or interface lost", b.interface_down}}));
+}
+
+}  // namespace
+
+std::vector<LatenessBin> lateness_bins(const SignedHistogram& late) {
+    constexpr std::array kBounds{-30.0, -10.0, -3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0, 10.0, 30.0};
+    std::vector<LatenessBin> bins;
+    double from = -kInfinity;
+    std::uint64_t before = 0;
+    for (const double to : kBounds) {
+        const std::uint64_t up_to = late.count_up_to(std::llround(to * 1e6));
+        bins.push_back({std::exchange(from, to), to, up_to - std::exchange(before, up_to)});
+    }
+    bins.push_back({from, kInfinity, late.count() - before});
+    return bins;
+}
+
+std::string lateness_in_words(const SignedHistogram& late) {
+    std::string text;
+    for (const auto& [from, to, frames] : lateness_bins(late)) {
+        if (frames == 0) continue;
+        const bool early = to <= 0;
+        const double near = std::abs(early ? to : from), far = std::abs(early ? from : to);
+        text += fmt::format("{}{} ", text.empty() ? "" : ", ", frames);
+        text += std::isinf(far) ? fmt::format("over {:g} ms", near) : fmt::format("{:g} to {:g} ms", near, far);
+        text += early ? " early" : " late";
+    }
+    return text.empty() ? "none" : text;
+}
+
+std::string CameraSensor::in_words() const {
+    const CameraStats& s = stats_;
+    const auto late_ms = [&](double p) { return s.late.percentile_ns(p) * 1e-6; };
+    Counts steps;
+    for (std::size_t i = 0; i < kStepNames.size(); ++i) steps.emplace_back(kStepNames[i], s.steps[i]);
+    std::string out =
+        fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {} deadlines missed, {} stale\n", name(),
+                    s.frames, s.handed_over, s.skipped, s.deadline_missed, s.stale);
+    out += fmt::format("    p50 / p99 / max: render {}; mid-exposure to hand-over {}; wake-up latency {}\n",
+                       latency(s.render), latency(s.hand_over), latency(s.wake_late));
+    out += fmt::format(
+        "    hand-over after the deadline: p50 {:.2f}, p90 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
+        "repeated {}, blank {}\n    frames: {}\n",
+        late_ms(0.5), late_ms(0.9), late_ms(0.99), late_ms(0.999), s.late.max_ns() * 1e-6, s.repeated, s.blanked,
+        lateness_in_words(s.late));
+    out += fmt::format("    steps: {}; samples per pixel p50 {:.2f}, max {:.2f}", non_zero(steps),
+                       s.samples_1e3.percentile_ns(0.5) * 1e-3, s.samples_1e3.max_ns() * 1e-3);
+    if (s.error_1e9.count() > 0)
+        out += fmt::format("; expected error p50 {:.3g}, p99 {:.3g}, max {:.3g} of full scale",
+                           s.error_1e9.percentile_ns(0.5) * 1e-9, s.error_1e9.percentile_ns(0.99) * 1e-9,
+                           s.error_1e9.max_ns() * 1e-9);
+    out += "\n";
+    for (const auto& sink : sinks_) {
+        const VideoCounters c = sink->counters();
+        out +=
+            fmt::format("    -> {}: {} written, dropped: {}\n", sink->description(), c.written,
+                        non_zero({{"ring full", c.ring_full}, {"no reader", c.no_reader}, {"failed", c.failed}}));
+    }
+    return out;
+}
+
+std::string LidarSensor::in_words() const {
+    const LidarStats& s = stats_;
+    std::string out = fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
+                                  name(), s.packets, sweeps(), s.skipped, s.returns, s.shots);
+    out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(s.fire), latency(s.hand_over));
+    for (const auto& sink : sinks_)
+        out += fmt::format("    -> {}: {} sent, {} dropped\n", sink->description(), sink->counters().sent,
+                           sink->counters().dropped);
+    return out;
+}
+
+std::string in_words(const Emulator& emulator) {
+    const bool lockstep = emulator.options().lockstep;
+    std::string out = fmt::format("{}: {:.3f} s in {}\n", emulator.world().scene().name,
+                                  static_cast<double>(emulator.t_ns()) * 1e-9, lockstep ? "lockstep" : "real time");
+    for (const auto& sensor : emulator.sensors()) out += sensor->in_words();
+    if (const OnlineEstimator* e = emulator.estimator())
+        out += fmt::format("  estimate of {} from camera {}: {} frames skipped; {}", e->target(), e->camera().name,
+                           e->skipped(), in_words(summarise(e->frames())));
+    if (emulator.can()) out += bus_in_words(*emulator.can());
+    if (!lockstep)
+        out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,
+                           emulator.page_faults().major);
+    for (const std::string& notice : emulator.notices()) out += "  note: " + notice + "\n";
+    if (!emulator.options().log_folder.empty()) out += "  log: " + emulator.options().log_folder + "\n";
+    return out;
 }
 
 }  // namespace narpa

@@ -2,61 +2,45 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <map>
+
+#include "emulator/log/csv.h"
 
 namespace narpa {
 namespace {
 
 constexpr int kColumns = 15;
 
-/// One line's cells, each with the column (from 1) at which it starts.
-struct Cell {
-    std::string_view text;
-    int column = 1;
-};
-
-std::vector<Cell> split(std::string_view line) {
-    std::vector<Cell> cells;
-    std::size_t start = 0;
-    for (;;) {
-        const std::size_t comma = std::min(line.find(',', start), line.size());
-        std::string_view text = line.substr(start, comma - start);
-        const std::size_t blank = std::min(text.find_first_not_of(" \t"), text.size());
-        text.remove_prefix(blank);
-        while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-        cells.push_back({text, static_cast<int>(start + blank) + 1});
-        if (comma == line.size()) return cells;
-        start = comma + 1;
-    }
-}
-
-bool read_number(std::string_view text, double& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
+std::string_view trimmed(std::string_view text) {
+    text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+    return text.substr(0, text.find_last_not_of(" \t") + 1);
 }
 
 Result<TrajectoryRow> read_row(std::string_view line, const std::string& path, int number) {
-    const auto bad = [&](int column, std::string what) { return Error{std::move(what), path, number, column}; };
-    const std::vector<Cell> cells = split(line);
+    const auto bad = [&](std::string_view at, std::string what) {
+        return Error{std::move(what), path, number, static_cast<int>(at.data() - line.data()) + 1};
+    };
+    std::vector<std::string_view> cells = cells_of(line);
+    std::ranges::transform(cells, cells.begin(), trimmed);
     if (cells.size() != kColumns)
-        return bad(1, fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kTrajectoryHeader));
+        return bad(line, fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kTrajectoryHeader));
     std::array<double, kColumns> v{};
     for (std::size_t i = 0; i < kColumns; ++i) {
-        if (i != 1 && !read_number(cells[i].text, v[i]))
-            return bad(cells[i].column, fmt::format("\"{}\" where a finite number was expected", cells[i].text));
+        if (i != 1 && !(read_number(cells[i], v[i]) && std::isfinite(v[i])))
+            return bad(cells[i], fmt::format("\"{}\" where a finite number was expected", cells[i]));
     }
-    if (std::abs(v[0]) > 9e9) return bad(1, fmt::format("time {} s, expected less than 9e9 s", v[0]));
-    if (cells[1].text.empty()) return bad(cells[1].column, "empty body name");
+    if (std::abs(v[0]) > 9e9) return bad(line, fmt::format("time {} s, expected less than 9e9 s", v[0]));
+    if (cells[1].empty()) return bad(cells[1], "empty body name");
 
-    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1].text), {}, number};
+    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1]), {}, number};
     row.motion = {{{v[5], v[6], v[7], v[8]}, {v[2], v[3], v[4]}}, {v[9], v[10], v[11]}, {v[12], v[13], v[14]}};
     if (!accept_attitude(row.motion.T_world_body.q))
-        return bad(cells[5].column, fmt::format("attitude of norm {:.6g}, expected a unit quaternion (w, x, y, z)",
-                                                norm(Quat{v[5], v[6], v[7], v[8]})));
+        return bad(cells[5], fmt::format("attitude of norm {:.6g}, expected a unit quaternion (w, x, y, z)",
+                                         norm(Quat{v[5], v[6], v[7], v[8]})));
     return row;
 }
 

@@ -10,7 +10,7 @@ namespace narpa {
 
 namespace {
 
-/// What a scene may ask but this camera cannot give.
+/// An Error if the camera's rows are too narrow for its embedded line.
 Status check_camera(const Camera& c, const std::string& file) {
     const std::size_t row = static_cast<std::size_t>(c.width) * bytes_per_pixel(c.format);
     if (c.embedded_line && row < kEmbeddedLineBytes)

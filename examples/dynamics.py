@@ -50,7 +50,7 @@ def report(bus, t_ns, chaser, phase):
 
 
 def command_poses(bus, t_ns, chaser):
-    """The chaser's last: its pose says that all bodies have theirs."""
+    """The chaser's last: it completes the poses of this time."""
     for can_id, position in AT_REST.items():
         bus.send_pose(can_id, t_ns, position, attitude=(1, 0, 0, 0))
     bus.send_pose(CHASER, t_ns, chaser.position, chaser.attitude, chaser.velocity, chaser.rate)

@@ -4,7 +4,7 @@
 Usage: emulator.py BUS FIFO      BUS: udp:239.74.163.2, or vcan0 with CAN FD
 
 When the chaser's pose for time t has come (it is the last of all bodies'), every frame due by t is written to the FIFO,
-its ledger is sent, and then the heartbeat says that the emulator has reached t.
+its ledger is sent, and then the heartbeat reports that the emulator has reached t.
 """
 import sys
 from pathlib import Path
@@ -49,7 +49,7 @@ def main(bus_name, fifo):
                 try:
                     video.write(draw(frame * PERIOD_NS))
                 except BrokenPipeError:
-                    print("nobody reads the video any more")
+                    print("the video has no reader any more")
                 frame += 1
             bus.send("Heartbeat", Time=t_ns // 1000, State="lockstep")
             print(f"{t_ns * 1e-9:8.2f} s, {frame} frames", flush=True)

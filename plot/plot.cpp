@@ -5,7 +5,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -89,6 +91,12 @@ Status can_write_plot(const std::string& picture) {
     const std::string json_file = document_beside(picture);
     if (json_file == picture || !std::ofstream(json_file, std::ios::app)) return cannot_write(picture);
     return Ok{};
+}
+
+std::uint8_t srgb_byte(double linear) {
+    const double l = std::clamp(linear, 0.0, 1.0),
+                 s = l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
+    return static_cast<std::uint8_t>(std::lround(255 * s));
 }
 
 nlohmann::json plot_image(int width, int height, int channels, std::span<const std::uint8_t> pixels) {

@@ -22,6 +22,9 @@ namespace narpa {
 /// An Error where write_plot could not write: for commands that measure for minutes first.
 [[nodiscard]] Status can_write_plot(const std::string& picture);
 
+/// A linear value from 0 to 1 as a display's 8 bits (sRGB, IEC 61966-2-1).
+[[nodiscard]] std::uint8_t srgb_byte(double linear);
+
 /// An image within a document: 8 bits a channel, rows from the top; `channels`: 1 (grey) or 3 (RGB).
 [[nodiscard]] nlohmann::json plot_image(int width, int height, int channels, std::span<const std::uint8_t> pixels);
 

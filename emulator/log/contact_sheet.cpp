@@ -1,9 +1,13 @@
 #include "emulator/log/contact_sheet.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "plot/plot.h"
 
 namespace narpa {
 namespace {
@@ -29,10 +33,7 @@ std::array<int, 3> pixel(const VideoFormat& f, std::span<const std::uint8_t> byt
 
 cv::Mat srgb_curve() {
     cv::Mat table(1, 256, CV_8U);
-    for (int i = 0; i < 256; ++i) {
-        const double l = i / 255.0, s = l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
-        table.at<std::uint8_t>(i) = static_cast<std::uint8_t>(std::lround(255 * s));
-    }
+    for (int i = 0; i < 256; ++i) table.at<std::uint8_t>(i) = srgb_byte(i / 255.0);
     return table;
 }
 
@@ -43,7 +44,8 @@ ContactSheet::ContactSheet(const VideoFormat& format)
       scale_(std::max(1, (format.width + kThumbnailWidth - 1) / kThumbnailWidth)),
       width_(format.width / scale_),
       height_(std::max(1, format.height / scale_)),
-      tiles_(kTiles) {
+      tiles_(kTiles),
+      frames_(kTiles) {
     for (auto& tile : tiles_) tile.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 3);
 }
 
@@ -52,11 +54,12 @@ void ContactSheet::offer(std::uint64_t frame, std::span<const std::uint8_t> byte
     if (used_ == tiles_.size()) thin_out();
     if (frame % stride_ != 0) return;
     shrink(bytes, tiles_[used_]);
-    ++used_;
+    frames_[used_++] = frame;
 }
 
 void ContactSheet::thin_out() noexcept {
-    for (std::size_t i = 0; 2 * i < used_; ++i) std::swap(tiles_[i], tiles_[2 * i]);
+    for (std::size_t i = 0; 2 * i < used_; ++i)
+        std::swap(tiles_[i], tiles_[2 * i]), std::swap(frames_[i], frames_[2 * i]);
     used_ = (used_ + 1) / 2;
     stride_ *= 2;
 }
@@ -87,6 +90,10 @@ Status ContactSheet::write(const std::string& path) const {
         const int y = gap + static_cast<int>(i / kColumns) * (height_ + gap);
         cv::Mat tile(height_, width_, CV_8UC3, const_cast<std::uint8_t*>(tiles_[i].data())), shown;
         cv::LUT(tile, srgb_curve(), shown);
+        const double t_s = static_cast<double>(frames_[i]) * static_cast<double>(format_.period_ns) * 1e-9;
+        for (const auto& [colour, width] : {std::pair{cv::Scalar::all(0), 3}, std::pair{cv::Scalar::all(255), 1}})
+            cv::putText(shown, fmt::format("{:.2f} s", t_s), {4, height_ - 6}, cv::FONT_HERSHEY_SIMPLEX, 0.4,
+                        colour, width, cv::LINE_AA);
         shown.copyTo(sheet(cv::Rect(x, y, width_, height_)));
     }
     try {

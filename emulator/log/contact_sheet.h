@@ -1,6 +1,6 @@
 /// emulator/log/contact_sheet.h - a run at a glance: up to 24 of a camera's frames, evenly spread, row by row in
-/// one image. The number of frames need not be known: when the sheet is full, every other tile is dropped and the
-/// stride doubles. All memory is allocated at the start.
+/// one image, each with its time. The number of frames need not be known: when the sheet is full, every other tile
+/// is dropped and the stride doubles. All memory is allocated at the start.
 #pragma once
 
 #include <cstdint>
@@ -31,6 +31,7 @@ private:
     VideoFormat format_;
     int scale_, width_, height_;                    ///< source pixels per thumbnail pixel; thumbnail size
     std::vector<std::vector<std::uint8_t>> tiles_;  ///< blue, green, red
+    std::vector<std::uint64_t> frames_;             ///< number of each tile's frame
     std::size_t used_ = 0;
     std::uint64_t stride_ = 1;
 };

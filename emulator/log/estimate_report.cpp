@@ -14,12 +14,18 @@ namespace {
 
 constexpr int kFreedom = 6;
 
-double rotation(const Vector6& error) {
-    return error.head<3>().norm();
-}
-double position(const Vector6& error) {
-    return error.tail<3>().norm();
-}
+/// Of one frame against the truth; zeros where there is no pose.
+struct Errors {
+    explicit Errors(const TrackedFrame& f) {
+        if (f.measured) vector = error_between(*f.measured, f.truth);
+        if (f.state != EstimateState::lost) filtered = error_between(f.filtered, f.truth);
+    }
+    Vector6 vector = Vector6::Zero(), filtered = Vector6::Zero();
+    [[nodiscard]] double rotation() const { return vector.head<3>().norm(); }
+    [[nodiscard]] double position() const { return vector.tail<3>().norm(); }
+    [[nodiscard]] double filtered_rotation() const { return filtered.head<3>().norm(); }
+    [[nodiscard]] double filtered_position() const { return filtered.tail<3>().norm(); }
+};
 /// RMS of what is added.
 struct Squares {
     double sum = 0;
@@ -32,27 +38,19 @@ struct Squares {
 
 std::string estimate_row(const TrackedFrame& f) {
     std::string row = fmt::format("{},{},{},", f.frame, f.t_ns, kEstimateStates[static_cast<std::size_t>(f.state)]);
-    if (f.measured) {
-        const Rigid3& T = *f.measured;
-        row += fmt::format("{},{},{},{},{},{},{},", T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z);
-        for (int i = 0; i < kFreedom; ++i) row += fmt::format("{:.6g},", std::sqrt(f.covariance(i, i)));
-        const Vector6 error = error_between(T, f.truth);
-        row += fmt::format("{:.6g},{:.6g},", rotation(error), position(error));
-    } else {
-        row += ",,,,,,,,,,,,,,,";
-    }
-    if (f.state != EstimateState::lost) {
-        const Vector6 error = error_between(f.filtered, f.truth);
-        row += fmt::format("{:.6g},{:.6g},", rotation(error), position(error));
-    } else {
-        row += ",,";
-    }
-    if (f.measured)
-        row += fmt::format("{:.6g},{:.6g},{:.6g},{:.6g},",
-                           normalised_error_squared(error_between(*f.measured, f.truth), f.covariance), f.nis,
-                           rotation_sigma(f.bound), position_sigma(f.bound));
-    else
-        row += ",,,,";
+    const auto add = [&](bool known, auto... values) {
+        ((row += known ? fmt::format("{:.6g},", values) : ","), ...);
+    };
+    const bool known = f.measured.has_value(), tracked = f.state != EstimateState::lost;
+    const Rigid3 T = f.measured.value_or(Rigid3{});
+    const Errors e(f);
+    for (const double value : {T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z})
+        row += known ? fmt::format("{},", value) : ",";
+    for (int i = 0; i < kFreedom; ++i) add(known, std::sqrt(f.covariance(i, i)));
+    add(known, e.rotation(), e.position());
+    add(tracked, e.filtered_rotation(), e.filtered_position());
+    add(known, known ? normalised_error_squared(e.vector, f.covariance) : 0, f.nis, rotation_sigma(f.bound),
+        position_sigma(f.bound));
     std::string why = f.why;  // one field
     std::replace(why.begin(), why.end(), ',', ';');
     return row + fmt::format("{},{},{:.3f},{}\n", f.matches, f.renders, f.ms, why);
@@ -63,32 +61,30 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
     s.frames = frames.size();
     Squares turn, shift, part, filtered_turn, filtered_shift, turn_of_bound, shift_of_bound;
     double nees = 0, nis = 0;
-    std::size_t told = 0, compared = 0;
+    std::size_t finite = 0, compared = 0;
     std::vector<double> ms;
     for (const TrackedFrame& f : frames) {
         ms.push_back(f.ms);
-        if (f.state != EstimateState::lost) {
-            const Vector6 error = error_between(f.filtered, f.truth);
-            filtered_turn.add(rotation(error)), filtered_shift.add(position(error));
-        }
+        const Errors e(f);
+        if (f.state != EstimateState::lost)
+            filtered_turn.add(e.filtered_rotation()), filtered_shift.add(e.filtered_position());
         if (f.state != EstimateState::measured || !f.measured) continue;
         if (f.nis > 0) nis += f.nis, ++compared;
         ++s.measured;
-        const Vector6 error = error_between(*f.measured, f.truth);
-        turn.add(rotation(error)), shift.add(position(error)), part.add(position(error) / norm(f.truth.t));
-        if (const double square = normalised_error_squared(error, f.covariance); std::isfinite(square))
-            nees += square, ++told;
+        turn.add(e.rotation()), shift.add(e.position()), part.add(e.position() / norm(f.truth.t));
+        if (const double square = normalised_error_squared(e.vector, f.covariance); std::isfinite(square))
+            nees += square, ++finite;
         if (f.bound.topLeftCorner<3, 3>().trace() > 0) {
-            turn_of_bound.add(rotation(error) / rotation_sigma(f.bound));
-            shift_of_bound.add(position(error) / position_sigma(f.bound));
+            turn_of_bound.add(e.rotation() / rotation_sigma(f.bound));
+            shift_of_bound.add(e.position() / position_sigma(f.bound));
         }
     }
     s.rotation_rms_rad = turn.rms(), s.position_rms_m = shift.rms(), s.position_rms_of_range = part.rms();
     s.filtered_rotation_rms_rad = filtered_turn.rms(), s.filtered_position_rms_m = filtered_shift.rms();
     s.rotation_of_bound = turn_of_bound.rms(), s.position_of_bound = shift_of_bound.rms();
-    if (told > 0) {
-        s.nees_mean = nees / static_cast<double>(told);
-        const double half = 1.96 * std::sqrt(2.0 * kFreedom / static_cast<double>(told));  // of chi-square
+    if (finite > 0) {
+        s.nees_mean = nees / static_cast<double>(finite);
+        const double half = 1.96 * std::sqrt(2.0 * kFreedom / static_cast<double>(finite));  // of chi-square
         s.nees_low = std::max(0.0, kFreedom - half), s.nees_high = kFreedom + half;
     }
     if (compared > 0) s.nis_mean = nis / static_cast<double>(compared);
@@ -135,23 +131,19 @@ std::string in_words(const EstimateSummary& s) {
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames) {
     nlohmann::json rows = nlohmann::json::array();
     for (const TrackedFrame& f : frames) {
-        nlohmann::json row{{"frame", f.frame}, {"t_s", static_cast<double>(f.t_ns) * 1e-9}};
-        for (const char* key :
-             {"rotation_error_rad", "position_error_m", "rotation_sigma_rad", "position_sigma_m",
-              "rotation_bound_rad", "position_bound_m", "rotation_filtered_rad", "position_filtered_m"})
-            row[key] = nullptr;
-        if (f.measured) {
-            const Vector6 error = error_between(*f.measured, f.truth);
-            row["rotation_error_rad"] = rotation(error), row["position_error_m"] = position(error);
-            row["rotation_sigma_rad"] = rotation_sigma(f.covariance);
-            row["position_sigma_m"] = position_sigma(f.covariance);
-            row["rotation_bound_rad"] = rotation_sigma(f.bound), row["position_bound_m"] = position_sigma(f.bound);
-        }
-        if (f.state != EstimateState::lost) {
-            const Vector6 error = error_between(f.filtered, f.truth);
-            row["rotation_filtered_rad"] = rotation(error), row["position_filtered_m"] = position(error);
-        }
-        rows.push_back(std::move(row));
+        const auto value = [](bool known, double v) { return known ? nlohmann::json(v) : nlohmann::json(nullptr); };
+        const bool known = f.measured.has_value(), tracked = f.state != EstimateState::lost;
+        const Errors e(f);
+        rows.push_back({{"frame", f.frame},
+                        {"t_s", static_cast<double>(f.t_ns) * 1e-9},
+                        {"rotation_error_rad", value(known, e.rotation())},
+                        {"position_error_m", value(known, e.position())},
+                        {"rotation_sigma_rad", value(known, rotation_sigma(f.covariance))},
+                        {"position_sigma_m", value(known, position_sigma(f.covariance))},
+                        {"rotation_bound_rad", value(known, rotation_sigma(f.bound))},
+                        {"position_bound_m", value(known, position_sigma(f.bound))},
+                        {"rotation_filtered_rad", value(tracked, e.filtered_rotation())},
+                        {"position_filtered_m", value(tracked, e.filtered_position())}});
     }
     return write_plot(path, {{"plot", "estimates"}, {"title", title}, {"frames", rows}});
 }

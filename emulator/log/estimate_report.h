@@ -14,13 +14,13 @@ inline constexpr std::string_view kEstimateHeader =
     "frame,t_ns,state,x_m,y_m,z_m,qw,qx,qy,qz,sigma_rx_rad,sigma_ry_rad,sigma_rz_rad,sigma_x_m,sigma_y_m,sigma_z_m,"
     "error_rotation_rad,error_position_m,filtered_error_rotation_rad,filtered_error_position_m,nees,nis,"
     "bound_rotation_rad,bound_position_m,matches,renders,ms,why";
-/// One row, with its line end: the pose that the frame alone gives, with its errors against the truth. Fields of
-/// what there is not are empty.
+/// One row, with its line end: the pose that the frame alone gives, with its errors against the truth. Missing
+/// values are empty.
 [[nodiscard]] std::string estimate_row(const TrackedFrame& frame);
 
 /// Over the frames that gave a pose; RMS of the errors' lengths, in rotation and in position.
 struct EstimateSummary {
-    std::size_t frames = 0, measured = 0;  ///< looked at; that gave a pose which the track took
+    std::size_t frames = 0, measured = 0;  ///< all; those whose pose the filter accepted
     double rotation_rms_rad = 0, position_rms_m = 0, position_rms_of_range = 0;
     double filtered_rotation_rms_rad = 0, filtered_position_rms_m = 0;  ///< over all frames with a track
     double nees_mean = 0;                                               ///< 6 where the covariances are right

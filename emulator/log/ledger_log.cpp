@@ -4,27 +4,17 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <numeric>
 #include <type_traits>
 
+#include "emulator/log/csv.h"
 #include "protocols/ledger_fields.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::uint64_t kMostSpp = 65535;
-
-std::vector<std::string_view> cells_of(std::string_view line, char separator) {
-    std::vector<std::string_view> cells;
-    for (std::size_t start = 0;;) {
-        const std::size_t end = std::min(line.find(separator, start), line.size());
-        cells.push_back(line.substr(start, end - start));
-        if (end == line.size()) return cells;
-        start = end + 1;
-    }
-}
 
 /// Rows are formatted into a buffer that may be too short: `size` counts on, and what does not fit is left out.
 struct RowBuffer {
@@ -52,12 +42,6 @@ void format_cell(RowBuffer& row, const LedgerField& field, Named value) noexcept
 /// "307200;614400"
 void format_cell(RowBuffer& row, const LedgerField&, const FrameLedger::Passes& passes) noexcept {
     for (std::size_t i = 0; i < passes.size() && passes[i] > 0; ++i) row.add("{}{}", i > 0 ? ";" : "", passes[i]);
-}
-
-template <class... Base>
-bool read_number(std::string_view text, auto& value, Base... base) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);
-    return error == std::errc{} && end == text.data() + text.size();
 }
 
 // Each reads a cell and returns what was expected where it is bad, else nothing.
@@ -148,7 +132,7 @@ Result<std::vector<LoggedFrame>> read_ledger_log(const std::string& path) {
     constexpr std::size_t columns = kLedgerColumns.size() + 1;
     std::vector<LoggedFrame> frames;
     for (int number = 2; std::getline(in, line); ++number) {
-        const std::vector<std::string_view> cells = cells_of(line, ',');
+        const std::vector<std::string_view> cells = cells_of(line);
         if (cells.size() != columns)
             return bad(number, 1,
                        fmt::format("{} columns, expected {}: {}", cells.size(), columns, ledger_header()));

@@ -40,7 +40,7 @@ void RowLog::write(std::span<const std::uint8_t> item, const WriteQueue&) noexce
 Status RowLog::close() {
     if (!file_) return Ok{};
     std::uint64_t dropped = queue_->dropped();
-    queue_.reset();  // ends its thread: nobody else writes the file or `lost_`
+    queue_.reset();  // ends its thread, which writes the file and `lost_`
     dropped += lost_;
     const bool closed = std::fclose(file_) == 0;
     file_ = nullptr;

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 namespace narpa {
 namespace {
@@ -23,62 +23,27 @@ std::string file_in(const std::string& folder) {
     return folder + "/run.json";
 }
 
-/// Takes values out of a document; remembers the first that is not as it should be.
-class Reader {
-public:
-    Reader(std::string file, std::string text) : file_(std::move(file)), text_(std::move(text)) {
-        try {
-            document_ = json::parse(text_);
-        } catch (const json::parse_error& e) {
-            fail_at(e.byte > 0 ? e.byte - 1 : 0, "not JSON, expected the record of a run");
-        }
-    }
+/// An Error at this offset of the file's text.
+Error error_at(const std::string& file, const std::string& text, std::size_t offset, std::string what) {
+    const std::string_view before = std::string_view(text).substr(0, offset);
+    const auto line = 1 + static_cast<int>(std::count(before.begin(), before.end(), '\n'));
+    return {std::move(what), file, line, static_cast<int>(before.size() - (before.rfind('\n') + 1)) + 1};
+}
 
-    std::uint64_t whole(const char* at, std::uint64_t least, std::uint64_t most) {
-        const json* value = find(at);
-        const bool good = value && value->is_number_unsigned() && value->get<std::uint64_t>() >= least &&
-                          value->get<std::uint64_t>() <= most;
-        if (good) return value->get<std::uint64_t>();
-        fail(at, fmt::format("expected a whole number from {} to {}", least, most));
-        return least;
-    }
-    std::string words(const char* at, std::initializer_list<std::string_view> expected = {}) {
-        const json* value = find(at);
-        const std::string text = value && value->is_string() ? value->get<std::string>() : "";
-        const bool good = expected.size() == 0
-                              ? !text.empty()
-                              : std::find(expected.begin(), expected.end(), text) != expected.end();
-        if (!good)
-            fail(at, expected.size() == 0 ? "expected a name"
-                                          : fmt::format("expected {}", fmt::join(expected, " or ")));
-        return text;
-    }
-    [[nodiscard]] const std::optional<Error>& error() const { return error_; }
-
-private:
-    [[nodiscard]] const json* find(const char* at) const {
-        const json::json_pointer pointer(at);
-        return document_.contains(pointer) ? &document_.at(pointer) : nullptr;
-    }
-    /// Where the key stands; at the beginning, where there is none.
-    void fail(const std::string& at, const std::string& what) {
-        const std::string key = at.substr(at.rfind('/') + 1);
-        const std::size_t found = text_.find('"' + key + '"');
-        fail_at(found == std::string::npos ? 0 : found, key + ": " + what);
-    }
-    void fail_at(std::size_t offset, std::string what) {
-        if (error_) return;
-        const std::string_view before = std::string_view(text_).substr(0, offset);
-        const auto line = 1 + static_cast<int>(std::count(before.begin(), before.end(), '\n'));
-        const std::size_t start = before.rfind('\n');
-        const std::size_t column = start == std::string_view::npos ? before.size() + 1 : before.size() - start;
-        error_ = Error{std::move(what), file_, line, static_cast<int>(column)};
-    }
-
-    std::string file_, text_;
-    json document_;
-    std::optional<Error> error_;
+/// What a key must hold.
+struct Key {
+    const char* at;  ///< JSON pointer
+    std::function<bool(const json&)> is_good;
+    std::string expected;
 };
+
+Key whole_number(const char* at, std::uint64_t least, std::uint64_t most) {
+    return {at,
+            [=](const json& v) {
+                return v.is_number_unsigned() && v.get<std::uint64_t>() >= least && v.get<std::uint64_t>() <= most;
+            },
+            fmt::format("a whole number from {} to {}", least, most)};
+}
 
 }  // namespace
 
@@ -100,15 +65,28 @@ Status write_run_record(const std::string& folder, const Scene& scene) {
 Result<RunRecord> read_run_record(const std::string& folder) {
     std::ifstream in(file_in(folder));
     if (!in) return Error{"is not there, expected the log folder of a run", file_in(folder)};
-    Reader reader(file_in(folder), {std::istreambuf_iterator<char>(in), {}});
-    (void)reader.whole("/format", kFormat, kFormat);
-    RunRecord record;
-    record.scene_file = reader.words("/scene");
-    record.method = reader.words("/render/method", {kDirect, kPath}) == kPath ? Method::path : Method::direct;
-    record.max_depth = static_cast<int>(reader.whole("/render/max_depth", 1, 40));
-    record.seed = reader.whole("/render/seed", 0, std::numeric_limits<std::uint64_t>::max());
-    if (reader.error()) return *reader.error();
-    return record;
+    const std::string file = file_in(folder), text{std::istreambuf_iterator<char>(in), {}};
+    json document;
+    try {
+        document = json::parse(text);
+    } catch (const json::parse_error& e) {
+        return error_at(file, text, e.byte > 0 ? e.byte - 1 : 0, "not JSON, expected the record of a run");
+    }
+    for (const auto& [at, is_good, expected] :
+         {whole_number("/format", kFormat, kFormat),
+          Key{"/scene", [](const json& v) { return v.is_string() && v != ""; }, "a name"},
+          Key{"/render/method", [](const json& v) { return v == kDirect || v == kPath; }, "direct or path"},
+          whole_number("/render/max_depth", 1, 40),
+          whole_number("/render/seed", 0, std::numeric_limits<std::uint64_t>::max())}) {
+        const json::json_pointer pointer(at);
+        if (document.contains(pointer) && is_good(document.at(pointer))) continue;
+        const std::size_t found = text.find('"' + pointer.back() + '"');
+        return error_at(file, text, found == std::string::npos ? 0 : found,
+                        pointer.back() + ": expected " + expected);
+    }
+    const json& render = document["render"];
+    return RunRecord{document["scene"], render["method"] == kPath ? Method::path : Method::direct,
+                     render["max_depth"], render["seed"]};
 }
 
 }  // namespace narpa

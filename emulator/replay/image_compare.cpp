@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <set>
 
 namespace narpa {
 namespace {
@@ -17,12 +18,8 @@ constexpr double kEdge = 1.0 / 16;  // of the full scale, a pixel
 
 cv::Mat mean_bands(const RadianceImage& image, double full_scale) {
     cv::Mat out(image.height, image.width, CV_64F);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const std::size_t at =
-                static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
-            out.at<double>(y, x) = mean_band(vec_cast<double>(image.pixels[at])) / full_scale;
-        }
+    std::transform(image.pixels.begin(), image.pixels.end(), out.begin<double>(),
+                   [&](const Rgb& p) { return mean_band(vec_cast<double>(p)) / full_scale; });
     return out;
 }
 
@@ -86,19 +83,11 @@ ShiftStatistics edge_shifts(const cv::Mat& picture, const cv::Mat& reference) {
 
 /// For each body a mask of the pixels that hold its light and no other body's.
 std::map<int, cv::Mat> masks_of(std::span<const std::int32_t> body, int width, int height) {
-    std::map<int, cv::Mat> seen;
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const int b =
-                body[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
-            if (b < 0) continue;
-            cv::Mat& mask = seen[b];
-            if (mask.empty()) mask = cv::Mat::zeros(height, width, CV_8U);
-            mask.at<std::uint8_t>(y, x) = 255;
-        }
+    const cv::Mat bodies(height, width, CV_32S, const_cast<std::int32_t*>(body.data()));
     const cv::Mat around = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kBesides + 1, 2 * kBesides + 1});
     std::map<int, cv::Mat> wide;
-    for (const auto& [b, mask] : seen) cv::dilate(mask, wide[b], around);
+    for (const int b : std::set<int>(body.begin(), body.end()))
+        if (b >= 0) cv::dilate(bodies == b, wide[b], around);
     std::map<int, cv::Mat> alone;
     for (const auto& [b, mask] : wide) {
         cv::Mat own = mask.clone();

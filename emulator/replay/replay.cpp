@@ -53,35 +53,15 @@ void expect_same(std::string_view what, const Value& now, const Value& logged, s
 
 }  // namespace
 
-struct Replay::Impl {
-    Impl(std::unique_ptr<World> w, std::size_t camera_index)
-        : world(std::move(w)),
-          camera(world->scene().cameras[camera_index]),
-          index(static_cast<std::uint8_t>(camera_index)),
-          full_scale(full_scale_radiance(camera)),
-          renderer(world->render_scene(), camera),
-          picture(camera.width, camera.height),
-          reference(camera.width, camera.height),
-          bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})) {}
-
-    [[nodiscard]] FrameSettings settings_of(std::size_t i) const;
-    [[nodiscard]] Rigid3 T_world_camera(std::size_t i) const {
-        return world->sensor_pose(camera.mount, camera.T_mount_camera, placements[i]);
-    }
-    [[nodiscard]] bool bytes_repeat(const LoggedFrame& logged);
-
-    std::unique_ptr<World> world;
-    const Camera& camera;
-    std::uint8_t index;
-    double full_scale;
-    std::vector<LoggedFrame> frames;
-    std::vector<BodyPoses> placements;
-    CameraRenderer renderer;
-    RadianceImage picture, reference;
-    Aovs middles;
-    std::vector<std::uint8_t> bytes;
-    std::size_t made = 0;  ///< the frame that `picture` shows
-};
+Replay::Replay(std::unique_ptr<World> world, std::size_t camera_index)
+    : world_(std::move(world)),
+      camera_(world_->scene().cameras[camera_index]),
+      index_(static_cast<std::uint8_t>(camera_index)),
+      full_scale_(full_scale_radiance(camera_)),
+      renderer_(world_->render_scene(), camera_),
+      picture_(camera_.width, camera_.height),
+      reference_(camera_.width, camera_.height),
+      bytes_(frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns})) {}
 
 Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const std::string& camera,
                                              const std::string& scene_file) {
@@ -101,46 +81,15 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
     if (!world) return world.error();
     auto placements = placements_of(*frames, **world, stem + ".ledger.csv", stem + ".truth.csv");
     if (!placements) return placements.error();
-    auto impl = std::make_unique<Impl>(*std::move(world), *index);
-    impl->frames = *std::move(frames);
-    impl->placements = *std::move(placements);
-    return std::unique_ptr<Replay>(new Replay(std::move(impl)));
+    std::unique_ptr<Replay> replay(new Replay(*std::move(world), *index));
+    replay->frames_ = *std::move(frames);
+    replay->placements_ = *std::move(placements);
+    return replay;
 }
 
-Replay::Replay(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Replay::~Replay() = default;
-
-const std::vector<LoggedFrame>& Replay::frames() const noexcept {
-    return impl_->frames;
-}
-const World& Replay::world() const noexcept {
-    return *impl_->world;
-}
-const Camera& Replay::camera() const noexcept {
-    return impl_->camera;
-}
-std::size_t Replay::camera_index() const noexcept {
-    return impl_->index;
-}
-const BodyPoses& Replay::placement(std::size_t i) const noexcept {
-    return impl_->placements[i];
-}
-std::span<const std::uint8_t> Replay::bytes() const noexcept {
-    return impl_->bytes;
-}
-const RadianceImage& Replay::picture() const noexcept {
-    return impl_->picture;
-}
-const RadianceImage& Replay::reference() const noexcept {
-    return impl_->reference;
-}
-bool Replay::has_image(std::size_t i) const noexcept {
-    return static_cast<FrameStep>(impl_->frames[i].ledger.step) != FrameStep::nothing;
-}
-
-FrameSettings Replay::Impl::settings_of(std::size_t i) const {
-    const FrameLedger& logged = frames[i].ledger;
-    const RenderSettings& render = world->scene().render;
+FrameSettings Replay::settings_of(std::size_t i) const {
+    const FrameLedger& logged = frames_[i].ledger;
+    const RenderSettings& render = world_->scene().render;
     FrameSettings s;
     s.seed = render.seed;
     s.frame = logged.frame;
@@ -157,11 +106,10 @@ FrameSettings Replay::Impl::settings_of(std::size_t i) const {
 }
 
 std::vector<std::string> Replay::make(std::size_t i) {
-    Impl& r = *impl_;
-    const LoggedFrame& logged = r.frames[i];
-    const FrameSettings settings = r.settings_of(i);
-    const FrameAccount account = r.renderer.render(r.placements[i], r.T_world_camera(i), settings, r.picture);
-    r.made = i;
+    const LoggedFrame& logged = frames_[i];
+    const FrameSettings settings = settings_of(i);
+    const FrameAccount account = renderer_.render(placements_[i], T_world_camera(i), settings, picture_);
+    made_ = i;
 
     std::vector<std::string> differs;
     const FrameLedger& l = logged.ledger;
@@ -171,40 +119,40 @@ std::vector<std::string> Replay::make(std::size_t i) {
     if (!has_image(i) && l.passes[0] > 0) differs.push_back(fmt::format("passes: none, logged {}", l.passes[0]));
     // A frame that had no time left to estimate its error has time here.
     if (l.expected_error >= 0)
-        expect_same("expected_error", static_cast<float>(account.standard_error / r.full_scale), l.expected_error,
+        expect_same("expected_error", static_cast<float>(account.standard_error / full_scale_), l.expected_error,
                     differs);
-    expose(r.camera, r.picture, settings.seed, l.frame, r.bytes);
-    if (has_image(i) && !r.bytes_repeat(logged))
+    expose(camera_, picture_, settings.seed, l.frame, bytes_);
+    if (has_image(i) && !bytes_repeat(logged))
         differs.push_back(
-            fmt::format("image_crc32: {:08x}, logged {:08x}", image_crc32(r.bytes), logged.image_crc32));
+            fmt::format("image_crc32: {:08x}, logged {:08x}", image_crc32(bytes_), logged.image_crc32));
     return differs;
 }
 
 /// The embedded line is written just before the hand-over: whether the deadline was met then is not in the log
 /// where it was missed after all.
-bool Replay::Impl::bytes_repeat(const LoggedFrame& logged) {
-    if (!camera.embedded_line) return image_crc32(bytes) == logged.image_crc32;
+bool Replay::bytes_repeat(const LoggedFrame& logged) {
+    if (!camera_.embedded_line) return image_crc32(bytes_) == logged.image_crc32;
     FrameLedger line = logged.ledger;
-    line.camera = index;
+    line.camera = index_;
     line.t_hand_over_ns = 0;
-    const std::size_t row = bytes.size() / static_cast<std::size_t>(camera.height);
+    const std::size_t row = bytes_.size() / static_cast<std::size_t>(camera_.height);
     const auto same = [&](bool in_time) {
         line.deadline_met = in_time;
-        (void)encode_embedded_line(line, std::span(bytes).last(row));  // World::create refuses rows too narrow
-        return image_crc32(bytes) == logged.image_crc32;
+        (void)encode_embedded_line(line, std::span(bytes_).last(row));  // World::create refuses rows too narrow
+        return image_crc32(bytes_) == logged.image_crc32;
     };
     return (!logged.ledger.deadline_met && same(false)) || same(true);
 }
 
 ReferenceComparison Replay::against(int spp) {
-    Impl& r = *impl_;
-    FrameSettings settings = r.settings_of(r.made);
+    Aovs aovs;
+    FrameSettings settings = settings_of(made_);
     settings.budget = {};
     settings.spp = spp;
     settings.seed = ~settings.seed;
     const FrameAccount account =
-        r.renderer.render(r.placements[r.made], r.T_world_camera(r.made), settings, r.reference, &r.middles);
-    return {compare(r.picture, r.reference, r.middles.body, r.full_scale), std::max(0.0, account.standard_error)};
+        renderer_.render(placements_[made_], T_world_camera(made_), settings, reference_, &aovs);
+    return {compare(picture_, reference_, aovs.body, full_scale_), std::max(0.0, account.standard_error)};
 }
 
 }  // namespace narpa

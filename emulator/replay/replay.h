@@ -30,33 +30,48 @@ public:
     /// `camera` empty: the first of the scene. `scene_file` empty: the run's own.
     static Result<std::unique_ptr<Replay>> open(const std::string& folder, const std::string& camera,
                                                 const std::string& scene_file);
-    ~Replay();
 
-    [[nodiscard]] const std::vector<LoggedFrame>& frames() const noexcept;
-    [[nodiscard]] const World& world() const noexcept;
-    [[nodiscard]] const Camera& camera() const noexcept;
-    [[nodiscard]] std::size_t camera_index() const noexcept;
+    [[nodiscard]] const std::vector<LoggedFrame>& frames() const noexcept { return frames_; }
+    [[nodiscard]] const World& world() const noexcept { return *world_; }
+    [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
+    [[nodiscard]] std::size_t camera_index() const noexcept { return index_; }
     /// Body poses of frame i.
-    [[nodiscard]] const BodyPoses& placement(std::size_t i) const noexcept;
+    [[nodiscard]] const BodyPoses& placement(std::size_t i) const noexcept { return placements_[i]; }
 
     /// Whether frame i has an image of its own; false if not even the coarsest step was rendered.
-    [[nodiscard]] bool has_image(std::size_t i) const noexcept;
+    [[nodiscard]] bool has_image(std::size_t i) const noexcept {
+        return static_cast<FrameStep>(frames_[i].ledger.step) != FrameStep::nothing;
+    }
 
     /// Renders frame i again. Returns the differences from the log as text: empty if the frame repeats bit for bit,
     /// or has no image and cost nothing.
     std::vector<std::string> make(std::size_t i);
-    [[nodiscard]] const RadianceImage& picture() const noexcept;
+    [[nodiscard]] const RadianceImage& picture() const noexcept { return picture_; }
     /// The last frame rendered, in the device's format.
-    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept;
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
 
     /// Compares the last frame rendered with `spp` samples per pixel of other random numbers.
     ReferenceComparison against(int spp);
-    [[nodiscard]] const RadianceImage& reference() const noexcept;
+    [[nodiscard]] const RadianceImage& reference() const noexcept { return reference_; }
 
 private:
-    struct Impl;
-    explicit Replay(std::unique_ptr<Impl>);
-    std::unique_ptr<Impl> impl_;
+    Replay(std::unique_ptr<World> world, std::size_t camera_index);
+    [[nodiscard]] FrameSettings settings_of(std::size_t i) const;
+    [[nodiscard]] Rigid3 T_world_camera(std::size_t i) const {
+        return world_->sensor_pose(camera_.mount, camera_.T_mount_camera, placements_[i]);
+    }
+    [[nodiscard]] bool bytes_repeat(const LoggedFrame& logged);
+
+    std::unique_ptr<World> world_;
+    const Camera& camera_;
+    std::uint8_t index_;
+    double full_scale_;
+    std::vector<LoggedFrame> frames_;
+    std::vector<BodyPoses> placements_;
+    CameraRenderer renderer_;
+    RadianceImage picture_, reference_;
+    std::vector<std::uint8_t> bytes_;
+    std::size_t made_ = 0;  ///< the frame that `picture_` shows
 };
 
 }  // namespace narpa

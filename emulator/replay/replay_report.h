@@ -11,7 +11,7 @@
 
 namespace narpa {
 
-/// A frame made once more.
+/// A frame rendered again.
 struct ReplayedFrame {
     LoggedFrame logged;
     std::vector<std::string> differs;             ///< from the log; empty: it repeats bit for bit

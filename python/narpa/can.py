@@ -221,7 +221,7 @@ class Bus:
 
 
 def open_python_can(name, fd, patience_s=0):
-    """A python-can bus by narpa's name for it; tries again for so many seconds where nobody listens yet."""
+    """A python-can bus by narpa's name for it; tries again for so many seconds if the bus does not exist yet."""
     import can
 
     if name.startswith(("slcan:", "socket://")):

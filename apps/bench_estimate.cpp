@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "apps/bench.h"
 #include "apps/bench_scene.h"
+#include "apps/cli.h"
 #include "bench/approach.h"
 #include "bench/filter.h"
 #include "bench/icp.h"
@@ -68,7 +68,7 @@ Outcome bench_pnp(const Options& o, Findings& findings) {
     const std::vector<PnpCell> cells = run_pnp_bench(
         options,
         [&](std::size_t done, std::size_t of) {
-            progress.tell(fmt::format("points: cell {} of {}", done + 1, of));
+            progress.show(fmt::format("points: cell {} of {}", done + 1, of));
         },
         stop_flag());
     const PnpVerdict verdict = judge(cells);
@@ -132,7 +132,7 @@ Outcome bench_approach(const Options& o, Findings& findings) {
     TracingThreads threads(o.threads);
     const Progress progress;
     auto runs = run_approach(
-        **world, *camera, target, options, threads, [&](const std::string& step) { progress.tell(step); },
+        **world, *camera, target, options, threads, [&](const std::string& step) { progress.show(step); },
         stop_flag());
     if (!runs) return runs.error();
     say(in_words(*runs));
@@ -169,7 +169,7 @@ Outcome bench_stereo(const Options& o, Findings& findings) {
     StereoBenchSettings settings;
     if (o.quick) settings.points = 20;
     const auto stereo =
-        measure_stereo(*scene, settings, [&](const std::string& step) { progress.tell("stereo: " + step); });
+        measure_stereo(*scene, settings, [&](const std::string& step) { progress.show("stereo: " + step); });
     if (!stereo) return stereo.error();
     say(in_words(*stereo));
     if (!o.quick)
@@ -196,7 +196,7 @@ Outcome bench_icp(const Options& o, Findings& findings) {
     const std::vector<IcpStarts> starts{
         {5, 0.05, count}, {10, 0.1, count / 5}, {20, 0.2, count / 5}, {30, 0.3, count / 5}};
     const auto runs = run_icp(**world, *target, settings, starts,
-                              [&](int done, int of) { progress.tell(fmt::format("ICP: start {}/{}", done, of)); });
+                              [&](int done, int of) { progress.show(fmt::format("ICP: start {}/{}", done, of)); });
     if (!runs) return runs.error();
     say(in_words(*runs));
     const double range_m = 0.5 * (settings.distance_min_m + settings.distance_max_m);

@@ -101,7 +101,7 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     }
     const Progress progress;
     l.ladder = measure_ladder(**world, camera, settings, loop ? &*loop : nullptr, threads,
-                              [&](const std::string& step) { progress.tell(std::string(s.name) + ": " + step); });
+                              [&](const std::string& step) { progress.show(std::string(s.name) + ": " + step); });
     return l;
 }
 
@@ -127,10 +127,10 @@ Result<CraftRatios> measure_ratios(const LadderOptions& o, TracingThreads& threa
     if (!world) return world.error();
     const int rounds = o.quick ? kQuick : kRatioFrames;
     const Progress progress;
-    progress.tell("craft: a frame beside Embree's calls");
+    progress.show("craft: a frame beside Embree's calls");
     auto cost = frame_against_raw(**world, cameras[0], rounds, threads);
     if (!cost) return cost.error();
-    progress.tell("craft: empty space, moved bodies, first frames");
+    progress.show("craft: empty space, moved bodies, first frames");
     auto far = frame_against_raw(**world, cameras[1], rounds, threads);
     if (!far) return far.error();
     const std::vector<double> space = frames_of(**world, std::span(cameras).subspan(1), rounds, threads);

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "apps/bench.h"
 #include "apps/bench_scene.h"
-#include "apps/budget_options.h"
+#include "apps/cli.h"
+#include "apps/scene_options.h"
 #include "bench/loop.h"
 #include "emulator/realtime.h"
 
@@ -47,7 +47,7 @@ Result<std::vector<LoopRun>> measure(const Options& o, const Scene& scene) {
     for (const bool loaded : {false, true}) {
         if ((loaded && o.load.empty()) || stop_flag()) continue;
         const std::string name = loaded ? "loaded" : "idle";
-        progress.tell(fmt::format("{}: {:g} s", name, options.duration_s));
+        progress.show(fmt::format("{}: {:g} s", name, options.duration_s));
         auto run = run_loop(name, scene, options, loaded ? o.load : std::vector<int>{}, stop_flag());
         if (!run) return run.error();
         runs.push_back(*std::move(run));

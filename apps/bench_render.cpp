@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "apps/bench.h"
 #include "apps/bench_ladder.h"
 #include "apps/bench_scene.h"
+#include "apps/cli.h"
 #include "bench/convergence.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
@@ -87,7 +87,7 @@ Result<Measured> measure(const Options& o, const Scene& scene, std::size_t camer
     auto many = ImageSeries::create(scene, camera, reference_spp, scene.render.seed + 1);
     if (!many) return many.error();
     for (std::uint32_t k = 0; k < kReferenceImages; ++k) {
-        progress.tell(fmt::format("reference {}/{}", k, kReferenceImages));
+        progress.show(fmt::format("reference {}/{}", k, kReferenceImages));
         reference.add(many->render(threads, k));
         m.reference_seconds += many->seconds();
     }
@@ -102,7 +102,7 @@ Result<Measured> measure(const Options& o, const Scene& scene, std::size_t camer
         double seconds = 0;
         images->render(threads, frame);
         for (int k = 0; k < o.seeds; ++k) {
-            progress.tell(fmt::format("{} spp {}/{}", spp, k, o.seeds));
+            progress.show(fmt::format("{} spp {}/{}", spp, k, o.seeds));
             error.add(images->render(threads, frame++));
             seconds += images->seconds();
         }

@@ -1,10 +1,6 @@
 #include "apps/bench_scene.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "renderer/camera/camera_model.h"
@@ -31,14 +27,6 @@ void resize_longer_side(Camera& c, int pixels) {
     const double scale = static_cast<double>(pixels) / std::max(c.width, c.height);
     resize(c, std::max(1, static_cast<int>(c.width * scale + 0.5)),
            std::max(1, static_cast<int>(c.height * scale + 0.5)));
-}
-
-Progress::Progress() : terminal_(::isatty(STDERR_FILENO) == 1) {}
-Progress::~Progress() {
-    if (terminal_) fmt::print(stderr, "\r{:<60}\r", "");
-}
-void Progress::tell(const std::string& text) const {
-    if (terminal_) fmt::print(stderr, "\r{:<60}", text), std::fflush(stderr);
 }
 
 }  // namespace narpa::cli

@@ -1,4 +1,4 @@
-/// apps/bench_scene.h - the scenes that the benches look at.
+/// apps/bench_scene.h - scenes that come with narpa, at other sizes.
 #pragma once
 
 #include <string>
@@ -15,18 +15,5 @@ namespace narpa::cli {
 void resize(Camera& camera, int width, int height);
 /// The same view, its longer side so many pixels.
 void resize_longer_side(Camera& camera, int pixels);
-
-/// A line on a terminal that replaces itself; nothing elsewhere.
-class Progress {
-public:
-    Progress();
-    ~Progress();
-    Progress(const Progress&) = delete;
-    Progress& operator=(const Progress&) = delete;
-    void tell(const std::string& text) const;
-
-private:
-    bool terminal_;
-};
 
 }  // namespace narpa::cli

@@ -57,27 +57,17 @@ Finding video_devices() {
     return {"V4L2 devices", true, found, ""};
 }
 
-Finding real_time() {
+/// A limit of this process, which root does not have; `item` is its name and value in limits.conf.
+Finding permission(std::string name, int resource, rlim_t needed, std::string_view what, std::string_view without,
+                   std::string_view item) {
     rlimit limit{};
-    ::getrlimit(RLIMIT_RTPRIO, &limit);
-    if (::geteuid() == 0 || limit.rlim_cur >= 60)
-        return {"real-time priority", true, "SCHED_FIFO is permitted", ""};
-    return {
-        "real-time priority", false, "SCHED_FIFO is not permitted: deadlines may slip under load",
-        fmt::format("echo \"{} - rtprio 90\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
-                    ::getenv("USER") ? ::getenv("USER") : "USER")};
-}
-
-Finding locked_memory() {
-    rlimit limit{};
-    ::getrlimit(RLIMIT_MEMLOCK, &limit);
-    if (::geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY)
-        return {"locked memory", true, "mlockall is permitted", ""};
-    return {
-        "locked memory", false, fmt::format("limit {} KiB: page faults may cost deadlines", limit.rlim_cur / 1024),
-        fmt::format(
-            "echo \"{} - memlock unlimited\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
-            ::getenv("USER") ? ::getenv("USER") : "USER")};
+    ::getrlimit(static_cast<__rlimit_resource_t>(resource), &limit);
+    if (::geteuid() == 0 || limit.rlim_cur >= needed)
+        return {std::move(name), true, fmt::format("{} is permitted", what), ""};
+    const char* user = ::getenv("USER");
+    return {std::move(name), false, fmt::format(fmt::runtime(without), limit.rlim_cur / 1024),
+            fmt::format("echo \"{} - {}\" | sudo tee -a /etc/security/limits.d/narpa.conf, then log in again",
+                        user ? user : "USER", item)};
 }
 
 /// The number of materials of each kind.
@@ -156,7 +146,7 @@ std::string budget_words(const RenderSettings& r) {
     return fmt::format("{} sample{} per pixel", r.spp, r.spp > 1 ? "s" : "");
 }
 
-void tell_light(const Scene& s) {
+void print_light(const Scene& s) {
     const bool path = s.render.method == RenderSettings::Method::path;
     say(fmt::format(
         "  render: {}, {}",
@@ -171,11 +161,11 @@ void tell_light(const Scene& s) {
                         l.mount < 0 ? "" : " on body " + s.bodies[static_cast<std::size_t>(l.mount)].name));
 }
 
-void tell(const World& world) {
+void print_scene(const World& world) {
     const Scene& s = world.scene();
     say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
                     world.tracer().triangle_count(), s.materials.size(), s.textures.size()));
-    tell_light(s);
+    print_light(s);
     for (const Body& b : s.bodies)
         say(fmt::format("  body {}{}", b.name,
                         b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
@@ -214,11 +204,16 @@ Outcome check(const Options& o) {
     if (!scene) return scene.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
-    tell(**world);
+    print_scene(**world);
     if (!o.dbc.empty())
         if (auto written = save_dbc((*world)->scene(), o.dbc); !written) return written.error();
 
-    std::vector<Finding> findings{socketcan(), video_devices(), real_time(), locked_memory()};
+    std::vector<Finding> findings{
+        socketcan(), video_devices(),
+        permission("real-time priority", RLIMIT_RTPRIO, 60, "SCHED_FIFO",
+                   "SCHED_FIFO is not permitted: deadlines may slip under load", "rtprio 90"),
+        permission("locked memory", RLIMIT_MEMLOCK, RLIM_INFINITY, "mlockall",
+                   "limit {} KiB: page faults may cost deadlines", "memlock unlimited")};
     const std::size_t general = findings.size();
     for (const std::string& spec : o.devices) {
         auto finding = try_device(spec);

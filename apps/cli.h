@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "apps/options.h"
@@ -25,16 +26,41 @@ Command add_run(Parser app);
 Command add_fly(Parser app);
 Command add_render(Parser app);
 Command add_scan(Parser app);
-Command add_bench(Parser app);
 Command add_replay(Parser app);
 Command add_estimate(Parser app);
 Command add_rehearse(Parser app);
+/// Of `narpa bench`.
+Command add_bench_render(Parser bench);
+Command add_bench_loop(Parser bench);
+Command add_bench_estimate(CLI::App& bench);
 
 /// Prints a line on standard error.
 void say(std::string_view text);
+/// A line on a terminal that replaces itself; nothing elsewhere.
+class Progress {
+public:
+    Progress();
+    ~Progress();
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+    void show(const std::string& text) const;
+
+private:
+    bool terminal_;
+};
+
+/// Shows what `text` returns on a terminal, once a second, from a thread of its own.
+class ProgressThread {
+public:
+    explicit ProgressThread(std::function<std::string()> text);
+
+private:
+    std::jthread thread_;
+};
+
 /// Reads a scene, with another method than its own if one is given, and prints its warnings.
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
-/// "NAME=VALUE" -> {NAME, VALUE}; an Error that says what was expected.
+/// "NAME=VALUE" -> {NAME, VALUE}; an Error that names what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);
 
 }  // namespace narpa::cli

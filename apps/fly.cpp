@@ -64,11 +64,11 @@ Result<std::map<std::string, Commander>> commanders(const Options& o, const std:
 
 class Player {
 public:
-    Player(const Options& o, CanBus& bus, std::map<std::string, Commander>& who)
-        : options_(o), bus_(bus), who_(who), fd_(bus.carries_fd() && !o.classic) {}
+    Player(const Options& o, CanBus& bus, std::map<std::string, Commander>& bodies)
+        : options_(o), bus_(bus), bodies_(bodies), fd_(bus.carries_fd() && !o.classic) {}
 
     Status play(const std::vector<TrajectoryRow>& rows) {
-        if (auto ready = synchronise(); !ready) return ready;
+        synchronise();
         for (const TrajectoryRow& row : rows) {
             if (stop_flag()) break;
             const std::int64_t t = row.t_ns + start_ns_;
@@ -84,8 +84,8 @@ public:
     std::int64_t start_ns() const { return start_ns_; }
 
 private:
-    /// Real time: the trajectory's time 0 is a round tenth of a second ahead, unless --start says when.
-    Status synchronise() {
+    /// Real time: the trajectory's time 0 is a round tenth of a second ahead, unless --start is given.
+    void synchronise() {
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
         if (!options_.lockstep) {
             while (!clock_.synchronized() && monotonic_ns() < deadline && !stop_flag()) {
@@ -102,7 +102,6 @@ private:
         } else if (!options_.lockstep) {
             start_ns_ = (clock_.now_ns() + 300 * kMs) / (100 * kMs) * (100 * kMs);
         }
-        return Ok{};
     }
 
     void wait_for(std::int64_t t_ns) {
@@ -113,7 +112,7 @@ private:
     }
 
     Status send(const TrajectoryRow& row, std::int64_t t_ns) {
-        Commander& c = who_.at(row.body);
+        Commander& c = bodies_.at(row.body);
         const PoseCommand command{c.counter++, t_ns, row.motion};
         FrameSet frames;
         if (const EncodeStatus encoded = encode(command, c.base_id, fd_, frames); !encoded)
@@ -126,10 +125,10 @@ private:
         return Ok{};
     }
 
-    /// Until the emulator's clock stands where the commands let it go.
+    /// Until the emulator's clock has reached the newest time that all bodies have commands for.
     Status wait_in_lockstep() {
         std::int64_t granted = std::numeric_limits<std::int64_t>::max();
-        for (const auto& [name, c] : who_) granted = std::min(granted, c.newest_ns);
+        for (const auto& [name, c] : bodies_) granted = std::min(granted, c.newest_ns);
         if (granted <= last_granted_) return Ok{};
         last_granted_ = granted;
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
@@ -151,7 +150,7 @@ private:
 
     const Options& options_;
     CanBus& bus_;
-    std::map<std::string, Commander>& who_;
+    std::map<std::string, Commander>& bodies_;
     bool fd_;
     RemoteClock clock_;
     std::int64_t start_ns_ = 0, last_granted_ = std::numeric_limits<std::int64_t>::min();
@@ -160,16 +159,16 @@ private:
 Outcome fly(const Options& o) {
     auto rows = read_trajectory(o.trajectory);
     if (!rows) return rows.error();
-    auto who = commanders(o, *rows);
-    if (!who) return who.error();
+    auto bodies = commanders(o, *rows);
+    if (!bodies) return bodies.error();
     std::stable_sort(rows->begin(), rows->end(), [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
 
     stop_on_signals();
     auto bus = join_can_bus(o.bus, o.wait_s, stop_flag());
     if (!bus) return bus.error();
-    say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), who->size(),
+    say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), bodies->size(),
                     (*bus)->description()));
-    Player player(o, **bus, *who);
+    Player player(o, **bus, *bodies);
     if (auto played = player.play(*rows); !played) return played.error();
 
     const CanCounters& c = (*bus)->counters();

@@ -1,8 +1,12 @@
 // narpa - hardware-in-the-loop camera and LiDAR emulator. This file: subcommands, --json, exit status.
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <exception>
+#include <mutex>
 
 #include "apps/cli.h"
 #include "renderer/scene/scene_file.h"
@@ -11,6 +15,26 @@ namespace narpa::cli {
 
 void say(std::string_view text) {
     fmt::print(stderr, "{}\n", text);
+}
+
+Progress::Progress() : terminal_(::isatty(STDERR_FILENO) == 1) {}
+Progress::~Progress() {
+    if (terminal_) fmt::print(stderr, "\r{:<60}\r", "");
+}
+void Progress::show(const std::string& text) const {
+    if (terminal_) fmt::print(stderr, "\r{:<60}", text), std::fflush(stderr);
+}
+
+ProgressThread::ProgressThread(std::function<std::string()> text) {
+    if (::isatty(STDERR_FILENO) != 1) return;
+    thread_ = std::jthread([text = std::move(text)](const std::stop_token& stop) {
+        const Progress line;
+        std::mutex m;
+        std::unique_lock lock(m);
+        std::condition_variable_any woken;
+        while (!woken.wait_for(lock, stop, std::chrono::seconds(1), [&] { return stop.stop_requested(); }))
+            line.show(text());
+    });
 }
 
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method) {
@@ -53,6 +77,13 @@ int finish(const Outcome& outcome, bool json) {
     }
     if (json) print_json(*outcome);
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
+}
+
+Command add_bench(Parser app) {
+    const Parser bench = app.subcommand("bench", "Measure speed against error");
+    auto chosen = std::make_shared<Command>();
+    bench.choice<Command>({add_bench_render, add_bench_loop, add_bench_estimate}, *chosen);
+    return [chosen] { return (*chosen)(); };
 }
 
 constexpr const char* kDescription =

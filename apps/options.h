@@ -29,7 +29,7 @@ public:
     /// Refuses NaN and infinity; `range` lets NaN through.
     Option finite() const;
     Option one_of(const std::vector<std::string>& values) const;
-    /// `complaint`: what is wrong with a value; empty: nothing.
+    /// `complaint` returns what is wrong with a value; empty: nothing.
     Option check(const std::function<std::string(const std::string&)>& complaint) const;
     Option needs(Option other) const;
     Option excludes(Option other) const;

@@ -4,17 +4,14 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <filesystem>
 
+#include "apps/bench_scene.h"
 #include "apps/cli.h"
 #include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/rehearsal.h"
 
 namespace narpa::cli {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct Options {
     rehearsal::RehearsalOptions run;
@@ -23,15 +20,7 @@ struct Options {
     int jobs = 1;
 };
 
-/// The docking that comes with narpa: beside the program in a build, or installed.
-Result<std::string> shipped_scenario() {
-    const std::string bin = rehearsal::program_folder();
-    for (const char* at : {"/../scenes/rehearsal/docking.toml", "/../share/narpa/scenes/rehearsal/docking.toml"})
-        if (std::error_code none; fs::exists(bin + at, none)) return fs::path(bin + at).lexically_normal().string();
-    return Error{"no scenario was given, and the docking that comes with narpa is not beside the program"};
-}
-
-/// Whether a line has come on standard input; where that has ended, ten seconds after it was first asked for.
+/// Whether a line has come on standard input; after its end, ten seconds after the first call.
 bool line_on_stdin() {
     using Clock = std::chrono::steady_clock;
     static const Clock::time_point first = Clock::now();
@@ -85,8 +74,9 @@ Outcome rehearse(const Options& given) {
         o.video.insert(*std::move(pair));
     }
     if (o.scenario.empty()) {
-        auto shipped = shipped_scenario();
-        if (!shipped) return shipped.error();
+        auto shipped = shipped_scene("rehearsal/docking.toml");
+        if (!shipped)
+            return Error{"no scenario was given, and the docking that comes with narpa is not beside the program"};
         o.scenario = *shipped;
     }
     auto scenario = rehearsal::read_scenario(o.scenario);

@@ -1,20 +1,14 @@
 // narpa render - renders one frame of one camera, as a run would, to an image file.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
 #include <set>
-#include <thread>
 
-#include "apps/budget_options.h"
 #include "apps/cli.h"
-#include "apps/pose_options.h"
+#include "apps/scene_options.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
 #include "emulator/threads.h"
@@ -86,35 +80,6 @@ std::string_view name(Method m) {
     return m == Method::path ? "path" : "direct";
 }
 
-/// Shows the progress of a long frame on standard error, if that is a terminal.
-class Progress {
-public:
-    explicit Progress(std::size_t pixels) : pixels_(pixels) {
-        if (isatty(STDERR_FILENO) != 0)
-            watcher_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
-    }
-    std::atomic<std::size_t> pixels_done{0};
-
-private:
-    void watch(const std::stop_token& stop) {
-        using namespace std::chrono_literals;
-        std::mutex m;
-        std::unique_lock lock(m);
-        std::condition_variable_any woken;
-        const auto wait = [&](auto time) { return woken.wait_for(lock, stop, time, [] { return false; }); };
-        for (wait(2s); !stop.stop_requested(); wait(500ms)) {
-            const double part = static_cast<double>(pixels_done) / static_cast<double>(pixels_);
-            fmt::print(stderr, "\r{:5.1f} % ", 100 * part);
-            shown_ = true;
-        }
-        if (shown_) fmt::print(stderr, "\r        \r");
-    }
-
-    std::size_t pixels_;
-    bool shown_ = false;
-    std::jthread watcher_;  // last: joined before the members that it reads are destroyed
-};
-
 Outcome render(const Options& o) {
     std::optional<Method> method;
     if (!o.method.empty()) method = o.method == "path" ? Method::path : Method::direct;
@@ -152,9 +117,12 @@ Outcome render(const Options& o) {
     const std::int64_t start_ns = monotonic_ns();
     FrameLedger ledger;
     {
-        Progress progress(unit.radiance().pixels.size());
+        std::atomic<std::size_t> pixels_done{0};
+        const auto pixels = static_cast<double>(unit.radiance().pixels.size());
+        const ProgressThread progress(
+            [&] { return fmt::format("{:5.1f} %", 100 * static_cast<double>(pixels_done) / pixels); });
         threads.arena.execute([&] {
-            ledger = unit.expose(frame, t_ns, start_ns + budget_ns, aovs, &progress.pixels_done);
+            ledger = unit.expose(frame, t_ns, start_ns + budget_ns, aovs, &pixels_done);
             unit.embed(ledger);
         });
     }

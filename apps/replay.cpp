@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/bench_scene.h"
 #include "apps/cli.h"
 #include "emulator/replay/replay_report.h"
 #include "emulator/threads.h"
@@ -14,8 +13,8 @@
 namespace narpa::cli {
 namespace {
 
-constexpr std::size_t kDifferencesTold = 10;
-constexpr int kFramesCompared = 10;  ///< where nobody says how many
+constexpr std::size_t kDifferencesShown = 10;
+constexpr int kFramesCompared = 10;  ///< by default
 
 struct Options {
     std::string folder, camera, scene, picture;
@@ -25,7 +24,7 @@ struct Options {
 struct Replayed {
     std::vector<ReplayedFrame> frames;
     std::size_t not_whole = 0;
-    std::vector<ReplayedFrame> forged;  ///< of those that are not whole, what cannot be so
+    std::vector<ReplayedFrame> forged;  ///< not whole, and different from the log
     /// The frame that is farthest from its reference.
     std::size_t worst = 0;
     std::optional<RadianceImage> worst_picture, worst_reference;
@@ -44,13 +43,13 @@ std::vector<std::size_t> frames_for(const Options& o, std::size_t logged) {
     return chosen_frames(logged, o.reference > 0 ? std::size_t{kFramesCompared} : logged);
 }
 
-Replayed make_again(const Options& o, Replay& run) {
+Replayed render_again(const Options& o, Replay& run) {
     TracingThreads threads(o.threads);
     const Progress progress;
     const std::vector<std::size_t> chosen = frames_for(o, run.frames().size());
     Replayed done;
     for (std::size_t k = 0; k < chosen.size(); ++k) {
-        progress.tell(fmt::format("{}/{}", k, chosen.size()));
+        progress.show(fmt::format("{}/{}", k, chosen.size()));
         const std::size_t i = chosen[k];
         if (!run.has_image(i)) {
             ++done.not_whole;
@@ -75,20 +74,20 @@ Replayed make_again(const Options& o, Replay& run) {
     return done;
 }
 
-/// "nav.ledger.csv:12: frame 10: rays: 512, logged 513" for each, as far as anyone wants to read.
+/// "nav.ledger.csv:12: frame 10: rays: 512, logged 513" for each, up to kDifferencesShown.
 std::string differences_in_words(const Replayed& done, const std::string& log) {
     std::string out;
-    std::size_t told = 0, differing = 0;
+    std::size_t shown = 0, differing = 0;
     for (const auto* frames : {&done.frames, &done.forged})
         for (const ReplayedFrame& f : *frames) {
-            if (f.differs.empty() || ++differing > kDifferencesTold) continue;
+            if (f.differs.empty() || ++differing > kDifferencesShown) continue;
             out += fmt::format("{}:{}: frame {}: {}\n", log, f.logged.line, f.logged.ledger.frame,
                                fmt::join(f.differs, "; "));
-            ++told;
+            ++shown;
         }
     if (done.frames.empty())
         out += fmt::format("{}: no frame to repeat, expected one with an image at least\n", log);
-    if (differing > told) out += fmt::format("and {} frames more\n", differing - told);
+    if (differing > shown) out += fmt::format("and {} frames more\n", differing - shown);
     if (differing > 0)
         out +=
             "expected the scene, its meshes and the program as they were in the run, and a processor of its kind\n";
@@ -105,7 +104,7 @@ Outcome replay(const Options& o) {
     const std::string log = o.folder + "/" + camera + ".ledger.csv";
     if ((*run)->frames().empty()) return Error{fmt::format("holds no frame of camera \"{}\"", camera), log};
 
-    const Replayed done = make_again(o, **run);
+    const Replayed done = render_again(o, **run);
     const auto repeated = static_cast<std::size_t>(
         std::count_if(done.frames.begin(), done.frames.end(), [](const auto& f) { return f.differs.empty(); }));
     const bool passed = repeated > 0 && repeated == done.frames.size() && done.forged.empty();

@@ -1,12 +1,8 @@
 // narpa run - the emulator: poses in on CAN, frames and packets out, until the time is over or a signal comes.
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <thread>
-
-#include "apps/budget_options.h"
 #include "apps/cli.h"
-#include "apps/tracker_options.h"
+#include "apps/scene_options.h"
 #include "base/ready.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
@@ -44,16 +40,6 @@ std::string addresses(const std::string& bus, CanNode* can) {
                        a.pty.empty() ? "" : fmt::format("CAN_PTY={}\n", a.pty));
 }
 
-/// One line that is written over once a second, for a person who watches.
-void show_progress(const Emulator& emulator, const StopFlag& done) {
-    if (!::isatty(STDERR_FILENO)) return;
-    while (!done) {
-        for (int i = 0; i < 10 && !done; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        fmt::print(stderr, "\r  t = {:.1f} s ", static_cast<double>(emulator.t_ns()) * 1e-9);
-        if (done) fmt::print(stderr, "\r{:20}\r", "");
-    }
-}
-
 Outcome run(const Options& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     RunOptions o = options.run;
@@ -87,11 +73,11 @@ Outcome run(const Options& options) {
         say(fmt::format("pose of {} from camera {}", estimator->target(), estimator->camera().name));
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
-    StopFlag done{false};
-    std::thread progress([&] { show_progress(**emulator, done); });
-    const Status status = (*emulator)->run(stop_flag());
-    done = true;
-    progress.join();
+    const Status status = [&] {
+        const ProgressThread progress(
+            [&] { return fmt::format("  t = {:.1f} s", static_cast<double>((*emulator)->t_ns()) * 1e-9); });
+        return (*emulator)->run(stop_flag());
+    }();
     say(in_words(**emulator));
     if (!status) return status.error();
     return report(**emulator);

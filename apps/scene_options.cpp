@@ -1,10 +1,12 @@
-#include "apps/pose_options.h"
+#include "apps/scene_options.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
+#include <cstdio>
 
 #include "emulator/trajectory.h"
 
@@ -31,6 +33,23 @@ Result<Rigid3> parse_pose(const std::string& text) {
 }
 
 }  // namespace
+
+void BudgetOptions::add_to(Parser app) {
+    const Option samples = app.option("--spp", spp, "Samples per pixel instead of the scene's").range(1, 65535);
+    const Option time =
+        app.option("--budget-ms", budget_ms, "Time budget per frame in milliseconds, instead").range(0.001, 1e6);
+    const Option rays = app.option("--budget-rays", budget_rays, "Budget per frame in rays, instead")
+                            .range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000});
+    samples.excludes(time).excludes(rays);
+    time.excludes(rays);
+}
+
+void BudgetOptions::override_scene(RenderSettings& render) const {
+    if (!spp && !budget_ms && !budget_rays) return;
+    render.spp = spp.value_or(render.spp);
+    render.budget_ns = budget_ms ? std::llround(*budget_ms * 1e6) : 0;
+    render.budget_rays = budget_rays.value_or(0);
+}
 
 void PoseOptions::add_to(Parser app) {
     app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) with the bodies' poses");
@@ -60,6 +79,33 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
     auto rows = read_trajectory(trajectory);
     if (!rows) return rows.error();
     return world.load(*rows, t_from_ns, t_to_ns);
+}
+
+void TrackerFlags::add_to(Parser app, const std::string& prefix) {
+    const std::string dashes = "--" + prefix;
+    app.option(dashes + "target", tracker.target,
+               "Body whose pose is estimated (default: the first with a mesh that does not carry the camera)");
+    app.option(dashes + "method", method,
+               "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
+        .one_of({"features", "dense"})
+        .shows_default();
+    app.option(dashes + "start", start,
+               "DEG,PERCENT: error of the first guess, in attitude and as a part of the range")
+        .shows_default();
+    app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
+}
+
+Result<TrackerOptions> TrackerFlags::options() const {
+    TrackerOptions o = tracker;
+    double deg = 0, percent = 0;
+    int used = 0;
+    const bool read = std::sscanf(start.c_str(), "%lf,%lf%n", &deg, &percent, &used) == 2 &&
+                      used == static_cast<int>(start.size());
+    if (!read || !(deg >= 0 && deg <= 180) || !(percent >= 0 && percent <= 100))
+        return Error{fmt::format("start \"{}\", expected DEG,PERCENT from 0,0 to 180,100, like 5,5", start)};
+    o.start_deg = deg, o.start_percent = percent;
+    o.method = method == "dense" ? EstimateMethod::dense : EstimateMethod::features;
+    return o;
 }
 
 }  // namespace narpa::cli

@@ -1,0 +1,47 @@
+/// apps/scene_options.h - options that several commands share: budgets, poses of bodies, how poses are estimated.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/cli.h"
+#include "emulator/frame_tracker.h"
+#include "emulator/world.h"
+
+namespace narpa::cli {
+
+/// --spp, --budget-ms, --budget-rays: one of them, in place of the scene's.
+struct BudgetOptions {
+    std::optional<int> spp;
+    std::optional<double> budget_ms;
+    std::optional<std::uint64_t> budget_rays;
+
+    void add_to(Parser app);
+    void override_scene(RenderSettings& render) const;
+};
+
+/// --trajectory and --pose: where bodies are in a single image or scan.
+struct PoseOptions {
+    std::string trajectory;
+    std::vector<std::string> poses;
+
+    void add_to(Parser app);
+    /// --pose: before the world is made. --trajectory: after.
+    [[nodiscard]] Status place(Scene& scene) const;
+    [[nodiscard]] Status load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const;
+};
+
+/// How poses are estimated: options of `estimate` and of `run --estimate`.
+struct TrackerFlags {
+    std::string method = "features";
+    std::string start = "2,2";
+    TrackerOptions tracker;
+
+    /// With `prefix` before each name: --target, or --estimate-target.
+    void add_to(Parser app, const std::string& prefix);
+    [[nodiscard]] Result<TrackerOptions> options() const;
+};
+
+}  // namespace narpa::cli

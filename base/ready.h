@@ -22,7 +22,7 @@ inline Status check_ready_fd(int fd) {
     return Ok{};
 }
 
-/// `addresses`: lines KEY=VALUE. Whoever asked may be gone: that is no error.
+/// `addresses`: lines KEY=VALUE. It is no error if the reader has gone.
 inline void notify_ready(int fd, std::string addresses = {}) {
     if (fd < 0) return;
     addresses += kReadyLine;

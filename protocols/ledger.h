@@ -1,9 +1,9 @@
 /// protocols/ledger.h - the time ledger of one camera frame: what it shows, when it was made, what it cost and what
 /// that left in error.
 ///
-/// All times are nanoseconds of the simulation clock. The ledger goes to the CSV log, to CAN and, when the scene
-/// asks for it, into the image's last row (protocols/video/embedded_line.h). ledger_fields.h has the table of its
-/// fields.
+/// All times are nanoseconds of the simulation clock. The ledger goes to the CSV log, to CAN and, with
+/// embedded_line = true, into the image's last row (protocols/video/embedded_line.h). ledger_fields.h has the table
+/// of its fields.
 #pragma once
 
 #include <array>

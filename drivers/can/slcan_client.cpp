@@ -47,8 +47,8 @@ Connection outcome(int fd, std::int64_t timeout_ns) noexcept {
 constexpr std::array<std::string_view, 3> kGreeting{"C\r", "S8\r", "O\r"};
 constexpr std::int64_t kAnswerPatience_ns = 5 * kSecond_ns;  // the hub may have heavier things to do
 
-/// Opens the channel and waits for the hub's word that it is open: from then on nothing of the bus passes us by. A
-/// hub says nothing else before, so what comes after the answers is left in the socket.
+/// Opens the channel and waits for the hub's answers: from then on no frame of the bus is missed. A hub sends
+/// nothing else before, so what comes after the answers is left in the socket.
 Status greet(int fd) {
     const auto failed = [] {
         const bool hung_up = errno == 0 || errno == EPIPE || errno == ECONNRESET;
@@ -128,14 +128,14 @@ public:
     }
 
 private:
-    /// On the way again, without waiting for answers.
+    /// Connected again; does not wait for answers.
     void begin(Descriptor fd) noexcept {
         stream_.attach(std::move(fd));
         for (const std::string_view line : kGreeting)
             if (!stream_.write(line)) ++counters_.send_drops;
     }
 
-    /// Connected, if need be by a new try.
+    /// Connected, after a new try if needed.
     bool ready() noexcept {
         if (stream_) return true;
         Connection connection = Connection::refused;

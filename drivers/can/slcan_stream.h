@@ -33,11 +33,11 @@ public:
     [[nodiscard]] std::size_t room() const noexcept { return out_.size() - (out_end_ - out_begin_); }
     [[nodiscard]] bool pending() const noexcept { return out_begin_ != out_end_; }
 
-    /// Reads what is there, at most `kReadBytes`; false when the other end has gone. Then next_line() tells the
-    /// lines.
+    /// Reads what is there, at most `kReadBytes`; false when the other end has gone. Then next_line() returns
+    /// the lines.
     [[nodiscard]] bool read() noexcept;
     [[nodiscard]] bool next_line(std::string_view& line) noexcept;
-    /// Bytes have been read that next_line() has not looked at.
+    /// Bytes have been read that next_line() has not yet processed.
     [[nodiscard]] bool unread() const noexcept { return !unread_.empty(); }
     /// Lines too long for slcan, since attach.
     [[nodiscard]] std::uint64_t overlong() const noexcept { return lines_.overlong(); }

@@ -89,7 +89,7 @@ Result<Stage> start_streaming(Camera& camera) {
     if (xioctl(fd, VIDIOC_REQBUFS, &request) < 0) return cannot("the device gives no buffers");
     for (std::uint32_t i = 0; i < std::min(request.count, kBuffers); ++i) {
         v4l2_buffer buffer = capture_buffer(i);
-        if (xioctl(fd, VIDIOC_QUERYBUF, &buffer) < 0) return cannot("the device tells nothing of its buffers");
+        if (xioctl(fd, VIDIOC_QUERYBUF, &buffer) < 0) return cannot("the device does not describe its buffers");
         camera.buffers[i] = MappedBuffer(fd, buffer.length, buffer.m.offset);
         if (!camera.buffers[i]) return cannot("the device's buffers cannot be mapped");
         if (xioctl(fd, VIDIOC_QBUF, &buffer) < 0) return cannot("the device takes no buffer");
@@ -173,7 +173,7 @@ private:
         if (stage && *stage == Stage::streaming) {
             camera_ = std::move(fresh);
             stage_ = *stage;
-        } else if (!stage && stage.error().kind == ErrorKind::bad_input) {  // it is there, and it is another
+        } else if (!stage && stage.error().kind == ErrorKind::bad_input) {  // it is there, with another format
             status_ = stage.error();
             status_.error().file = path_;
         }

@@ -1,7 +1,7 @@
 #include "protocols/can/candump.h"
 
 #include <algorithm>
-#include <array>
+#include <charconv>
 #include <cstdio>
 
 #include "protocols/can/hex.h"
@@ -20,28 +20,25 @@ std::string_view next_word(std::string_view& rest) {
     return word;
 }
 
+/// Digits and nothing else.
+bool get_number(std::string_view text, std::uint64_t& value) {
+    const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return failure == std::errc{} && end == text.data() + text.size();
+}
+
 /// "(1700000000.250000)" with up to nine decimals, read as integers so that no nanosecond is lost.
 bool get_stamp(std::string_view text, std::int64_t& t_ns) {
-    constexpr std::int64_t max_s = 9'000'000'000;  // seconds that fit 64-bit nanoseconds
+    constexpr std::uint64_t max_s = 9'000'000'000;  // seconds that fit 64-bit nanoseconds
     if (text.size() < 3 || text.front() != '(' || text.back() != ')') return false;
-    std::int64_t seconds = 0, fraction_ns = 0, unit_ns = 1'000'000'000;
-    bool any = false, in_fraction = false;
-    for (const char c : text.substr(1, text.size() - 2)) {
-        if (c == '.' && !in_fraction && any) {
-            in_fraction = true;
-            continue;
-        }
-        if (c < '0' || c > '9') return false;
-        any = true;
-        if (in_fraction) {
-            if (unit_ns == 1) return false;
-            fraction_ns += (c - '0') * (unit_ns /= 10);
-        } else if ((seconds = 10 * seconds + (c - '0')) > max_s) {
-            return false;
-        }
-    }
-    t_ns = seconds * 1'000'000'000 + fraction_ns;
-    return any;
+    text = text.substr(1, text.size() - 2);
+    const std::size_t point = std::min(text.find('.'), text.size());
+    const std::string_view decimals = text.substr(std::min(point + 1, text.size()));
+    std::uint64_t seconds = 0, ns = 0;
+    if (!get_number(text.substr(0, point), seconds) || seconds > max_s) return false;
+    if (decimals.size() > 9 || (!decimals.empty() && !get_number(decimals, ns))) return false;
+    for (std::size_t digits = decimals.size(); digits < 9; ++digits) ns *= 10;
+    t_ns = static_cast<std::int64_t>(seconds * 1'000'000'000 + ns);
+    return true;
 }
 
 /// What follows the first '#'.

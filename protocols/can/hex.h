@@ -1,6 +1,7 @@
 /// protocols/can/hex.h - hexadecimal digits, as slcan and candump lines carry them.
 #pragma once
 
+#include <charconv>
 #include <cstdint>
 #include <string_view>
 
@@ -16,22 +17,8 @@ inline char* put_hex(char* p, std::uint32_t value, int digits) noexcept {
 
 /// One to eight digits, either case, and nothing else.
 [[nodiscard]] inline bool get_hex(std::string_view text, std::uint32_t& out) noexcept {
-    if (text.empty() || text.size() > 8) return false;
-    std::uint32_t value = 0;
-    for (const char c : text) {
-        std::uint32_t digit = 0;
-        if (c >= '0' && c <= '9')
-            digit = static_cast<std::uint32_t>(c - '0');
-        else if (c >= 'A' && c <= 'F')
-            digit = static_cast<std::uint32_t>(c - 'A' + 10);
-        else if (c >= 'a' && c <= 'f')
-            digit = static_cast<std::uint32_t>(c - 'a' + 10);
-        else
-            return false;
-        value = value << 4 | digit;
-    }
-    out = value;
-    return true;
+    const char* const end = text.data() + text.size();
+    return text.size() <= 8 && std::from_chars(text.data(), end, out, 16).ptr == end && !text.empty();
 }
 
 [[nodiscard]] inline bool get_hex_byte(std::string_view two_digits, std::uint8_t& out) noexcept {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <string_view>
 
 #include "protocols/can/hex.h"
@@ -62,78 +61,71 @@ private:
     std::uint8_t *start_, *p_;
 };
 
-/// Each function reads one value of its type from the front; nothing when there is another one or none.
+/// Each function reads one value of its type from the front. After another type or the end of the bytes the reader
+/// has failed, and values are empty.
 class Reader {
 public:
     explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
     [[nodiscard]] bool empty() const { return rest_.empty(); }
+    [[nodiscard]] bool failed() const { return failed_; }
 
-    std::optional<std::span<const std::uint8_t>> take(std::uint64_t n) {
-        if (n > rest_.size()) return std::nullopt;
+    std::uint64_t map_size() {
+        const std::uint8_t type = byte();
+        return (type & 0xF0) == kFixMap ? type & 0x0F : type == kMap16 ? big_endian(2) : fail();
+    }
+    std::string_view string() {
+        const std::uint8_t type = byte();
+        const auto text = take((type & 0xE0) == kFixStr ? type & 0x1F
+                               : type == kStr8          ? big_endian(1)
+                               : type == kStr16         ? big_endian(2)
+                                                        : fail());
+        return {reinterpret_cast<const char*>(text.data()), text.size()};
+    }
+    bool boolean() {
+        const std::uint8_t type = byte();
+        if (type != kTrue && type != kFalse) fail();
+        return type == kTrue;
+    }
+    std::uint64_t unsigned_integer() {
+        const std::uint8_t type = byte();
+        if (type < 0x80) return type;
+        return type >= kUint8 && type <= kUint64 ? big_endian(std::size_t{1} << (type - kUint8)) : fail();
+    }
+    std::span<const std::uint8_t> binary() {
+        const std::uint8_t type = byte();
+        return take(type >= kBin8 && type <= kBin32 ? big_endian(std::size_t{1} << (type - kBin8)) : fail());
+    }
+    /// A time stamp or a channel: not used, but it must be well formed.
+    void skip_number_or_text() {
+        const std::uint8_t type = rest_.empty() ? kNil : rest_.front();
+        if (type == kNil || type == kFloat32 || type == kFloat64)
+            take(type == kNil ? 1 : type == kFloat32 ? 5 : 9);
+        else if (type < 0x80 || (type >= kUint8 && type <= kUint64))
+            unsigned_integer();
+        else
+            (void)string();
+    }
+
+private:
+    std::uint64_t fail() {
+        failed_ = true;
+        return 0;
+    }
+    std::span<const std::uint8_t> take(std::uint64_t n) {
+        if (n > rest_.size()) n = fail();
         const auto front = rest_.first(static_cast<std::size_t>(n));
         rest_ = rest_.subspan(static_cast<std::size_t>(n));
         return front;
     }
-    std::optional<std::uint64_t> big_endian(std::size_t n) {
-        const auto bytes = take(n);
-        if (!bytes) return std::nullopt;
+    std::uint64_t big_endian(std::size_t n) {
         std::uint64_t value = 0;
-        for (const std::uint8_t b : *bytes) value = value << 8 | b;
+        for (const std::uint8_t b : take(n)) value = value << 8 | b;
         return value;
     }
-    std::optional<std::uint64_t> map_size() {
-        const auto type = big_endian(1);
-        if (!type) return std::nullopt;
-        if ((*type & 0xF0) == kFixMap) return *type & 0x0F;
-        return *type == kMap16 ? big_endian(2) : std::nullopt;
-    }
-    std::optional<std::string_view> string() {
-        const auto type = big_endian(1);
-        if (!type) return std::nullopt;
-        const auto n = (*type & 0xE0) == kFixStr ? std::optional<std::uint64_t>(*type & 0x1F)
-                       : *type == kStr8          ? big_endian(1)
-                       : *type == kStr16         ? big_endian(2)
-                                                 : std::nullopt;
-        const auto bytes = n ? take(*n) : std::nullopt;
-        if (!bytes) return std::nullopt;
-        return std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-    }
-    std::optional<bool> boolean() {
-        const auto type = big_endian(1);
-        if (!type || (*type != kTrue && *type != kFalse)) return std::nullopt;
-        return *type == kTrue;
-    }
-    std::optional<std::uint64_t> unsigned_integer() {
-        const auto type = big_endian(1);
-        if (!type) return std::nullopt;
-        if (*type < 0x80) return *type;
-        switch (*type) {
-            case kUint8: return big_endian(1);
-            case kUint16: return big_endian(2);
-            case kUint32: return big_endian(4);
-            case kUint64: return big_endian(8);
-            default: return std::nullopt;
-        }
-    }
-    std::optional<std::span<const std::uint8_t>> binary() {
-        const auto type = big_endian(1);
-        if (!type || *type < kBin8 || *type > kBin32) return std::nullopt;
-        const auto n = big_endian(*type == kBin8 ? 1 : *type == kBin16 ? 2 : 4);
-        return n ? take(*n) : std::nullopt;
-    }
-    /// A time stamp or a channel: not used, but it must be well formed.
-    bool skip_number_or_text() {
-        if (rest_.empty()) return false;
-        const std::uint8_t type = rest_.front();
-        if (type == kNil) return take(1).has_value();
-        if (type == kFloat32) return take(5).has_value();
-        if (type == kFloat64) return take(9).has_value();
-        if (type < 0x80 || (type >= kUint8 && type <= kUint64)) return unsigned_integer().has_value();
-        return string().has_value();
-    }
+    std::uint8_t byte() { return static_cast<std::uint8_t>(big_endian(1)); }
 
-private:
     std::span<const std::uint8_t> rest_;
+    bool failed_ = false;
 };
 
 bool valid(const CanFrame& frame) {
@@ -171,41 +163,40 @@ std::size_t encode_udp_multicast(const CanFrame& frame,
 
 bool decode_udp_multicast(std::span<const std::uint8_t> datagram, CanFrame& out) noexcept {
     Reader r(datagram);
-    const auto entries = r.map_size();
-    if (!entries || *entries > kKeyCount) return false;
+    const std::uint64_t entries = r.map_size();
+    if (r.failed() || entries > kKeyCount) return false;
     CanFrame frame;
     frame.extended = true;
     std::uint32_t seen = 0;
     std::uint64_t dlc = 0;
     std::span<const std::uint8_t> data;
-    for (std::uint64_t i = 0; i < *entries; ++i) {
-        const auto text = r.string();
-        if (!text) return false;
-        const auto k = static_cast<std::size_t>(std::find(kKeys.begin(), kKeys.end(), *text) - kKeys.begin());
+    for (std::uint64_t i = 0; i < entries; ++i) {
+        const std::string_view text = r.string();
+        const auto k = static_cast<std::size_t>(std::find(kKeys.begin(), kKeys.end(), text) - kKeys.begin());
         if (k == kKeyCount || (seen & (1u << k)) != 0) return false;
         seen |= 1u << k;
-        if (k == kTimestamp || k == kChannel) {
-            if (!r.skip_number_or_text()) return false;
-        } else if (k == kId || k == kDlc) {
-            const auto value = r.unsigned_integer();
-            if (!value || *value > kMaxExtendedId) return false;
-            if (k == kId)
-                frame.id = static_cast<std::uint32_t>(*value);
-            else
-                dlc = *value;
-        } else if (k == kData) {
-            const auto value = r.binary();
-            if (!value) return false;
-            data = *value;
-        } else {
-            const auto value = r.boolean();
-            if (!value) return false;
-            if (k == kExtended) frame.extended = *value;
-            if (k == kRemote) frame.remote = *value;
-            if (k == kError) frame.error = *value;
-            if (k == kFd) frame.fd = *value;
-            if (k == kBitRateSwitch) frame.bit_rate_switch = *value;
+        switch (k) {
+            case kTimestamp:
+            case kChannel: r.skip_number_or_text(); break;
+            case kId:
+            case kDlc: {
+                const std::uint64_t value = r.unsigned_integer();
+                if (value > kMaxExtendedId) return false;
+                if (k == kId)
+                    frame.id = static_cast<std::uint32_t>(value);
+                else
+                    dlc = value;
+                break;
+            }
+            case kData: data = r.binary(); break;
+            case kExtended: frame.extended = r.boolean(); break;
+            case kRemote: frame.remote = r.boolean(); break;
+            case kError: frame.error = r.boolean(); break;
+            case kFd: frame.fd = r.boolean(); break;
+            case kBitRateSwitch: frame.bit_rate_switch = r.boolean(); break;
+            default: (void)r.boolean();
         }
+        if (r.failed()) return false;
     }
     if (!r.empty() || (seen & (1u << kId)) == 0) return false;
     if ((seen & (1u << kDlc)) == 0) dlc = data.size();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "base/time.h"
@@ -125,35 +126,24 @@ int azimuth_gap_cdeg(std::span<const std::uint8_t> packet, int block) {
     return gap < 0 ? gap + kAzimuthTurn : gap;
 }
 
-// GPRMC, status A: valid. Time and date are filled in; the checksum follows the star. Latitude and longitude are 0:
-// a spacecraft's time can be written in NMEA, its position cannot.
-constexpr std::string_view kSentence = "$GPRMC,hhmmss,A,0000.0000,N,00000.0000,E,000.0,000.0,ddmmyy,000.0,E*";
-
-void put_two_digits(std::uint8_t* at, unsigned value) {
-    at[0] = static_cast<std::uint8_t>('0' + value / 10 % 10);
-    at[1] = static_cast<std::uint8_t>('0' + value % 10);
-}
-
-/// The sentence of this instant with checksum, carriage return and line feed; years 1970 to 2069.
+/// The GPRMC sentence of this instant, status A (valid), with checksum, carriage return and line feed; years 1970
+/// to 2069. Latitude and longitude are 0: NMEA holds a spacecraft's time, not its position.
 void put_sentence(std::chrono::sys_time<std::chrono::nanoseconds> now, std::uint8_t* out) {
     using namespace std::chrono;
     const year_month_day date{floor<days>(now)};
     const hh_mm_ss time{floor<seconds>(now) - floor<days>(now)};
-    std::ranges::copy(kSentence, out);
-    std::uint8_t* hhmmss = out + kSentence.find("hhmmss");
-    put_two_digits(hhmmss, static_cast<unsigned>(time.hours().count()));
-    put_two_digits(hhmmss + 2, static_cast<unsigned>(time.minutes().count()));
-    put_two_digits(hhmmss + 4, static_cast<unsigned>(time.seconds().count()));
-    std::uint8_t* ddmmyy = out + kSentence.find("ddmmyy");
-    put_two_digits(ddmmyy, static_cast<unsigned>(date.day()));
-    put_two_digits(ddmmyy + 2, static_cast<unsigned>(date.month()));
-    put_two_digits(ddmmyy + 4, static_cast<unsigned>(static_cast<int>(date.year()) % 100));
+    std::array<char, 160> text{};
+    const int size =
+        std::snprintf(text.data(), text.size(),
+                      "$GPRMC,%02d%02d%02d,A,0000.0000,N,00000.0000,E,000.0,000.0,%02u%02u%02d,000.0,E*",
+                      static_cast<int>(time.hours().count()), static_cast<int>(time.minutes().count()),
+                      static_cast<int>(time.seconds().count()), static_cast<unsigned>(date.day()),
+                      static_cast<unsigned>(date.month()), static_cast<int>(date.year()) % 100);
     // NMEA 0183: exclusive or of the characters between `$` and `*`.
-    std::uint8_t sum = 0;
-    for (std::size_t i = 1; i + 1 < kSentence.size(); ++i) sum = static_cast<std::uint8_t>(sum ^ out[i]);
-    constexpr std::string_view hex = "0123456789ABCDEF";
-    const std::array<char, 4> tail{hex[sum >> 4], hex[sum & 15], '\r', '\n'};
-    std::ranges::copy(tail, out + kSentence.size());
+    unsigned sum = 0;
+    for (int i = 1; i + 1 < size; ++i) sum ^= static_cast<unsigned char>(text[i]);
+    const int tail = std::snprintf(text.data() + size, text.size() - size, "%02X\r\n", sum);
+    std::copy_n(text.data(), size + tail, out);
 }
 
 class Vlp16 final : public LidarModel {

@@ -33,14 +33,15 @@ std::string size_text(std::string_view width, std::string_view height, std::stri
     return std::string(width) + "x" + std::string(height) + " C" + std::string(colour);
 }
 
-// Y0 U Y1 V in the frame; all Y, all U, all V in the samples.
-struct Planes {
-    explicit Planes(const VideoFormat& f)
-        : pairs(static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) / 2),
-          u(2 * pairs),
-          v(3 * pairs) {}
-    std::size_t pairs, u, v;
-};
+/// Calls `copy(i, k)` for each byte: i is its place in the frame (Y0 U Y1 V ...), k in the samples (all Y, all U,
+/// all V).
+void for_each_sample(const VideoFormat& f, const auto& copy) {
+    const std::size_t pairs = static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) / 2;
+    for (std::size_t i = 0; i < pairs; ++i) {
+        copy(4 * i, 2 * i), copy(4 * i + 1, 2 * pairs + i);
+        copy(4 * i + 2, 2 * i + 1), copy(4 * i + 3, 3 * pairs + i);
+    }
+}
 
 }  // namespace
 
@@ -75,32 +76,18 @@ Status check_y4m_stream_header(std::string_view line, const VideoFormat& format)
 
 void y4m_samples(const VideoFormat& format, std::span<const std::uint8_t> frame,
                  std::span<std::uint8_t> out) noexcept {
-    if (y4m_is_verbatim(format.pixel)) {
+    if (y4m_is_verbatim(format.pixel))
         std::ranges::copy(frame, out.data());
-        return;
-    }
-    const Planes plane(format);
-    for (std::size_t i = 0; i < plane.pairs; ++i) {
-        out[2 * i] = frame[4 * i];
-        out[plane.u + i] = frame[4 * i + 1];
-        out[2 * i + 1] = frame[4 * i + 2];
-        out[plane.v + i] = frame[4 * i + 3];
-    }
+    else
+        for_each_sample(format, [&](std::size_t i, std::size_t k) { out[k] = frame[i]; });
 }
 
 void frame_from_y4m(const VideoFormat& format, std::span<const std::uint8_t> samples,
                     std::span<std::uint8_t> out) noexcept {
-    if (y4m_is_verbatim(format.pixel)) {
+    if (y4m_is_verbatim(format.pixel))
         std::ranges::copy(samples, out.data());
-        return;
-    }
-    const Planes plane(format);
-    for (std::size_t i = 0; i < plane.pairs; ++i) {
-        out[4 * i] = samples[2 * i];
-        out[4 * i + 1] = samples[plane.u + i];
-        out[4 * i + 2] = samples[2 * i + 1];
-        out[4 * i + 3] = samples[plane.v + i];
-    }
+    else
+        for_each_sample(format, [&](std::size_t i, std::size_t k) { out[i] = samples[k]; });
 }
 
 }  // namespace narpa

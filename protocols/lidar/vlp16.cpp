@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "base/constants.h"
 #include "base/time.h"
 #include "protocols/little_endian.h"
 
@@ -32,7 +33,6 @@ constexpr std::size_t kPositionTimeOffset = 198, kPpsOffset = kPositionTimeOffse
 constexpr std::uint8_t kPpsLocked = 2;
 
 constexpr double kRangeQuantumM = 0.002, kRangeMaxM = 65535 * kRangeQuantumM;
-constexpr double kRadPerDeg = std::numbers::pi / 180;
 constexpr int kAzimuthTurn = 36'000;  // hundredths of a degree
 constexpr std::int64_t kHour_ns = 3600 * kSecond_ns, kHour_us = kHour_ns / 1000;
 

@@ -10,11 +10,11 @@ ContactConditions contact_conditions(const CaptureEnvelope& limits, const PortSt
         {"closing_rate", "closing rate", "m/s", s.closing_m_s(), limits.closing_min_m_s, limits.closing_max_m_s},
         {"lateral_rate", "lateral rate", "m/s", s.lateral_m_s(), 0, limits.lateral_rate_m_s},
         {"lateral", "lateral misalignment", "m", s.lateral_m(), 0, limits.lateral_m},
-        {"pitch_yaw", "pitch and yaw", "deg", s.pitch_yaw_rad() * kDegreesPerRadian, 0, limits.pitch_yaw_deg},
-        {"roll", "roll", "deg", s.roll_rad() * kDegreesPerRadian, 0, limits.roll_deg},
-        {"pitch_yaw_rate", "pitch and yaw rate", "deg/s", s.pitch_yaw_rad_s() * kDegreesPerRadian, 0,
+        {"pitch_yaw", "pitch and yaw", "deg", s.pitch_yaw_rad() * kDegPerRad, 0, limits.pitch_yaw_deg},
+        {"roll", "roll", "deg", s.roll_rad() * kDegPerRad, 0, limits.roll_deg},
+        {"pitch_yaw_rate", "pitch and yaw rate", "deg/s", s.pitch_yaw_rad_s() * kDegPerRad, 0,
          limits.pitch_yaw_rate_deg_s},
-        {"roll_rate", "roll rate", "deg/s", s.roll_rad_s() * kDegreesPerRadian, 0, limits.roll_rate_deg_s},
+        {"roll_rate", "roll rate", "deg/s", s.roll_rad_s() * kDegPerRad, 0, limits.roll_rate_deg_s},
     }};
 }
 

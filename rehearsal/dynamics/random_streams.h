@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "base/constants.h"
 #include "base/vec3.h"
 
 namespace narpa::rehearsal {
@@ -26,8 +27,6 @@ enum class Stream : std::uint32_t { start = 1, misalignment, pulses, attitude_se
     for (int i = 0; i < 3; ++i) v[i] = normal(from);
     return v;
 }
-
-inline constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 /// Of the scenario's seconds; infinity stays the end of time.
 [[nodiscard]] inline std::int64_t to_ns(double t_s) {

@@ -16,7 +16,7 @@ std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
 
 double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& p) {
     if (p.x < 0) return corridor.radius_m - norm(p);
-    const double allowed = corridor.radius_m + p.x * std::tan(corridor.half_angle_deg / kDegreesPerRadian);
+    const double allowed = corridor.radius_m + p.x * std::tan(corridor.half_angle_deg / kDegPerRad);
     return allowed - std::hypot(p.y, p.z);
 }
 

@@ -67,7 +67,7 @@ void Judge::check(const JudgedEstimate& estimate) {
     if (!measured_) return;  // until then the estimate is the scenario's start
     const bool too_far = position_.check(estimate, limits.position_m - norm(estimate.position_error_m));
     const bool too_turned =
-        attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDegreesPerRadian);
+        attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDegPerRad);
     if (scenario_.gates.navigation && (too_far || too_turned) && !reported) report(navigation());
 }
 
@@ -90,7 +90,7 @@ NavigationStatistics Judge::navigation_statistics() const {
         measured |= e.frames + e.sweeps > 0;
         if (!measured) continue;
         position.push_back(norm(e.position_error_m));
-        attitude.push_back(norm(e.rotation_error_rad) * kDegreesPerRadian);
+        attitude.push_back(norm(e.rotation_error_rad) * kDegPerRad);
     }
     if (s.estimates > 0) {
         s.share_within = static_cast<double>(within) / static_cast<double>(s.estimates);

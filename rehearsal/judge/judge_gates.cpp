@@ -103,9 +103,8 @@ GateResult Judge::navigation() const {
     };
     const auto attitude = [](const JudgedEstimate& e) {
         return fmt::format("{:.3f} deg off, standard deviations {:.3f}, {:.3f}, {:.3f} deg",
-                           norm(e.rotation_error_rad) * kDegreesPerRadian,
-                           e.sigma_rotation_rad.x * kDegreesPerRadian, e.sigma_rotation_rad.y * kDegreesPerRadian,
-                           e.sigma_rotation_rad.z * kDegreesPerRadian);
+                           norm(e.rotation_error_rad) * kDegPerRad, e.sigma_rotation_rad.x * kDegPerRad,
+                           e.sigma_rotation_rad.y * kDegPerRad, e.sigma_rotation_rad.z * kDegPerRad);
     };
     const auto sigmas = [](const JudgedEstimate& e) {
         return fmt::format("{:.2f} standard deviations", e.largest_in_sigmas());

@@ -86,12 +86,12 @@ TEST(PnpBench, VerdictComparesErrorsFailuresAndTimes) {
     EXPECT_EQ(judge({cell}).more_failures, 0);
 }
 
-struct Done {
+struct PnpDone {
     int status = 0;
     nlohmann::json document;
 };
 
-Done bench(const std::string& arguments) {
+PnpDone pnp_bench(const std::string& arguments) {
     const test::TemporaryFolder folder;
     const std::string out = folder / "out.json";
     const std::string command = std::string("timeout 60 ") + NARPA_BIN +
@@ -103,16 +103,16 @@ Done bench(const std::string& arguments) {
 }
 
 TEST(PnpBench, RunsFromTheCommandLine) {
-    const Done done = bench("--trials 5 --points 6 --noise-px 0.5 --ranges 10,30");
+    const PnpDone done = pnp_bench("--trials 5 --points 6 --noise-px 0.5 --ranges 10,30");
     ASSERT_TRUE(done.document.is_object());
     EXPECT_EQ(done.document["pnp"]["cells"].size(), 2u);
     EXPECT_EQ(done.status, done.document["passed"].get<bool>() ? 0 : 1);
 }
 
 TEST(PnpBench, RefusesSettingsWithoutTrials) {
-    EXPECT_EQ(bench("--noise-px nan").status, 2);
-    EXPECT_EQ(bench("--ranges inf").status, 2);
-    EXPECT_EQ(bench("--points 3").status, 2);
+    EXPECT_EQ(pnp_bench("--noise-px nan").status, 2);
+    EXPECT_EQ(pnp_bench("--ranges inf").status, 2);
+    EXPECT_EQ(pnp_bench("--points 3").status, 2);
     // At this range no draw determines the pose: the cell ends without trials.
     PnpBenchOptions far;
     far.trials = 5, far.points = {6}, far.noise_px = {1}, far.ranges_m = {1e12}, far.hard_cases = false;

@@ -20,7 +20,7 @@ using test::Bytes, test::noise_frame;
 
 constexpr VideoFormat kGrey{64, 48, PixelFormat::grey, 100'000'000};
 constexpr VideoFormat kBig{640, 480, PixelFormat::y16, 100'000'000};
-constexpr std::int64_t kPatience_ns = 30'000'000'000;  // for what must come
+constexpr std::int64_t kFramePatience_ns = 30'000'000'000;  // for what must come
 
 std::string make_fifo(const test::TemporaryFolder& folder) {
     const std::string path = folder / "fifo";
@@ -40,7 +40,7 @@ std::unique_ptr<VideoSink> sink_to(const std::string& spec, const VideoFormat& f
 /// The next frame is number `number`.
 void expect_frame(VideoSource& source, const VideoFormat& format, std::uint64_t number) {
     Bytes frame(frame_bytes(format));
-    ASSERT_TRUE(source.receive(frame, kPatience_ns)) << number;
+    ASSERT_TRUE(source.receive(frame, kFramePatience_ns)) << number;
     ASSERT_TRUE(frame == noise_frame(format, number)) << "another frame than " << number;
 }
 bool nothing_comes(VideoSource& source, const VideoFormat& format) {
@@ -140,11 +140,11 @@ TEST(Y4mSource, AnotherFormatIsNamed) {
     const auto source = source_of(fifo, kGrey);
     sink->send(noise_frame({64, 48, PixelFormat::y16, 1}, 0));
     Bytes frame(frame_bytes(kGrey));
-    EXPECT_FALSE(source->receive(frame, kPatience_ns));
+    EXPECT_FALSE(source->receive(frame, kFramePatience_ns));
     ASSERT_FALSE(source->status());
     EXPECT_EQ(source->status().error().text(),
               fifo + ": the stream has 64x48 Cmono16 frames, expected 64x48 Cmono");
-    EXPECT_FALSE(source->receive(frame, kPatience_ns)) << "and it stays so";
+    EXPECT_FALSE(source->receive(frame, kFramePatience_ns)) << "and it stays so";
 }
 
 TEST(Y4mSource, WhatIsNoVideoIsNamed) {
@@ -269,7 +269,7 @@ TEST_P(V4l2Source, AnotherFormatIsNamed) {
     std::string text;
     if (source) {  // the writer's format shows only with its first frame
         Bytes frame(frame_bytes(other));
-        EXPECT_FALSE((*source)->receive(frame, kPatience_ns));
+        EXPECT_FALSE((*source)->receive(frame, kFramePatience_ns));
         ASSERT_FALSE((*source)->status());
         text = (*source)->status().error().text();
     } else {

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kScene = fs::path(NARPA_BUILD_DIR) / "scenes" / "docking";
+const fs::path kDockingScene = fs::path(NARPA_BUILD_DIR) / "scenes" / "docking";
 
 std::string bytes_of(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
@@ -83,13 +83,13 @@ std::vector<std::size_t> shells_of(const ObjMesh& m) {
 
 class DockingMesh : public testing::TestWithParam<const char*> {
 protected:
-    const ObjMesh mesh = read_obj(kScene / (std::string(GetParam()) + ".obj"));
+    const ObjMesh mesh = read_obj(kDockingScene / (std::string(GetParam()) + ".obj"));
 };
 INSTANTIATE_TEST_SUITE_P(Bodies, DockingMesh, testing::Values("station", "chaser"),
                          [](const auto& body) { return std::string(body.param); });
 
 TEST_P(DockingMesh, HasNoDegenerateOrRepeatedTriangles) {
-    ASSERT_FALSE(mesh.faces.empty()) << kScene;
+    ASSERT_FALSE(mesh.faces.empty()) << kDockingScene;
     std::set<std::array<int, 3>> seen;
     for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
         const auto [a, b, c] = corners(mesh, f);
@@ -126,7 +126,7 @@ TEST_P(DockingMesh, EveryShellIsClosedAndFacesOutwards) {
 }
 
 TEST(DockingScene, StationIsLargeVariedAndReachesTheInterfacePlane) {
-    const ObjMesh m = read_obj(kScene / "station.obj");
+    const ObjMesh m = read_obj(kDockingScene / "station.obj");
     EXPECT_GE(m.faces.size(), 100'000u);
     EXPECT_LE(m.faces.size(), 200'000u);
     EXPECT_GE(m.materials.size(), 12u);
@@ -143,7 +143,7 @@ TEST(DockingScene, StationIsLargeVariedAndReachesTheInterfacePlane) {
 }
 
 TEST(DockingScene, ReadsWithoutAWarning) {
-    const Result<Scene> scene = read_scene((kScene / "docking.toml").string());
+    const Result<Scene> scene = read_scene((kDockingScene / "docking.toml").string());
     ASSERT_TRUE(scene.has_value()) << scene.error().text();
     EXPECT_TRUE(scene->warnings.empty()) << scene->warnings[0];
     ASSERT_EQ(scene->bodies.size(), 2u);
@@ -167,7 +167,7 @@ TEST(DockingScene, GeneratorWritesTheSameBytesAgain) {
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
     int compared = 0;
     for (const auto& entry : fs::directory_iterator(again)) {
-        const std::string first = bytes_of(kScene / entry.path().filename());
+        const std::string first = bytes_of(kDockingScene / entry.path().filename());
         EXPECT_FALSE(first.empty()) << entry.path();
         EXPECT_TRUE(first == bytes_of(entry.path())) << entry.path();
         ++compared;

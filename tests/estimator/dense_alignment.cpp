@@ -1,5 +1,6 @@
 // Render and compare, dense: from five degrees and five per cent off to the pose of a frame.
 #include "estimator/dense/dense_alignment.h"
+#include "base/constants.h"
 #include "estimator/view/model_view.h"
 
 #include <gtest/gtest.h>
@@ -14,8 +15,6 @@
 
 namespace narpa {
 namespace {
-
-constexpr double kDegree = 0.017453292519943295;
 
 /// The docking scene with the navigation camera at 160 x 120, 25 m before the port.
 class DockingFrame : public testing::Test {
@@ -59,7 +58,7 @@ protected:
 
 Vector6 off_by(double degrees, double part, double range_m) {
     Vector6 e;
-    e << degrees * kDegree * Eigen::Vector3d(0.6, -0.5, 0.62).normalized(),
+    e << degrees * kRadPerDeg * Eigen::Vector3d(0.6, -0.5, 0.62).normalized(),
         part * range_m * Eigen::Vector3d(-0.5, 0.4, 0.7).normalized();
     return e;
 }
@@ -74,7 +73,7 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_EQ(e->status, DenseStatus::converged) << name(e->status);
     const Vector6 error = error_between(truth, e->T_camera_body);
-    EXPECT_LT(error.head<3>().norm(), 0.02 * kDegree);
+    EXPECT_LT(error.head<3>().norm(), 0.02 * kRadPerDeg);
     EXPECT_LT(error.tail<3>().norm(), 1e-3 * norm(truth.t));
 }
 
@@ -89,7 +88,7 @@ TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
     const auto e = dense.align(frame, at, displaced(truth, off_by(60, 0.1, norm(truth.t))), o);
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_NE(e->status, DenseStatus::converged);
-    EXPECT_GT(angle_between(e->T_camera_body.q, truth.q), 10 * kDegree) << "then it may as well converge";
+    EXPECT_GT(angle_between(e->T_camera_body.q, truth.q), 10 * kRadPerDeg) << "then it may as well converge";
 }
 
 TEST_F(DockingFrame, IsTheSameOnAnyNumberOfThreads) {

@@ -1,5 +1,6 @@
 // The pose by rendering and comparing points: convergence, covariance, and saying so where there is nothing to see.
 #include "estimator/features/feature_alignment.h"
+#include "base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,6 @@
 namespace narpa {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
 constexpr std::size_t kStation = 0, kChaser = 1;
 
 /// The docking scene with its camera at 320 x 240, before the port.
@@ -51,7 +51,7 @@ protected:
         std::normal_distribution<double> normal;
         Vector6 e;
         for (int i = 0; i < 6; ++i) e[i] = normal(random);
-        e.head<3>() *= amount * kDegree / e.head<3>().norm();
+        e.head<3>() *= amount * kRadPerDeg / e.head<3>().norm();
         e.tail<3>() *= 0.01 * amount * norm(truth_.t) / e.tail<3>().norm();
         return displaced(truth_, e);
     }
@@ -74,7 +74,7 @@ TEST_F(FeatureAlignmentTest, FindsThePoseFromFiveDegreesAndFivePerCentOff) {
             const FeatureEstimate e = alignment.align(frame, at_, off_by(5, random));
             ASSERT_TRUE(e.ok()) << x_m << " m: " << name(e.status);
             const Vector6 error = error_between(e.T_camera_target, truth_);
-            EXPECT_LT(error.head<3>().norm(), 0.2 * kDegree) << x_m;
+            EXPECT_LT(error.head<3>().norm(), 0.2 * kRadPerDeg) << x_m;
             EXPECT_LT(error.tail<3>().norm(), 2e-3 * norm(truth_.t)) << x_m;
             EXPECT_GT(e.agreeing, 30);
             EXPECT_LT(e.rounds.back().after_px, 0.2);
@@ -120,7 +120,7 @@ TEST_F(FeatureAlignmentTest, EachKindOfFeatureLeadsThere) {
         FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2), settings);
         const FeatureEstimate e = alignment.align(frame, at_, guess);
         ASSERT_TRUE(e.ok()) << name(kind) << ": " << name(e.status);
-        EXPECT_LT(error_between(e.T_camera_target, truth_).head<3>().norm(), 0.5 * kDegree) << name(kind);
+        EXPECT_LT(error_between(e.T_camera_target, truth_).head<3>().norm(), 0.5 * kRadPerDeg) << name(kind);
     }
 }
 

@@ -7,12 +7,12 @@
 
 #include "../support/allocation_counter.h"
 #include "../support/shapes.h"
+#include "base/constants.h"
 #include "estimator/cloud/cloud_icp.h"
 
 namespace narpa {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
 constexpr RangeNoise kNoise{0.02, 1e-4};
 
 void append(Mesh& to, const Mesh& part, const Rigid3& T) {
@@ -54,7 +54,7 @@ struct Bench {
         rate << to_eigen(motion.rate_rad_s), to_eigen(motion.velocity_m_s);
         for (int column = -150; column <= 150; ++column)
             for (int line = -16; line < 16; ++line) {
-                const double a = 0.2 * kDegree * column, w = 0.7 * kDegree * (line + 0.5);
+                const double a = 0.2 * kRadPerDeg * column, w = 0.7 * kRadPerDeg * (line + 0.5);
                 const double t_s = (column + line / 32.0) / 301 / 60;
                 at.set(0, displaced(T_lidar_target, t_s * rate));
                 const Vec3 aim{std::cos(w) * std::sin(a), std::cos(w) * std::cos(a), std::sin(w)};
@@ -116,7 +116,7 @@ TEST(IcpSweeps, FindsThePoseFromFiveDegreesAndFivePercent) {
     for (int k = 0; k < kStarts; ++k) {
         const Rigid3 T = truth(random);
         const auto points = bench().sweep(T, kTumbling, random);
-        const auto e = icp.align(points, kTumbling, start_beside(T, 5 * kDegree, 0.05, random), kSearch);
+        const auto e = icp.align(points, kTumbling, start_beside(T, 5 * kRadPerDeg, 0.05, random), kSearch);
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_LT(normalised_error_squared(error_between(e->T_lidar_target, T), e->covariance), 40)
             << "start " << k << ": a false minimum";
@@ -145,7 +145,7 @@ TEST(IcpSweeps, OutliersDoNotMoveIt) {
         auto points = bench().sweep(T, {}, random);
         for (RangePoint& p : points)
             if (u(random) < 0.25) p.range_m *= 0.5 + 0.45 * u(random);
-        const auto e = icp.align(points, {}, start_beside(T, 2 * kDegree, 0.02, random), kSearch);
+        const auto e = icp.align(points, {}, start_beside(T, 2 * kRadPerDeg, 0.02, random), kSearch);
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_GT(static_cast<double>(e->rejected), 0.2 * static_cast<double>(e->points));
         EXPECT_LT(static_cast<double>(e->explained), 0.8 * static_cast<double>(e->points));
@@ -175,7 +175,7 @@ TEST(IcpSweeps, NeedsNoHeapOnceItHasSeenASweep) {
     std::mt19937_64 random(14);
     const Rigid3 T = truth(random);
     const auto points = bench().sweep(T, kTumbling, random);
-    const Rigid3 start = start_beside(T, 2 * kDegree, 0.02, random);
+    const Rigid3 start = start_beside(T, 2 * kRadPerDeg, 0.02, random);
     CloudIcp icp = *CloudIcp::create(bench().tracer, 0, noisy());
     const auto first = icp.align(points, kTumbling, start, kSearch);
     const test::AllocationCounter heap;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "base/constants.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pose/pnp.h"
@@ -18,8 +19,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-
-constexpr double kDegree = 0.017453292519943295;
 
 /// Points up to 60 degrees off the axis, seen with noise.
 class EquidistantPoints : public testing::Test {
@@ -125,7 +124,7 @@ protected:
     }
     [[nodiscard]] Rigid3 guess() const {
         Vector6 e;
-        e << 2 * kDegree * Eigen::Vector3d(0.6, -0.5, 0.62), 0.08 * Eigen::Vector3d(-0.5, 0.4, 0.7);
+        e << 2 * kRadPerDeg * Eigen::Vector3d(0.6, -0.5, 0.62), 0.08 * Eigen::Vector3d(-0.5, 0.4, 0.7);
         return displaced(truth, e);
     }
     void expect_truth(const Rigid3& T, double rad, double m) const {
@@ -147,14 +146,14 @@ TEST_F(EquidistantFrame, DenseAlignmentFindsThePose) {
     const auto e = dense.align(frame, at, guess(), {});
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_EQ(e->status, DenseStatus::converged) << name(e->status);
-    expect_truth(e->T_camera_body, 0.1 * kDegree, 4e-3);
+    expect_truth(e->T_camera_body, 0.1 * kRadPerDeg, 4e-3);
 }
 
 TEST_F(EquidistantFrame, FeatureAlignmentFindsThePose) {
     FeatureAlignment features(*render_scene, camera, 0, at);
     const FeatureEstimate e = features.align(frame, at, guess());
     EXPECT_TRUE(e.ok()) << name(e.status);
-    expect_truth(e.T_camera_target, 0.3 * kDegree, 0.02);
+    expect_truth(e.T_camera_target, 0.3 * kRadPerDeg, 0.02);
 }
 
 TEST(EquidistantStereo, TriangulatesAndRefusesToMatch) {

@@ -1,14 +1,13 @@
 // The paper's solver over a global vector of Rodrigues parameters: as corrected, and as printed.
 #include <gtest/gtest.h>
 
+#include "base/constants.h"
 #include "estimator/pose/crp.h"
 #include "estimator/pose/levenberg_marquardt.h"
 #include "tests/estimator/pnp_support.h"
 
 namespace narpa {
 namespace {
-
-constexpr double kDegree = M_PI / 180;
 
 /// What the paper has in print, against what follows from its own definitions.
 struct Misprints {
@@ -52,20 +51,20 @@ Outcome solve(double angle_deg, double off_deg, double off_part, const Misprints
     Outcome outcome;
     for (int trial = 0; trial < trials; ++trial) {
         const double angle = angle_deg >= 0 ? angle_deg : std::uniform_real_distribution<double>(0, 120)(random);
-        const Rigid3 truth{exp_rotation(test::random_direction(random) * (angle * kDegree)), {0.3, -0.2, 15}};
+        const Rigid3 truth{exp_rotation(test::random_direction(random) * (angle * kRadPerDeg)), {0.3, -0.2, 15}};
         const test::Seen seen = test::see(random, test::random_points(random, 12, 2.5), truth, 0.1);
         GlobalCrp problem{seen.body_m, Eigen::VectorXd(24), seen.camera.fx, printed};
         for (std::size_t i = 0; i < 12; ++i) {
             problem.measured[static_cast<Eigen::Index>(2 * i)] = seen.pixels[i].u - seen.camera.cx;
             problem.measured[static_cast<Eigen::Index>(2 * i + 1)] = seen.pixels[i].v - seen.camera.cy;
         }
-        const Rigid3 start = test::pose_off_by(random, truth, off_deg * kDegree, off_part);
+        const Rigid3 start = test::pose_off_by(random, truth, off_deg * kRadPerDeg, off_part);
         Vector6 x;
         x << crp_from_quaternion(start.q), to_eigen(start.t);
         LmSummary summary;
         levenberg_marquardt(problem, x, options, summary);
         const double error = angle_between(quaternion_from_crp(x.head<3>()), truth.q);
-        outcome.solved += error < 1 * kDegree ? 1 : 0;
+        outcome.solved += error < 1 * kRadPerDeg ? 1 : 0;
         outcome.mean_steps += static_cast<double>(summary.iterations) / trials;
     }
     return outcome;

@@ -1,5 +1,6 @@
 // The refinement: where it ends, from where it gets there, what it says of its error, and what it refuses.
 #include "estimator/pose/pnp_refine.h"
+#include "base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +11,6 @@
 
 namespace narpa {
 namespace {
-
-constexpr double kDegree = M_PI / 180;
 
 class Refine : public testing::Test {
 protected:
@@ -26,10 +25,11 @@ TEST_F(Refine, EveryAttitudeIsReachedWithinTenSteps) {
     for (const double angle_deg : {0., 30., 60., 90., 120., 150., 170., 178., 179., 179.9, 180.}) {
         int steps_max = 0;
         for (int trial = 0; trial < 500; ++trial) {
-            const Rigid3 truth{exp_rotation(test::random_direction(random_) * (angle_deg * kDegree)),
+            const Rigid3 truth{exp_rotation(test::random_direction(random_) * (angle_deg * kRadPerDeg)),
                                {0.3, -0.2, 15}};
             const test::Seen seen = test::see(random_, test::random_points(random_, 12, 2.5), truth, 0.1);
-            const PnpFit& fit = refiner_.refine(seen.input(), test::pose_off_by(random_, truth, 3 * kDegree, 0.02));
+            const PnpFit& fit =
+                refiner_.refine(seen.input(), test::pose_off_by(random_, truth, 3 * kRadPerDeg, 0.02));
             ASSERT_TRUE(fit.ok()) << in_words(fit.status);
             steps_max = std::max(steps_max, fit.summary.iterations);
             // Chi-square of six degrees of freedom exceeds 45 once in 2e7 draws.

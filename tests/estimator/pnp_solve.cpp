@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "base/constants.h"
 #include "estimator/pose/pnp.h"
 #include "estimator/pose/pnp_bound.h"
 #include "tests/estimator/pnp_support.h"
@@ -10,8 +11,6 @@
 
 namespace narpa {
 namespace {
-
-constexpr double kDegree = M_PI / 180;
 
 class SolvePnp : public testing::Test {
 protected:
@@ -24,7 +23,7 @@ protected:
     Rigid3 tilted(double tilt_deg, double range_m) {
         std::uniform_real_distribution<double> turn(-M_PI, M_PI);
         const double a = turn(random_);
-        return {exp_rotation(Vec3{std::cos(a), std::sin(a), 0} * (tilt_deg * kDegree)) *
+        return {exp_rotation(Vec3{std::cos(a), std::sin(a), 0} * (tilt_deg * kRadPerDeg)) *
                     exp_rotation({0, 0, turn(random_)}),
                 {0, 0, range_m}};
     }
@@ -290,7 +289,7 @@ TEST_F(SolvePnp, SamePointsTwiceAreSolved) {
         seen.body_m.push_back(Vec3(seen.body_m[i])), seen.pixels.push_back(Pixel(seen.pixels[i]));
     const PnpSolution& s = solver_.solve(seen.input());
     ASSERT_TRUE(s.ok());
-    EXPECT_LT(angle_between(s.fit.T_camera_body.q, seen.T_camera_body.q), 1 * kDegree);
+    EXPECT_LT(angle_between(s.fit.T_camera_body.q, seen.T_camera_body.q), 1 * kRadPerDeg);
 }
 
 // Twice the size at twice the range is the same picture: a wrong scale cannot be seen, only carried along.

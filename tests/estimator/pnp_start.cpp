@@ -1,5 +1,6 @@
 // Poses to start from: near enough for the refinement, and both of those that a flat body allows.
 #include "estimator/pose/pnp_start.h"
+#include "base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +8,6 @@
 
 namespace narpa {
 namespace {
-
-constexpr double kDegree = M_PI / 180;
 
 class PnpStart : public testing::Test {
 protected:
@@ -49,7 +48,7 @@ TEST_F(PnpStart, SolidBodiesGiveOnePoseNearTheTruth) {
             const Gathered g(test::see(random_, test::random_points(random_, 8, 1), truth, 0));
             const InitialPoses starts = orthographic_poses(g.list, g.spread, false);
             ASSERT_EQ(starts.count, 1u);
-            EXPECT_LT(angle(starts.pose[0], truth), 3 * kDegree) << range_m;
+            EXPECT_LT(angle(starts.pose[0], truth), 3 * kRadPerDeg) << range_m;
             EXPECT_LT(norm(g.points.uncentred(starts.pose[0]).t - truth.t), 0.03 * range_m);
         }
     }
@@ -66,10 +65,10 @@ TEST_F(PnpStart, FlatBodiesGiveTwoOfWhichOneIsNear) {
         const InitialPoses starts = orthographic_poses(g.list, g.spread, true);
         ASSERT_EQ(starts.count, 2u);
         const double first = angle(starts.pose[0], truth), second = angle(starts.pose[1], truth);
-        near += std::min(first, second) < 3 * kDegree ? 1 : 0;
+        near += std::min(first, second) < 3 * kRadPerDeg ? 1 : 0;
         // They are mirror images of one another, as far as perspective is small.
         mirrored +=
-            angle_between(depth_reversed(starts.pose[0], g.spread).q, starts.pose[1].q) < 8 * kDegree ? 1 : 0;
+            angle_between(depth_reversed(starts.pose[0], g.spread).q, starts.pose[1].q) < 8 * kRadPerDeg ? 1 : 0;
     }
     // The rest is seen almost on edge, where the two meet.
     EXPECT_GE(near, 90);
@@ -106,7 +105,7 @@ TEST_F(PnpStart, TriplesNeedNotBeCentred) {
             best = std::min(best, angle(starts.pose[i], truth));
             off = std::min(off, norm(g.points.uncentred(starts.pose[i]).t - truth.t));
         }
-        near += best < 5 * kDegree && off < 0.5 ? 1 : 0;
+        near += best < 5 * kRadPerDeg && off < 0.5 ? 1 : 0;
     }
     EXPECT_GE(near, 90);  // the rest: triples nearly on a line, or on edge
 }

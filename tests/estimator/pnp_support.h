@@ -5,19 +5,12 @@
 #include <vector>
 
 #include "estimator/pose/pnp_points.h"
+#include "tests/support/shapes.h"
 
 namespace narpa::test {
 
 inline const Pinhole kPaperCamera{1319.4792168823421, 1319.4792168823421, 249.5, 249.5};
 
-inline Quat random_attitude(std::mt19937_64& random) {
-    std::normal_distribution<double> n;
-    return normalized(Quat{n(random), n(random), n(random), n(random)});
-}
-inline Vec3 random_direction(std::mt19937_64& random) {
-    std::normal_distribution<double> n;
-    return normalized(Vec3{n(random), n(random), n(random)});
-}
 /// In a cube of edges 2 * half.
 inline std::vector<Vec3> random_points(std::mt19937_64& random, std::size_t n, double half_m) {
     std::uniform_real_distribution<double> u(-half_m, half_m);

@@ -16,7 +16,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::uint32_t kBase = 0x100;
+constexpr std::uint32_t kChaserBase = 0x100;
 const std::string kDbcPath = NARPA_SOURCE_DIR "/protocols/can/narpa.dbc";
 
 std::string shipped_text() {
@@ -25,7 +25,7 @@ std::string shipped_text() {
 }
 
 TEST(CanDbc, ShippedFileIsTheGeneratedOne) {
-    const std::array<CanBody, 1> bodies{{{"chaser", kBase}}};
+    const std::array<CanBody, 1> bodies{{{"chaser", kChaserBase}}};
     const std::string generated = write_dbc(bodies);
     if (generated == shipped_text()) return;
     const std::string path = NARPA_BUILD_DIR "/narpa.dbc";
@@ -87,12 +87,12 @@ TEST(CanDbc, CanmatrixEncodesWhatWeDecode) {
 
     std::istringstream lines(python.out);
     std::string text;
-    PoseDecoder decoder(kBase);
+    PoseDecoder decoder(kChaserBase);
     for (const PoseCommand& sent : commands) {
         FrameSet frames;
         PoseCommand expected, out;
-        ASSERT_TRUE(encode_classic(sent, kBase, frames));
-        ASSERT_EQ(decode_all(frames, kBase, sent.t_valid_ns, expected), PoseStatus::complete);
+        ASSERT_TRUE(encode_classic(sent, kChaserBase, frames));
+        ASSERT_EQ(decode_all(frames, kChaserBase, sent.t_valid_ns, expected), PoseStatus::complete);
         std::vector<CanFrame> theirs;
         for (int i = 0; i < 10; ++i) {
             CandumpLine line;
@@ -101,9 +101,9 @@ TEST(CanDbc, CanmatrixEncodesWhatWeDecode) {
             theirs.push_back(line.frame);
         }
         const std::span<const CanFrame> all(theirs);
-        ASSERT_EQ(decode_all(all.first(9), kBase, sent.t_valid_ns, out), PoseStatus::complete) << text;
+        ASSERT_EQ(decode_all(all.first(9), kChaserBase, sent.t_valid_ns, out), PoseStatus::complete) << text;
         ASSERT_TRUE(same(out, expected)) << "classic";
-        ASSERT_EQ(decode_all(all.last(1), kBase, sent.t_valid_ns, out), PoseStatus::complete) << text;
+        ASSERT_EQ(decode_all(all.last(1), kChaserBase, sent.t_valid_ns, out), PoseStatus::complete) << text;
         ASSERT_TRUE(same(out, expected)) << "FD";
     }
 }

@@ -124,7 +124,7 @@ std::vector<std::uint8_t> datagram(const CanFrame& f) {
     return {out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n)};
 }
 
-std::vector<std::uint8_t> bytes_of(std::string_view text) {
+std::vector<std::uint8_t> datagram_bytes(std::string_view text) {
     return {text.begin(), text.end()};
 }
 
@@ -153,7 +153,7 @@ TEST(CanUdpMulticast, SameBytesAsPythonCan) {
                                  "bitrate_switch\xc2" +
                                  "\xb5"
                                  "error_state_indicator\xc2";
-    EXPECT_EQ(datagram(frame_of(0x123, {0xDE, 0xAD, 0xBE, 0xEF})), bytes_of(expected));
+    EXPECT_EQ(datagram(frame_of(0x123, {0xDE, 0xAD, 0xBE, 0xEF})), datagram_bytes(expected));
     EXPECT_EQ(expected.size(), 158u);
 }
 
@@ -169,9 +169,9 @@ TEST(CanUdpMulticast, RoundTrip) {
 
 TEST(CanUdpMulticast, MissingFlagsHavePythonCansDefaults) {
     CanFrame out;
-    ASSERT_TRUE(decode_udp_multicast(bytes_of("\x82\xae"
-                                              "arbitration_id\x05\xa4"
-                                              "data\xc4\x01Z"),
+    ASSERT_TRUE(decode_udp_multicast(datagram_bytes("\x82\xae"
+                                                    "arbitration_id\x05\xa4"
+                                                    "data\xc4\x01Z"),
                                      out));
     EXPECT_TRUE(out.extended);
     EXPECT_EQ(out.id, 5u);
@@ -224,7 +224,7 @@ TEST(CanUdpMulticast, RejectsBadMaps) {
                                         "arbitration_id\x05\xa5"
                                         "is_fd\xc3\xaf"
                                         "is_remote_frame\xc3"sv})
-        EXPECT_FALSE(decode_udp_multicast(bytes_of(text), out));
+        EXPECT_FALSE(decode_udp_multicast(datagram_bytes(text), out));
 }
 
 std::string candump(const CandumpLine& line) {

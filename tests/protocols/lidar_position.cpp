@@ -12,23 +12,23 @@
 namespace narpa {
 namespace {
 
-using Bytes = std::array<std::uint8_t, 512>;
+using PositionBytes = std::array<std::uint8_t, 512>;
 
-Bytes encoded(std::int64_t unix_ns) {
-    Bytes bytes;
+PositionBytes encoded(std::int64_t unix_ns) {
+    PositionBytes bytes;
     bytes.fill(0xAA);  // everything must be overwritten
     vlp16().encode_position(unix_ns, bytes);
     return bytes;
 }
 
-std::string sentence(const Bytes& b) {
+std::string sentence(const PositionBytes& b) {
     return {b.begin() + 206, std::find(b.begin() + 206, b.end(), std::uint8_t{0})};
 }
 
 // Manual 63-9243 Rev. D, table 9-3 (its offsets less the 42 bytes of header) and table 9-4.
 TEST(Vlp16Position, PacketHasTheManualsBytes) {
     ASSERT_EQ(vlp16().spec().position_packet_bytes + 42, 554U);
-    const Bytes b = encoded(1'709'210'096'789'012'345);  // 2024-02-29T12:34:56.789012345Z
+    const PositionBytes b = encoded(1'709'210'096'789'012'345);  // 2024-02-29T12:34:56.789012345Z
     EXPECT_TRUE(std::all_of(b.begin(), b.begin() + 198, [](auto x) { return x == 0; }));
     const std::array<std::uint8_t, 8> middle{0x14, 0x76, 0xFA, 0x7C, 2, 0, 0, 0};  // 2096789012 us, PPS locked
     EXPECT_TRUE(std::equal(middle.begin(), middle.end(), b.begin() + 198));
@@ -45,7 +45,7 @@ TEST(Vlp16Position, AnyInstantIsWrittenWithItsTimeDateAndChecksum) {
     for (int trial = 0; trial < 2000; ++trial) {
         const auto s = static_cast<std::int64_t>(random() % (end_of_2069 + 1));
         const auto ns = static_cast<std::int64_t>(random() % 1'000'000'000);
-        const Bytes b = encoded(s * 1'000'000'000 + ns);
+        const PositionBytes b = encoded(s * 1'000'000'000 + ns);
         EXPECT_EQ(get_le<std::uint32_t>(&b[198]), static_cast<std::uint64_t>(s % 3600) * 1'000'000 + ns / 1000);
         const std::time_t time = s;
         std::tm utc{};

@@ -9,18 +9,13 @@
 #include "rehearsal/navigation/state_estimator.h"
 #include "rehearsal/navigation/sweep_buffer.h"
 #include "tests/rehearsal/navigation_plant.h"
+#include "tests/rehearsal/simulated_sensors.h"
 
 namespace narpa::rehearsal {
 namespace {
 
+using test::chaser_target;
 using test::docking;
-
-Rigid3 chaser_target(const test::Plant& plant) {
-    const RelativeMotion& m = plant.motion;
-    const Scenario& s = plant.scenario;
-    return inverse(Rigid3{m.q_world_chaser, m.position_m - m.q_world_chaser * s.chaser.centre_of_mass_m}) *
-           Rigid3{m.q_world_target, -(m.q_world_target * s.target.centre_of_mass_m)};
-}
 
 AttitudeReport attitude(const test::Plant& plant) {
     return {0, std::llround(1e9 * plant.t_s), plant.motion.q_world_chaser, plant.motion.chaser_rate_rad_s};

@@ -10,7 +10,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-constexpr Vec3 kNormal{0, 0, 1};
 
 class EveryMaterial : public testing::TestWithParam<TestMaterial> {};
 INSTANTIATE_TEST_SUITE_P(Bsdf, EveryMaterial, testing::ValuesIn(broad_materials()), [](const auto& test_case) {

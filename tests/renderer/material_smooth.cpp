@@ -12,7 +12,6 @@ namespace {
 
 using namespace test;
 using nlohmann::json;
-constexpr Vec3 kNormal{0, 0, 1};
 
 Vec3 vec(const json& a) {
     return {a[0], a[1], a[2]};

@@ -14,6 +14,8 @@
 
 namespace narpa::test {
 
+inline constexpr Vec3 kNormal{0, 0, 1};
+
 /// A surface with the material it points to.
 struct TestMaterial {
     std::string name;

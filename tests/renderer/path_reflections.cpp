@@ -7,8 +7,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-const PathSettings kDirectLight{.max_depth = 1};
-
 Material metal(float roughness) {
     Material m = lambert(0.8f);
     m.kind = Material::Kind::ggx;

@@ -14,8 +14,6 @@ namespace {
 
 using namespace test;
 constexpr double kSolar = 1361;
-const PathSettings kDirectLight{.max_depth = 1};
-
 TEST(SunDisc, IsSeenByTheCameraAndInAMirrorWithItsRadiance) {
     Scene s;
     s.materials.push_back(mirror(0.9f));
@@ -183,11 +181,11 @@ Scene workshop() {
     return s;
 }
 
-constexpr int kSide = 12;
+constexpr int kGridSide = 12;
 /// An image of the workshop, its pixels `together` at a time.
 std::vector<Rgb> picture(const RenderScene& render_scene, const BodyPoses& at, const Vec3& offset,
                          std::size_t together, const PathSettings& settings = {}) {
-    std::vector<Rgb> pixels(kSide * kSide);
+    std::vector<Rgb> pixels(kGridSide * kGridSide);
     tbb::parallel_for(std::size_t{0}, (pixels.size() + together - 1) / together, [&](std::size_t block) {
         const std::size_t from = block * together, n = std::min(together, pixels.size() - from);
         std::vector<Ray> rays(n);
@@ -196,8 +194,8 @@ std::vector<Rgb> picture(const RenderScene& render_scene, const BodyPoses& at, c
         std::vector<std::uint32_t> number(n), sample(n);
         for (std::size_t i = 0; i < n; ++i) {
             const std::size_t pixel = from + i;
-            const double x = static_cast<double>(pixel % kSide) / kSide - 0.5,
-                         y = static_cast<double>(pixel / kSide) / kSide - 0.5;
+            const double x = static_cast<double>(pixel % kGridSide) / kGridSide - 0.5,
+                         y = static_cast<double>(pixel / kGridSide) / kGridSide - 0.5;
             rays[i] = ray_to({3, -3, 3}, {3 * (x + y), 3 * (x - y), 0.5});
             rays[i].origin += offset;
             first[i] = render_scene.tracer().intersect(at, rays[i], kInfinity);

@@ -12,6 +12,9 @@
 
 namespace narpa::test {
 
+/// Direct light only.
+inline const PathSettings kDirectLight{.max_depth = 1};
+
 /// This sample for every lane.
 inline Lanes<std::uint32_t> the_same(std::uint32_t sample) {
     Lanes<std::uint32_t> all;

@@ -29,7 +29,7 @@ void PrintTo(const BadScene& bad, std::ostream* out) {
     *out << bad.name;
 }
 
-const BadScene kBad[] = {
+const BadScene kBadMaterials[] = {
     {"KindUnknown", BALL "material = {kind = \"chrome\"}\n", 4, 20,
      "expected one of \"lambert\", \"phong\", \"phong_classic\", \"mirror\", \"dielectric\", \"ggx\""},
     {"KindUnknownIsToldBeforeItsKeys", BALL "material = {roughness = 0.1, kind = \"chrome\"}\n", 4, 37,
@@ -138,7 +138,7 @@ TEST_P(BadMaterialOrLight, SaysWhereAndWhat) {
     EXPECT_EQ(e.column, bad.column) << e.text();
     EXPECT_NE(e.what.find(bad.words), e.what.npos) << e.what;
 }
-INSTANTIATE_TEST_SUITE_P(Scene, BadMaterialOrLight, testing::ValuesIn(kBad),
+INSTANTIATE_TEST_SUITE_P(Scene, BadMaterialOrLight, testing::ValuesIn(kBadMaterials),
                          [](const auto& one) { return std::string(one.param.name); });
 
 Scene read_good(const TemporaryFolder& folder, const std::string& text) {

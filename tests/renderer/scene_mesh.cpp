@@ -25,7 +25,7 @@ void PrintTo(const BadMesh& bad, std::ostream* out) {
 
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
-const BadMesh kBad[] = {
+const BadMesh kBadMeshes[] = {
     {"Empty", "", 0, 0, "no triangles in it"},
     {"OnlyVertices", CORNERS, 0, 0, "no triangles in it"},
     {"OnlyLines", CORNERS "l 1 2 3\np 1\n", 0, 0, "no triangles in it"},
@@ -66,7 +66,7 @@ TEST_P(BadObjFile, SaysWhereAndWhat) {
     EXPECT_EQ(e.column, bad.column) << e.text();
     EXPECT_NE(e.what.find(bad.words), e.what.npos) << e.what;
 }
-INSTANTIATE_TEST_SUITE_P(Mesh, BadObjFile, testing::ValuesIn(kBad),
+INSTANTIATE_TEST_SUITE_P(Mesh, BadObjFile, testing::ValuesIn(kBadMeshes),
                          [](const auto& one) { return std::string(one.param.name); });
 
 MeshFile read_good(const std::string& path, double scale = 1) {

@@ -118,7 +118,7 @@ Scene motley() {
     return s;
 }
 
-struct Stage {
+struct BlockerStage {
     Scene scene = motley();
     RenderScene render_scene;
     BodyPoses at;
@@ -126,7 +126,7 @@ struct Stage {
     Rigid3 T;
     FrameSettings settings;
 
-    explicit Stage(Camera c)
+    explicit BlockerStage(Camera c)
         : render_scene(*RenderScene::create(scene, 1)),
           at(placed(scene)),
           view(c),
@@ -142,7 +142,7 @@ TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
     Camera pinhole = camera(200, 160, 400), lens = pinhole;
     lens.lens = Lens{0.05, 6};
     for (const Camera& c : {pinhole, lens}) {
-        const Stage stage(c);
+        const BlockerStage stage(c);
         const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
         auto p = std::make_unique<CameraBatch>();
         for (int round = 0; round < 200; ++round) {
@@ -175,7 +175,7 @@ TEST(CameraBatch, OneSampleGoesThroughAllCentres) {
     std::mt19937_64 random(7);
     Camera c = camera(200, 160, 400);
     c.lens = Lens{0.05, 6};
-    Stage stage(c);
+    BlockerStage stage(c);
     stage.settings.spp = 1;
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     auto p = std::make_unique<CameraBatch>();
@@ -192,7 +192,7 @@ TEST(CameraBatch, OneSampleGoesThroughAllCentres) {
 
 TEST(BatchRadiance, EqualsThatOfOneRayAtATime) {
     std::mt19937_64 random(5);
-    const Stage stage(camera(64, 64, 100));
+    const BlockerStage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     ASSERT_TRUE(f.sun_only);
     auto p = std::make_unique<CameraBatch>();
@@ -242,7 +242,7 @@ TEST(BatchRadiance, EqualsThatOfOneRayAtATime) {
 
 TEST(BatchRadiance, TimesOfThePhasesAddUpWhereTheyAreMeasured) {
     std::mt19937_64 random(6);
-    const Stage stage(camera(64, 64, 100));
+    const BlockerStage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
     auto p = std::make_unique<CameraBatch>();
     PhaseTimes times{};

@@ -8,36 +8,21 @@
 #include <random>
 
 #include "renderer/material/texture_lookup.h"
+#include "tests/renderer/texture_support.h"
 
 namespace narpa {
 namespace {
 
+using namespace test;
+
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-template <class Value>  // (x, y) -> 0..1
-Texture make(int width, int height, Value value, Texture::Wrap wrap = Texture::Wrap::repeat) {
-    Texture t{.name = "made", .width = width, .height = height, .rgb = {}, .wrap = wrap};
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const auto code = static_cast<std::uint16_t>(std::lround(65535 * static_cast<double>(value(x, y))));
-            t.rgb.insert(t.rgb.end(), 3, code);
-        }
-    build_coarser_levels(t);
-    return t;
-}
 
 Texture noise(int width, int height, Texture::Wrap wrap = Texture::Wrap::repeat, unsigned seed = 3) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> any;
     return make(
         width, height, [&](int, int) { return any(random); }, wrap);
-}
-
-double mean_of(const Texture& t) {
-    double sum = 0;
-    for (const std::uint16_t c : t.rgb) sum += c;
-    return sum / static_cast<double>(t.rgb.size()) / 65535;
 }
 
 /// Half axes in texels of the finest level, turned by `angle` from u towards v.

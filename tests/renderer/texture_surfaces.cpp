@@ -8,30 +8,13 @@
 #include "renderer/camera/camera_model.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/texture_lookup.h"
+#include "tests/renderer/texture_support.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
 
 using namespace test;
-
-template <class Value>  // (x, y) -> 0..1
-Texture make(int width, int height, Value value) {
-    Texture t{.name = "made", .width = width, .height = height, .rgb = {}};
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const auto code = static_cast<std::uint16_t>(std::lround(65535 * static_cast<double>(value(x, y))));
-            t.rgb.insert(t.rgb.end(), 3, code);
-        }
-    build_coarser_levels(t);
-    return t;
-}
-
-double mean_of(const Texture& t) {
-    double sum = 0;
-    for (const std::uint16_t c : t.rgb) sum += c;
-    return sum / static_cast<double>(t.rgb.size()) / 65535;
-}
 
 Scene with_texture(Texture t) {
     Scene s;

@@ -27,7 +27,7 @@ CLI::Validator finite_number() {
             ""};
 }
 
-struct Options {
+struct EstimateBenchOptions {
     std::vector<std::string> only;
     std::string plots;  ///< folder; empty: none
     std::string scene, camera, target;
@@ -52,16 +52,16 @@ struct Findings {
 };
 
 /// One estimator's part of the bench: says what it found and returns its document.
-using Part = Outcome (*)(const Options&, Findings&);
+using Part = Outcome (*)(const EstimateBenchOptions&, Findings&);
 
 /// Plots where plots are wanted. `document`: what the part found, without its kind and title.
-Status plot(const Options& o, const std::string& kind, const std::string& title, const char* key,
+Status plot(const EstimateBenchOptions& o, const std::string& kind, const std::string& title, const char* key,
             const nlohmann::json& found) {
     if (o.plots.empty()) return Ok{};
     return write_plot(fmt::format("{}/{}.png", o.plots, kind), {{"plot", kind}, {"title", title}, {key, found}});
 }
 
-Outcome bench_pnp(const Options& o, Findings& findings) {
+Outcome bench_pnp(const EstimateBenchOptions& o, Findings& findings) {
     const Progress progress;
     PnpBenchOptions options = o.pnp;
     if (o.quick) options.trials = 20, options.points = {10}, options.ranges_m = {30}, options.hard_cases = false;
@@ -113,7 +113,7 @@ Result<std::unique_ptr<World>> standing_world(const std::string& scene_file, int
     return World::create(*std::move(scene));
 }
 
-Outcome bench_approach(const Options& o, Findings& findings) {
+Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
     auto world = standing_world(o.scene, o.size);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
@@ -160,7 +160,7 @@ Outcome bench_approach(const Options& o, Findings& findings) {
     return document;
 }
 
-Outcome bench_stereo(const Options& o, Findings& findings) {
+Outcome bench_stereo(const EstimateBenchOptions& o, Findings& findings) {
     auto file = shipped_scene("descent/descent.toml");
     if (!file) return file.error();
     auto scene = load_scene(*file);
@@ -185,7 +185,7 @@ Outcome bench_stereo(const Options& o, Findings& findings) {
     return to_json(*stereo);
 }
 
-Outcome bench_icp(const Options& o, Findings& findings) {
+Outcome bench_icp(const EstimateBenchOptions& o, Findings& findings) {
     auto world = standing_world("", o.size);
     if (!world) return world.error();
     const auto target = (*world)->body_named("station");
@@ -211,7 +211,7 @@ Outcome bench_icp(const Options& o, Findings& findings) {
     return document;
 }
 
-Outcome bench_filter(const Options& o, Findings& findings) {
+Outcome bench_filter(const EstimateBenchOptions& o, Findings& findings) {
     FilterBenchSettings settings;
     if (o.quick) settings.runs = 10, settings.seconds = 10;
     const auto runs = run_filter(filter_cases(), settings);
@@ -235,7 +235,7 @@ constexpr std::pair<const char*, Part> kParts[] = {{"pnp", bench_pnp},
                                                    {"icp", bench_icp},
                                                    {"filter", bench_filter}};
 
-Outcome bench(const Options& o) {
+Outcome bench_estimates(const EstimateBenchOptions& o) {
     stop_on_signals();
     if (!o.plots.empty()) {
         std::error_code error;
@@ -272,7 +272,7 @@ Outcome bench(const Options& o) {
 }  // namespace
 
 Command add_bench_estimate(CLI::App& bench_command) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EstimateBenchOptions>();
     CLI::App* c = bench_command.add_subcommand(
         "estimate", "Estimators of the relative pose: error against the Cramer-Rao bound, failures, time");
     std::vector<std::string> names;
@@ -325,7 +325,7 @@ Command add_bench_estimate(CLI::App& bench_command) {
     c->add_option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error");
     c->footer(
         "Exit status 1 where points or stereo are less exact than they must be, or the bench was interrupted.");
-    return [o] { return bench(*o); };
+    return [o] { return bench_estimates(*o); };
 }
 
 }  // namespace narpa::cli

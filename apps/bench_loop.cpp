@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kCpusMax = 1024;
 
-struct Options {
+struct LoopBenchOptions {
     std::string scene, cpus, plot;
     std::vector<int> load;
     int busy = 0;  ///< processors to keep busy, where `load` does not name them
@@ -25,7 +25,7 @@ struct Options {
 };
 
 /// `busy` processes, by default one, on the first processors that this process may use, in turn.
-Status choose_load(Options& o) {
+Status choose_load(LoopBenchOptions& o) {
     for (const int cpu : o.load)
         if (!parse_cpus(std::to_string(cpu)))
             return Error{fmt::format("--load {}: this processor is not there, or not for this process", cpu)};
@@ -38,7 +38,7 @@ Status choose_load(Options& o) {
     return Ok{};
 }
 
-Result<std::vector<LoopRun>> measure(const Options& o, const Scene& scene) {
+Result<std::vector<LoopRun>> measure(const LoopBenchOptions& o, const Scene& scene) {
     RunOptions options = o.run;
     for (const Camera& c : scene.cameras) options.video.emplace_back(c.name, "none");
     for (const Lidar& l : scene.lidars) options.lidar.emplace_back(l.name, "none");
@@ -55,7 +55,7 @@ Result<std::vector<LoopRun>> measure(const Options& o, const Scene& scene) {
     return runs;
 }
 
-Outcome bench(Options o) {
+Outcome bench_loop(LoopBenchOptions o) {
     stop_on_signals();
     if (auto good = choose_load(o); !good) return good.error();
     if (!o.cpus.empty()) {
@@ -102,7 +102,7 @@ Outcome bench(Options o) {
 }  // namespace
 
 Command add_bench_loop(Parser bench_command) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<LoopBenchOptions>();
     o->run.duration_s = 10;
     const Parser c = bench_command.subcommand(
         "loop", "The real-time loop, alone and under load from other processes: jitter, latency, deadlines");
@@ -126,7 +126,7 @@ Command add_bench_loop(Parser bench_command) {
     c.footer(
         "Exit status 1 if a frame is incomplete, more frames are late than --late-max, none fell due, or the bench "
         "was interrupted.");
-    return [o] { return bench(*o); };
+    return [o] { return bench_loop(*o); };
 }
 
 }  // namespace narpa::cli

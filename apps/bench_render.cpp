@@ -22,7 +22,7 @@ namespace {
 constexpr std::uint32_t kReferenceImages = 16;  // their scatter tells the reference's own noise
 constexpr int kDefaultSize = 64;                // px, the longer side
 
-struct Options {
+struct RenderBenchOptions {
     std::string scene, camera, size, plot;
     std::vector<int> spp{4, 8, 16, 32};
     int reference_spp = 4096, seeds = 16, threads = 0;
@@ -76,7 +76,7 @@ struct Measured {
     double reference_level = 0, reference_noise = 0, reference_seconds = 0;
 };
 
-Result<Measured> measure(const Options& o, const Scene& scene, std::size_t camera, TracingThreads& threads) {
+Result<Measured> measure(const RenderBenchOptions& o, const Scene& scene, std::size_t camera, TracingThreads& threads) {
     Measured m;
     Progress progress;
     const auto pixels = static_cast<std::size_t>(scene.cameras[camera].width) *
@@ -112,7 +112,7 @@ Result<Measured> measure(const Options& o, const Scene& scene, std::size_t camer
     return m;
 }
 
-nlohmann::json to_json(const Estimate& e) {
+nlohmann::json estimate_json(const Estimate& e) {
     return {{"value", e.value}, {"standard_error", e.standard_error}};
 }
 
@@ -126,10 +126,10 @@ nlohmann::json describe(const Measured& m, const Camera& c) {
         const ErrorRow& r = m.rows[i];
         rows.push_back({{"spp", r.spp},
                         {"seeds", r.images},
-                        {"rmse", to_json(r.rmse)},
-                        {"relative_rmse", to_json(r.relative_rmse)},
-                        {"bias", to_json(r.bias)},
-                        {"pixel_bias_squared", to_json(r.pixel_bias_squared)},
+                        {"rmse", estimate_json(r.rmse)},
+                        {"relative_rmse", estimate_json(r.relative_rmse)},
+                        {"bias", estimate_json(r.bias)},
+                        {"pixel_bias_squared", estimate_json(r.pixel_bias_squared)},
                         {"render_s", m.seconds[i]},
                         {"samples_per_s", samples_per_second(c, r.spp, m.seconds[i])}});
     }
@@ -156,7 +156,7 @@ void tell_table(const Measured& m, const Camera& c) {
                     text(fit_slope(m.rows, &ErrorRow::relative_rmse), 3)));
 }
 
-Outcome bench(Options o) {
+Outcome bench_render(RenderBenchOptions o) {
     if (o.ladder.ablation && o.ladder.scenes.empty()) o.ladder.scenes = {"all"};
     if (o.ladder.quick && o.ladder.scenes.empty()) return Error{"--quick needs --scenes or --ablation"};
     if (!o.ladder.scenes.empty()) {
@@ -211,8 +211,8 @@ Outcome bench(Options o) {
                               {"noise_rms", measured->reference_noise},
                               {"render_s", measured->reference_seconds}}},
                             {"rows", describe(*measured, camera)},
-                            {"slope", to_json(fit_slope(measured->rows))},
-                            {"relative_slope", to_json(fit_slope(measured->rows, &ErrorRow::relative_rmse))}};
+                            {"slope", estimate_json(fit_slope(measured->rows))},
+                            {"relative_slope", estimate_json(fit_slope(measured->rows, &ErrorRow::relative_rmse))}};
     if (!o.plot.empty()) {
         nlohmann::json plot = document;
         plot.update({{"plot", "convergence"}, {"title", title}});
@@ -224,7 +224,7 @@ Outcome bench(Options o) {
 }  // namespace
 
 Command add_bench_render(Parser bench_command) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RenderBenchOptions>();
     const Parser c = bench_command.subcommand(
         "render", "Error of an image against samples and time, beside a reference of many samples");
     const std::array of_one_scene{
@@ -267,7 +267,7 @@ Command add_bench_render(Parser bench_command) {
     c.footer(
         "Without --scenes, exit status 1 where a bias is beyond three standard errors, or an error falls more "
         "slowly than spp^-0.47.");
-    return [o] { return bench(*o); };
+    return [o] { return bench_render(*o); };
 }
 
 }  // namespace narpa::cli

@@ -22,7 +22,7 @@
 namespace narpa::cli {
 namespace {
 
-struct Options {
+struct CheckOptions {
     std::string scene, dbc;
     std::vector<std::string> devices;
 };
@@ -199,7 +199,7 @@ Result<Finding> try_device(const std::string& spec) {
     return Finding{spec, false, bus.error().what, bus.error().remedy};
 }
 
-Outcome check(const Options& o) {
+Outcome check(const CheckOptions& o) {
     auto scene = load_scene(o.scene);
     if (!scene) return scene.error();
     auto world = World::create(*std::move(scene));
@@ -235,7 +235,7 @@ Outcome check(const Options& o) {
 }  // namespace
 
 Command add_check(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CheckOptions>();
     const Parser c = app.subcommand("check", "Check the scene and this machine; names what is missing");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();
     c.option("DEVICE", o->devices,

@@ -34,7 +34,7 @@ struct OneOptions {
     int threads = 0;
 };
 
-struct Options {
+struct EstimateOptions {
     std::string input, camera, scene, csv, picture;
     int every = 1;
     TrackerFlags tracker;
@@ -43,7 +43,7 @@ struct Options {
 };
 
 /// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
-Result<std::vector<TrackedFrame>> track(const Options& o, Replay& run, FrameTracker& tracker) {
+Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, FrameTracker& tracker) {
     TracingThreads threads(o.one.threads);
     const Progress progress;
     std::vector<TrackedFrame> tracked;
@@ -75,7 +75,7 @@ Status write_rows(const std::string& path, const std::vector<TrackedFrame>& trac
     return Ok{};
 }
 
-Outcome estimate_log(const Options& o, const TrackerOptions& tracker_options) {
+Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_options) {
     auto run = Replay::open(o.input, o.camera, o.scene);
     if (!run) return run.error();
     auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), tracker_options);
@@ -269,7 +269,7 @@ Outcome estimate_sweep(const OneOptions& o) {
     return document;
 }
 
-Outcome estimate(const Options& o) {
+Outcome estimate(const EstimateOptions& o) {
     auto tracker = o.tracker.options();
     if (!tracker) return tracker.error();
     std::error_code error;
@@ -294,7 +294,7 @@ Outcome estimate(const Options& o) {
 }  // namespace
 
 Command add_estimate(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EstimateOptions>();
     const Parser c = app.subcommand("estimate",
                                     "Estimate the target's pose from a logged run, a frame or a sweep, and compare "
                                     "with the truth and the bound");

@@ -16,7 +16,7 @@
 namespace narpa::cli {
 namespace {
 
-struct Options {
+struct FlyOptions {
     std::string trajectory, bus;
     std::vector<std::string> ids;
     std::optional<double> start_s;
@@ -33,7 +33,7 @@ struct Commander {
     std::int64_t newest_ns = std::numeric_limits<std::int64_t>::min();
 };
 
-Result<std::map<std::string, Commander>> commanders(const Options& o, const std::vector<TrajectoryRow>& rows) {
+Result<std::map<std::string, Commander>> commanders(const FlyOptions& o, const std::vector<TrajectoryRow>& rows) {
     std::map<std::string, Commander> all;
     for (const TrajectoryRow& r : rows) all.try_emplace(r.body);
     if (o.ids.empty()) {
@@ -64,7 +64,7 @@ Result<std::map<std::string, Commander>> commanders(const Options& o, const std:
 
 class Player {
 public:
-    Player(const Options& o, CanBus& bus, std::map<std::string, Commander>& bodies)
+    Player(const FlyOptions& o, CanBus& bus, std::map<std::string, Commander>& bodies)
         : options_(o), bus_(bus), bodies_(bodies), fd_(bus.carries_fd() && !o.classic) {}
 
     Status play(const std::vector<TrajectoryRow>& rows) {
@@ -148,7 +148,7 @@ private:
         return Ok{};
     }
 
-    const Options& options_;
+    const FlyOptions& options_;
     CanBus& bus_;
     std::map<std::string, Commander>& bodies_;
     bool fd_;
@@ -156,7 +156,7 @@ private:
     std::int64_t start_ns_ = 0, last_granted_ = std::numeric_limits<std::int64_t>::min();
 };
 
-Outcome fly(const Options& o) {
+Outcome fly(const FlyOptions& o) {
     auto rows = read_trajectory(o.trajectory);
     if (!rows) return rows.error();
     auto bodies = commanders(o, *rows);
@@ -183,7 +183,7 @@ Outcome fly(const Options& o) {
 }  // namespace
 
 Command add_fly(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<FlyOptions>();
     const Parser c = app.subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
     c.option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)").required();
     c.option("--can", o->bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").required();

@@ -13,7 +13,7 @@
 namespace narpa::cli {
 namespace {
 
-struct Options {
+struct RehearseOptions {
     rehearsal::RehearsalOptions run;
     std::vector<std::string> video;
     std::size_t runs = 0;  ///< 0: one, without a summary
@@ -66,7 +66,7 @@ Outcome many(const rehearsal::CampaignOptions& options) {
     return summary;
 }
 
-Outcome rehearse(const Options& given) {
+Outcome rehearse(const RehearseOptions& given) {
     rehearsal::RehearsalOptions o = given.run;
     for (const std::string& text : given.video) {
         auto pair = split_pair(text, "CAMERA=DEVICE, like nav=/dev/video10");
@@ -89,7 +89,7 @@ Outcome rehearse(const Options& given) {
 }  // namespace
 
 Command add_rehearse(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RehearseOptions>();
     rehearsal::RehearsalOptions& r = o->run;
     r.version = NARPA_VERSION;
     const Parser c = app.subcommand(

@@ -19,7 +19,7 @@ namespace {
 
 using Method = RenderSettings::Method;
 
-struct Options {
+struct RenderOptions {
     std::string scene, camera, format, out, aov, method;
     PoseOptions pose;
     std::optional<double> time_s;
@@ -31,7 +31,7 @@ struct Options {
 };
 
 /// Applies the options that override the scene.
-Status override_scene(const Options& o, Scene& scene, Camera& camera) {
+Status override_scene(const RenderOptions& o, Scene& scene, Camera& camera) {
     o.budget.override_scene(scene.render);
     if (o.seed) scene.render.seed = *o.seed;
     if (o.max_depth && scene.render.method == Method::direct)
@@ -80,7 +80,7 @@ std::string_view name(Method m) {
     return m == Method::path ? "path" : "direct";
 }
 
-Outcome render(const Options& o) {
+Outcome render(const RenderOptions& o) {
     std::optional<Method> method;
     if (!o.method.empty()) method = o.method == "path" ? Method::path : Method::direct;
     auto scene = load_scene(o.scene, method);
@@ -158,7 +158,7 @@ Outcome render(const Options& o) {
 }  // namespace
 
 Command add_render(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RenderOptions>();
     const Parser c = app.subcommand(
         "render", "Render one frame of a camera, byte for byte as `run` does (except with a time budget)");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kDifferencesShown = 10;
 constexpr int kFramesCompared = 10;  ///< by default
 
-struct Options {
+struct ReplayOptions {
     std::string folder, camera, scene, picture;
     int reference = 0, frames = 0, threads = 0;
 };
@@ -38,12 +38,12 @@ std::vector<std::size_t> chosen_frames(std::size_t frames, std::size_t wanted) {
     return chosen;
 }
 
-std::vector<std::size_t> frames_for(const Options& o, std::size_t logged) {
+std::vector<std::size_t> frames_for(const ReplayOptions& o, std::size_t logged) {
     if (o.frames > 0) return chosen_frames(logged, static_cast<std::size_t>(o.frames));
     return chosen_frames(logged, o.reference > 0 ? std::size_t{kFramesCompared} : logged);
 }
 
-Replayed render_again(const Options& o, Replay& run) {
+Replayed render_again(const ReplayOptions& o, Replay& run) {
     TracingThreads threads(o.threads);
     const Progress progress;
     const std::vector<std::size_t> chosen = frames_for(o, run.frames().size());
@@ -94,7 +94,7 @@ std::string differences_in_words(const Replayed& done, const std::string& log) {
     return out;
 }
 
-Outcome replay(const Options& o) {
+Outcome replay(const ReplayOptions& o) {
     if (!o.picture.empty() && o.reference == 0)
         return Error{
             fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
@@ -142,14 +142,14 @@ Outcome replay(const Options& o) {
 }
 
 /// In lockstep all of it can be run again; what was run in real time has the emulator's frames to repeat.
-Outcome replay_any(const Options& o) {
+Outcome replay_any(const ReplayOptions& o) {
     std::error_code none;
     if (!std::filesystem::exists(o.folder + "/rehearsal.json", none)) return replay(o);
     const auto record = rehearsal::read_record(o.folder);
     if (!record) return record.error();
     const bool frames_alone = o.reference > 0 || o.frames > 0 || !o.camera.empty();
     if ((*record)["mode"] != "lockstep" || frames_alone) {
-        Options emulator = o;
+        ReplayOptions emulator = o;
         emulator.folder += "/emulator";
         return replay(emulator);
     }
@@ -161,7 +161,7 @@ Outcome replay_any(const Options& o) {
 }  // namespace
 
 Command add_replay(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ReplayOptions>();
     const Parser c = app.subcommand(
         "replay", "Render the frames of a logged run again, bit for bit, and report what their budget cost");
     c.option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written").required();

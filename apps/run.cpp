@@ -11,7 +11,7 @@
 namespace narpa::cli {
 namespace {
 
-struct Options {
+struct RunCommandOptions {
     std::string scene;
     std::vector<std::string> video, lidar;
     std::string cpus;
@@ -40,7 +40,7 @@ std::string addresses(const std::string& bus, CanNode* can) {
                        a.pty.empty() ? "" : fmt::format("CAN_PTY={}\n", a.pty));
 }
 
-Outcome run(const Options& options) {
+Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     RunOptions o = options.run;
     if (auto good = split_outputs(options.video, "CAMERA=SINK, like nav=/dev/video10", o.video); !good)
@@ -86,7 +86,7 @@ Outcome run(const Options& options) {
 }  // namespace
 
 Command add_run(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RunCommandOptions>();
     const Parser c =
         app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();

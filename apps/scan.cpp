@@ -16,7 +16,7 @@
 namespace narpa::cli {
 namespace {
 
-struct Options {
+struct ScanOptions {
     std::string scene, lidar, out;
     PoseOptions pose;
     double time_s = 0, duration_s = 0;
@@ -96,7 +96,7 @@ Status write_capture(const std::string& path, const LidarUnit& of, std::int64_t 
     return Ok{};
 }
 
-Outcome scan(const Options& o) {
+Outcome scan(const ScanOptions& o) {
     const std::string extension = std::filesystem::path(o.out).extension();
     if (extension != ".csv" && extension != ".ply" && extension != ".pcd" && extension != ".pcap")
         return Error{"unknown kind of file, expected .ply, .pcd, .csv or .pcap", o.out};
@@ -138,7 +138,7 @@ Outcome scan(const Options& o) {
 }  // namespace
 
 Command add_scan(Parser app) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ScanOptions>();
     const Parser c = app.subcommand("scan", "Scan with a LiDAR from a time on: points, shots or packets");
     c.option("SCENE", o->scene, "Scene file (TOML)").required();
     c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");

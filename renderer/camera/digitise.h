@@ -44,9 +44,9 @@ using DnLanes = Lanes<std::uint32_t>;
 inline RgbLanes load_radiance(const DetectorConstants& sensor, const Rgb* radiance) noexcept {
     const auto clamped = [](float v, float max) {
         // Bit patterns order as: positive numbers, infinity, NaN, negative numbers.
-        constexpr auto kInfinity = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity());
+        constexpr auto kInfinityBits = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity());
         const auto bits = std::bit_cast<std::uint32_t>(v);
-        return std::bit_cast<float>(bits <= kInfinity ? std::min(bits, std::bit_cast<std::uint32_t>(max)) : 0u);
+        return std::bit_cast<float>(bits <= kInfinityBits ? std::min(bits, std::bit_cast<std::uint32_t>(max)) : 0u);
     };
     const auto [r_max, g_max, b_max] = sensor.radiance_max;
     RgbLanes out;

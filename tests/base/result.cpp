@@ -27,7 +27,7 @@ TEST(Result, StatusIsSuccessOrError) {
     EXPECT_FALSE(bad);
 }
 
-TEST(Error, TellsThePlaceAsFarAsItIsKnown) {
+TEST(Error, TextNamesThePlaceAsFarAsItIsKnown) {
     EXPECT_EQ((Error{.what = "w"}).text(), "w");
     EXPECT_EQ((Error{.what = "w", .file = "f"}).text(), "f: w");
     EXPECT_EQ((Error{.what = "w", .file = "f", .line = 3}).text(), "f:3: w");

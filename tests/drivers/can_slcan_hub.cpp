@@ -15,7 +15,7 @@
 namespace narpa {
 namespace {
 
-/// A bare socket or terminal that says what the test tells it.
+/// A bare socket or terminal that sends the bytes of the test.
 class Wire {
 public:
     explicit Wire(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -132,7 +132,7 @@ TEST_F(SlcanHub, IsABusForAllOpenClients) {
     EXPECT_EQ(a.frames.size() + b.frames.size() + terminal.frames.size(), 2u) << "the hub itself received both";
 }
 
-TEST_F(SlcanHub, NobodyListeningIsADrop) {
+TEST_F(SlcanHub, SendingWithoutClientsIsADrop) {
     EXPECT_FALSE(hub_->send(can_frame(0x123, {1})));
     EXPECT_EQ(hub_->counters().send_drops, 1u);
     EXPECT_EQ(hub_->counters().sent, 0u);
@@ -294,7 +294,7 @@ TEST(SlcanClient, ComesBackWhenTheHubDoes) {
     EXPECT_EQ(out.frame.id, 0x2u);
 }
 
-/// A hub that a thread of its own serves; it says `every`-th frame anew under an identifier of its own.
+/// A hub that a thread of its own serves; it repeats every `every`-th frame under an identifier of its own.
 class ServedHub {
 public:
     explicit ServedHub(std::uint32_t says_every) : says_every_(says_every), thread_([this] { serve(); }) {}
@@ -416,7 +416,7 @@ TEST(SlcanBus, AFastSpeakerWaitsForASlowListener) {
         ASSERT_EQ(text.compare(i, line.size(), line), 0) << i;
 }
 
-TEST(SlcanClient, SaysWhatIsWrongWithAHub) {
+TEST(SlcanClient, ErrorsNameTheFaultOfAHub) {
     ServedHub hub(0);
     std::vector<std::unique_ptr<CanBus>> all;
     for (int i = 0; i < 8; ++i) all.push_back(open_or_fail(hub.spec(), CanRole::client));

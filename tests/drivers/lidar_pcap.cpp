@@ -165,7 +165,7 @@ TEST_F(PcapSink, RefusesMoreThanAnEthernetFrameHolds) {
     EXPECT_EQ(sink->counters().dropped, 1U);
 }
 
-TEST_F(PcapSink, SaysWhyItCannotWrite) {
+TEST_F(PcapSink, ErrorNamesWhyItCannotWrite) {
     const std::string path = folder_ / "no/such/folder.pcap";
     const auto sink = open_packet_sink(path, vlp16().spec().network, 0, false);
     ASSERT_FALSE(sink);

@@ -27,7 +27,7 @@ Bytes counted_bytes(std::size_t size, std::size_t first) {
     return bytes;
 }
 
-/// A source at a port that nobody else has, and its port.
+/// A source at a free port, and the port.
 struct Opened {
     std::unique_ptr<PacketSource> source{};
     int port = 0;

@@ -77,7 +77,7 @@ TEST(UdpSink, DataAndPositionPacketsReachTheirPorts) {
     GTEST_SKIP() << "no pair of free ports on loopback";
 }
 
-TEST(UdpSink, NobodyListeningIsNoError) {
+TEST(UdpSink, SendingWithoutReceiverIsNoError) {
     for (const std::string host : {"127.0.0.1", "localhost", "[::1]"}) {
         auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().spec().network, 0, false);
         if (!sink) continue;  // no such address family here

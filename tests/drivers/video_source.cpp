@@ -73,7 +73,7 @@ TEST(Y4mSource, FramesOfAFifoComeWholeInOrderInEveryFormat) {
     }
 }
 
-TEST(Y4mSource, TheNextWriterBeginsAnew) {
+TEST(Y4mSource, TheNextWriterBeginsANewStream) {
     const test::TemporaryFolder folder;
     const std::string fifo = make_fifo(folder);
     const auto source = source_of(fifo, kGrey);
@@ -244,7 +244,7 @@ TEST_P(V4l2Source, FramesComeInOrderFromTheFirstOn) {
     EXPECT_EQ(source->counters().lost, 0U);
 }
 
-TEST_P(V4l2Source, WhatNobodyTookInTimeIsCounted) {
+TEST_P(V4l2Source, FramesNotReadInTimeAreCounted) {
     auto sink = sink_to(device_, format_);
     ASSERT_TRUE(sink);
     const auto source = source_of(device_, format_);

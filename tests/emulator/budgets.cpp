@@ -142,7 +142,7 @@ std::vector<FrameLedger> fly(CanBus& hub, const std::vector<PoseCommand>& comman
     return ledgers;
 }
 
-TEST_F(Budgets, OfRaysAreKeptAndToldTheSameInTheLogOnTheBusAndInTheImage) {
+TEST_F(Budgets, OfRaysAreKeptAndReportedAlikeInLogOnBusAndInImage) {
     RunOptions o = lockstep("slcan:0", 2);
     o.duration_s = 0.8;
     auto emulator = Emulator::create(scene(scene_with("budget_rays = 40000")), o);
@@ -206,7 +206,7 @@ TEST_F(Budgets, TheReportCountsFramesByStep) {
     }
 }
 
-TEST(Report, TellsHowManyFramesWereHowLate) {
+TEST(Report, CountsFramesByLateness) {
     SignedHistogram late;
     for (int i = 0; i < 7; ++i) late.add(-2'000'000);
     for (int i = 0; i < 2; ++i) late.add(500'000);

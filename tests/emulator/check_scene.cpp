@@ -1,4 +1,4 @@
-// What `narpa check` tells of a scene's light and materials: the program itself is run.
+// What `narpa check` reports of a scene's light and materials: the program itself is run.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -30,7 +30,7 @@ TEST(UseMethod, RefusesWhatKeepsNoEnergyAndWarnsOfWhatIsDark) {
     EXPECT_TRUE(s.warnings.empty());
 }
 
-TEST(Check, TellsLightsMethodAndMaterialsByKind) {
+TEST(Check, ReportsLightsMethodAndMaterialsByKind) {
     const Done said = run_check(std::string(kComplete) + " 2>&1 >/dev/null");
     EXPECT_EQ(said.status, 0) << said.out;
     for (const char* words :
@@ -55,7 +55,7 @@ TEST(Check, JsonHasTheSame) {
     EXPECT_EQ(scene.at("cameras")[0].at("lens"), true);
 }
 
-TEST(Check, TellsTheBudget) {
+TEST(Check, ReportsTheBudget) {
     const TemporaryFolder folder;
     const std::string file = folder / "s.toml";
     std::ofstream(file) << with_render(small_scene(), "budget_ms = 60");

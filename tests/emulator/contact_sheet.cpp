@@ -38,7 +38,7 @@ TEST(ContactSheet, SpreadsAnyNumberOfFramesOverAtMostTwentyFourTiles) {
     }
 }
 
-TEST(ContactSheet, SaysWhereItCannotWrite) {
+TEST(ContactSheet, ErrorNamesTheFile) {
     ContactSheet sheet({8, 8, PixelFormat::grey});
     EXPECT_TRUE(sheet.write("/nowhere/at/all.png"));  // nothing taken, nothing to write
     sheet.offer(0, std::vector<std::uint8_t>(64));

@@ -1,4 +1,4 @@
-// Poses estimated beside a run and from its log: what is logged, what goes out on CAN, what the program says.
+// Poses estimated beside a run and from its log: what is logged, what goes out on CAN, what the program prints.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -164,7 +164,7 @@ TEST_F(EstimateTest, FromOneFrameAndFromOneSweep) {
     EXPECT_EQ(cloud["unobserved"].get<int>(), 0);
 }
 
-TEST_F(EstimateTest, BadInputIsToldInWords) {
+TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     const std::string scene = kDocking;
     const auto refuses = [](const std::string& arguments, const std::string& words) {
         const Done p = narpa_does("estimate " + arguments);
@@ -181,7 +181,7 @@ TEST_F(EstimateTest, BadInputIsToldInWords) {
     refuses(folder_ / "nowhere", "nowhere");
 }
 
-TEST(EstimateSummary, TellsWhatIsThere) {
+TEST(EstimateSummary, CoversTheFramesWithAPose) {
     std::vector<TrackedFrame> frames(3);
     for (std::size_t i = 0; i < 2; ++i) {
         TrackedFrame& f = frames[i];

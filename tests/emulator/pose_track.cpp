@@ -77,7 +77,7 @@ TEST(PoseTrack, CommandsWithoutVelocitiesGiveStraightLines) {
     EXPECT_DOUBLE_EQ(track.at(250 * kMs).motion.T_world_body.t.x, 1.0);
 }
 
-TEST(PoseTrack, HoldsAndSaysStaleBeyondTheLimit) {
+TEST(PoseTrack, HoldsAndIsStaleBeyondTheLimit) {
     PoseTrack track({}, 0.5);
     ASSERT_EQ(track.push(command(0, {{{}, {0, 0, 0}}, {2, 0, 0}, {}}), 0), TrackStatus::taken);
     EXPECT_DOUBLE_EQ(track.at(500 * kMs).motion.T_world_body.t.x, 1.0);

@@ -254,7 +254,7 @@ TEST_F(ReplayTest, FindsPosesThatAreNotAsTheyWere) {
     EXPECT_FALSE(replay->make(1).empty());
 }
 
-TEST_F(ReplayTest, SaysWhatIsWrongWithALogAndWhere) {
+TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     expect_refused(folder_ / "nowhere", "run.json: is not there, expected the log folder of a run");
     const std::string log = run(scene_with("budget_rays = 20000"), 3);
     const std::string ledger = log + "/nav.ledger.csv", truth = log + "/nav.truth.csv",
@@ -409,7 +409,7 @@ Done replay(const std::string& arguments, const char* streams) {
     return test::run_command(std::string("timeout 60 ") + NARPA_BIN + " replay " + arguments + streams);
 }
 
-TEST_F(ReplayTest, TheProgramTellsHowManyFramesRepeat) {
+TEST_F(ReplayTest, TheProgramReportsHowManyFramesRepeat) {
     const std::string log = run(scene_with("budget_rays = 20000"));
     const Done good = replay(log + " --json", " 2>/dev/null");
     EXPECT_EQ(good.status, 0);
@@ -437,7 +437,7 @@ TEST_F(ReplayTest, TheProgramFindsNothingProvedWhereNothingIsRepeated) {
 }
 
 /// A frame that got nowhere took nothing: a whole one cannot be hidden behind that step.
-TEST_F(ReplayTest, TheProgramLooksAtFramesWithoutAnImageToo) {
+TEST_F(ReplayTest, TheProgramChecksFramesWithoutAnImageToo) {
     const std::string log = run(scene_with("budget_rays = 20000"));
     set_cell(log, 4, "step", "5");
     const Done bad = replay(log, " 2>&1");

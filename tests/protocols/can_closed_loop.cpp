@@ -1,5 +1,4 @@
-// What dynamics and navigation say to each other on CAN: both forms carry the same, and nothing else is let
-// through.
+// Messages between dynamics and navigation on CAN: both forms carry the same, and invalid ones are refused.
 
 #include <gtest/gtest.h>
 
@@ -317,7 +316,7 @@ TEST(CanClosedLoopValues, TimesTurnWithTheReference) {
     }
 }
 
-/// Who says what under an identifier: no two sets share one, and all are those of 11 bits.
+/// No two sets share an identifier, and all have 11 bits.
 TEST(CanClosedLoopValues, IdentifiersCollideWithNothing) {
     std::map<std::uint32_t, std::string> owner;
     const auto claim = [&](std::uint32_t base, const SetLayout& layout) {

@@ -62,7 +62,7 @@ TEST(CanEstimate, DeviationsSaturate) {
     EXPECT_EQ(out.sigma_rotation_rad, (Vec3{1.6777215, 1.6777215, 0}));
 }
 
-TEST(CanEstimate, SaysThatItIsLost) {
+TEST(CanEstimate, LostHasNoPose) {
     std::mt19937_64 rng(43);
     EstimateReport sent = random_estimate(rng);
     sent.state = EstimateState::lost;

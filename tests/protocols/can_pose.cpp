@@ -377,7 +377,7 @@ TEST(CanPose, RejectsWhatIsNoRotation) {
     EXPECT_EQ(out.motion.T_world_body.q, (Quat{1, 0, 0, 0}));
 }
 
-TEST(CanPose, EncodeSaysWhatDoesNotFit) {
+TEST(CanPose, EncodeReturnsWhatDoesNotFit) {
     FrameSet frames;
     CanFrame frame;
     PoseCommand c = command_at(1, 1);
@@ -456,7 +456,7 @@ TEST(CanPose, UnwrapsToTheNearestTurn) {
     EXPECT_EQ(unwrap(last, last), last);
 }
 
-// The frames that the README shows are the ones that we send, and say what it says they do.
+// The frames that the README shows are the ones that narpa sends, with the values that it states.
 TEST(CanPose, WorkedExampleOfTheReadme) {
     std::ifstream readme(NARPA_SOURCE_DIR "/protocols/can/README.md");
     std::vector<CanFrame> frames;

@@ -54,7 +54,7 @@ TEST(CanLedger, ClassicAndFdCarryTheSame) {
     }
 }
 
-TEST(CanLedger, SaysWhenThereWasNoCommandAndNoHandOver) {
+TEST(CanLedger, MarksMissingCommandAndHandOver) {
     FrameLedger sent, out;
     sent.t_exposure_mid_ns = 5'000'000'000;
     sent.t_exposure_start_ns = sent.t_exposure_end_ns = sent.t_render_start_ns = sent.t_render_end_ns =
@@ -105,7 +105,7 @@ TEST(CanLedger, CountsAndErrorsSaturate) {
     EXPECT_EQ(out.samples_per_pixel, 0);
 }
 
-TEST(CanLedger, RefusesChoicesThatNobodyKnows) {
+TEST(CanLedger, RefusesUnknownChoices) {
     FrameLedger sent, out;
     sent.step = 6;
     LedgerDecoder decoder;

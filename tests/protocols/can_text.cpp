@@ -279,7 +279,7 @@ TEST(CanCandump, RoundTrip) {
     }
 }
 
-TEST(CanCandump, SaysWhatWasExpected) {
+TEST(CanCandump, ErrorsNameWhatWasExpected) {
     CandumpLine line;
     const auto complaint = [&](std::string_view text) {
         const char* expected = parse_candump(text, line);

@@ -117,7 +117,7 @@ TEST(EmbeddedLine, AnyOneWrongBitIsFound) {
     EXPECT_TRUE(decode_embedded_line(row));
 }
 
-TEST(EmbeddedLine, ChoicesThatNobodyKnowsAreRefused) {
+TEST(EmbeddedLine, UnknownChoicesAreRefused) {
     Row row{};
     FrameLedger ledger;
     ledger.step = 6;

@@ -13,14 +13,14 @@ std::string header(int w, int h, PixelFormat pixel, std::int64_t period_ns) {
     return text ? *text : "error: " + text.error().what;
 }
 
-TEST(Y4m, StreamHeaderSaysSizeExactRateAndColourSpace) {
+TEST(Y4m, StreamHeaderHasSizeExactRateAndColourSpace) {
     EXPECT_EQ(header(640, 480, PixelFormat::grey, 100'000'000), "YUV4MPEG2 W640 H480 F10:1 Ip A1:1 Cmono\n");
     EXPECT_EQ(header(8, 2, PixelFormat::y16, 40'000'000), "YUV4MPEG2 W8 H2 F25:1 Ip A1:1 Cmono16\n");
     EXPECT_EQ(header(8, 2, PixelFormat::yuyv, 16'666'667), "YUV4MPEG2 W8 H2 F1000000000:16666667 Ip A1:1 C422\n");
     EXPECT_EQ(header(1, 1, PixelFormat::grey, 2'000'000'000), "YUV4MPEG2 W1 H1 F1:2 Ip A1:1 Cmono\n");
 }
 
-TEST(Y4m, SaysWhichFormatsItHolds) {
+TEST(Y4m, ErrorNamesTheFormatsThatItHolds) {
     EXPECT_EQ(header(8, 2, PixelFormat::rgb24, 1),
               "error: Y4M cannot hold RGB24 frames; it holds GREY, Y16 and YUYV");
     EXPECT_EQ(header(7, 2, PixelFormat::yuyv, 1), "error: YUYV needs an even width, not 7");

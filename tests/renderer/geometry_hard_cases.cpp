@@ -83,15 +83,15 @@ TEST(FarFromTheOrigin, OffsetThatIsExactInDoubleChangesNoBitOfTheRadiance) {
 
 /// Nearest hit by trying every face in extended precision.
 long double nearest_by_hand(const Mesh& m, const Vec3& origin, const Vec3& direction) {
-    using Wide = Vec<long double>;
-    const Wide o = vec_cast<long double>(origin), d = vec_cast<long double>(direction);
+    using LongVec3 = Vec<long double>;
+    const LongVec3 o = vec_cast<long double>(origin), d = vec_cast<long double>(direction);
     long double best = std::numeric_limits<long double>::infinity();
     for (const auto& f : m.faces) {
-        const Wide a = vec_cast<long double>(m.positions[f[0]]), e1 = vec_cast<long double>(m.positions[f[1]]) - a,
+        const LongVec3 a = vec_cast<long double>(m.positions[f[0]]), e1 = vec_cast<long double>(m.positions[f[1]]) - a,
                    e2 = vec_cast<long double>(m.positions[f[2]]) - a, p = cross(d, e2);
         const long double det = dot(e1, p);
         if (det == 0) continue;
-        const Wide s = o - a, q = cross(s, e1);
+        const LongVec3 s = o - a, q = cross(s, e1);
         const long double b1 = dot(s, p) / det, b2 = dot(d, q) / det, t = dot(e2, q) / det;
         if (b1 >= 0 && b2 >= 0 && b1 + b2 <= 1 && t > 0) best = std::min(best, t);
     }
@@ -117,8 +117,8 @@ TEST(FarFromTheOrigin, RangeOfASmallBodyIsExactToTenMicrometresAtAnyDistance) {
             ASSERT_EQ(hit.body, 0);
             // The reference starts 20 m away: long double is exact there, and moving along the ray loses nothing.
             const double skipped = distance - 20;
-            using Wide = Vec<long double>;
-            const Wide start = vec_cast<long double>(eye) +
+            using LongVec3 = Vec<long double>;
+            const LongVec3 start = vec_cast<long double>(eye) +
                                vec_cast<long double>(ray.direction) * static_cast<long double>(skipped);
             const long double t = static_cast<long double>(skipped) +
                                   nearest_by_hand(s.meshes[0], vec_cast<double>(start), ray.direction);

@@ -92,7 +92,7 @@ RadianceImage render(const Scene& s, const Camera& c, int spp, const Rigid3& T =
     return image;
 }
 
-Scene shining() {
+Scene emitting_ball() {
     Scene s;
     s.materials.push_back(lambert(0));
     s.materials[0].emission = {1, 1, 1};
@@ -110,7 +110,7 @@ TEST(Lens, AnEdgeOutOfFocusIsSpreadOverTheCircleOfConfusion) {
         for (const double focus : {8.0, kInfinity}) {
             if (depth > 10 && std::isinf(focus)) continue;
             const Camera c = with_lens(camera(61, 1, 400), 0.1, focus);
-            Scene s = shining();
+            Scene s = emitting_ball();
             const double wide = 100 * depth;
             add_mesh(s, plate(wide, wide), {{0, 1, 0, 0}, {wide / 2, 0, depth}});  // its edge on the axis
             const RadianceImage image = render(s, c, 1024);
@@ -131,7 +131,7 @@ TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
     const double depth = 500, radius = 0.1 * depth / 700;
     const Camera c = with_lens(camera(41, 41, 700), 0.1, 4.9);
     const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
-    Scene s = shining();
+    Scene s = emitting_ball();
     add_sphere(s, radius, {0.3 * depth / 700, -0.2 * depth / 700, depth});
     const RadianceImage image = render(s, c, 4);
     double sum = 0, x1 = 0, y1 = 0, r2 = 0, outside = 0;
@@ -151,14 +151,14 @@ TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
 }
 
 TEST(Lens, OneSampleAPixelAndWhatIsInFocusAreAsThroughAPinhole) {
-    Scene s = shining();
+    Scene s = emitting_ball();
     add_mesh(s, plate(3, 3), {normalized(Quat{1, 0.1, 0.2, 0.1}), {0.3, 0.1, 8}});
     const Camera pinhole = camera(48, 36, 60), wide_open = with_lens(pinhole, 0.3, 2);
     EXPECT_EQ(render(s, pinhole, 1).pixels, render(s, wide_open, 1).pixels);
     EXPECT_NE(render(s, pinhole, 16).pixels, render(s, wide_open, 16).pixels);
     EXPECT_EQ(render(s, pinhole, 16).pixels, render(s, with_lens(pinhole, 0, 2), 16).pixels);
 
-    Scene facing = shining();
+    Scene facing = emitting_ball();
     add_mesh(facing, plate(3, 3), {{0, 1, 0, 0}, {0.3, 0.1, 8}});
     const auto sharp = render(facing, pinhole, 64), focused = render(facing, with_lens(pinhole, 0.3, 8), 64);
     for (std::size_t i = 0; i < sharp.pixels.size(); ++i)

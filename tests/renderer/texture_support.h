@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "renderer/material/texture.h"
+#include "renderer/material/material.h"
 
 namespace narpa::test {
 

@@ -9,24 +9,10 @@
 
 namespace narpa {
 
-using Block = std::array<std::uint32_t, 4>;
-
 /// Philox4x32-10: J. Salmon, M. Moraes, R. Dror, D. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11.
 inline constexpr int kPhiloxRounds = 10;
 inline constexpr std::array<std::uint32_t, 2> kPhiloxMultiplier{0xd2511f53u, 0xcd9e8d57u};
 inline constexpr std::array<std::uint32_t, 2> kPhiloxWeyl{0x9e3779b9u, 0xbb67ae85u};
-
-constexpr Block philox(Block c, std::array<std::uint32_t, 2> key) noexcept {
-    for (int round = 0; round < kPhiloxRounds; ++round) {
-        const std::uint64_t a = std::uint64_t{kPhiloxMultiplier[0]} * c[0],
-                            b = std::uint64_t{kPhiloxMultiplier[1]} * c[2];
-        c = {static_cast<std::uint32_t>(b >> 32) ^ c[1] ^ key[0], static_cast<std::uint32_t>(b),
-             static_cast<std::uint32_t>(a >> 32) ^ c[3] ^ key[1], static_cast<std::uint32_t>(a)};
-        key[0] += kPhiloxWeyl[0];
-        key[1] += kPhiloxWeyl[1];
-    }
-    return c;
-}
 
 /// The keys of all rounds, for batches of kLanes counters. The multipliers are data because GCC turns a
 /// multiplication by a known constant into a dozen shifts and additions.

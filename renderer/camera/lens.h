@@ -13,20 +13,8 @@
 
 namespace narpa {
 
-/// Distance from the lens to the image plane on which the focus distance is sharp, metres.
-[[nodiscard]] inline double image_distance_m(double focal_length_m, double inverse_focus_per_m) {
-    return focal_length_m / (1 - focal_length_m * inverse_focus_per_m);
-}
-
-/// Diameter on the image plane of the blurred image of a point: the circle of confusion, metres.
-[[nodiscard]] inline double circle_of_confusion_m(double focal_length_m, double aperture_diameter_m,
-                                                  double inverse_focus_per_m, double inverse_depth_per_m) {
-    return aperture_diameter_m * image_distance_m(focal_length_m, inverse_focus_per_m) *
-           std::abs(inverse_focus_per_m - inverse_depth_per_m);
-}
-
-/// The same in pixels, of a point at this depth along the camera's z axis; `focal_px`: px per unit of the plane z
-/// = 1.
+/// Diameter of the blurred image of a point at this depth along the camera's z axis: the circle of confusion, px.
+/// `focal_px`: px per unit of the plane z = 1.
 [[nodiscard]] inline double circle_of_confusion_px(const Lens& lens, double focal_px, double depth_m) {
     return lens.aperture_diameter_m * focal_px * std::abs(1 / lens.focus_distance_m - 1 / depth_m);
 }
@@ -47,12 +35,6 @@ namespace narpa {
 /// The chief ray that meets a ray from this point of the aperture in the plane of focus: the inverse, of z = 1.
 [[nodiscard]] inline Vec3 chief_direction(const Lens& lens, const Vec3& direction, const Vec3& from) {
     return direction / direction.z + from / lens.focus_distance_m;
-}
-
-/// The ray from a point of the aperture that is focused on image point (x, y), world axes.
-[[nodiscard]] inline Ray lens_ray(const CameraModelHandle& model, const Lens& lens, const Rigid3& T_world_camera,
-                                  double x, double y, const Vec3& from) {
-    return {T_world_camera * from, T_world_camera.q * lens_direction(lens, model->direction({x, y}), from)};
 }
 
 }  // namespace narpa

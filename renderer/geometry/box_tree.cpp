@@ -1,11 +1,12 @@
-#include "renderer/geometry/box_tree.h"
-
+// Boxes about the parts of a mesh, from one about all of it down to a few thousand.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <queue>
 #include <span>
 #include <unordered_map>
+
+#include "renderer/geometry/mesh_shape.h"
 
 namespace narpa {
 namespace {

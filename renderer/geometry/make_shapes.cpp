@@ -1,9 +1,9 @@
-#include "renderer/geometry/make_shapes.h"
-
+// The shapes of a scene's bodies.
 #include <tbb/task_arena.h>
 
 #include "renderer/geometry/ellipsoid.h"
 #include "renderer/geometry/mesh_shape.h"
+#include "renderer/geometry/tracer_impl.h"
 
 namespace narpa {
 namespace {

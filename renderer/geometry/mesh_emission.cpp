@@ -1,10 +1,10 @@
-#include "renderer/geometry/mesh_emission.h"
-
+// The faces of a mesh that shine.
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "base/constants.h"
+#include "renderer/geometry/mesh_shape.h"
 
 namespace narpa {
 namespace {

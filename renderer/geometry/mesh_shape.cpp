@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/geometry/box_tree.h"
-#include "renderer/geometry/mesh_topology.h"
 
 namespace narpa {
 namespace {

@@ -5,11 +5,24 @@
 
 #include "base/result.h"
 #include "renderer/geometry/embree.h"
-#include "renderer/geometry/mesh_emission.h"
 #include "renderer/geometry/shape.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
+
+/// A tree of boxes, root first, every node before its children; empty for a mesh without faces. Each triangle, to
+/// rounding in single precision, lies in the union of the leaves, in pieces where it is large: a box about a whole
+/// panel that stands askew would hold mostly nothing. Boxes are cut one at a time, the one with the largest surface
+/// first, where the surfaces of the halves weigh least (J. Goldsmith, J. Salmon, "Automatic creation of object
+/// hierarchies for ray tracing", IEEE CG&A 7(5), 1987), so that the leaves are of like size.
+[[nodiscard]] std::vector<BoxNode> box_tree(const Mesh& mesh);
+
+/// Every edge is passed as often in one direction as in the other, with vertices identified by position alone: a
+/// ray that meets the mesh from outside meets its outer side first. Several shells may be closed together.
+[[nodiscard]] bool is_closed(const Mesh& mesh);
+
+/// The faces that shine; null where none does. Scene and mesh must outlive it.
+[[nodiscard]] std::unique_ptr<const EmissiveSurface> mesh_emission(const Scene& scene, const Mesh& mesh);
 
 class MeshShape final : public Shape {
 public:

@@ -1,9 +1,10 @@
-#include "renderer/geometry/mesh_topology.h"
-
+// Is a mesh a closed surface?
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <vector>
+
+#include "renderer/geometry/mesh_shape.h"
 
 namespace narpa {
 namespace {

@@ -30,20 +30,7 @@ inline SphereRoots sphere_roots(const Vec3& o, const Vec3& d, double radius) noe
     return {in_order ? near_zero : far_from_zero, in_order ? far_from_zero : near_zero};
 }
 
-/// Where a ray is inside a bounding sphere about the origin: a coarse interval, for a unit direction.
-struct SphereSpan {
-    double entry = 1, exit = -1;
-};
-/// exit < 0 when the line misses, or the sphere is behind.
-inline SphereSpan bounding_span(const Vec3& o, const Vec3& unit_d, double radius) noexcept {
-    const double b = -dot(o, unit_d);
-    const Vec3 closest = o + b * unit_d;
-    const double half_chord2 = radius * radius - dot(closest, closest);
-    if (!(half_chord2 >= 0)) return {};
-    const double half_chord = std::sqrt(half_chord2);
-    return {b - half_chord, b + half_chord};
-}
-/// Where the ray enters it, without a branch; infinity where it misses.
+/// Where a ray enters a bounding sphere about the origin, roughly; infinity where it misses. Without a branch.
 inline double bounding_entry(const Vec3& o, const Vec3& unit_d, double radius) noexcept {
     const double b = -dot(o, unit_d);
     const Vec3 closest = o + b * unit_d;

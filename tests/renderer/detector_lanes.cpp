@@ -8,6 +8,7 @@
 
 #include "renderer/camera/detector.h"
 #include "renderer/camera/digitise.h"
+#include "tests/renderer/detector_philox.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

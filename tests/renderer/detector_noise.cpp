@@ -7,9 +7,13 @@
 #include <vector>
 
 #include "renderer/camera/noise.h"
+#include "tests/renderer/detector_philox.h"
 
 namespace narpa {
 namespace {
+
+using test::Block;
+using test::philox;
 
 double open_unit(std::uint32_t word) {
     return (word + 0.5) * 0x1p-32;

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "renderer/geometry/mesh_topology.h"
+#include "renderer/geometry/mesh_shape.h"
 
 namespace narpa {
 namespace {

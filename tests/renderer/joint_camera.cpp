@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "base/constants.h"
-#include "renderer/camera/lens.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/film/tile_culling.h"
 #include "tests/support/equidistant_camera.h"
+#include "tests/support/lens_ray.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -6,12 +6,12 @@
 #include <numbers>
 #include <random>
 
-#include "renderer/camera/lens.h"
 #include "renderer/film/camera_batch.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/bsdf.h"
 #include "renderer/material/fast_math.h"
+#include "tests/support/lens_ray.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

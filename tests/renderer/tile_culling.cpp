@@ -9,9 +9,9 @@
 #include <random>
 
 #include "renderer/camera/camera_model.h"
-#include "renderer/camera/lens.h"
-#include "renderer/geometry/box_tree.h"
+#include "renderer/geometry/mesh_shape.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/lens_ray.h"
 
 namespace narpa {
 namespace {
@@ -127,10 +127,11 @@ Tally send_rays(const Tracer& tracer, const Camera& camera, const TileCulling& c
     Tally tally;
     for (int i = 0; i < rays; ++i) {
         const double x = uniform(random, -0.5, camera.width - 0.5), y = uniform(random, -0.5, camera.height - 0.5);
-        const Ray ray = lens != nullptr ? lens_ray(camera, *lens, T_world_camera, x, y,
-                                                   aperture_point(*lens, uniform(random, 0, 1),
-                                                                  i % 2 == 0 ? 0.999999 : uniform(random, 0, 1)))
-                                        : camera_ray(camera, T_world_camera, x, y);
+        const Ray ray = lens != nullptr
+                            ? test::lens_ray(camera, *lens, T_world_camera, x, y,
+                                             aperture_point(*lens, uniform(random, 0, 1),
+                                                            i % 2 == 0 ? 0.999999 : uniform(random, 0, 1)))
+                            : camera_ray(camera, T_world_camera, x, y);
         const auto listed =
             cover.bodies(static_cast<int>((x + 0.5) / kTileSize), static_cast<int>((y + 0.5) / kTileSize));
         // The body behind the first one, too.

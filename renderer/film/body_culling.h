@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "renderer/camera/camera_model.h"
-#include "renderer/geometry/box_tree.h"
 
 namespace narpa {
 

@@ -5,8 +5,7 @@
 
 #include <algorithm>
 
-#include "renderer/scene/mesh_material.h"
-#include "renderer/scene/triangle_soup.h"
+#include "renderer/scene/mesh_readers.h"
 
 namespace narpa {
 

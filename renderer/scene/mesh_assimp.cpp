@@ -6,10 +6,8 @@
 #include <exception>
 
 #include "renderer/scene/file_bytes.h"
-#include "renderer/scene/mesh_material.h"
+#include "renderer/scene/mesh_readers.h"
 #include "renderer/scene/text_cursor.h"
-#include "renderer/scene/triangle_soup.h"
-#include "renderer/scene/triangulate.h"
 
 namespace narpa {
 

@@ -8,8 +8,7 @@
 #include <filesystem>
 
 #include "renderer/scene/file_bytes.h"
-#include "renderer/scene/obj_file.h"
-#include "renderer/scene/triangle_soup.h"
+#include "renderer/scene/mesh_readers.h"
 
 namespace narpa {
 

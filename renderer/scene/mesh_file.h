@@ -1,4 +1,4 @@
-/// renderer/scene/mesh_file.h - mesh files -> triangles, by Assimp, and OBJ by our own reader (obj_file.h says
+/// renderer/scene/mesh_file.h - mesh files -> triangles, by Assimp, and OBJ by our own reader (mesh_readers.h says
 /// why).
 #pragma once
 

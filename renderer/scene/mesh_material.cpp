@@ -1,4 +1,4 @@
-#include "renderer/scene/mesh_material.h"
+#include "renderer/scene/mesh_readers.h"
 
 #include <algorithm>
 

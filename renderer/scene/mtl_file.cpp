@@ -4,8 +4,7 @@
 #include <set>
 
 #include "renderer/scene/file_bytes.h"
-#include "renderer/scene/mesh_material.h"
-#include "renderer/scene/obj_file.h"
+#include "renderer/scene/mesh_readers.h"
 #include "renderer/scene/text_cursor.h"
 
 namespace narpa {

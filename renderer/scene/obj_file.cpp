@@ -1,4 +1,4 @@
-#include "renderer/scene/obj_file.h"
+#include "renderer/scene/mesh_readers.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,6 @@
 
 #include "renderer/scene/file_bytes.h"
 #include "renderer/scene/text_cursor.h"
-#include "renderer/scene/triangulate.h"
 
 namespace narpa {
 

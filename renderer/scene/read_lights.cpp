@@ -1,7 +1,6 @@
 #include <array>
 
 #include "renderer/scene/kind_names.h"
-#include "renderer/scene/read_mounting.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {

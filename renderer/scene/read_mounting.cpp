@@ -1,8 +1,8 @@
-#include "renderer/scene/read_mounting.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
+
+#include "renderer/scene/scene_parts.h"
 
 namespace narpa {
 

@@ -6,7 +6,6 @@
 
 #include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
-#include "renderer/scene/read_mounting.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {

@@ -1,4 +1,4 @@
-/// renderer/scene/scene.h - what is there to see, as plain data: the result of reading a scene file.
+/// renderer/scene/scene.h - bodies, lights, sensors and settings as plain data: the result of reading a scene file.
 ///
 /// SI units; world frame right-handed and inertial. What a scene file does not name is not here (empty vector,
 /// empty optional), costs nothing, and is decided once, before the first frame.

@@ -56,6 +56,19 @@ std::optional<int> read_material(TableReader& body, const std::string& name, Sce
 /// The material of a shape for which the scene names none; its index.
 int add_grey_material(const std::string& name, Scene& scene);
 
+struct Mounting {
+    int mount = -1;  ///< body it rides on; -1 is the world
+    Rigid3 T_mount_thing{};
+};
+
+/// The attitude that looks along `forward` (unit), upright with `right` (unit, across `forward`) at its right.
+using AttitudeOf = Quat (*)(const Vec3& forward, const Vec3& right);
+Quat camera_attitude(const Vec3& forward, const Vec3& right);  ///< x right, y down, z forward; lights too
+Quat lidar_attitude(const Vec3& forward, const Vec3& right);   ///< x right, y forward, z up
+
+/// Where a camera, a LiDAR or a light sits: `mount`, `position_m`, and `attitude_wxyz` or `look_at` with `up`.
+Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of);
+
 /// `name`: 1 to 64 of letters, digits, '_', '-', '.'; used by no other table of its kind (`taken`).
 std::string read_name(TableReader& table, std::vector<std::string>& taken);
 

@@ -33,7 +33,8 @@ std::optional<double> as_number(const toml::node& node) {
 }
 
 std::string shown(const toml::node& node) {
-    if (const std::optional<double> x = as_number(node)) return fmt::format("{}", *x);
+    if (const auto* i = node.as_integer()) return fmt::format("{}", i->get());
+    if (const auto* f = node.as_floating_point()) return fmt::format("{}", f->get());
     return std::string(type_words(node));
 }
 
@@ -126,52 +127,51 @@ void TableReader::require(std::string_view key, std::string_view expected) {
                                fmt::format("{} has no \"{}\", expected {}", name_, key, expected));
 }
 
-std::optional<double> TableReader::number(std::string_view key, const Range& range) {
+template <class Take>
+auto TableReader::value(std::string_view key, const Take& take, const std::string& expected)
+    -> decltype(take(std::declval<const toml::node&>())) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
-    const std::optional<double> x = as_number(*node);
-    if (x && range.holds(*x)) return x;
-    fail(key, fmt::format("got {}, expected {}", shown(*node), range.words()));
-    return std::nullopt;
+    auto taken = take(*node);
+    if (!taken) fail(key, fmt::format("got {}, expected {}", shown(*node), expected));
+    return taken;
+}
+
+std::optional<double> TableReader::number(std::string_view key, const Range& range) {
+    const auto take = [&](const toml::node& node) {
+        const std::optional<double> x = as_number(node);
+        return x && range.holds(*x) ? x : std::nullopt;
+    };
+    return value(key, take, range.words());
 }
 
 std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int64_t low, std::int64_t high) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    const auto* i = node->as_integer();
-    if (i && i->get() >= low && i->get() <= high) return i->get();
-    const std::string got = i ? fmt::format("{}", i->get()) : shown(*node);
-    fail(key, fmt::format("got {}, expected an integer in [{}, {}]", got, low, high));
-    return std::nullopt;
+    const auto take = [&](const toml::node& node) {
+        const auto* i = node.as_integer();
+        return i && i->get() >= low && i->get() <= high ? std::optional(i->get()) : std::nullopt;
+    };
+    return value(key, take, fmt::format("an integer in [{}, {}]", low, high));
 }
 
 std::optional<bool> TableReader::boolean(std::string_view key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    if (const auto* b = node->as_boolean()) return b->get();
-    fail(key, fmt::format("got {}, expected true or false", shown(*node)));
-    return std::nullopt;
+    return value(
+        key, [](const toml::node& node) { return node.value_exact<bool>(); }, "true or false");
 }
 
 std::optional<std::string> TableReader::text(std::string_view key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    if (const auto* s = node->as_string()) return s->get();
-    fail(key, fmt::format("got {}, expected a text in quotes", shown(*node)));
-    return std::nullopt;
+    return value(
+        key, [](const toml::node& node) { return node.value_exact<std::string>(); }, "a text in quotes");
 }
 
 std::optional<std::vector<std::string>> TableReader::texts(std::string_view key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    const toml::array* array = node->as_array();
-    if (!array || !(array->empty() || array->is_homogeneous(toml::node_type::string))) {
-        fail(key, fmt::format("got {}, expected an array of texts in quotes", shown(*node)));
-        return std::nullopt;
-    }
-    std::vector<std::string> out;
-    for (const toml::node& element : *array) out.push_back(element.as_string()->get());
-    return out;
+    const auto take = [](const toml::node& node) -> std::optional<std::vector<std::string>> {
+        const toml::array* array = node.as_array();
+        if (!array || !(array->empty() || array->is_homogeneous(toml::node_type::string))) return std::nullopt;
+        std::vector<std::string> out;
+        for (const toml::node& element : *array) out.push_back(element.as_string()->get());
+        return out;
+    };
+    return value(key, take, "an array of texts in quotes");
 }
 
 std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::size_t count,

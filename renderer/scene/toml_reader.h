@@ -126,6 +126,10 @@ public:
     void finish();
 
 private:
+    /// What `take` makes of the key's node; where that is nothing, a problem.
+    template <class Take>
+    auto value(std::string_view key, const Take& take, const std::string& expected)
+        -> decltype(take(std::declval<const toml::node&>()));
     std::optional<std::vector<double>> numbers(std::string_view key, std::size_t count, const Range& range);
 
     const toml::table* table_;

@@ -1,4 +1,4 @@
-#include "renderer/scene/triangulate.h"
+#include "renderer/scene/mesh_readers.h"
 
 #include <cmath>
 #include <numeric>

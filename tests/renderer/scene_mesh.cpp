@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "renderer/scene/mesh_file.h"
+#include "renderer/scene/mesh_readers.h"
 #include "renderer/scene/scene_file.h"
-#include "renderer/scene/triangulate.h"
 #include "tests/renderer/scene_support.h"
 
 namespace narpa {

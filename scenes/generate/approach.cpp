@@ -1,9 +1,9 @@
-#include "base/constants.h"
-#include "scenes/generate/scenes.h"
-
 #include <charconv>
 #include <fstream>
 #include <stdexcept>
+
+#include "scenes/generate/scenes.h"
+#include "scenes/generate/shapes.h"
 
 namespace narpa::scenes {
 namespace {

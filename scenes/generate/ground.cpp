@@ -1,12 +1,43 @@
-#include "base/constants.h"
-#include "scenes/generate/scenes.h"
-
-#include <cmath>
-
+// The cratered ground of the descent, and the small body.
 #include "scenes/generate/noise.h"
+#include "scenes/generate/scenes.h"
+#include "scenes/generate/shapes.h"
 
 namespace narpa::scenes {
 namespace {
+
+constexpr int kCells = static_cast<int>(kTerrainSide);
+
+struct Crater {
+    double x, y, radius;
+};
+
+/// Ten times smaller, a hundred times as many.
+std::vector<Crater> craters() {
+    constexpr int kCount = 220;
+    constexpr double kSmallest = 3, kLargest = 40;
+    Random random(11);
+    std::vector<Crater> all;
+    for (int i = 0; i < kCount; ++i) {
+        const double part = random.uniform(std::pow(kSmallest / kLargest, 2), 1);
+        all.push_back({random.uniform(-0.5, 0.5) * kTerrainSide, random.uniform(-0.5, 0.5) * kTerrainSide,
+                       kSmallest / std::sqrt(part)});
+    }
+    return all;
+}
+
+/// A bowl with a raised rim that falls off outside; depth and rim are parts of the radius.
+double crater_height(double distance, double radius, double depth_part, double rim_part) {
+    const double r = distance / radius, depth = depth_part * radius, rim = rim_part * radius;
+    return r < 1 ? (depth + rim) * r * r - depth : rim * std::exp(-4 * (r - 1));
+}
+
+double hills(double x, double y) {
+    double sum = 0, amplitude = 13, wavelength = 110;
+    for (std::uint64_t octave = 0; octave < 6; ++octave, amplitude *= 0.47, wavelength *= 0.5)
+        sum += amplitude * value_noise(x / wavelength, y / wavelength, 400 + octave);
+    return sum;
+}
 
 constexpr Vec3 kSemiAxes{28, 20, 17};
 constexpr int kMeridians = 360, kParallels = 180;
@@ -37,12 +68,11 @@ void add_features(int count, double smallest_m, double largest_m, bool boulder, 
     }
 }
 
-/// A bowl with a raised rim that falls off outside; a boulder is half of a flattened ball.
+/// A boulder is half of a flattened ball.
 double height_m(const Feature& f, double distance_m) {
+    if (!f.boulder) return crater_height(distance_m, f.radius_m, 0.22, 0.05);
     const double r = distance_m / f.radius_m;
-    if (f.boulder) return r < 1 ? 0.7 * f.radius_m * std::sqrt(1 - r * r) : 0;
-    const double depth = 0.22 * f.radius_m, rim = 0.05 * f.radius_m;
-    return r < 1 ? (depth + rim) * r * r - depth : rim * std::exp(-4 * (r - 1));
+    return r < 1 ? 0.7 * f.radius_m * std::sqrt(1 - r * r) : 0;
 }
 
 /// Waves in directions drawn at random: no seam and no poles.
@@ -58,6 +88,33 @@ double hills_m(const Vec3& p) {
 }
 
 }  // namespace
+
+std::vector<MaterialSpec> terrain_materials() {
+    return {{"ground", {0.4, 0.4, 0.4}, {}, 1, "ground.png"}};
+}
+
+Mesh build_terrain() {
+    const auto holes = craters();
+    const auto height = [&holes](double x, double y) {
+        double z = hills(x, y);
+        for (const Crater& c : holes)
+            if (const double d = std::hypot(x - c.x, y - c.y); d < 2.5 * c.radius)
+                z += crater_height(d, c.radius, 0.3, 0.06);
+        return z;
+    };
+    Mesh mesh;
+    mesh.begin("terrain", "ground");
+    mesh.grid(
+        kCells, kCells, false,
+        [&](int i, int j) {
+            const double x = i - 0.5 * kCells, y = j - 0.5 * kCells;
+            return Vec3{x, y, height(x, y)};
+        },
+        [](int i, int j) {
+            return Uv{static_cast<double>(i) / kCells, static_cast<double>(j) / kCells};
+        });
+    return mesh;
+}
 
 std::vector<MaterialSpec> small_body_materials() {
     return {{"regolith", {0.16, 0.15, 0.14}}};

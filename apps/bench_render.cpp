@@ -19,7 +19,7 @@
 namespace narpa::cli {
 namespace {
 
-constexpr std::uint32_t kReferenceImages = 16;  // their scatter tells the reference's own noise
+constexpr std::uint32_t kReferenceImages = 16;  // their scatter is the reference's own noise
 constexpr int kDefaultSize = 64;                // px, the longer side
 
 struct RenderBenchOptions {
@@ -76,7 +76,8 @@ struct Measured {
     double reference_level = 0, reference_noise = 0, reference_seconds = 0;
 };
 
-Result<Measured> measure(const RenderBenchOptions& o, const Scene& scene, std::size_t camera, TracingThreads& threads) {
+Result<Measured> measure(const RenderBenchOptions& o, const Scene& scene, std::size_t camera,
+                         TracingThreads& threads) {
     Measured m;
     Progress progress;
     const auto pixels = static_cast<std::size_t>(scene.cameras[camera].width) *

@@ -54,9 +54,6 @@ class Parser {
 public:
     explicit Parser(CLI::App& app) : app_(&app) {}
 
-    /// For units that use CLI11 themselves.
-    operator CLI::App&() const { return *app_; }
-
     Parser subcommand(const std::string& name, const std::string& help) const;
     /// `names`: "--spp", "-o,--output", or "SCENE" for a positional argument. T: a string or number, or an optional
     /// or vector of them.

@@ -75,8 +75,7 @@ Outcome rehearse(const RehearseOptions& given) {
     }
     if (o.scenario.empty()) {
         auto shipped = shipped_scene("rehearsal/docking.toml");
-        if (!shipped)
-            return Error{"no scenario was given, and the docking that comes with narpa is not beside the program"};
+        if (!shipped) return shipped.error();
         o.scenario = *shipped;
     }
     auto scenario = rehearsal::read_scenario(o.scenario);

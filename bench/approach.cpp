@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -109,10 +108,10 @@ ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, do
 
 }  // namespace
 
-Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t camera_index, std::size_t target,
-                                              const ApproachOptions& o, TracingThreads& threads,
-                                              const std::function<void(const std::string&)>& tell,
-                                              const StopFlag& stop) {
+std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_index, std::size_t target,
+                                      const ApproachOptions& o, TracingThreads& threads,
+                                      const std::function<void(const std::string&)>& progress,
+                                      const StopFlag& stop) {
     const Camera& camera = world.scene().cameras[camera_index];
     ApproachFrames frames(world, camera, target, o);
     std::vector<ApproachRun> runs;
@@ -124,7 +123,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
     // All methods estimate from the same frames and starts.
     std::mt19937_64 random(o.seed);
     for (int k = 0; k < o.frames && !stop; ++k) {
-        tell(fmt::format("approach: frame {}/{}", k, o.frames));
+        progress(fmt::format("approach: frame {}/{}", k, o.frames));
         threads.arena.execute([&] {
             const ApproachView& view = frames.make(k, o.frames);
             const Vector6 off =
@@ -136,7 +135,7 @@ Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t ca
     for (const double deg : o.basin_trials > 0 ? o.basin : std::vector<double>{}) {
         std::vector<BasinCell> cells(methods.size(), {deg, 0, 0});
         for (int k = 0; k < o.basin_trials && !stop; ++k) {
-            tell(fmt::format("basin: {} deg, trial {}/{}", deg, k, o.basin_trials));
+            progress(fmt::format("basin: {} deg, trial {}/{}", deg, k, o.basin_trials));
             threads.arena.execute([&] {
                 const ApproachView& view =
                     frames.make_at(o.basin_range_m, static_cast<std::uint32_t>(o.frames + k));

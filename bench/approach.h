@@ -53,7 +53,7 @@ struct ApproachBand {
 };
 
 struct BasinCell {
-    double off = 0;  ///< degrees and per cent
+    double off_deg_and_percent = 0;
     int trials = 0, found = 0;
 };
 
@@ -65,13 +65,12 @@ struct ApproachRun {
 };
 
 /// `target` and the camera are of the world's scene, placed as the approach goes; other bodies stay where the scene
-/// has them at time 0. `tell` is called with each step. Returns the results so far once `stop` is
+/// has them at time 0. `progress` is called with each step. Returns the results so far once `stop` is
 /// set.
-[[nodiscard]] Result<std::vector<ApproachRun>> run_approach(const World& world, std::size_t camera,
-                                                            std::size_t target, const ApproachOptions& options,
-                                                            TracingThreads& threads,
-                                                            const std::function<void(const std::string&)>& tell,
-                                                            const StopFlag& stop);
+[[nodiscard]] std::vector<ApproachRun> run_approach(const World& world, std::size_t camera, std::size_t target,
+                                                    const ApproachOptions& options, TracingThreads& threads,
+                                                    const std::function<void(const std::string&)>& progress,
+                                                    const StopFlag& stop);
 
 [[nodiscard]] nlohmann::json to_json(const ApproachRun& run);
 /// A table for people.

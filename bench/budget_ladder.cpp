@@ -7,7 +7,7 @@
 #include <ctime>
 #include <memory>
 
-#include "emulator/clock.h"
+#include "base/time.h"
 #include "renderer/camera/detector.h"
 
 namespace narpa {
@@ -65,10 +65,6 @@ double cpu_s() {
     ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
-double seconds_since(std::int64_t start_ns) {
-    return static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
-}
-
 void expose(View& v, const FrameSettings& s) {
     const std::int64_t start_ns = monotonic_ns();
     v.threads.arena.execute([&] { expose(v.camera, v.image, s.seed, s.frame, v.bytes); });

@@ -35,6 +35,24 @@ std::string name_of(EstimateMethod m) {
 
 }  // namespace
 
+// JSON keys are the members' names. Infinity becomes null.
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PnpRow, method, trials, rotation_median_bounds, rotation_rms_bounds,
+                                   position_median_bounds, position_rms_bounds, failed, flagged, median_us)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PnpCell, name, points, noise_px, range_m, outliers, bound_rotation_deg,
+                                   bound_position_of_range, rows)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PnpVerdict, worst_rms_bounds, cells_with_more_failures, cold_time_ratio,
+                                   warm_time_ratio, outlier_time_ratio)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ApproachBand, from_m, to_m, frames, found, wrong, rotation_rms_rad,
+                                   position_rms_m, rotation_of_bound, position_of_bound, nees_median, ms_median,
+                                   renders_mean)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BasinCell, off_deg_and_percent, trials, found)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ApproachFrame, range_m, found, claimed, rotation_rad, position_m,
+                                   bound_rotation_rad, bound_position_m, nees, ms, renders)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StereoCounts, accepted, cut_off, unlike, ambiguous, inconsistent, unsettled,
+                                   off_line, without_depth)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FilterTime, t_s, nees, position_rms_m, position_sigma_m, attitude_rms_rad,
+                                   attitude_sigma_rad)
+
 // Poses from points
 
 std::string in_words(const std::vector<PnpCell>& cells) {
@@ -46,11 +64,11 @@ std::string in_words(const std::vector<PnpCell>& cells) {
         out += fmt::format("{}, {} points, {:g} px, {:g} m{}: bound {:.3g} deg, {:.3g} % of the range\n", cell.name,
                            cell.points, cell.noise_px, cell.range_m,
                            cell.outliers > 0 ? fmt::format(", {:g} % outliers", 100 * cell.outliers) : "",
-                           cell.bound_rotation_deg, 100 * cell.bound_position);
+                           cell.bound_rotation_deg, 100 * cell.bound_position_of_range);
         for (const PnpRow& r : cell.rows)
             out += fmt::format("  {:<22} {:>6.2f} {:>6.2f} {:>6.2f} {:>6.2f} {:>9.2f} {:>9.0f} {:>9.1f}\n",
-                               r.method, r.rotation_median, r.rotation_rms, r.position_median, r.position_rms,
-                               100 * r.failed, 100 * r.flagged, r.median_us);
+                               r.method, r.rotation_median_bounds, r.rotation_rms_bounds, r.position_median_bounds,
+                               r.position_rms_bounds, 100 * r.failed, 100 * r.flagged, r.median_us);
     }
     return out;
 }
@@ -60,73 +78,22 @@ std::string in_words(const PnpVerdict& v) {
         "points: worst RMS {:.3f} bounds from ten points up; {} cells with more failures than {}; time: cold "
         "{:.2f} "
         "of {}, warm {:.2f} of {}, outliers {:.2f} of {}\n",
-        v.worst_rms, v.more_failures, kPnpPeerCold, v.cold_time_ratio, kPnpPeerCold, v.warm_time_ratio,
-        kPnpPeerWarm, v.outlier_time_ratio, kPnpPeerOutliers);
+        v.worst_rms_bounds, v.cells_with_more_failures, kPnpPeerCold, v.cold_time_ratio, kPnpPeerCold,
+        v.warm_time_ratio, kPnpPeerWarm, v.outlier_time_ratio, kPnpPeerOutliers);
 }
 
 json to_json(const std::vector<PnpCell>& cells) {
-    json all = json::array();
-    for (const PnpCell& cell : cells) {
-        json rows = json::array();
-        for (const PnpRow& r : cell.rows)
-            rows.push_back({{"method", r.method},
-                            {"trials", r.trials},
-                            {"rotation_median_bounds", r.rotation_median},
-                            {"rotation_rms_bounds", r.rotation_rms},
-                            {"position_median_bounds", r.position_median},
-                            {"position_rms_bounds", r.position_rms},
-                            {"failed", r.failed},
-                            {"flagged", r.flagged},
-                            {"median_us", r.median_us}});
-        all.push_back({{"name", cell.name},
-                       {"points", cell.points},
-                       {"noise_px", cell.noise_px},
-                       {"range_m", cell.range_m},
-                       {"outliers", cell.outliers},
-                       {"bound_rotation_deg", cell.bound_rotation_deg},
-                       {"bound_position_of_range", cell.bound_position},
-                       {"rows", rows}});
-    }
-    return all;
+    return json(cells);
 }
 
 json to_json(const PnpVerdict& v) {
-    return {{"worst_rms_bounds", v.worst_rms},
-            {"cells_with_more_failures", v.more_failures},
-            {"cold_time_ratio", v.cold_time_ratio},
-            {"warm_time_ratio", v.warm_time_ratio},
-            {"outlier_time_ratio", v.outlier_time_ratio}};
+    return json(v);
 }
 
 // Approach
 
 json to_json(const ApproachRun& run) {
-    json bands = json::array(), basin = bands, frames = bands;
-    for (const ApproachBand& b : run.bands)
-        bands.push_back({{"from_m", std::isfinite(b.from_m) ? json(b.from_m) : json(nullptr)},
-                         {"to_m", b.to_m},
-                         {"frames", b.frames},
-                         {"found", b.found},
-                         {"wrong", b.wrong},
-                         {"rotation_rms_rad", b.rotation_rms_rad},
-                         {"position_rms_m", b.position_rms_m},
-                         {"rotation_of_bound", b.rotation_of_bound},
-                         {"position_of_bound", b.position_of_bound},
-                         {"nees_median", b.nees_median},
-                         {"ms_median", b.ms_median},
-                         {"renders_mean", b.renders_mean}});
-    for (const BasinCell& c : run.basin)
-        basin.push_back({{"off_deg_and_percent", c.off}, {"trials", c.trials}, {"found", c.found}});
-    for (const ApproachFrame& f : run.frames)
-        frames.push_back({{"range_m", f.range_m},
-                          {"found", f.found},
-                          {"rotation_rad", f.rotation_rad},
-                          {"position_m", f.position_m},
-                          {"bound_rotation_rad", f.bound_rotation_rad},
-                          {"bound_position_m", f.bound_position_m},
-                          {"nees", f.nees},
-                          {"ms", f.ms}});
-    return {{"method", name_of(run.method)}, {"bands", bands}, {"basin", basin}, {"frames", frames}};
+    return {{"method", name_of(run.method)}, {"bands", run.bands}, {"basin", run.basin}, {"frames", run.frames}};
 }
 
 std::string in_words(const std::vector<ApproachRun>& runs) {
@@ -148,7 +115,8 @@ std::string in_words(const std::vector<ApproachRun>& runs) {
         }
         if (run.basin.empty()) continue;
         out += fmt::format("{:<10} found from starts off by", name_of(run.method));
-        for (const BasinCell& c : run.basin) out += fmt::format("  {:g}: {}/{}", c.off, c.found, c.trials);
+        for (const BasinCell& c : run.basin)
+            out += fmt::format("  {:g}: {}/{}", c.off_deg_and_percent, c.found, c.trials);
         out += " (degrees and % of the range)\n";
     }
     return out;
@@ -170,15 +138,7 @@ json to_json(const StereoBench& bench) {
             at["absolute_m"] = to_json(bench.errors(fine, axis, false));
             at["over_range"] = to_json(bench.errors(fine, axis, true));
         }
-    const StereoCounts& n = bench.counts;
-    out["corners"] = {{"accepted", n.accepted},
-                      {"cut_off", n.cut_off},
-                      {"unlike", n.unlike},
-                      {"ambiguous", n.ambiguous},
-                      {"inconsistent", n.inconsistent},
-                      {"unsettled", n.unsettled},
-                      {"off_line", n.off_line},
-                      {"without_depth", n.without_depth}};
+    out["corners"] = bench.counts;
     return out;
 }
 
@@ -239,14 +199,6 @@ std::string in_words(const std::vector<IcpRun>& runs) {
 // Filter
 
 json to_json(const FilterRun& r) {
-    json times = json::array();
-    for (const FilterTime& t : r.times)
-        times.push_back({{"t_s", t.t_s},
-                         {"nees", t.nees},
-                         {"position_rms_m", t.position_rms_m},
-                         {"position_sigma_m", t.position_sigma_m},
-                         {"attitude_rms_rad", t.attitude_rms_rad},
-                         {"attitude_sigma_rad", t.attitude_sigma_rad}});
     return {{"name", r.name},
             {"runs", r.runs},
             {"nees", r.nees()},
@@ -256,7 +208,7 @@ json to_json(const FilterRun& r) {
             {"updates", r.updates},
             {"gated", r.gated},
             {"update_microseconds", r.update_microseconds},
-            {"times", times}};
+            {"times", r.times}};
 }
 
 std::string in_words(const std::vector<FilterRun>& runs) {

@@ -51,9 +51,8 @@ struct FilterRun {
     [[nodiscard]] double inside_band() const;  ///< part of the times
 };
 
-/// Errors: no runs or no time.
-[[nodiscard]] Result<std::vector<FilterRun>> run_filter(const std::vector<FilterCase>& cases,
-                                                        const FilterBenchSettings& settings);
+[[nodiscard]] std::vector<FilterRun> run_filter(const std::vector<FilterCase>& cases,
+                                                const FilterBenchSettings& settings);
 
 [[nodiscard]] nlohmann::json to_json(const FilterRun& run);
 /// A table, a line for each case.

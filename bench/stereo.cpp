@@ -129,11 +129,11 @@ double StereoBench::mean_epipolar_squared() const {
 }
 
 Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings& settings,
-                                   const std::function<void(const std::string&)>& tell) {
+                                   const std::function<void(const std::string&)>& progress) {
     const Camera *left = find_camera(scene, "left"), *right = find_camera(scene, "right");
     if (!left || !right)
         return Error{"no stereo pair, expected two cameras with the names left and right", scene.file};
-    tell("building");
+    progress("building");
     const auto world = World::create(scene);
     if (!world) return world.error();
     BodyPoses at(scene.bodies.size());
@@ -151,15 +151,15 @@ Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings
         return Error{"the middle of the left frame sees no surface, expected ground to measure from", scene.file};
 
     const auto start = std::chrono::steady_clock::now();
-    tell("left frame");
+    progress("left frame");
     auto left_frame = l.frame(settings, 2 * settings.frame);
     if (!left_frame) return left_frame.error();
-    tell("right frame");
+    progress("right frame");
     const auto right_frame = r.frame(settings, 2 * settings.frame + 1);
     if (!right_frame) return right_frame.error();
     out.render_s = seconds_since(start);
 
-    tell("matching");
+    progress("matching");
     StereoSettings s;
     s.points_max = settings.points;
     s.nearest_m = settings.nearest_part * middle->z(), s.farthest_m = settings.farthest_part * middle->z();

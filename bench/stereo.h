@@ -63,11 +63,11 @@ struct StereoBench {
     [[nodiscard]] double mean_epipolar_squared() const;
 };
 
-/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches them. `tell` is
-/// called with each step. Errors: no such cameras; no surface in the middle of the left frame; what match_stereo
+/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches them. `progress`
+/// is called with each step. Errors: no such cameras; no surface in the middle of the left frame; what match_stereo
 /// says; a match whose left pixel sees no surface.
 [[nodiscard]] Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings& settings,
-                                                 const std::function<void(const std::string&)>& tell);
+                                                 const std::function<void(const std::string&)>& progress);
 
 /// What is wrong, one sentence each: fewer points than this, a gain below 5, errors that are not as predicted
 /// (means off 1 by a factor of 1.5 and beyond three standard errors). Empty: nothing.

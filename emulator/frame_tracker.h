@@ -13,7 +13,7 @@
 
 #include "base/result.h"
 #include "emulator/world.h"
-#include "estimator/filter/pose_tracker.h"
+#include "estimator/filter/pose_filter.h"
 #include "protocols/estimate.h"
 
 namespace narpa {

@@ -49,26 +49,6 @@ Status check(const Rigid3& T, const SweepMotion& motion) {
 
 }  // namespace
 
-Status check(const IcpSettings& s) {
-    const auto wrong = [](const char* name, double value, const char* expected) {
-        return Error{std::string(name) + " = " + std::to_string(value) + ": expected " + expected};
-    };
-    if (!(s.noise.range_m > 0 && std::isfinite(s.noise.range_m)))
-        return wrong("noise.range_m", s.noise.range_m, "a standard deviation > 0 m");
-    if (!(s.noise.pointing_rad >= 0 && std::isfinite(s.noise.pointing_rad)))
-        return wrong("noise.pointing_rad", s.noise.pointing_rad, "a standard deviation >= 0 rad");
-    if (s.search_points < kFewestBeams) return wrong("search_points", static_cast<double>(s.search_points), ">= 6");
-    if (s.search_iterations < 2) return wrong("search_iterations", s.search_iterations, ">= 2");
-    if (s.iterations < 1) return wrong("iterations", s.iterations, ">= 1");
-    if (!(s.grazing_cosine > 0 && s.grazing_cosine < 1)) return wrong("grazing_cosine", s.grazing_cosine, "0 to 1");
-    if (!(s.unobserved_below > 0 && s.unobserved_below < 1))
-        return wrong("unobserved_below", s.unobserved_below, "0 to 1");
-    if (!(s.settled >= 0)) return wrong("settled", s.settled, ">= 0");
-    if (!(s.explained_least >= 0 && s.explained_least <= 1))
-        return wrong("explained_least", s.explained_least, "0 to 1");
-    return Ok{};
-}
-
 struct CloudIcp::Pass {
     Matrix6 hessian = Matrix6::Zero();            ///< sum of weight * J J' / sigma^2
     Vector6 gradient = Vector6::Zero();           ///< -sum of weight * J distance / sigma^2
@@ -92,7 +72,7 @@ double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
     return std::max(1.0, std::pow(correction * pass.scatter / slope, 2) * mean_square);
 }
 
-CloudIcp::Pass CloudIcp::look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
+CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
     association_.associate(T, settings_.noise, settings_.grazing_cosine, search_m, stride, planes_);
     Pass pass;
     magnitudes_.clear();
@@ -150,7 +130,7 @@ Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points
     const double narrower = std::pow(kLastCircle, 1.0 / (circles - 1));
     Rigid3 T = start;
     for (int i = 0; i < circles; ++i, search_m *= narrower) {
-        const Pass pass = look(T, search_m, stride, out);
+        const Pass pass = linearise(T, search_m, stride, out);
         if (!pass.enough) break;
         T = displaced(T, out.observability.solve(pass.hessian, pass.gradient));
         ++out.iterations;
@@ -164,7 +144,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     Vector6 last = Vector6::Zero();
     double damping = 1;
     for (int i = 0;; ++i) {
-        const Pass pass = look(T, 0, 1, out);
+        const Pass pass = linearise(T, 0, 1, out);
         if (!pass.enough) break;
         if (out.settled || i == settings_.iterations) {
             out.bound = out.observability.covariance(pass.information, 1);
@@ -184,14 +164,6 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     out.credible = out.settled && static_cast<double>(out.explained) >=
                                       settings_.explained_least * static_cast<double>(out.points);
     return out;
-}
-
-Result<CloudIcp> CloudIcp::create(const Tracer& tracer, std::size_t target, const IcpSettings& settings) {
-    if (target >= tracer.scene().bodies.size())
-        return Error{"no body " + std::to_string(target) + ", the scene has " +
-                     std::to_string(tracer.scene().bodies.size())};
-    if (auto good = check(settings); !good) return good.error();
-    return CloudIcp(tracer, target, settings);
 }
 
 Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const SweepMotion& motion,

@@ -28,8 +28,6 @@ struct IcpSettings {
     /// repeated with four times the points.
     double explained_least = 0.9;
 };
-/// An Error names the setting, what it is and what was expected.
-[[nodiscard]] Status check(const IcpSettings& settings);
 
 struct CloudEstimate {
     Rigid3 T_lidar_target{};
@@ -51,8 +49,9 @@ struct CloudEstimate {
 
 class CloudIcp {
 public:
-    /// `tracer` outlives it. `target`: index of the body whose pose is estimated. Errors: no such body, settings.
-    static Result<CloudIcp> create(const Tracer& tracer, std::size_t target, const IcpSettings& settings);
+    /// `tracer` outlives it. `target`: index of the body whose pose is estimated.
+    CloudIcp(const Tracer& tracer, std::size_t target, const IcpSettings& settings = {})
+        : settings_(settings), association_(tracer, target) {}
 
     /// `search_m`: bound of the error of surfaces at the start, about distance * angle + shift; 0: no search around
     /// the beams. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
@@ -62,11 +61,9 @@ public:
                                               const Rigid3& start, double search_m = 0);
 
 private:
-    CloudIcp(const Tracer& tracer, std::size_t target, const IcpSettings& settings)
-        : settings_(settings), association_(tracer, target) {}
     struct Pass;  ///< sums over the points at one pose
     [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
-    [[nodiscard]] Pass look(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
+    [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
     [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,
                                 CloudEstimate& out);

@@ -1,7 +1,12 @@
 /// estimator/cloud/range_points.h - a LiDAR's sweep as measurements.
 #pragma once
 
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "base/pose.h"
+#include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
 
@@ -29,5 +34,14 @@ struct RangeNoise {
     double range_m = 0.02;         ///< including the rounding in the packet: resolution / sqrt(12)
     double pointing_rad = 5.1e-5;  ///< of the beam's direction: an azimuth rounded to 0.01 deg
 };
+
+/// Appends a packet's decoded returns to `out`. `packet_after_ns`: time of the packet's first shot after the time
+/// of the pose.
+inline void append_points(std::span<const LidarPoint> packet, std::int64_t packet_after_ns,
+                          std::vector<RangePoint>& out) {
+    for (const LidarPoint& p : packet)
+        out.push_back(
+            {p.origin_m, p.direction, p.range_m, 1e-9 * static_cast<double>(packet_after_ns + p.t_offset_ns)});
+}
 
 }  // namespace narpa

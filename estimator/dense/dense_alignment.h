@@ -34,8 +34,6 @@ struct DenseOptions {
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
 };
-/// Errors name the field, what it is and what it may be.
-[[nodiscard]] Status check(const DenseOptions& options);
 
 enum class DenseStatus : std::uint8_t {
     converged,

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "base/constants.h"
-#include "estimator/dense/pixel_patch.h"
+#include "estimator/view/measured_image.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/camera_model.h"
+#include "renderer/film/camera_batch.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
 
@@ -36,6 +38,108 @@ bool depends_on_view(const Material& m) {
     return m.kind != Material::Kind::phong || m.specular != Rgb{};
 }
 
+Camera finer_camera(const Camera& camera, int factor) {
+    Camera c = scaled(camera, factor, factor);
+    c.lens.reset();
+    return c;
+}
+
+FrameSettings one_ray(FrameSettings settings) {
+    settings.spp = 1;
+    settings.budget = {};
+    return settings;
+}
+
+/// DN above black of this radiance, not clipped.
+double signal_of(const SensorModel& sensor, const Rgb& L) {
+    const auto& k = sensor.dn_per_radiance;
+    return k[0] * static_cast<double>(L.x) + k[1] * static_cast<double>(L.y) + k[2] * static_cast<double>(L.z);
+}
+
+/// A camera with fineness x fineness pixels for each pixel of another.
+struct FineGrid {
+    /// All but `pixels` outlive it.
+    FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& pixels,
+             const Rigid3& T_world_camera, const FrameSettings& for_all, int factor)
+        : fineness(factor),
+          camera(finer_camera(pixels, factor)),
+          settings(one_ray(for_all)),
+          frame(make_frame(render_scene, at, camera, T_world_camera, settings)) {}
+    FineGrid(const FineGrid&) = delete;
+    FineGrid& operator=(const FineGrid&) = delete;
+
+    const int fineness;
+    const Camera camera;
+    const FrameSettings settings;
+    const Frame frame;
+};
+
+/// The first hit of one ray. None: body -1, infinite range.
+struct RaySample {
+    double signal = 0;  ///< DN above black
+    int body = -1;
+    double range_m = 0;                          ///< along the ray
+    Vec3 position{}, normal{}, ray_direction{};  ///< world
+};
+
+class PixelPatch {
+public:
+    /// Traces a pixel and the ring of grid points around it, without the ring's corners.
+    void trace(const FineGrid& grid, const SensorModel& sensor, int x, int y) {
+        const int s = grid.fineness;
+        const Frame& f = grid.frame;
+        side_ = s + 2;
+        points_.resize(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
+        sees_anything_ = false;
+        CameraBatch p;
+        CameraSamples samples;
+        samples.centre = true;
+        samples.sample.fill(0);
+        Lanes<std::size_t> place;
+        const auto trace = [&] {
+            RgbLanes radiance;
+            trace_rays(f, samples, f.tracer.all_bodies(), p);
+            f.integrator.radiance(f, p, radiance);
+            for (std::size_t i = 0; i < samples.n; ++i) {
+                RaySample& seen = points_[place[i]];
+                seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
+                if (p.hits.body[i] < 0) continue;
+                sees_anything_ = true;
+                seen.body = p.hits.body[i];
+                seen.range_m = p.hits.range_m[i];
+                seen.position = p.hits.position[i];
+                seen.normal = p.hits.geometric_normal[i];
+            }
+            samples.n = 0;
+        };
+        for (int j = -1; j <= s; ++j)
+            for (int i = -1; i <= s; ++i) {
+                if ((i == -1 || i == s) && (j == -1 || j == s)) continue;
+                const int fine_x = x * s + i, fine_y = y * s + j;
+                samples.x[samples.n] = fine_x, samples.y[samples.n] = fine_y;
+                samples.number[samples.n] =
+                    static_cast<std::uint32_t>(fine_y) * static_cast<std::uint32_t>(grid.camera.width) +
+                    static_cast<std::uint32_t>(fine_x);
+                place[samples.n++] = static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
+                                     static_cast<std::size_t>(i + 1);
+                if (samples.n == kLanes) trace();
+            }
+        if (samples.n > 0) trace();
+    }
+
+    /// Point (i, j) of the pixel's own, 0 .. fineness - 1, or of the ring, -1 and fineness.
+    [[nodiscard]] const RaySample& at(int i, int j) const {
+        return points_[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
+                       static_cast<std::size_t>(i + 1)];
+    }
+    [[nodiscard]] bool sees_anything() const noexcept { return sees_anything_; }
+
+private:
+    int side_ = 0;
+    bool sees_anything_ = false;
+    std::vector<RaySample> points_;
+};
+
 /// The first two terms of one pixel, on one grid.
 class PixelSides {
 public:
@@ -44,20 +148,42 @@ public:
 
     /// Sum over the sides within the pixel and its share of those on its border.
     Row sum() {
-        const int s = grid_.fineness();
+        const int s = grid_.fineness;
         for (int j = 0; j < s; ++j)
             for (int i = -1; i < s; ++i) {
                 add(i, j, i + 1, j);
                 add(j, i, j, i + 1);
             }
+        add_contours();
         return sum_ / (static_cast<double>(s) * s);
     }
     /// Total variation of the signal across the pixel, DN; after `sum`.
-    [[nodiscard]] double change() const { return jumps_ / grid_.fineness(); }
+    [[nodiscard]] double change() const { return jumps_ / grid_.fineness; }
 
 private:
+    /// From the sample on the nearer surface to its neighbour, grid points.
+    struct Side {
+        double x, y, dx, dy;
+        double jump;  ///< DN, left or upper minus right or lower sample
+    };
+    struct Contour {
+        Side side;
+        const RaySample* far;
+        double range_m;  ///< of the nearer surface
+        bool near_within, far_within;
+        double on_near = 0, on_far = 1;
+
+        [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
+        void halve(int body, double here_m) {
+            if (body >= 0 && (body != far->body || std::abs(here_m - range_m) < std::abs(here_m - far->range_m)))
+                on_near = middle(), range_m = here_m;
+            else
+                on_far = middle();
+        }
+    };
+
     [[nodiscard]] bool within(int i, int j) const {
-        return i >= 0 && j >= 0 && i < grid_.fineness() && j < grid_.fineness();
+        return i >= 0 && j >= 0 && i < grid_.fineness && j < grid_.fineness;
     }
 
     /// The side between a and b, its neighbour to the right or below.
@@ -66,19 +192,47 @@ private:
         const double jump = a.signal - b.signal;
         if (jump == 0) return;
         jumps_ += std::abs(jump);
-        const RaySample& near = a.range_m <= b.range_m ? a : b;
-        const bool rides_along = near.body >= 0 && near.body == grid_.camera().mount;
-        if (near.body < 0 || rides_along) return;
-        double along = 0.5, range_m = near.range_m;
+        const bool near_is_a = a.range_m <= b.range_m;
+        const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
+        if (near.body < 0 || near.body == grid_.camera.mount) return;
+        const double s = grid_.fineness, to_far = near_is_a ? 1 : -1;
+        const Side side{x_ * s + (near_is_a ? ia : ib), y_ * s + (near_is_a ? ja : jb), to_far * (ib - ia),
+                        to_far * (jb - ja), jump};
         // A side on the border counts half for this pixel, except a contour, whose position is known.
-        double share = 0.5 * (within(ia, ja) ? 1 : 0) + 0.5 * (within(ib, jb) ? 1 : 0);
-        const double xa = x_ * grid_.fineness() + ia, ya = y_ * grid_.fineness() + ja;
-        const double dx = ib - ia, dy = jb - ja;
-        if (is_contour(a, b)) {
-            find_contour(a, b, xa, ya, dx, dy, along, range_m);
-            share = (along < 0.5 ? within(ia, ja) : within(ib, jb)) ? 1 : 0;
+        if (is_contour(a, b))
+            contours_.push_back({side, &far, near.range_m, within(near_is_a ? ia : ib, near_is_a ? ja : jb),
+                                 within(near_is_a ? ib : ia, near_is_a ? jb : ja)});
+        else
+            add(side, 0.5, near.range_m, 0.5 * within(ia, ja) + 0.5 * within(ib, jb));
+    }
+
+    /// `along`: where between the nearer sample, 0, and the other, 1, the edge lies.
+    void add(const Side& side, double along, double range_m, double share) {
+        sum_ +=
+            share * side.jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
+    }
+
+    /// Bisects contours side by side: where between two samples the nearer surface ends, and its range there.
+    void add_contours() {
+        const Frame& f = grid_.frame;
+        RayBatch rays;
+        HitBatch hits;
+        for (std::size_t first = 0; first < contours_.size(); first += kLanes) {
+            rays.n = std::min(kLanes, contours_.size() - first);
+            const std::span<Contour> batch(&contours_[first], rays.n);
+            for (int k = 0; k < kHalvings; ++k) {
+                for (std::size_t i = 0; i < batch.size(); ++i) {
+                    const Contour& c = batch[i];
+                    rays.put(i, camera_ray(f.model, f.T_world_camera, c.side.x + c.middle() * c.side.dx,
+                                           c.side.y + c.middle() * c.side.dy));
+                }
+                f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
+                for (std::size_t i = 0; i < batch.size(); ++i) batch[i].halve(hits.body[i], hits.range_m[i]);
+            }
+            for (const Contour& c : batch)
+                add(c.side, c.middle(), c.range_m, (c.middle() < 0.5 ? c.near_within : c.far_within) ? 1 : 0);
         }
-        if (share > 0) sum_ += share * jump * velocity(xa + along * dx, ya + along * dy, range_m, dy == 0);
+        contours_.clear();
     }
 
     /// True where the two are not neighbouring points of one surface, by the slopes from their normals.
@@ -91,33 +245,9 @@ private:
         return norm(a.position - b.position) > kSurfaceSteps * step_m;
     }
 
-    /// Where between a at (xa, ya), 0, and b at (xa + dx, ya + dy), 1, the nearer surface ends, and its range
-    /// there.
-    void find_contour(const RaySample& a, const RaySample& b, double xa, double ya, double dx, double dy,
-                      double& along, double& range_m) const {
-        const bool near_is_a = a.range_m <= b.range_m;
-        const RaySample& far = near_is_a ? b : a;
-        double on_near = near_is_a ? 0 : 1, on_far = 1 - on_near;
-        const Frame& f = grid_.frame();
-        for (int k = 0; k < kHalvings; ++k) {
-            const double middle = 0.5 * (on_near + on_far);
-            const Ray ray = camera_ray(f.model, f.T_world_camera, xa + middle * dx, ya + middle * dy);
-            const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-            const double here_m = hit.body < 0 ? kInfinity : hit.range_m;
-            const bool nearer = std::abs(here_m - range_m) < std::abs(here_m - far.range_m);
-            if (hit.body >= 0 && (hit.body != far.body || nearer)) {
-                on_near = middle;
-                range_m = here_m;
-            } else {
-                on_far = middle;
-            }
-        }
-        along = 0.5 * (on_near + on_far);
-    }
-
     /// Image velocity across a side at this point of the grid: grid points per unit of the pose's error.
     [[nodiscard]] Row velocity(double x, double y, double range_m, bool horizontal) const {
-        const CameraModel& model = *grid_.frame().model;
+        const CameraModel& model = *grid_.frame.model;
         const Vec3 point = range_m * model.direction({x, y});
         const Vec3 a = point - t_camera_target_;  // about the target's origin, in camera axes
         const ProjectionJacobian J = model.jacobian(point);
@@ -132,6 +262,7 @@ private:
     const int x_, y_;
     const Vec3 t_camera_target_;
     Row sum_ = Row::Zero();
+    std::vector<Contour> contours_;
     double jumps_ = 0;
 };
 

@@ -177,7 +177,7 @@ Result<Matrix6> LevelSolver::bound() {
     images.signal_variance = {};
     const auto all = equations(images, sensor_, {}, o_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
     const Matrix6 information = all.pose_information();
-    if (!is_observable(information)) return Error{"too few pixels tell of the target to say all of its pose"};
+    if (!is_observable(information)) return Error{"too few pixels show the target to determine its pose"};
     return Matrix6(information.inverse());
 }
 

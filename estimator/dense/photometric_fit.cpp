@@ -20,7 +20,7 @@ double precision(double sigma) {
 struct Residual {
     double r = 0;          ///< in units of s
     double inverse_s = 0;  ///< 1 / DN
-    bool counts = false, tells = false;
+    bool counts = false, shows_target = false;
 };
 
 class Residuals {
@@ -44,7 +44,7 @@ public:
         if (!out.counts) return out;
         out.inverse_s = 1 / std::sqrt(variance);
         out.r = (measured - expected) * out.inverse_s;
-        out.tells = signal > 0 || (!i_.derivative.empty() && !i_.derivative[p].isZero(0));
+        out.shows_target = signal > 0 || (!i_.derivative.empty() && !i_.derivative[p].isZero(0));
         return out;
     }
     /// The outermost pixels have no Jacobian.
@@ -102,7 +102,7 @@ double residual_scale(const PhotometricImages& images, const SensorModel& sensor
     std::vector<float> size;
     for (int y = 1; y < images.height - 1; ++y)
         residuals.each(y, [&](const Residual& r, std::size_t) {
-            if (r.tells) size.push_back(static_cast<float>(std::abs(r.r)));
+            if (r.shows_target) size.push_back(static_cast<float>(std::abs(r.r)));
         });
     if (size.empty()) return 1;
     const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
@@ -150,7 +150,7 @@ PhotometricCost cost(const PhotometricImages& images, const SensorModel& sensor,
         residuals.each(y, [&](const Residual& r, std::size_t) {
             const double square = r.r * r.r;
             row.robust += std::isfinite(k) ? k * k * std::log1p(square / (k * k)) : square;
-            if (!r.tells) return;
+            if (!r.shows_target) return;
             row.chi2 += square;
             ++row.pixels;
         });

@@ -3,21 +3,18 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 
 #include "base/constants.h"
 #include "base/time.h"
-#include "estimator/features/flow_noise.h"
-#include "estimator/pose/reprojection.h"
+#include "estimator/features/feature_matcher.h"
+#include "estimator/pose/pnp_points.h"
 
 namespace narpa {
 namespace {
 
 /// Half the window over which a match's noise is summed: that of the optical flow.
 constexpr int kHalfWindow_px = 10;
-/// Standard deviation of a descriptor's position: measured, 0.15 to 0.4 px.
-constexpr double kDescriptor_px = 0.3;
 /// A match whose residual exceeds this many times the median is an outlier.
 constexpr double kOutlier = 4;
 /// Median of the length of a residual of unit variance in u and in v: Rayleigh's.
@@ -144,38 +141,42 @@ struct FeatureAlignment::Points {
 
 FeatureAlignment::FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                    const BodyPoses& at, const FeatureSettings& settings)
-    : view_(render_scene, camera, target, at),
-      sensor_(sensor_model(camera)),
-      settings_(settings),
-      matcher_(settings.kind, settings.features) {}
+    : view_(render_scene, camera, target, at), sensor_(sensor_model(camera)), settings_(settings) {}
 
-bool FeatureAlignment::on_smooth_surface(double u, double v, const Hit& hit) const {
+/// The rays of lanes 1 to 4 meet the surface that lane 0 meets.
+bool FeatureAlignment::on_smooth_surface(const HitBatch& hits) const {
+    const Hit hit = hits[0];
     const double step_m = kStep_px * hit.range_m / CameraModelHandle(view_.camera())->pixels_per_radian();
-    constexpr std::array<std::array<double, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
-    return std::all_of(kAround.begin(), kAround.end(), [&](const std::array<double, 2>& d) {
-        const Hit beside = view_.trace_pixel(u + kNeighbour_px * d[0], v + kNeighbour_px * d[1]);
-        if (beside.body != hit.body) return false;
-        const Vec3 between = beside.position - hit.position;
-        const double off_plane =
-            std::min(std::abs(dot(between, hit.geometric_normal)), std::abs(dot(between, beside.geometric_normal)));
-        return off_plane < step_m;
-    });
+    for (std::size_t i = 1; i < 5; ++i) {
+        if (hits.body[i] != hit.body) return false;
+        const Vec3 between = hits.position[i] - hit.position;
+        if (std::min(std::abs(dot(between, hit.geometric_normal)),
+                     std::abs(dot(between, hits.geometric_normal[i]))) >= step_m)
+            return false;
+    }
+    return true;
 }
 
-/// Where features are looked for: blocks of pixels whose middle shows the target.
+/// Where features are looked for: blocks of pixels whose centre shows the target.
 void FeatureAlignment::find_target() {
-    const Camera& camera = view_.camera();
-    const auto width = static_cast<std::size_t>(camera.width);
-    on_target_.assign(width * static_cast<std::size_t>(camera.height), 0);
-    for (int v0 = 0; v0 < camera.height; v0 += kBlock_px)
-        for (int u0 = 0; u0 < camera.width; u0 += kBlock_px) {
-            const double middle = 0.5 * (kBlock_px - 1);
-            if (view_.trace_pixel(u0 + middle, v0 + middle).body != static_cast<int>(view_.target())) continue;
-            const int u1 = std::min(u0 + kBlock_px, camera.width), v1 = std::min(v0 + kBlock_px, camera.height);
-            for (int v = v0; v < v1; ++v)
-                std::fill(&on_target_[static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u0)],
-                          &on_target_[static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u1 - 1)] + 1,
-                          std::uint8_t{255});
+    const int width = view_.camera().width, height = view_.camera().height;
+    constexpr double kCentre = 0.5 * (kBlock_px - 1);
+    const int across = (width + kBlock_px - 1) / kBlock_px;
+    on_target_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0);
+    std::array<ImagePoint, kLanes> centres;
+    HitBatch hits;
+    for (int v0 = 0; v0 < height; v0 += kBlock_px)
+        for (int first = 0; first < across; first += static_cast<int>(kLanes)) {
+            const int n = std::min(static_cast<int>(kLanes), across - first);
+            for (int i = 0; i < n; ++i)
+                centres[static_cast<std::size_t>(i)] = {(first + i) * kBlock_px + kCentre, v0 + kCentre};
+            view_.trace_pixels(std::span(centres).first(static_cast<std::size_t>(n)), hits);
+            for (int i = 0; i < n; ++i) {
+                if (hits.body[static_cast<std::size_t>(i)] != static_cast<int>(view_.target())) continue;
+                const int u0 = (first + i) * kBlock_px, u1 = std::min(u0 + kBlock_px, width);
+                for (int v = v0; v < std::min(v0 + kBlock_px, height); ++v)
+                    std::fill_n(on_target_.begin() + std::ptrdiff_t{v} * width + u0, u1 - u0, std::uint8_t{255});
+            }
         }
 }
 
@@ -191,21 +192,23 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
         const auto pixels = static_cast<std::size_t>(frame.height) * static_cast<std::size_t>(frame.width);
         toned_view.pixels.resize(pixels), on_target_.resize(pixels);
     }
-    const std::vector<FeatureMatch> matches = matcher_.match(toned_view, toned_frame, on_target_);
     const Rigid3 T_target_world = inverse(view_.T_world_target());
-    for (const FeatureMatch& m : matches) {
-        const Hit hit = view_.trace_pixel(m.view_u, m.view_v);
-        if (hit.body != target || !on_smooth_surface(m.view_u, m.view_v, hit)) continue;
-        PixelCovariance noise{kDescriptor_px * kDescriptor_px, 0, kDescriptor_px * kDescriptor_px};
-        if (settings_.kind == FeatureKind::corners) {
-            const Eigen::Matrix2d C =
-                flow_covariance(toned_frame, tones.variance(), m.frame_u, m.frame_v, kHalfWindow_px);
-            if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;
-            noise = {C(0, 0), C(0, 1), C(1, 1)};
-        }
-        points.body_m.push_back(T_target_world * hit.position);
+    HitBatch hits;
+    for (const FeatureMatch& m : match_corners(toned_view, toned_frame, on_target_, settings_.features)) {
+        const double u = m.view_u, v = m.view_v;
+        view_.trace_pixels(std::array<ImagePoint, 5>{{{u, v},
+                                                      {u + kNeighbour_px, v},
+                                                      {u - kNeighbour_px, v},
+                                                      {u, v + kNeighbour_px},
+                                                      {u, v - kNeighbour_px}}},
+                           hits);
+        if (hits.body[0] != target || !on_smooth_surface(hits)) continue;
+        const Eigen::Matrix2d C =
+            flow_covariance(toned_frame, tones.variance(), m.frame_u, m.frame_v, kHalfWindow_px);
+        if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;
+        points.body_m.push_back(T_target_world * hits.position[0]);
         points.pixels.push_back({m.frame_u, m.frame_v});
-        points.noise.push_back(noise);
+        points.noise.push_back({C(0, 0), C(0, 1), C(1, 1)});
     }
     round.matches = static_cast<int>(points.size());
 }
@@ -222,7 +225,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     render_settings.spp = settings_.spp;
     render_settings.seed = settings_.seed;
     PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
-    double floor_px = 1;  // until the matches tell
+    double floor_px = 1;  // until there are matches
     Points points;
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();

@@ -16,7 +16,6 @@
 namespace narpa {
 
 struct FeatureSettings {
-    FeatureKind kind = FeatureKind::corners;
     int features = 400;        ///< detected in the view, at most
     int renders_max = 10;      ///< views rendered for a frame
     double settled_px = 0.02;  ///< converged: a solution that moves the points by less (RMS)
@@ -75,12 +74,11 @@ private:
     void gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones, Points& points,
                 FeatureRound& round);
     void find_target();
-    [[nodiscard]] bool on_smooth_surface(double u, double v, const Hit& hit) const;
+    [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;
 
     ModelView view_;
     SensorModel sensor_;
     FeatureSettings settings_;
-    FeatureMatcher matcher_;
     std::vector<std::uint8_t> on_target_;  ///< of each pixel of the view
 };
 

@@ -1,6 +1,7 @@
 /// estimator/features/feature_matcher.h - correspondences between the rendered view and the frame.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <string_view>
@@ -37,14 +38,6 @@ private:
     double black_ = 0, steps_ = 1;  ///< 255 / (top - black), stabilised
 };
 
-enum class FeatureKind : std::uint8_t {
-    sift,     ///< Lowe 2004
-    akaze,    ///< Alcantarilla et al. 2013
-    orb,      ///< Rublee et al. 2011
-    corners,  ///< minimum eigenvalue (Shi and Tomasi 1994), tracked by pyramidal optical flow (Bouguet 2001)
-};
-[[nodiscard]] std::string_view name(FeatureKind kind) noexcept;
-
 /// Pixels; the centre of the top-left one is (0, 0).
 struct FeatureMatch {
     double view_u = 0, view_v = 0;
@@ -63,23 +56,15 @@ private:
     int before_;
 };
 
-class FeatureMatcher {
-public:
-    /// `most`: features detected in each image, at most.
-    FeatureMatcher(FeatureKind kind, int most);
-    ~FeatureMatcher();
-    FeatureMatcher(FeatureMatcher&&) noexcept;
-    FeatureMatcher& operator=(FeatureMatcher&&) noexcept;
+/// Corners of least eigenvalue (Shi and Tomasi 1994), tracked by pyramidal optical flow (Bouguet 2001) into the
+/// frame and back. `most`: at most so many corners. `on_target`: mask of the view, non-zero where corners may lie.
+[[nodiscard]] std::vector<FeatureMatch> match_corners(const TonedImage& view, const TonedImage& frame,
+                                                      const std::vector<std::uint8_t>& on_target, int most);
 
-    [[nodiscard]] FeatureKind kind() const noexcept;
-    /// Descriptors pass Lowe's ratio test and match both ways; corners are tracked forward and back. `on_target`:
-    /// mask of the view, non-zero where features may lie.
-    [[nodiscard]] std::vector<FeatureMatch> match(const TonedImage& view, const TonedImage& frame,
-                                                  const std::vector<std::uint8_t>& on_target);
-
-private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
-};
+/// Covariance (px^2; u, v) of a point tracked by optical flow, for independent noise of this `variance` in the
+/// pixels of the image that it is tracked to: variance * (sum of g g' over the window)^-1, g the image gradients.
+/// The window reaches `half_px` to each side. Zero where the sum is singular: no corner.
+[[nodiscard]] Eigen::Matrix2d flow_covariance(const TonedImage& image, double variance, double u_px, double v_px,
+                                              int half_px);
 
 }  // namespace narpa

@@ -32,11 +32,6 @@ Matrix6 driven(double psd) {
     return Qc;
 }
 
-Eigen::Vector3d angular_acceleration(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse,
-                                     const Eigen::Vector3d& w) {
-    return -inverse * w.cross(inertia * w);
-}
-
 /// Errors of (attitude, rate), target axes.
 Matrix6 rotation_rates(const Eigen::Vector3d& w) {
     Matrix6 F = Matrix6::Zero();
@@ -50,7 +45,6 @@ void turn_steadily(const MotionModel& model, double dt_s, RelativeState& state, 
     state.q_frame_target = state.q_frame_target * exp_rotation(dt_s * state.rate_rad_s);
 }
 
-/// Rates by Runge and Kutta, attitude by the fourth-order Magnus expansion (A. Iserles, S. Norsett, 1999).
 void tumble(const MotionModel& model, double dt_s, RelativeState& state, Discrete<6>& d) {
     const Eigen::Matrix3d& J = *model.inertia_kg_m2;
     const Eigen::Matrix3d J_inverse = J.inverse();
@@ -60,23 +54,31 @@ void tumble(const MotionModel& model, double dt_s, RelativeState& state, Discret
     d.noise.setZero();
     Eigen::Vector3d w = to_eigen(state.rate_rad_s);
     for (int i = 0; i < steps; ++i) {
-        const auto f = [&](const Eigen::Vector3d& rate) { return angular_acceleration(J, J_inverse, rate); };
-        const Eigen::Vector3d k1 = f(w), k2 = f(w + 0.5 * h * k1), k3 = f(w + 0.5 * h * k2), k4 = f(w + h * k3);
-        const Eigen::Vector3d next = w + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
-        const Eigen::Vector3d middle = 0.5 * (w + next) + h / 8 * (k1 - f(next));  // cubic through both ends
-        const Eigen::Vector3d turn = h / 6 * (w + 4 * middle + next) + h * h / 12 * w.cross(next);
+        const RotationStep turned = rotation_step(J, J_inverse, Eigen::Vector3d::Zero(), w, h);
+        const Eigen::Vector3d& middle = turned.mid_rate_rad_s;
         Matrix6 F = rotation_rates(middle);
         F.bottomRightCorner<3, 3>() = J_inverse * (skew(J * middle) - skew(middle) * J);
         const Discrete<6> step = discretise<6>(F, driven(model.angular_acceleration_psd), h);
         d.transition = (step.transition * d.transition).eval();
         d.noise = (step.transition * d.noise * step.transition.transpose() + step.noise).eval();
-        state.q_frame_target = state.q_frame_target * exp_rotation(to_vec3(turn));
-        w = next;
+        state.q_frame_target = state.q_frame_target * exp_rotation(to_vec3(turned.turn_rad));
+        w = turned.rate_rad_s;
     }
     state.rate_rad_s = to_vec3(w);
 }
 
 }  // namespace
+
+RotationStep rotation_step(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse,
+                           const Eigen::Vector3d& torque_n_m, const Eigen::Vector3d& w, double h) {
+    const auto f = [&](const Eigen::Vector3d& rate) -> Eigen::Vector3d {
+        return inverse * (torque_n_m - rate.cross(inertia * rate));
+    };
+    const Eigen::Vector3d k1 = f(w), k2 = f(w + 0.5 * h * k1), k3 = f(w + 0.5 * h * k2), k4 = f(w + h * k3);
+    const Eigen::Vector3d next = w + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    const Eigen::Vector3d middle = 0.5 * (w + next) + h / 8 * (k1 - f(next));  // cubic through both ends
+    return {next, middle, h / 6 * (w + 4 * middle + next) + h * h / 12 * w.cross(next)};
+}
 
 RelativeState displaced(const RelativeState& s, const Vector12& e) {
     return {s.position_m + Vec3{e[0], e[1], e[2]}, s.velocity_m_s + Vec3{e[3], e[4], e[5]},

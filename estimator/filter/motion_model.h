@@ -48,6 +48,16 @@ struct MotionModel {
 /// An Error names the field, what it is and what was expected.
 [[nodiscard]] Status check(const MotionModel& model);
 
+/// One step of a rigid body under a constant torque, body axes: rates by Runge and Kutta, attitude by the
+/// fourth-order Magnus expansion (A. Iserles, S. Norsett, 1999).
+struct RotationStep {
+    Eigen::Vector3d rate_rad_s, mid_rate_rad_s;  ///< at the end and in the middle
+    Eigen::Vector3d turn_rad;                    ///< rotation vector
+};
+[[nodiscard]] RotationStep rotation_step(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse,
+                                         const Eigen::Vector3d& torque_n_m, const Eigen::Vector3d& rate_rad_s,
+                                         double dt_s);
+
 /// Propagates state and covariance by dt_s >= 0. `acceleration_m_s2`: known, of the target relative to the chaser,
 /// frame axes, constant. Allocates nothing.
 void propagate(const MotionModel& model, double dt_s, const Vec3& acceleration_m_s2, RelativeState& state,

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "estimator/pose/reprojection.h"
+#include "estimator/pose/pnp_points.h"
 
 namespace narpa {
 namespace {
@@ -97,13 +97,7 @@ struct AllResiduals {
 };
 
 std::unique_ptr<ceres::LossFunction> loss_function(const RobustLoss& loss) {
-    switch (loss.kind) {
-        case Loss::none: return nullptr;
-        case Loss::huber: return std::make_unique<ceres::HuberLoss>(loss.scale);
-        case Loss::cauchy: return std::make_unique<ceres::CauchyLoss>(loss.scale);
-        case Loss::tukey: return std::make_unique<ceres::TukeyLoss>(loss.scale);
-    }
-    return nullptr;
+    return loss.kind == Loss::none ? nullptr : std::make_unique<ceres::CauchyLoss>(loss.scale);
 }
 
 /// The pose with chi2, covariance and status as pnp_refine.h has them.

@@ -6,8 +6,8 @@
 
 namespace narpa {
 
-/// Ceres's Levenberg-Marquardt over a quaternion manifold and a translation, automatic derivatives, dense Cholesky;
-/// one residual block and one loss for each point. The covariance is that of pnp_refine.h at this minimum.
+/// Ceres's Levenberg-Marquardt, dense Cholesky, one residual block and one loss for each point. The covariance is
+/// that of pnp_refine.h at this minimum.
 [[nodiscard]] PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const RobustLoss& loss = {});
 
 /// Ceres's TinySolver, which takes no losses and none of Ceres's set-up: over a rotation vector from the start and

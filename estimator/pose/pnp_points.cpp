@@ -94,7 +94,7 @@ void PnpPoints::put(std::size_t i, const PnpInput& input, const Model& model, st
     const std::size_t k = i % kGroup;
     to.x[k] = a.x, to.y[k] = a.y, to.z[k] = a.z;
     to.u[k] = on_plane.x, to.v[k] = on_plane.y;
-    // C^-1 = W' W with W upper triangular: 1 / sqrt(var(v)) last, and u by what v does not tell of it.
+    // C^-1 = W' W with W upper triangular: 1 / sqrt(var(v)) last, and u conditioned on v.
     double w00 = 1 / input.sigma_px, w01 = 0, w11 = w00;
     if (!input.covariance_px2.empty()) {
         const PixelCovariance& s = input.covariance_px2[point];

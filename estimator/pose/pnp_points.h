@@ -2,15 +2,33 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "estimator/pose/levenberg_marquardt.h"
-#include "estimator/pose/robust_loss.h"
+#include "estimator/pose/pose_estimate.h"
 #include "renderer/camera/camera_model.h"
 
 namespace narpa {
+
+/// Cauchy's grows logarithmically beyond `scale`, in standard deviations.
+struct RobustLoss {
+    enum class Kind : std::uint8_t { none, cauchy };
+    Kind kind = Kind::none;
+    double scale = 2.5;
+
+    /// Of a residual's squared normalised length s = r' C^-1 r; rho(s) = s - ... near 0.
+    [[nodiscard]] double cost(double s) const {
+        return kind == Kind::none ? s : scale * scale * std::log1p(s / (scale * scale));
+    }
+    /// rho'(s): the weight of iteratively reweighted least squares.
+    [[nodiscard]] double weight(double s) const {
+        return kind == Kind::none ? 1 : scale * scale / (scale * scale + s);
+    }
+};
+using Loss = RobustLoss::Kind;
 
 struct Pixel {
     double u = 0, v = 0;
@@ -117,5 +135,24 @@ private:
     Vec3 centroid_{};
     std::vector<Group> groups_;
 };
+
+using Matrix26 = Eigen::Matrix<double, 2, 6>;
+
+[[nodiscard]] inline Eigen::Matrix<double, 2, 3> to_eigen(const ProjectionJacobian& J) {
+    Eigen::Matrix<double, 2, 3> m;
+    m << J.x.x, J.x.y, J.x.z, J.y.x, J.y.y, J.y.z;
+    return m;
+}
+
+/// Of the image point of `body_m`, which has one, by the pose's error (pose_estimate.h): px per (rad, m).
+[[nodiscard]] inline Matrix26 reprojection_jacobian(const CameraModel& model, const Rigid3& T_camera_body,
+                                                    const Vec3& body_m) {
+    const Vec3 a = T_camera_body.q * body_m;
+    const ProjectionJacobian J = model.jacobian(a + T_camera_body.t);
+    Matrix26 m;
+    m.leftCols<3>() << to_eigen(cross(a, J.x)).transpose(), to_eigen(cross(a, J.y)).transpose();
+    m.rightCols<3>() = to_eigen(J);
+    return m;
+}
 
 }  // namespace narpa

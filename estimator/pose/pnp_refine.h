@@ -6,6 +6,7 @@
 /// equations.
 #pragma once
 
+#include "base/result.h"
 #include "estimator/pose/pnp_points.h"
 
 namespace narpa {
@@ -30,10 +31,6 @@ struct PnpFit {
     [[nodiscard]] double relative_position_sigma() const {
         return std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) / norm(T_camera_body.t);
     }
-    /// The pixel noise estimated from the residuals, as a multiple of the given one; 1 without redundancy.
-    [[nodiscard]] double noise_scale() const {
-        return degrees_of_freedom > 0 ? std::sqrt(chi2 / degrees_of_freedom) : 1.0;
-    }
 };
 
 /// Whether a start can be refined: finite, with a rotation.
@@ -55,5 +52,10 @@ private:
     PnpPoints points_;
     PnpFit fit_;
 };
+
+/// The Cramer-Rao bound of a pose seen through these points: the inverse of F = sum J' C^-1 J with
+/// J = dpi/db [-[R a]x | I], a covariance as in pose_estimate.h. Of `input` the pixels are not read. Errors: what
+/// check() finds, a point behind the camera, or a direction that the points leave undetermined.
+[[nodiscard]] Result<Matrix6> pnp_bound(const PnpInput& input, const Rigid3& T_camera_body);
 
 }  // namespace narpa

@@ -59,7 +59,7 @@ inline constexpr double kDegree = 3.14159265358979323846 / 180;  ///< radians
 [[nodiscard]] Matrix6 covariance_of_product(const Rigid3& T_a_b, const Matrix6& covariance_of_a_b,
                                             const Rigid3& T_b_c);
 
-/// The covariance of the same estimate told in other axes: of T_a_b, given that of T_c_b, where a and c lie apart
+/// The covariance of the same estimate in other axes: of T_a_b, given that of T_c_b, where a and c lie apart
 /// by an exact T_a_c with this rotation.
 [[nodiscard]] Matrix6 covariance_in_other_axes(const Quat& q_a_c, const Matrix6& covariance);
 

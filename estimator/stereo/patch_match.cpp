@@ -2,9 +2,78 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "estimator/pose/pose_estimate.h"
+
 namespace narpa {
+namespace {
+
+/// Turns n samples into the coefficients of the spline through them, in place.
+void filter(double* first, std::ptrdiff_t stride, int n) {
+    if (n < 2) return;
+    const double pole = std::sqrt(3.0) - 2;
+    const auto at = [=](int i) -> double& { return first[i * stride]; };
+    double start = 0, power = 1;  // of the causal part, the image mirrored before its first sample
+    for (int i = 0; i < std::min(n, 30); ++i, power *= pole) start += power * at(i);
+    at(0) = start;
+    for (int i = 1; i < n; ++i) at(i) += pole * at(i - 1);
+    at(n - 1) = pole / (pole * pole - 1) * (at(n - 1) + pole * at(n - 2));
+    for (int i = n - 2; i >= 0; --i) at(i) = pole * (at(i + 1) - at(i));
+    for (int i = 0; i < n; ++i) at(i) *= 6;
+}
+
+std::array<double, 4> weights(double t) {
+    const double s = 1 - t;
+    return {s * s * s / 6, 2.0 / 3 - t * t * (2 - t) / 2, 2.0 / 3 - s * s * (2 - s) / 2, t * t * t / 6};
+}
+std::array<double, 4> slopes(double t) {
+    const double s = 1 - t;
+    return {-s * s / 2, t * (1.5 * t - 2), -s * (1.5 * s - 2), t * t / 2};
+}
+
+}  // namespace
+
+SplineImage::SplineImage(const MeasuredImage& image)
+    : width_(image.width), height_(image.height), coefficients_(image.dn.begin(), image.dn.end()) {
+    for (int y = 0; y < height_; ++y) filter(coefficients_.data() + std::ptrdiff_t{y} * width_, 1, width_);
+    for (int x = 0; x < width_; ++x) filter(coefficients_.data() + x, width_, height_);
+}
+
+double SplineImage::dn(const Eigen::Vector2d& px) const {
+    const double x = std::floor(px.x()), y = std::floor(px.y());
+    const auto wx = weights(px.x() - x), wy = weights(px.y() - y);
+    const double* row = &coefficients_[(static_cast<std::size_t>(y) - 1) * static_cast<std::size_t>(width_) +
+                                       static_cast<std::size_t>(x) - 1];
+    double sum = 0;
+    for (std::size_t j = 0; j < 4; ++j, row += width_)
+        sum += wy[j] * (wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3]);
+    return sum;
+}
+
+SplineImage::Sample SplineImage::sample(const Eigen::Vector2d& px) const {
+    const double x = std::floor(px.x()), y = std::floor(px.y());
+    const auto wx = weights(px.x() - x), wy = weights(px.y() - y);
+    const auto sx = slopes(px.x() - x), sy = slopes(px.y() - y);
+    const double* row = &coefficients_[(static_cast<std::size_t>(y) - 1) * static_cast<std::size_t>(width_) +
+                                       static_cast<std::size_t>(x) - 1];
+    Sample s;
+    for (std::size_t j = 0; j < 4; ++j, row += width_) {
+        const double value = wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3];
+        s.dn += wy[j] * value;
+        s.gradient.x() += wy[j] * (sx[0] * row[0] + sx[1] * row[1] + sx[2] * row[2] + sx[3] * row[3]);
+        s.gradient.y() += sy[j] * value;
+    }
+    return s;
+}
+
+EpipolarWarp::EpipolarWarp(const Pinhole& from, const Pinhole& to, const Rigid3& T_to_from)
+    : t_(to_eigen(T_to_from.t)), to_(to) {
+    const auto [origin, per_x, per_y] = from.rays(T_to_from.q);
+    origin_ = to_eigen(origin), across_ = to_eigen(per_x), down_ = to_eigen(per_y);
+}
+
 namespace {
 
 using Eigen::Matrix2d;
@@ -17,13 +86,13 @@ using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
 constexpr int kIterationsMax = 20;
 constexpr double kSettled_px = 1e-4, kFarthest_px = 1.5;
-/// What neither plane nor curvature describes of where a pixel lies in the other picture, interpolation and its
+/// What neither plane nor curvature describes of where a pixel lies in the other image, interpolation and its
 /// aliases among it: each pixel for itself. Measured on scenes/descent, where it makes the scatter across epipolar
 /// lines, which relief does not touch, the predicted one at a quarter to twice the exposure.
 constexpr double kUnexplained_px = 0.06;
-/// How far ground that is no plane may move the picture of a patch's edge: craters of scenes/descent do.
+/// How far ground that is no plane may move the image of a patch's edge: craters of scenes/descent do.
 constexpr double kCurvature_px = 0.1;
-/// Weights of a picture's pixel and its neighbours each way before it is interpolated: they take the frequencies
+/// Weights of an image's pixel and its neighbours each way before it is interpolated: they take the frequencies
 /// that a step between two pixels has aliased, and this part of the variance of noise.
 constexpr double kNeighbour = 0.125, kMiddle = 1 - 2 * kNeighbour;
 constexpr double kSoftNoise =
@@ -55,7 +124,7 @@ private:
     double n_ = 0, a_ = 0, b_ = 0, aa_ = 0, bb_ = 0, ab_ = 0;
 };
 
-/// Of the patch with what the other picture shows where a facing plane would have it, moved by `shift`.
+/// Of the patch with what the other image shows where a facing plane would have it, moved by `shift`.
 std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
                                   double inverse_depth, const Vector2d& shift) {
     Correlation c;
@@ -94,7 +163,7 @@ public:
     /// Where the middle lies without a shift.
     [[nodiscard]] Vector2d start_px() const { return warp_.px(warp_.ray(patch_.centre_px()), inverse_depth_); }
 
-    /// Nothing where the patch leaves the other picture.
+    /// Nothing where the patch leaves the other image.
     [[nodiscard]] std::optional<Normal> linearise(const Vector& p) const {
         Normal n;
         if (!for_each_pixel(patch_, [&](const Vector2d& offset, double dn) { return add(offset, dn, p, n); }))

@@ -5,10 +5,72 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/stereo/epipolar_warp.h"
-#include "estimator/stereo/spline_image.h"
+#include "base/pose.h"
+#include "estimator/pose/pose_estimate.h"
+#include "estimator/view/measured_image.h"
+#include "renderer/camera/camera_model.h"
 
 namespace narpa {
+
+class SplineImage {
+public:
+    explicit SplineImage(const MeasuredImage& image);
+
+    struct Sample {
+        double dn = 0;
+        Eigen::Vector2d gradient{0, 0};  ///< DN per px
+    };
+    /// At a point that `holds` with a margin of kMargin_px, else undefined.
+    [[nodiscard]] double dn(const Eigen::Vector2d& px) const;
+    [[nodiscard]] Sample sample(const Eigen::Vector2d& px) const;
+
+    static constexpr int kMargin_px = 2;
+    [[nodiscard]] bool holds(const Eigen::Vector2d& px) const {
+        return px.x() >= kMargin_px && px.y() >= kMargin_px && px.x() < width_ - 1 - kMargin_px &&
+               px.y() < height_ - 1 - kMargin_px;
+    }
+
+private:
+    int width_, height_;
+    std::vector<double> coefficients_;
+};
+
+class EpipolarWarp {
+public:
+    EpipolarWarp(const Pinhole& from, const Pinhole& to, const Rigid3& T_to_from);
+
+    [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& px) const {
+        return origin_ + px.x() * across_ + px.y() * down_;
+    }
+    /// Is the point in front of the other camera?
+    [[nodiscard]] bool is_before(const Eigen::Vector3d& ray, double inverse_depth) const {
+        return ray.z() + inverse_depth * t_.z() > 0;
+    }
+    [[nodiscard]] Eigen::Vector2d px(const Eigen::Vector3d& ray, double inverse_depth) const {
+        const Eigen::Vector3d q = ray + inverse_depth * t_;
+        const auto [x, y] = to_.of_plane(q.x() / q.z(), q.y() / q.z());
+        return {x, y};
+    }
+    /// Change of `px` per change of the inverse depth: along the epipolar line.
+    [[nodiscard]] Eigen::Vector2d px_slope(const Eigen::Vector3d& ray, double inverse_depth) const {
+        const Eigen::Vector3d q = ray + inverse_depth * t_;
+        const auto [x, y] = to_.jacobian({q.x(), q.y(), q.z()});
+        return {dot(x, to_vec3(t_)), dot(y, to_vec3(t_))};
+    }
+    /// The inverse depth at which `px` has this coordinate (0 column, 1 row), where the epipolar line crosses it.
+    [[nodiscard]] double inverse_depth_at(const Eigen::Vector3d& ray, int axis, double coordinate_px) const {
+        const double n = to_.on_plane({coordinate_px, coordinate_px})[axis];
+        return (ray[axis] - n * ray.z()) / (n * t_.z() - t_[axis]);
+    }
+    /// Inverse depth in the other camera's frame.
+    [[nodiscard]] double inverse_depth_there(const Eigen::Vector3d& ray, double inverse_depth) const {
+        return inverse_depth / (ray.z() + inverse_depth * t_.z());
+    }
+
+private:
+    Eigen::Vector3d origin_, across_, down_, t_;
+    Pinhole to_;
+};
 
 /// A camera's image, prepared for matching.
 struct StereoView {

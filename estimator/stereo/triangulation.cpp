@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/pose/reprojection.h"
+#include "estimator/pose/pnp_points.h"
 
 namespace narpa {
 namespace {

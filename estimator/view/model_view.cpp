@@ -1,9 +1,5 @@
 #include "estimator/view/model_view.h"
 
-#include <limits>
-
-#include "renderer/camera/camera_model.h"
-
 namespace narpa {
 
 Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, BodyPoses& at) {
@@ -21,18 +17,18 @@ ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std:
       renderer_(render_scene_, camera_),
       radiance_(camera.width, camera.height) {}
 
-void ModelView::place(const Rigid3& T_camera_target) {
-    T_world_camera_ = place_camera(T_camera_target, camera_, target_, at_);
-}
-
 void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {
-    place(T_camera_target);
+    T_world_camera_ = place_camera(T_camera_target, camera_, target_, at_);
     renderer_.render(at_, T_world_camera_, settings, radiance_, aovs ? &aovs_ : nullptr);
 }
 
-Hit ModelView::trace_pixel(double u_px, double v_px) const noexcept {
-    const Ray ray = camera_ray(camera_, T_world_camera_, u_px, v_px);
-    return render_scene_.tracer().intersect(at_, ray, std::numeric_limits<double>::infinity());
+void ModelView::trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept {
+    const CameraModelHandle model(camera_);
+    RayBatch rays;
+    rays.n = points.size();
+    for (std::size_t i = 0; i < rays.n; ++i)
+        rays.put(i, camera_ray(model, T_world_camera_, points[i].x, points[i].y));
+    tracer().intersect(at_, rays, tracer().all_bodies(), hits);
 }
 
 }  // namespace narpa

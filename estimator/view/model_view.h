@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
+#include "renderer/camera/camera_model.h"
 #include "renderer/film/camera_image.h"
 
 namespace narpa {
@@ -39,10 +41,8 @@ public:
     [[nodiscard]] const Rigid3& T_world_camera() const noexcept { return T_world_camera_; }
     [[nodiscard]] const Rigid3& T_world_target() const noexcept { return at_.T_world_body[target_]; }
 
-    /// Places camera and mount for this pose without rendering, for `trace_pixel`.
-    void place(const Rigid3& T_camera_target);
-    /// The first hit of the ray through an image point, from the camera as it is placed.
-    [[nodiscard]] Hit trace_pixel(double u_px, double v_px) const noexcept;
+    /// The first hits of the rays through up to kLanes image points, from the camera of the last render.
+    void trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept;
 
 private:
     const RenderScene& render_scene_;

@@ -6,6 +6,8 @@
 /// about z.
 #pragma once
 
+#include <array>
+
 #include "base/pose.h"
 
 namespace narpa::rehearsal {
@@ -51,5 +53,26 @@ struct PortState {
                                    const Motion& chaser_body);
 [[nodiscard]] Motion chaser_motion(const PortState& state, const Vehicle& target, const Motion& target_body,
                                    const Vehicle& chaser);
+
+/// Defaults: International Docking System Standard, Interface Definition Document, revision E, table of initial
+/// contact conditions.
+struct CaptureEnvelope {
+    double closing_min_m_s = 0.05, closing_max_m_s = 0.10, lateral_rate_m_s = 0.04, lateral_m = 0.10;
+    double pitch_yaw_deg = 4, roll_deg = 4, pitch_yaw_rate_deg_s = 0.20, roll_rate_deg_s = 0.20;
+};
+
+/// One quantity of a port state and its limits, which belong to the allowed range.
+struct ContactCondition {
+    const char *name = "", *title = "", *unit = "";
+    double value = 0, min = 0, max = 0;
+    [[nodiscard]] bool within() const { return value >= min && value <= max; }
+};
+
+/// In the order of the standard's table.
+using ContactConditions = std::array<ContactCondition, 7>;
+[[nodiscard]] ContactConditions contact_conditions(const CaptureEnvelope& limits, const PortState& state);
+
+/// All of them.
+[[nodiscard]] bool within(const CaptureEnvelope& limits, const PortState& state);
 
 }  // namespace narpa::rehearsal

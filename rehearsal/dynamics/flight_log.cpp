@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/time.h"
-#include "rehearsal/dynamics/random_streams.h"
+#include "rehearsal/dynamics/thruster_model.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -29,8 +29,8 @@ nlohmann::json numbers(const Vec3& v, double scale = 1) {
 nlohmann::json to_json(const PortState& p) {
     return {{"position_m", numbers(p.position_m())},
             {"velocity_m_s", numbers(p.velocity_m_s)},
-            {"attitude_deg", numbers(p.misalignment_rad(), 1 / kRadPerDeg)},
-            {"rate_deg_s", numbers(p.rate_rad_s, 1 / kRadPerDeg)}};
+            {"attitude_deg", numbers(p.misalignment_rad(), 1 / kDegree)},
+            {"rate_deg_s", numbers(p.rate_rad_s, 1 / kDegree)}};
 }
 
 }  // namespace
@@ -50,7 +50,7 @@ void TruthLog::append(const Simulation& s) {
     const ActuatorCommand& c = s.command();
     const Loads& fired = s.fired();
     file_ << fmt::format("{:.9f}", to_seconds(s.t_ns())) << fields(p.position_m()) << fields(p.velocity_m_s)
-          << fields(p.misalignment_rad(), 1 / kRadPerDeg) << fields(p.rate_rad_s, 1 / kRadPerDeg)
+          << fields(p.misalignment_rad(), 1 / kDegree) << fields(p.rate_rad_s, 1 / kDegree)
           << fmt::format(",{},{},{},{}", kDynamicsPhases[static_cast<std::size_t>(s.phase())],
                          kGuidancePhases[static_cast<std::size_t>(c.phase)], c.leg,
                          kAbortReasons[static_cast<std::size_t>(c.abort)])

@@ -1,5 +1,6 @@
 // narpa-dynamics - simulates the two bodies of a scenario on a CAN bus.
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/stop.h"
@@ -26,9 +27,9 @@ Status simulate(Arguments& a) {
     auto bus = join_can_bus(a.bus, a.options.wait_s, stop_flag());
     if (!bus) return bus.error();
     notify_ready(a.ready_fd);
-    const auto flown = fly_and_log(*scenario, a.options, NARPA_VERSION, **bus, stop_flag());
+    const auto flown = run_dynamics(*scenario, a.options, **bus, stop_flag());
     if (!flown) return flown.error();
-    fmt::print(stderr, "{}\n", *flown);
+    fmt::print(stderr, "{}\n", in_words(*flown));
     return Ok{};
 }
 
@@ -53,6 +54,7 @@ int main(int argc, char** argv) {
         "commands in.",
         "narpa-dynamics"};
     Arguments a;
+    a.options.version = NARPA_VERSION;
     app.add_option("SCENARIO", a.scenario, "Scenario file (TOML)")->required();
     app.add_option("--can", a.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2")->required();
     app.add_flag("--lockstep", a.options.lockstep,

@@ -40,11 +40,11 @@ struct CommandCounts {
 
 class Node {
 public:
-    Node(const Scenario& scenario, const DynamicsOptions& options, Simulation simulation,
-         std::optional<TruthLog> log, CanBus& bus, const StopFlag& stop)
+    Node(const Scenario& scenario, const DynamicsOptions& options, std::optional<TruthLog> log, CanBus& bus,
+         const StopFlag& stop)
         : scenario_(scenario),
           options_(options),
-          simulation_(std::move(simulation)),
+          simulation_(scenario, options.seed),
           log_(std::move(log)),
           bus_(bus),
           stop_(stop),
@@ -284,45 +284,36 @@ nlohmann::json Node::report() const {
 
 Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
                                     const StopFlag& stop) {
-    auto simulation = Simulation::create(scenario, options.seed);
-    if (!simulation) return simulation.error();
     std::optional<TruthLog> log;
     if (!options.log_folder.empty()) {
         auto made = TruthLog::create(options.log_folder);
         if (!made) return made.error();
         log.emplace(std::move(*made));
     }
-    Node node(scenario, options, std::move(*simulation), std::move(log), bus, stop);
+    Node node(scenario, options, std::move(log), bus, stop);
     const Status flown = node.run();
-    const nlohmann::json document = node.report();
     if (!flown) return flown.error();
-    return document;
-}
-
-Result<std::string> fly_and_log(const Scenario& scenario, const DynamicsOptions& options,
-                                const std::string& version, CanBus& bus, const StopFlag& stop) {
-    auto flown = run_dynamics(scenario, options, bus, stop);
-    if (!flown) return flown.error();
-    nlohmann::json& document = *flown;
-    document["version"] = version;
+    nlohmann::json document = node.report();
+    document["version"] = options.version;
     if (!options.log_folder.empty()) {
         const std::string path = options.log_folder + "/dynamics.json";
         std::ofstream file(path);
         file << document.dump(2) << '\n';
         if (!file.flush()) return Error{"cannot be written", path, 0, 0, ErrorKind::failed};
     }
-    const auto count = [&](const char* group, const char* key) {
-        return document[group][key].get<std::uint64_t>();
-    };
+    return document;
+}
+
+std::string in_words(const nlohmann::json& d) {
+    const nlohmann::json &commands = d["actuator_commands"], &bus = d["bus"];
     return fmt::format(
         "{}: seed {}, {:.3f} s, {}; {} actuator commands applied, {} lost, {} late, {} refused, {} bad frames; {} "
         "CAN "
         "frames dropped",
-        scenario.name, options.seed, document["end_s"].get<double>(),
-        document["stopped"].get<bool>() ? "stopped" : document["ending"].get<std::string>(),
-        count("actuator_commands", "applied"), count("actuator_commands", "lost"),
-        count("actuator_commands", "late"), count("actuator_commands", "refused"),
-        count("actuator_commands", "bad_frames"), count("bus", "frames_dropped"));
+        d["scenario"].get<std::string>(), d["seed"].dump(), d["end_s"].get<double>(),
+        d["stopped"].get<bool>() ? "stopped" : d["ending"].get<std::string>(), commands["applied"].dump(),
+        commands["lost"].dump(), commands["late"].dump(), commands["refused"].dump(), commands["bad_frames"].dump(),
+        bus["frames_dropped"].dump());
 }
 
 }  // namespace narpa::rehearsal

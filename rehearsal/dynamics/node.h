@@ -22,17 +22,16 @@ struct DynamicsOptions {
     std::string log_folder;   ///< empty: none
     double wait_s = 15;       ///< real time: for the first heartbeat
     double patience_s = 300;  ///< lockstep: for a command, and at the end for the emulator
+    std::string version;
 };
 
-/// Runs the scenario to its end. Returns dynamics.json: random draws, ending (`stopped` after a signal), counts.
-/// Errors: a scenario that cannot be simulated, a pose outside the range of its message, no messages for too long,
+/// Runs the scenario to its end. Returns dynamics.json, which it writes into the log folder: random draws, ending
+/// (`stopped` after a signal), counts. Errors: a pose outside the range of its message, no messages for too long,
 /// a log that cannot be written.
 Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
                                     const StopFlag& stop);
 
-/// run_dynamics for a program: writes the document as dynamics.json into the log folder, with the version, and
-/// returns a line for people.
-Result<std::string> fly_and_log(const Scenario& scenario, const DynamicsOptions& options,
-                                const std::string& version, CanBus& bus, const StopFlag& stop);
+/// A line for people on that document.
+[[nodiscard]] std::string in_words(const nlohmann::json& document);
 
 }  // namespace narpa::rehearsal

@@ -2,7 +2,10 @@
 /// on a circular orbit.
 #pragma once
 
+#include <Eigen/Core>
+
 #include "base/pose.h"
+#include "estimator/pose/pose_estimate.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
@@ -22,5 +25,24 @@ struct Translation {
 
 /// The attractor relative to the target, world axes; it does not rotate.
 [[nodiscard]] Motion attractor_motion(const Orbit& orbit, const Quat& q_world_attractor, double t_s);
+
+struct Attitude {
+    Quat q_world_body{};
+    Vec3 rate_rad_s{};  ///< body axes, against inertial space
+};
+
+class RigidBody {
+public:
+    /// About the centre of mass, body axes; symmetric and positive definite.
+    explicit RigidBody(const Eigen::Matrix3d& inertia_kg_m2);
+
+    /// The state dt_s later; the torque is about the centre of mass, constant in body axes. Rates by RK4, attitude
+    /// by the fourth-order Magnus expansion (A. Iserles, S. Norsett, 1999), in steps of at most 0.005 rad: a
+    /// tumbling body keeps energy and momentum to 1e-10 over a hundred turns.
+    [[nodiscard]] Attitude turned(Attitude from, const Vec3& torque_n_m, double dt_s) const;
+
+private:
+    Eigen::Matrix3d inertia_, inverse_;
+};
 
 }  // namespace narpa::rehearsal

@@ -1,13 +1,12 @@
 #include "rehearsal/dynamics/simulation.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "base/time.h"
 #include "protocols/can/messages.h"
-#include "rehearsal/dynamics/random_streams.h"
+#include "rehearsal/dynamics/thruster_model.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -27,32 +26,7 @@ Motion as_transmitted(const Motion& motion) {
     return command.motion;
 }
 
-Status check(const Vehicle& v, const char* name) {
-    if (!(v.mass_kg > 0)) return Error{std::string(name) + ": mass_kg: expected more than 0"};
-    const Eigen::Matrix3d& J = v.inertia_kg_m2;
-    if (!J.allFinite() || !J.isApprox(J.transpose(), 1e-9) ||
-        Eigen::LLT<Eigen::Matrix3d>(J).info() != Eigen::Success)
-        return Error{std::string(name) + ": inertia_kg_m2: expected a symmetric, positive definite matrix"};
-    return Ok{};
-}
-
 }  // namespace
-
-Result<Simulation> Simulation::create(const Scenario& scenario, std::uint64_t seed) {
-    const auto wrong = [&](std::string what) { return Error{std::move(what), scenario.file}; };
-    if (auto good = check(scenario.target, "target"); !good) return wrong(good.error().what);
-    if (auto good = check(scenario.chaser, "chaser"); !good) return wrong(good.error().what);
-    if (scenario.period_ns() <= 0 || scenario.pose_period_ns() <= 0 ||
-        scenario.period_ns() % scenario.pose_period_ns() != 0)
-        return wrong("navigation.period_s and pose_rate_hz: expected a whole number of poses in a period");
-    if (!(scenario.thrusters.force_n > 0 && scenario.thrusters.torque_n_m > 0))
-        return wrong("thrusters: force_n and torque_n_m: expected more than 0");
-    for (const Fault& f : scenario.faults)
-        if ((f.kind == Fault::Kind::thruster_off || f.kind == Fault::Kind::thruster_stuck) &&
-            !thruster_group(f.axis))
-            return wrong("fault: axis \"" + f.axis + "\": expected +fx, -fx, +fy ... +tx ... -tz");
-    return Simulation(scenario, seed);
-}
 
 Simulation::Simulation(const Scenario& scenario, std::uint64_t seed)
     : scenario_(scenario),
@@ -75,7 +49,7 @@ void Simulation::place_bodies(std::uint64_t seed) {
     };
 
     state_.target.q_world_body = normalized(scenario_.q_world_target);
-    state_.target.rate_rad_s = kRadPerDeg * scenario_.target_motion.rate_deg_s;
+    state_.target.rate_rad_s = kDegree * scenario_.target_motion.rate_deg_s;
     if (scenario_.target_motion.with_lvlh) {
         const Vec3 orbit_rate = scenario_.orbit.q_world_lvlh(0) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
         state_.target.rate_rad_s += conjugate(state_.target.q_world_body) * orbit_rate;
@@ -86,9 +60,8 @@ void Simulation::place_bodies(std::uint64_t seed) {
     port.T_port_chaser_port.t = s.position_m + off(s.position_sigma_m, draws_.position);
     port.velocity_m_s = s.velocity_m_s + off(s.velocity_sigma_m_s, draws_.velocity);
     port.T_port_chaser_port.q =
-        T_port_docked().q *
-        exp_rotation(kRadPerDeg * (s.attitude_deg + off(s.attitude_sigma_deg, draws_.attitude)));
-    const Vec3 rate_body = kRadPerDeg * (s.rate_deg_s + off(s.rate_sigma_deg_s, draws_.rate));
+        T_port_docked().q * exp_rotation(kDegree * (s.attitude_deg + off(s.attitude_sigma_deg, draws_.attitude)));
+    const Vec3 rate_body = kDegree * (s.rate_deg_s + off(s.rate_sigma_deg_s, draws_.rate));
     port.rate_rad_s = conjugate(scenario_.chaser.T_body_port.q) * rate_body;
     const Motion chaser = chaser_motion(port, scenario_.target, target_motion(state_), scenario_.chaser);
     const Vec3& centre = scenario_.chaser.centre_of_mass_m;
@@ -144,8 +117,8 @@ void Simulation::change_target_rate(std::int64_t after_ns, std::int64_t until_ns
     for (const Fault& f : scenario_.faults) {
         if (f.kind != Fault::Kind::target_rate) continue;
         const auto due = [&](double t_s) { return to_ns(t_s) > after_ns && to_ns(t_s) <= until_ns; };
-        if (due(f.from_s)) state_.target.rate_rad_s += kRadPerDeg * f.value;
-        if (due(f.until_s)) state_.target.rate_rad_s -= kRadPerDeg * f.value;
+        if (due(f.from_s)) state_.target.rate_rad_s += kDegree * f.value;
+        if (due(f.until_s)) state_.target.rate_rad_s -= kDegree * f.value;
     }
 }
 
@@ -262,9 +235,9 @@ AttitudeReport Simulation::measure_attitude() {
     Quat bias;
     for (const Fault& f : scenario_.faults)
         if (f.kind == Fault::Kind::attitude_bias && t_ns() >= to_ns(f.from_s) && t_ns() < to_ns(f.until_s))
-            bias = bias * exp_rotation(kRadPerDeg * f.value);
-    const Vec3 attitude = (s.attitude_sigma_deg * kRadPerDeg) * draw_normal(sensor_);
-    const Vec3 rate = (s.rate_sigma_deg_s * kRadPerDeg) * draw_normal(sensor_);
+            bias = bias * exp_rotation(kDegree * f.value);
+    const Vec3 attitude = (s.attitude_sigma_deg * kDegree) * draw_normal(sensor_);
+    const Vec3 rate = (s.rate_sigma_deg_s * kDegree) * draw_normal(sensor_);
     AttitudeReport report;
     report.t_ns = t_ns();
     report.q_world_chaser = normalized(state_.chaser.q_world_body * bias * exp_rotation(attitude));

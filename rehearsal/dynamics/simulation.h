@@ -12,10 +12,8 @@
 #include <random>
 #include <string_view>
 
-#include "base/result.h"
 #include "protocols/closed_loop.h"
 #include "rehearsal/dynamics/orbit_motion.h"
-#include "rehearsal/dynamics/rigid_body.h"
 #include "rehearsal/dynamics/thruster_model.h"
 #include "rehearsal/scenario/scenario.h"
 
@@ -45,8 +43,7 @@ inline constexpr std::array<std::string_view, 6> kEndings{"not_yet",  "captured"
 
 class Simulation {
 public:
-    /// Errors: an invalid mass, inertia or period; a fault of an unknown thruster group.
-    static Result<Simulation> create(const Scenario& scenario, std::uint64_t seed);
+    Simulation(const Scenario& scenario, std::uint64_t seed);
 
     /// The scenario's time.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return state_.t_ns; }
@@ -78,7 +75,6 @@ private:
         Attitude target, chaser;
         Translation translation;
     };
-    Simulation(const Scenario& scenario, std::uint64_t seed);
 
     void place_bodies(std::uint64_t seed);
     void change_target_rate(std::int64_t after_ns, std::int64_t until_ns);

@@ -4,22 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "rehearsal/dynamics/random_streams.h"
-
 namespace narpa::rehearsal {
 namespace {
 
-constexpr std::array<std::string_view, kThrusterGroups> kNames{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
-                                                               "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
 constexpr int kForceGroups = 6;
 
 }  // namespace
-
-std::optional<int> thruster_group(std::string_view axis) {
-    const auto* at = std::find(kNames.begin(), kNames.end(), axis);
-    if (at == kNames.end()) return std::nullopt;
-    return static_cast<int>(at - kNames.begin());
-}
 
 ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
     : thrusters_(scenario.thrusters), period_ns_(scenario.period_ns()), gains_(engine(seed, Stream::pulses)) {
@@ -28,13 +18,13 @@ ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
         Vec3 axis;
         axis[group % kForceGroups / 2] = group % 2 == 0 ? 1 : -1;
         directions_[group] =
-            exp_rotation((thrusters_.misalignment_sigma_deg * kRadPerDeg) * draw_normal(draws)) * axis;
+            exp_rotation((thrusters_.misalignment_sigma_deg * kDegree) * draw_normal(draws)) * axis;
     }
     for (const Fault& fault : scenario.faults) {
         const bool stuck = fault.kind == Fault::Kind::thruster_stuck;
         if (!stuck && fault.kind != Fault::Kind::thruster_off) continue;
-        if (const auto group = thruster_group(fault.axis))
-            faults_.push_back({to_ns(fault.from_s), to_ns(fault.until_s), *group, stuck});
+        const auto group = std::ranges::find(kThrusterGroupNames, fault.axis) - kThrusterGroupNames.begin();
+        faults_.push_back({to_ns(fault.from_s), to_ns(fault.until_s), static_cast<int>(group), stuck});
     }
 }
 
@@ -83,11 +73,11 @@ double ThrusterModel::strength(int group, std::int64_t t_ns) const {
 
 std::int64_t ThrusterModel::next_change_ns(std::int64_t t_ns) const {
     std::int64_t next = std::numeric_limits<std::int64_t>::max();
-    const auto look = [&](std::int64_t at) {
+    const auto consider = [&](std::int64_t at) {
         if (at > t_ns) next = std::min(next, at);
     };
-    for (const Pulse& p : pulses_) look(p.until_ns);
-    for (const GroupFault& f : faults_) look(f.from_ns), look(f.until_ns);
+    for (const Pulse& p : pulses_) consider(p.until_ns);
+    for (const GroupFault& f : faults_) consider(f.from_ns), consider(f.until_ns);
     return next;
 }
 

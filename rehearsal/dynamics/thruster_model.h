@@ -3,26 +3,47 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
-#include <optional>
+#include <limits>
 #include <random>
-#include <string_view>
 #include <vector>
 
+#include "estimator/pose/pose_estimate.h"
 #include "protocols/closed_loop.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
+
+enum class Stream : std::uint32_t { start = 1, misalignment, pulses, attitude_sensor };
+
+[[nodiscard]] inline std::mt19937_64 engine(std::uint64_t seed, Stream stream) {
+    std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32),
+                           static_cast<std::uint32_t>(stream)};
+    return std::mt19937_64(sequence);
+}
+
+/// Three draws of unit variance: x, y, z.
+[[nodiscard]] inline Vec3 draw_normal(std::mt19937_64& from) {
+    std::normal_distribution<double> normal;
+    Vec3 v;
+    for (int i = 0; i < 3; ++i) v[i] = normal(from);
+    return v;
+}
+
+/// Of the scenario's seconds; infinity stays the end of time.
+[[nodiscard]] inline std::int64_t to_ns(double t_s) {
+    constexpr double kEnd = 9.2e18;
+    return t_s * 1e9 < kEnd ? std::llround(t_s * 1e9) : std::numeric_limits<std::int64_t>::max();
+}
 
 /// On the chaser, body axes; the torque is about the centre of mass.
 struct Loads {
     Vec3 force_n{}, torque_n_m{};
 };
 
-/// Groups in the order +fx, -fx, +fy, ... -fz, +tx, ... -tz.
-inline constexpr int kThrusterGroups = 12;
-/// "+fx" -> 0; nothing where it is no such name.
-[[nodiscard]] std::optional<int> thruster_group(std::string_view axis);
+/// In the order of kThrusterGroupNames.
+inline constexpr int kThrusterGroups = static_cast<int>(kThrusterGroupNames.size());
 
 /// A group fires with its full force or not at all. Of a command, each of the six impulses is for the group in its
 /// direction, which fires for |impulse| / force seconds from the command's time on: not at all where that is less

@@ -6,20 +6,40 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <limits>
 #include <optional>
 #include <vector>
 
+#include "base/pose.h"
 #include "protocols/can/messages.h"
 #include "protocols/closed_loop.h"
 #include "protocols/ledger.h"
 #include "rehearsal/docking/port_state.h"
-#include "rehearsal/judge/motion_track.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
+
+class MotionTrack {
+public:
+    /// False: not newer than the last one, and not taken.
+    bool push(std::int64_t t_ns, const Motion& motion);
+    /// Exact at the times of commands; between them a cubic through positions and velocities, the shortest arc
+    /// between attitudes. Nothing before the first and after the last.
+    [[nodiscard]] std::optional<Motion> at(std::int64_t t_ns) const;
+    [[nodiscard]] bool empty() const { return samples_.empty(); }
+    [[nodiscard]] std::int64_t newest_ns() const { return samples_.back().t_ns; }
+    [[nodiscard]] std::size_t size() const { return samples_.size(); }
+
+private:
+    struct Sample {
+        std::int64_t t_ns;
+        Motion motion;
+    };
+    std::vector<Sample> samples_;
+};
 
 /// The true port state at one instant.
 struct TruthState : PortState {

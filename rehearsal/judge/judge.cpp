@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+
 #include "base/constants.h"
-
-#include "drivers/can/can_bus.h"
-
 namespace narpa::rehearsal {
-namespace {}  // namespace
 
 Judge::Judge(const Scenario& scenario, Failure on_failure)
     : scenario_(scenario), on_failure_(std::move(on_failure)) {}
@@ -169,14 +166,6 @@ Verdict Judge::finish(const std::string& trouble) const {
     v.late = bus_.late;
     v.headline = headline(v, trouble);
     return v;
-}
-
-Result<Verdict> judge_log(const Scenario& scenario, const std::string& path) {
-    auto log = open_can_bus("log:" + path, CanRole::hub);
-    if (!log) return log.error();
-    Judge judge(scenario);
-    for (ReceivedFrame received; (*log)->receive(received);) judge.accept(received.frame, received.t_received_ns);
-    return judge.finish();
 }
 
 }  // namespace narpa::rehearsal

@@ -1,15 +1,40 @@
 /// rehearsal/judge/judge.h - judges a rehearsal by the messages on its bus.
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <string>
 
-#include "base/result.h"
 #include "rehearsal/judge/bus_record.h"
-#include "rehearsal/judge/gates.h"
 #include "rehearsal/judge/verdict.h"
 
 namespace narpa::rehearsal {
+
+/// Distance to the wall of the approach corridor in metres, positive inside. Before the port a cone about its x
+/// axis; behind the port's plane a half sphere.
+[[nodiscard]] double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& position_m);
+
+/// A limit on every sample of a series: the first violation, and the worst (or the closest approach to the limit).
+template <class Sample>
+struct LimitMonitor {
+    std::size_t seen = 0;
+    std::optional<Sample> first, worst;
+    double margin = std::numeric_limits<double>::infinity();
+
+    /// A negative margin is a violation. True for the first one.
+    bool check(const Sample& sample, double margin_now) {
+        ++seen;
+        if (margin_now < margin) margin = margin_now, worst = sample;
+        if (margin_now >= 0 || first) return false;
+        first = sample;
+        return true;
+    }
+};
+
+/// "leg 2 \"hold\"", of an index as the commands carry it.
+[[nodiscard]] std::string leg_text(const Scenario& scenario, std::size_t leg);
 
 /// Frames in, a verdict out. Its only inputs are the scenario and the bus: a log gives the same verdict as the live
 /// bus.
@@ -64,8 +89,5 @@ private:
     LimitMonitor<JudgedEstimate> position_, attitude_,
         sigmas_;  ///< largest errors, and those beyond the gate's sigmas
 };
-
-/// Of a candump log.
-Result<Verdict> judge_log(const Scenario& scenario, const std::string& path);
 
 }  // namespace narpa::rehearsal

@@ -3,30 +3,63 @@
 
 #include <algorithm>
 #include <cmath>
-#include "base/constants.h"
 
+#include "base/constants.h"
 #include "rehearsal/judge/judge.h"
 
 namespace narpa::rehearsal {
+double corridor_clearance_m(const Gates::Corridor& corridor, const Vec3& p) {
+    if (p.x < 0) return corridor.radius_m - norm(p);
+    const double allowed = corridor.radius_m + p.x * std::tan(corridor.half_angle_deg / kDegPerRad);
+    return allowed - std::hypot(p.y, p.z);
+}
+
+std::string leg_text(const Scenario& scenario, std::size_t leg) {
+    if (leg >= scenario.legs.size() || scenario.legs[leg].name.empty()) return fmt::format("leg {}", leg + 1);
+    return fmt::format("leg {} \"{}\"", leg + 1, scenario.legs[leg].name);
+}
+
 namespace {
 
-/// State, margin and times from a monitor; the caller adds the reason.
-template <class Sample>
-void conclude(GateResult& gate, const LimitMonitor<Sample>& monitor, const BusRecord& bus,
-              const std::string& unit) {
-    if (monitor.seen == 0) return;
-    gate.state = monitor.first ? GateState::failed : GateState::passed;
-    gate.margin = monitor.margin;
-    gate.unit = unit;
-    if (monitor.first) gate.t_first_s = bus.seconds(monitor.first->t_ns);
-    if (monitor.worst) gate.t_worst_s = bus.seconds(monitor.worst->t_ns);
+/// "at t = 12.30 s (leg 2 \"hold\", holding)".
+std::string when(const Scenario& scenario, const BusRecord& bus, std::int64_t t_ns) {
+    std::string text = fmt::format("at t = {:.2f} s", bus.seconds(t_ns));
+    const ActuatorCommand* command = bus.command_before(t_ns);
+    if (!command) return text + " before the first thruster command";
+    const std::string_view phase = kGuidancePhases[static_cast<std::size_t>(command->phase)];
+    return text + fmt::format(" ({}, {})", leg_text(scenario, command->leg), phase);
+}
+
+std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
+    return t_ns == BusRecord::kNever ? "never" : fmt::format("at t = {:.3f} s", bus.seconds(t_ns));
+}
+
+/// The program whose message was due next and did not come: why a run broke off.
+/// In lockstep each program waits for the one before: poses, the emulator's heartbeat of their time, the command.
+/// In real time none waits: it is the one that stopped first.
+std::string missing_sender(const Scenario& scenario, const BusRecord& bus) {
+    const std::int64_t slack = bus.heartbeats.lockstep ? 1'000'000 : 2 * scenario.period_ns();
+    const std::int64_t t_report = bus.reports.empty() ? BusRecord::kNever : bus.reports.back().t_ns;
+    const std::int64_t t_command = bus.commands.empty() ? BusRecord::kNever : bus.commands.back().t_ns;
+    const std::string last =
+        fmt::format("last received: poses {}, heartbeat {}, thruster command {}", last_message(bus, bus.t_pose_ns),
+                    last_message(bus, bus.t_heartbeat_ns), last_message(bus, t_command));
+    const auto behind = [&](std::int64_t t, std::int64_t other) {
+        return other != BusRecord::kNever && (t == BusRecord::kNever || t < other - slack);
+    };
+    if (bus.heartbeats.received == 0) return "the emulator sent nothing; " + last;
+    if (bus.t_pose_ns == BusRecord::kNever) return "the dynamics sent nothing; " + last;
+    if (behind(bus.t_heartbeat_ns, bus.t_pose_ns)) return "the emulator stopped sending; " + last;
+    if (bus.heartbeats.lockstep ? behind(t_command, t_report) : behind(t_command, bus.t_pose_ns))
+        return fmt::format("the navigation {}; {}",
+                           t_command == BusRecord::kNever ? "sent nothing" : "stopped sending", last);
+    return "the dynamics stopped sending; " + last;
 }
 
 /// "at t = .. s: WORDS; worst at t = .. s: WORDS" or "nearest to it at ..".
 template <class Sample, class Words>
 std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, const LimitMonitor<Sample>& monitor,
                             Words words) {
-    if (monitor.seen == 0) return "";
     if (!monitor.first) {
         if (!monitor.worst) return "never near it";
         return "nearest to the limit " + when(scenario, bus, monitor.worst->t_ns) + ": " + words(*monitor.worst);
@@ -37,49 +70,56 @@ std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, cons
     return text;
 }
 
+/// A limit on every pose; `words` describes one.
+template <class Words>
+GateResult pose_gate(const char* name, std::string asked, const Scenario& scenario, const BusRecord& bus,
+                     const LimitMonitor<TruthState>& monitor, std::string not_judged, Words words) {
+    GateResult gate{.name = name, .asked = std::move(asked), .reason = std::move(not_judged)};
+    if (monitor.seen == 0) return gate;
+    gate.state = monitor.first ? GateState::failed : GateState::passed;
+    gate.margin = monitor.margin;
+    gate.unit = "m";
+    if (monitor.first) gate.t_first_s = bus.seconds(monitor.first->t_ns);
+    if (monitor.worst) gate.t_worst_s = bus.seconds(monitor.worst->t_ns);
+    gate.reason = first_and_worst(scenario, bus, monitor, words);
+    return gate;
+}
+constexpr const char* kNoPoses = "no poses of both bodies were on the bus";
+
 }  // namespace
 
 GateResult Judge::corridor() const {
     const Gates::Corridor& c = *scenario_.gates.corridor;
-    GateResult gate{
-        .name = "corridor",
-        .asked = fmt::format("within a cone of {:g} deg about the port's axis, {:g} m wide at the port, "
-                             "nearer than {:g} m",
-                             c.half_angle_deg, c.radius_m, c.from_m)};
-    conclude(gate, corridor_, bus_, "m");
-    gate.reason = first_and_worst(scenario_, bus_, corridor_, [&](const TruthState& s) {
-        if (s.position_m().x < 0)
-            return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -s.position_m().x,
-                               s.lateral_m());
-        return fmt::format("{:.3f} m off the axis {:.2f} m before the port, the corridor allows {:.3f} m",
-                           s.lateral_m(), s.position_m().x,
-                           corridor_clearance_m(c, s.position_m()) + s.lateral_m());
-    });
-    if (gate.state == GateState::not_judged)
-        gate.reason = fmt::format("the chaser never came nearer than {:g} m", c.from_m);
-    return gate;
+    return pose_gate("corridor",
+                     fmt::format("within a cone of {:g} deg about the port's axis, {:g} m wide at the port, nearer "
+                                 "than {:g} m",
+                                 c.half_angle_deg, c.radius_m, c.from_m),
+                     scenario_, bus_, corridor_, fmt::format("the chaser never came nearer than {:g} m", c.from_m),
+                     [&](const TruthState& s) {
+                         const Vec3& p = s.position_m();
+                         if (p.x < 0)
+                             return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -p.x,
+                                                s.lateral_m());
+                         return fmt::format(
+                             "{:.3f} m off the axis {:.2f} m before the port, the corridor allows {:.3f} m",
+                             s.lateral_m(), p.x, corridor_clearance_m(c, p) + s.lateral_m());
+                     });
 }
 
 GateResult Judge::keep_out() const {
-    GateResult gate{
-        .name = "keep_out",
-        .asked = fmt::format("no nearer to the port than {:g} m but in the corridor", *scenario_.gates.keep_out_m)};
-    conclude(gate, keep_out_, bus_, "m");
-    gate.reason = first_and_worst(scenario_, bus_, keep_out_, [&](const TruthState& s) {
-        return fmt::format("{:.2f} m from the port, {:.2f} m off its axis", s.range_m(), s.lateral_m());
-    });
-    if (gate.state == GateState::not_judged) gate.reason = "no poses of both bodies were on the bus";
-    return gate;
+    return pose_gate(
+        "keep_out",
+        fmt::format("no nearer to the port than {:g} m but in the corridor", *scenario_.gates.keep_out_m),
+        scenario_, bus_, keep_out_, kNoPoses, [](const TruthState& s) {
+            return fmt::format("{:.2f} m from the port, {:.2f} m off its axis", s.range_m(), s.lateral_m());
+        });
 }
 
 GateResult Judge::distance() const {
     const auto [least, most] = *scenario_.gates.distance_m;
-    GateResult gate{.name = "distance", .asked = fmt::format("{:g} to {:g} m between the ports", least, most)};
-    conclude(gate, distance_, bus_, "m");
-    gate.reason = first_and_worst(scenario_, bus_, distance_,
-                                  [](const TruthState& s) { return fmt::format("{:.3f} m apart", s.range_m()); });
-    if (gate.state == GateState::not_judged) gate.reason = "no poses of both bodies were on the bus";
-    return gate;
+    return pose_gate("distance", fmt::format("{:g} to {:g} m between the ports", least, most), scenario_, bus_,
+                     distance_, kNoPoses,
+                     [](const TruthState& s) { return fmt::format("{:.3f} m apart", s.range_m()); });
 }
 
 GateResult Judge::navigation() const {
@@ -151,7 +191,7 @@ GateResult Judge::contact() const {
         gate.reason = t_contact_ns_
                           ? "the dynamics report contact, but no poses of its time"
                           : fmt::format("there was no contact: {}",
-                                        bus_.truth.empty() ? "no poses of both bodies were on the bus"
+                                        bus_.truth.empty() ? kNoPoses
                                                            : fmt::format("the ports were {:.2f} m apart at the end",
                                                                          bus_.truth.back().range_m()));
         return gate;

@@ -3,19 +3,7 @@
 #include <cmath>
 
 namespace narpa::rehearsal {
-namespace {
-
-MeasurementRecord::Outcome outcome_of(UpdateOutcome o) {
-    switch (o) {
-        case UpdateOutcome::taken: return MeasurementRecord::Outcome::taken;
-        case UpdateOutcome::gated: return MeasurementRecord::Outcome::gated;
-        case UpdateOutcome::too_late: return MeasurementRecord::Outcome::too_late;
-        case UpdateOutcome::bad: return MeasurementRecord::Outcome::bad;
-    }
-    return MeasurementRecord::Outcome::bad;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, std::uint64_t seed) {
     std::unique_ptr<Autopilot> a(new Autopilot);
@@ -24,11 +12,7 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     if (!model) return model.error();
     a->model_ = *std::move(model);
     for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
-    for (const std::size_t lidar : a->model_->lidars()) {
-        auto estimator = LidarPoseEstimator::create(*a->model_, lidar);
-        if (!estimator) return estimator.error();
-        a->lidars_.push_back(*std::move(estimator));
-    }
+    for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
     return a;
 }
 
@@ -89,7 +73,7 @@ void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const Measure
     const std::lock_guard lock(mutex_);
     if (measurement.pose) {
         const UpdateResult result = estimator_->take(*measurement.pose);
-        record.outcome = outcome_of(result.outcome);
+        record.outcome = static_cast<MeasurementRecord::Outcome>(result.outcome);
         record.nis = result.nis;
         record.why = result.why;
         if (result.outcome == UpdateOutcome::taken && count < 255) ++count;

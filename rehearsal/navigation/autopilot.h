@@ -17,7 +17,7 @@ namespace narpa::rehearsal {
 
 /// The outcome of a frame or a sweep.
 struct MeasurementRecord {
-    enum class Outcome : std::uint8_t { taken, gated, too_late, bad, no_pose };
+    enum class Outcome : std::uint8_t { taken, gated, too_late, bad, no_pose };  ///< UpdateOutcome, and no pose
     std::string sensor;
     std::int64_t t_ns = 0;
     Outcome outcome = Outcome::no_pose;

@@ -85,8 +85,7 @@ private:
         loop_.autopilot.take(loop_.link.dynamics()->phase, t_ns);
         for (std::size_t i = 0; i < newest_.size(); ++i) {
             if (!newest_[i]) continue;  // none since the last cycle
-            if (loop_.log) loop_.log->frame(camera(i), newest_[i]->bytes);
-            loop_.autopilot.take_frame(i, newest_[i]->t_mid_ns, newest_[i]->bytes);
+            loop_.take_frame(i, newest_[i]->t_mid_ns, newest_[i]->bytes);
             newest_[i].reset();
         }
         if (!first)  // no packet has been completed yet
@@ -106,10 +105,6 @@ private:
         if (!input.buffer.complete_to(t_ns)) ++loop_.counts.turns_incomplete;
         input.buffer.turn(t_ns, points_);
         if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
-    }
-
-    [[nodiscard]] const Camera& camera(std::size_t i) const {
-        return loop_.autopilot.model().scene().cameras[loop_.inputs.cameras[i].camera];
     }
 
     const Loop& loop_;

@@ -21,6 +21,11 @@ struct Loop {
         const auto& dynamics = link.dynamics();
         return stop.load(std::memory_order_relaxed) || (dynamics && dynamics->phase == DynamicsPhase::finished);
     }
+    /// `i`: index in the scenario's list.
+    void take_frame(std::size_t i, std::int64_t t_mid_ns, std::span<const std::uint8_t> bytes) const {
+        if (log) log->frame(autopilot.model().scene().cameras[inputs.cameras[i].camera], bytes);
+        autopilot.take_frame(i, t_mid_ns, bytes);
+    }
     /// Sends and logs the results of a cycle.
     void publish(const CycleRecord& record) const {
         link.send(record.estimate);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/time.h"
@@ -58,12 +57,6 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     }
     out.pose = {t_ns, e.T_camera_target, kMatchVariance * e.covariance, camera_.T_mount_camera};
     return out;
-}
-
-Result<LidarPoseEstimator> LidarPoseEstimator::create(SceneModel& model, std::size_t lidar) {
-    auto icp = CloudIcp::create(model.tracer(), model.target(), {});
-    if (!icp) return icp.error();
-    return LidarPoseEstimator(model, lidar, *std::move(icp));
 }
 
 /// Drops returns from the chaser itself.

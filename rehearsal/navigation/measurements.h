@@ -42,8 +42,9 @@ private:
 /// Sweeps of one LiDAR: ICP of the last turn's returns, corrected for the motion to the time of its end.
 class LidarPoseEstimator {
 public:
-    /// `model` outlives it. `lidar`: index in the scene. Errors: ICP's.
-    static Result<LidarPoseEstimator> create(SceneModel& model, std::size_t lidar);
+    /// `model` outlives it. `lidar`: index in the scene.
+    LidarPoseEstimator(SceneModel& model, std::size_t lidar)
+        : model_(&model), lidar_(model.scene().lidars[lidar]), icp_(model.tracer(), model.target()) {}
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
     /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
@@ -53,8 +54,6 @@ public:
                                             double position_sigma_m, double rotation_sigma_rad);
 
 private:
-    LidarPoseEstimator(SceneModel& model, std::size_t lidar, CloudIcp icp)
-        : model_(&model), lidar_(model.scene().lidars[lidar]), icp_(std::move(icp)) {}
     void remove_own_body(std::span<const RangePoint> points);
 
     SceneModel* model_;

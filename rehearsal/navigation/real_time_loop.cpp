@@ -2,11 +2,20 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
 
+#include "base/stop.h"
 #include "drivers/can/descriptor.h"
 #include "estimator/features/feature_matcher.h"
+#include "protocols/video/embedded_line.h"
 #include "rehearsal/navigation/loop.h"
-#include "rehearsal/navigation/sensor_receiver.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -16,6 +25,133 @@ constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kPatience_ns = 60 * kSecond_ns, kSilence_ns = 10 * kSecond_ns;
 /// Delays allowed after t_k: of its attitude report, of frames and packets that end at t_k.
 constexpr std::int64_t kReportWait_ns = 50 * kMs, kSensorWait_ns = 60 * kMs;
+
+constexpr std::int64_t kReadWait_ns = 50'000'000;
+constexpr std::size_t kFramesKept = 4, kNoticesKept = 16;
+
+/// Reads the sources, one thread each, keeps the newest frames and packets, and finds the exposure time of each
+/// frame.
+class SensorReceiver {
+public:
+    /// Both outlive it.
+    SensorReceiver(SensorInputs& inputs, const SceneModel& model)
+        : inputs_(inputs), model_(model), cameras_(inputs.cameras.size()) {
+        for (std::size_t i = 0; i < inputs.cameras.size(); ++i)
+            threads_.emplace_back([this, i] { read_frames(i); });
+        for (std::size_t i = 0; i < inputs.lidars.size(); ++i)
+            threads_.emplace_back([this, i] { read_packets(i); });
+    }
+    ~SensorReceiver() {
+        stop_ = true;
+        for (std::thread& t : threads_) t.join();
+    }
+    SensorReceiver(const SensorReceiver&) = delete;
+    SensorReceiver& operator=(const SensorReceiver&) = delete;
+
+    /// Frame notices from the bus, and simulation clock minus CLOCK_MONOTONIC.
+    void update(const std::vector<FrameNotice>& notices, std::int64_t offset_ns) {
+        const std::lock_guard lock(mutex_);
+        offset_ns_ = offset_ns;
+        for (const FrameNotice& notice : notices)
+            for (std::size_t i = 0; i < cameras_.size(); ++i) {
+                if (inputs_.cameras[i].camera != notice.camera || notice.delivery == Delivery::nothing) continue;
+                auto& kept = cameras_[i].notices;
+                if (kept.size() == kNoticesKept) kept.pop_front();
+                kept.push_back(notice);
+            }
+    }
+
+    struct Frame {
+        std::int64_t t_mid_ns = 0;
+        std::vector<std::uint8_t> bytes;
+    };
+    /// The newest frame exposed at t_ns or before, unless it was returned before. `camera`: in the scenario's
+    /// order.
+    [[nodiscard]] std::optional<Frame> newest_frame(std::size_t i, std::int64_t t_ns) {
+        const std::lock_guard lock(mutex_);
+        CameraState& state = cameras_[i];
+        const Camera& camera = model_.scene().cameras[inputs_.cameras[i].camera];
+        for (auto frame = state.arrived.rbegin(); frame != state.arrived.rend(); ++frame) {
+            const auto t_mid_ns = exposed_ns(state, camera, *frame);
+            if (!t_mid_ns || *t_mid_ns > t_ns) continue;
+            if (*t_mid_ns <= state.taken_ns) return std::nullopt;
+            state.taken_ns = *t_mid_ns;
+            return Frame{*t_mid_ns, frame->bytes};
+        }
+        return std::nullopt;
+    }
+    /// Points of the turn that ends at t_ns; false: its last packet has not come.
+    [[nodiscard]] bool turn(std::size_t i, std::int64_t t_ns, std::vector<RangePoint>& out) {
+        const std::lock_guard lock(mutex_);
+        const SweepBuffer& buffer = inputs_.lidars[i].buffer;
+        buffer.turn(t_ns, out);
+        return buffer.complete_to(t_ns);
+    }
+    [[nodiscard]] std::uint64_t frames() const {
+        const std::lock_guard lock(mutex_);
+        return frames_;
+    }
+
+private:
+    struct Arrived {
+        std::int64_t t_arrived_ns = 0;  ///< CLOCK_MONOTONIC
+        std::vector<std::uint8_t> bytes;
+    };
+    struct CameraState {
+        std::deque<Arrived> arrived;
+        std::deque<FrameNotice> notices;
+        std::int64_t taken_ns = std::numeric_limits<std::int64_t>::min();
+    };
+    void read_frames(std::size_t i) {
+        CameraInput& input = inputs_.cameras[i];
+        std::vector<std::uint8_t> bytes(input.frame_bytes);
+        while (!stop_ && input.source->status()) {
+            if (!input.source->receive(bytes, kReadWait_ns)) continue;
+            const std::int64_t now_ns = monotonic_ns();
+            const std::lock_guard lock(mutex_);
+            ++frames_;
+            auto& arrived = cameras_[i].arrived;
+            if (arrived.size() == kFramesKept) arrived.pop_front();
+            arrived.push_back({now_ns, bytes});
+        }
+    }
+    void read_packets(std::size_t i) {
+        LidarInput& input = inputs_.lidars[i];
+        std::vector<std::uint8_t> packet(kDatagramBytesMax);
+        while (!stop_) {
+            const std::size_t n = input.source->receive(packet, kReadWait_ns);
+            if (n == 0) continue;
+            const std::lock_guard lock(mutex_);
+            input.buffer.take({packet.data(), n}, monotonic_ns() + offset_ns_);
+        }
+    }
+    /// Mid-exposure, from the embedded line or from the notice whose hand-over is nearest to the arrival.
+    [[nodiscard]] std::optional<std::int64_t> exposed_ns(const CameraState& state, const Camera& camera,
+                                                         const Arrived& frame) const {
+        if (camera.embedded_line) {
+            const std::size_t row = frame.bytes.size() / static_cast<std::size_t>(camera.height);
+            const auto ledger = decode_embedded_line(std::span(frame.bytes).last(row));
+            return ledger ? std::optional(ledger->t_exposure_mid_ns) : std::nullopt;
+        }
+        const FrameNotice* nearest = nullptr;
+        std::int64_t least_ns = camera.period_ns / 2;
+        for (const FrameNotice& notice : state.notices) {
+            const std::int64_t off_ns = std::abs(frame.t_arrived_ns + offset_ns_ - notice.t_hand_over_ns);
+            if (off_ns < least_ns) nearest = &notice, least_ns = off_ns;
+        }
+        if (!nearest || nearest->delivery != Delivery::frame) return std::nullopt;
+        return nearest->t_mid_ns;
+    }
+
+    SensorInputs& inputs_;
+    const SceneModel& model_;
+    StopFlag stop_{false};
+    mutable std::mutex mutex_;  ///< guards what follows and the LiDARs' buffers
+    std::vector<CameraState> cameras_;
+    std::int64_t offset_ns_ = 0;
+    std::uint64_t frames_ = 0;
+    std::vector<std::thread> threads_;
+};
 
 class RealTimeLoop {
 public:
@@ -42,9 +178,9 @@ public:
 
 private:
     void receive(std::int64_t timeout_ns) {
-        const std::int64_t heard_ns = loop_.link.clock().newest().t_ns;
+        const std::int64_t before_ns = loop_.link.clock().newest().t_ns;
         loop_.link.receive(timeout_ns);
-        if (loop_.link.clock().newest().t_ns != heard_ns) t_received_ns_ = monotonic_ns();
+        if (loop_.link.clock().newest().t_ns != before_ns) t_received_ns_ = monotonic_ns();
         receiver_.update(loop_.link.take_notices(), loop_.link.clock().now_ns() - monotonic_ns());
     }
 
@@ -139,10 +275,7 @@ private:
                 ++loop_.counts.frames_missing;
                 continue;
             }
-            if (loop_.log)
-                loop_.log->frame(loop_.autopilot.model().scene().cameras[loop_.inputs.cameras[i].camera],
-                                 frame->bytes);
-            loop_.autopilot.take_frame(i, frame->t_mid_ns, frame->bytes);
+            loop_.take_frame(i, frame->t_mid_ns, frame->bytes);
         }
     }
 

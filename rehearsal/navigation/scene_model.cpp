@@ -1,37 +1,10 @@
 #include "rehearsal/navigation/scene_model.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "renderer/scene/scene_file.h"
 
 namespace narpa::rehearsal {
-namespace {
-
-template <class Named>
-Result<std::size_t> index_of(const std::vector<Named>& all, const std::string& name, const std::string& file) {
-    const auto it = std::ranges::find(all, name, &Named::name);
-    if (it == all.end()) return Error{fmt::format("\"{}\" is not in this scene", name), file};
-    return static_cast<std::size_t>(it - all.begin());
-}
-
-template <class Sensor>
-Result<std::vector<std::size_t>> on_chaser(const std::vector<Sensor>& all, const std::vector<std::string>& names,
-                                           std::size_t chaser, const std::string& file) {
-    std::vector<std::size_t> out;
-    for (const std::string& name : names) {
-        const auto i = index_of(all, name, file);
-        if (!i) return i.error();
-        if (all[*i].mount != static_cast<int>(chaser))
-            return Error{fmt::format("\"{}\" does not ride on the chaser: expected mount = its name", name), file};
-        out.push_back(*i);
-    }
-    return out;
-}
-
-}  // namespace
-
 Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario) {
     auto scene = read_scene(scenario.scene);
     if (!scene) return scene.error();
@@ -39,21 +12,18 @@ Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario)
     m->scene_ = *std::move(scene);
     m->orbit_ = scenario.orbit;
     m->target_centre_of_mass_m_ = scenario.target.centre_of_mass_m;
-    const auto target = index_of(m->scene_.bodies, scenario.target.body, scenario.scene);
-    if (!target) return target.error();
-    const auto chaser = index_of(m->scene_.bodies, scenario.chaser.body, scenario.scene);
-    if (!chaser) return chaser.error();
-    m->target_ = *target, m->chaser_ = *chaser;
-    if (scenario.attractor) {
-        const auto attractor = index_of(m->scene_.bodies, scenario.attractor->first, scenario.scene);
-        if (!attractor) return attractor.error();
-        m->attractor_ = *attractor;
-    }
-    auto cameras = on_chaser(m->scene_.cameras, scenario.navigation.cameras, *chaser, scenario.scene);
-    if (!cameras) return cameras.error();
-    auto lidars = on_chaser(m->scene_.lidars, scenario.navigation.lidars, *chaser, scenario.scene);
-    if (!lidars) return lidars.error();
-    m->cameras_ = *std::move(cameras), m->lidars_ = *std::move(lidars);
+    // read_scenario has found all of them in the scene.
+    const auto index_of = [](const auto& all, const std::string& name) {
+        const auto has_name = [&](const auto& named) { return named.name == name; };
+        return static_cast<std::size_t>(std::ranges::find_if(all, has_name) - all.begin());
+    };
+    m->target_ = index_of(m->scene_.bodies, scenario.target.body);
+    m->chaser_ = index_of(m->scene_.bodies, scenario.chaser.body);
+    if (scenario.attractor) m->attractor_ = index_of(m->scene_.bodies, scenario.attractor->first);
+    for (const std::string& name : scenario.navigation.cameras)
+        m->cameras_.push_back(index_of(m->scene_.cameras, name));
+    for (const std::string& name : scenario.navigation.lidars)
+        m->lidars_.push_back(index_of(m->scene_.lidars, name));
     auto render_scene = RenderScene::create(m->scene_);
     if (!render_scene) return render_scene.error();
     m->render_scene_.emplace(*std::move(render_scene));

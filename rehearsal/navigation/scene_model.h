@@ -13,8 +13,7 @@ namespace narpa::rehearsal {
 
 class SceneModel {
 public:
-    /// Reads the scenario's scene and builds its tracer. Errors: of the scene; a body or sensor that it does not
-    /// have; a sensor that is not mounted on the chaser.
+    /// Reads the scenario's scene and builds its tracer. Errors: of the scene.
     static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }

@@ -2,14 +2,36 @@
 /// inputs: converts between the bodies' axes and the filter's centres of mass.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <deque>
 
 #include "estimator/cloud/range_points.h"
-#include "estimator/filter/pose_tracker.h"
-#include "rehearsal/navigation/attitude_track.h"
+#include "estimator/filter/pose_filter.h"
+#include "protocols/closed_loop.h"
 #include "rehearsal/navigation/flight_control.h"
 
 namespace narpa::rehearsal {
+
+class AttitudeTrack {
+public:
+    /// False: not newer than the last report, and dropped.
+    bool take(const AttitudeReport& report) noexcept;
+    [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+    [[nodiscard]] const AttitudeReport& newest() const noexcept { return reports_[count_ - 1]; }
+
+    struct At {
+        Quat q_world_chaser{};
+        Vec3 rate_rad_s{};  ///< body axes, against inertial space
+    };
+    /// Between two reports along the shortest arc; outside them extrapolated at the nearest one's rate. Not when
+    /// empty.
+    [[nodiscard]] At at(std::int64_t t_ns) const noexcept;
+
+private:
+    std::array<AttitudeReport, 8> reports_{};  ///< oldest first
+    std::size_t count_ = 0;
+};
 
 /// Pose of the target's body axes in a sensor's axes, with its covariance (estimator/pose/pose_estimate.h).
 struct TargetMeasurement {

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "rehearsal/runner/child_process.h"
-#include "rehearsal/runner/report_charts.h"
+#include "rehearsal/runner/report.h"
 #include "rehearsal/runner/run_folder.h"
 
 namespace narpa::rehearsal {

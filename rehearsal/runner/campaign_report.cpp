@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <map>
 
-#include "rehearsal/judge/statistics.h"
+#include "rehearsal/judge/verdict.h"
 #include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/report_charts.h"
-#include "rehearsal/runner/report_page.h"
+#include "rehearsal/runner/report.h"
 
 namespace narpa::rehearsal {
 
@@ -138,61 +137,52 @@ std::string campaign_page(const Scenario& scenario, const json& s, const std::st
     const auto percent = [](const json& v) { return v.get<double>() * 100; };
     std::string body = fmt::format(
         "<h1>{}</h1>\n<p class=\"lead\">{} {} of {} runs succeeded: {:.1f} %, with 95 % confidence between {:.1f} "
-        "and "
-        "{:.1f} % (Clopper and Pearson)</p>\n",
-        escape(scenario.title), badge(s["passed"], s["passed"].get<bool>() ? "passed" : "failed"),
-        s["succeeded"].get<int>(), s["judged"].get<int>(), percent(s["success_rate"]),
-        percent(s["success_interval_95"][0]), percent(s["success_interval_95"][1]));
+        "and {:.1f} % (Clopper and Pearson)</p>\n",
+        escape(scenario.title), badge(s["passed"]), s["succeeded"].get<int>(), s["judged"].get<int>(),
+        percent(s["success_rate"]), percent(s["success_interval_95"][0]), percent(s["success_interval_95"][1]));
     if (s["judged"] != s["runs"])
         body += fmt::format("<p>{} of {} runs have no result yet.</p>\n",
                             s["runs"].get<int>() - s["judged"].get<int>(), s["runs"].get<int>());
+    const auto value = [](const json& d, const char* key, int digits) {
+        return fmt::format("{:.{}f}", d[key].get<double>(), digits);
+    };
     if (!s["contact"].empty()) {
-        body += "<h2>Contact</h2>\n" + campaign_contact_charts(folder) +
-                "<table><tr><th>condition</th><th class=\"n\">asked</th><th class=\"n\">mean</th><th "
-                "class=\"n\">sigma</th><th class=\"n\">least</th><th class=\"n\">p99</th><th "
-                "class=\"n\">most</th><th></th>"
-                "</tr>\n";
+        HtmlTable table{"condition", "#asked", "#mean", "#sigma", "#least", "#p99", "#most", ""};
         for (const json& c : s["contact"])
-            body += fmt::format(
-                "<tr><td>{}</td><td class=\"n\">{:g} to {:g}</td><td class=\"n\">{:.4f}</td><td "
-                "class=\"n\">{:.4f}</td>"
-                "<td class=\"n\">{:.4f}</td><td class=\"n\">{:.4f}</td><td "
-                "class=\"n\">{:.4f}</td><td>{}</td></tr>\n",
-                c["title"].get<std::string>(), c["asked_min"].get<double>(), c["asked_max"].get<double>(),
-                c["mean"].get<double>(), c["sigma"].get<double>(), c["min"].get<double>(), c["p99"].get<double>(),
-                c["max"].get<double>(), c["unit"].get<std::string>());
-        body += "</table>\n";
+            table.row({c["title"],
+                       fmt::format("{:g} to {:g}", c["asked_min"].get<double>(), c["asked_max"].get<double>()),
+                       value(c, "mean", 4), value(c, "sigma", 4), value(c, "min", 4), value(c, "p99", 4),
+                       value(c, "max", 4), c["unit"]});
+        body += "<h2>Contact</h2>\n" +
+                charts_of(folder, {{"where", "Where the ports met"},
+                                   {"rates", "Rates at contact"},
+                                   {"angles", "Angles at contact"}}) +
+                table.html();
     }
-    body +=
-        "<h2>Navigation</h2>\n<table><tr><th>of each run</th><th class=\"n\">mean</th><th class=\"n\">p50</th><th "
-        "class=\"n\">p99</th><th class=\"n\">most</th></tr>\n";
+    HtmlTable navigation{"of each run", "#mean", "#p50", "#p99", "#most"};
     const auto row = [&](const char* title, const json& d) {
         if (d.is_object())
-            body += fmt::format(
-                "<tr><td>{}</td><td class=\"n\">{:.3f}</td><td class=\"n\">{:.3f}</td><td "
-                "class=\"n\">{:.3f}</td><td class=\"n\">{:.3f}</td></tr>\n",
-                title, d["mean"].get<double>(), d["p50"].get<double>(), d["p99"].get<double>(),
-                d["max"].get<double>());
+            navigation.row(
+                {title, value(d, "mean", 3), value(d, "p50", 3), value(d, "p99", 3), value(d, "max", 3)});
     };
     row("squared errors over variances (6 is right)", s["navigation"]["nees"]);
     row("largest position error [m]", s["navigation"]["largest_position_error_m"]);
     row("largest attitude error [deg]", s["navigation"]["largest_attitude_error_deg"]);
     row("time until the end [s]", s["duration_s"]);
-    body += "</table>\n<h2>Failures</h2>\n";
+    body += "<h2>Navigation</h2>\n" + navigation.html() + "<h2>Failures</h2>\n";
     if (s["failures"].empty()) body += "<p>None.</p>\n";
+    const auto link = [](const json& run, std::string_view words) {
+        return fmt::format("<a href=\"{}/index.html\">{}{}</a>", run["folder"].get<std::string>(),
+                           run["run"].get<int>(), words);
+    };
     for (const auto& [gate, list] : s["failures"].items()) {
-        body += fmt::format("<h3>{}: {} runs</h3>\n<table><tr><th>run</th><th>seed</th><th>reason</th></tr>\n",
-                            escape(gate), list.size());
+        HtmlTable table{"run", "seed", "reason"};
         for (const json& f : list)
-            body += fmt::format("<tr><td><a href=\"{0}/index.html\">{1}</a></td><td>{2}</td><td>{3}</td></tr>\n",
-                                f["folder"].get<std::string>(), f["run"].get<int>(), f["seed"].get<std::uint64_t>(),
-                                escape(f["reason"].get<std::string>()));
-        body += "</table>\n";
+            table.row({link(f, ""), f["seed"].dump(), escape(f["reason"].get<std::string>())});
+        body += fmt::format("<h3>{}: {} runs</h3>\n", escape(gate), list.size()) + table.html();
     }
     body += "<h2>All runs</h2>\n<p>";
-    for (const json& run : s["each"])
-        body += fmt::format("<a href=\"{}/index.html\">{}{}</a> ", run["folder"].get<std::string>(),
-                            run["run"].get<int>(), run["passed"].get<bool>() ? "" : " (failed)");
+    for (const json& run : s["each"]) body += link(run, run["passed"].get<bool>() ? "" : " (failed)") + " ";
     return page_around(scenario.title, body + "</p>\n");
 }
 

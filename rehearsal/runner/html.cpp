@@ -1,7 +1,9 @@
 // HTML parts of all report pages.
 #include <fmt/format.h>
 
-#include "rehearsal/runner/report_page.h"
+#include "base/base64.h"
+#include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/report.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -42,8 +44,36 @@ std::string page_around(std::string_view title, std::string_view body) {
         escape(title), kStyle, body);
 }
 
-std::string badge(bool good, std::string_view words) {
-    return fmt::format("<span class=\"badge {}\">{}</span>", good ? "good" : "bad", escape(words));
+std::string badge(bool good) {
+    return good ? "<span class=\"badge good\">passed</span>" : "<span class=\"badge bad\">failed</span>";
+}
+
+HtmlTable::HtmlTable(std::initializer_list<std::string_view> titles) {
+    rows_ += "<tr>";
+    for (std::string_view title : titles) {
+        numbers_.push_back(title.starts_with('#'));
+        rows_ += numbers_.back() ? fmt::format("<th class=\"n\">{}</th>", title.substr(1))
+                                 : fmt::format("<th>{}</th>", title);
+    }
+    rows_ += "</tr>\n";
+}
+
+void HtmlTable::row(std::initializer_list<std::string> cells) {
+    rows_ += "<tr>";
+    auto is_number = numbers_.begin();
+    for (const std::string& cell : cells) rows_ += (*is_number++ ? "<td class=\"n\">" : "<td>") + cell + "</td>";
+    rows_ += "</tr>\n";
+}
+
+std::string charts_of(const std::string& folder, std::initializer_list<PageChart> charts) {
+    std::string out;
+    for (const auto& [name, title] : charts)
+        if (const std::string svg = read_text(fmt::format("{}/charts/{}.svg", folder, name)); !svg.empty())
+            out += fmt::format("<img class=\"chart\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\"/>\n",
+                               escape(title), base64(svg));
+    if (!out.empty()) return "<div class=\"charts\">\n" + out + "</div>\n";
+    return "<p class=\"soft\">The charts were not drawn: that needs python3-matplotlib. "
+           "<code>narpa-plot charts.json</code> in this folder draws them.</p>\n";
 }
 
 }  // namespace narpa::rehearsal

@@ -13,10 +13,9 @@
 
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/judge/judge.h"
+#include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/free_port.h"
-#include "rehearsal/runner/program.h"
-#include "rehearsal/runner/report_charts.h"
-#include "rehearsal/runner/report_page.h"
+#include "rehearsal/runner/report.h"
 #include "rehearsal/runner/run_folder.h"
 
 namespace narpa::rehearsal {
@@ -327,7 +326,7 @@ private:
         if (options_.page) {
             record_["wall_s"] = done.wall_s;
             done.page = in_folder("index.html");
-            if (Status good = draw_charts(options_.folder, rehearsal_plot({scenario_, judge_.bus(), v})); !good)
+            if (Status good = draw_charts(options_.folder, rehearsal_plot(scenario_, judge_.bus(), v)); !good)
                 return good.error();
             const std::string page = rehearsal_page(scenario_, judge_.bus(), v, record_, options_.folder);
             if (Status good = write_text(done.page, page); !good) return good.error();

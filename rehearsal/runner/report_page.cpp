@@ -1,5 +1,4 @@
-#include "rehearsal/runner/report_page.h"
-
+// The page of one run.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/base64.h"
-#include "rehearsal/judge/gates.h"
+#include "rehearsal/judge/judge.h"
 #include "rehearsal/runner/child_process.h"
-#include "rehearsal/runner/report_charts.h"
+#include "rehearsal/runner/report.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -19,7 +18,10 @@ namespace fs = std::filesystem;
 constexpr std::size_t kPictures = 8;
 
 /// Input of all sections.
-struct Run : Report {
+struct Run {
+    const Scenario& scenario;
+    const BusRecord& bus;
+    const Verdict& verdict;
     const nlohmann::json& record;
     const std::string& folder;
 };
@@ -27,7 +29,7 @@ struct Run : Report {
 std::string head(const Run& run) {
     const Verdict& v = run.verdict;
     std::string out = fmt::format("<h1>{}</h1>\n<p class=\"lead\">{} {}</p>\n", escape(run.scenario.title),
-                                  badge(v.passed, v.passed ? "passed" : "failed"), escape(v.headline));
+                                  badge(v.passed), escape(v.headline));
     out += fmt::format("<p class=\"soft\">{}, seed {}, {:.1f} s simulated in {:.1f} s, narpa {}, {}</p>\n",
                        escape(run.record.value("mode", "")), run.record.value("seed", std::uint64_t{0}), v.t_end_s,
                        run.record.value("wall_s", 0.0), escape(run.record.value("version", "")),
@@ -36,33 +38,27 @@ std::string head(const Run& run) {
 }
 
 std::string gates(const Run& run) {
-    std::string out =
-        "<h2>Gates</h2>\n<table><tr><th>gate</th><th>asked</th><th></th><th>what there was</th>"
-        "<th class=\"n\">margin</th></tr>\n";
+    HtmlTable table{"gate", "asked", "", "what there was", "#margin"};
     for (const GateResult& g : run.verdict.gates) {
         const auto state = static_cast<std::size_t>(g.state);
         constexpr const char* kClasses[] = {"good", "bad", "none"};
-        out += fmt::format(
-            "<tr><td><b>{}</b></td><td>{}</td><td><span class=\"badge {}\">{}</span></td><td>{}</td><td "
-            "class=\"n\">{}</td></tr>\n",
-            escape(g.name), escape(g.asked), kClasses[state], kGateStates[state], escape(g.reason),
-            g.margin && std::isfinite(*g.margin) ? fmt::format("{:.3g} {}", *g.margin, g.unit) : "");
+        table.row({fmt::format("<b>{}</b>", escape(g.name)), escape(g.asked),
+                   fmt::format("<span class=\"badge {}\">{}</span>", kClasses[state], kGateStates[state]),
+                   escape(g.reason),
+                   g.margin && std::isfinite(*g.margin) ? fmt::format("{:.3g} {}", *g.margin, g.unit) : ""});
     }
-    return out + "</table>\n";
+    return "<h2>Gates</h2>\n" + table.html();
 }
-
-// --- Sections with charts ---------------------------------------------------------------------------------------
 
 std::string approach(const Run& run) {
     return "<h2>Approach</h2>\n<p>The chaser's port in the target's port axes: x out of the docking interface. "
-           "Scales "
-           "differ across and along.</p>\n" +
-           approach_charts(run.folder);
-}
-
-std::string motion(const Run& run) {
-    return "<h2>Range and rates</h2>\n<p>Shaded: phase of the guidance and number of the leg.</p>\n" +
-           motion_charts(run.folder);
+           "Scales differ across and along.</p>\n" +
+           charts_of(run.folder, {{"above", "From above"},
+                                  {"side", "From the side"},
+                                  {"front", "From the front"},
+                                  {"contact", "The last three metres, from the front"}}) +
+           "<h2>Range and rates</h2>\n<p>Shaded: phase of the guidance and number of the leg.</p>\n" +
+           charts_of(run.folder, {{"range", "Range over time"}, {"rates", "Rates over time"}});
 }
 
 std::string errors(const Run& run) {
@@ -76,7 +72,32 @@ std::string errors(const Run& run) {
                "exact "
                "covariance).</p>\n",
                n.estimates, n.share_within * 100, n.nees) +
-           (run.bus.estimates.empty() ? "<p>No estimates.</p>\n" : error_charts(run.folder));
+           (run.bus.estimates.empty() ? "<p>No estimates.</p>\n"
+                                      : charts_of(run.folder, {{"position_x", "Position error along x"},
+                                                               {"position_y", "Position error along y"},
+                                                               {"position_z", "Position error along z"},
+                                                               {"attitude_x", "Attitude error about x"},
+                                                               {"attitude_y", "Attitude error about y"},
+                                                               {"attitude_z", "Attitude error about z"}}));
+}
+
+/// A table: each condition as a bar beside its limits.
+std::string contact_bars(const ContactConditions& conditions) {
+    std::string rows;
+    for (const ContactCondition& c : conditions) {
+        // Full scale is a third beyond the limit, or at the value where that is more.
+        const double percent = 100 / std::max(c.max * 1.33, c.value * 1.05);
+        const std::string asked =
+            c.min > 0 ? fmt::format("{:g} to {:g}", c.min, c.max) : fmt::format("at most {:g}", c.max);
+        rows += fmt::format(
+            "<tr><td>{}</td><td class=\"bar\"><i class=\"asked\" style=\"left:{:.1f}%;width:{:.1f}%\"></i>"
+            "<i class=\"{}\" style=\"width:{:.1f}%\"></i></td><td class=\"n\"><b>{:.4g}</b> "
+            "{}</td><td>{}{}</td></tr>\n",
+            escape(c.title), c.min * percent, (c.max - c.min) * percent, c.within() ? "value" : "value beyond",
+            std::max(0.3, c.value * percent), c.value, escape(c.unit), asked, c.within() ? "" : " - beyond");
+    }
+    return "<table class=\"bars\"><tr><th>condition</th><th></th><th class=\"n\">value</th><th>asked</th></tr>\n" +
+           rows + "</table>\n";
 }
 
 std::string contact(const Run& run) {
@@ -89,8 +110,6 @@ std::string contact(const Run& run) {
         c.t_s, c.captured ? "captured" : "bounced off", contact_bars(c.conditions));
 }
 
-// --- Ledger, pictures, events, how ------------------------------------------------------------------------------
-
 std::string ledger(const Run& run) {
     const LedgerStatistics& l = run.verdict.ledger;
     std::string out = fmt::format(
@@ -99,24 +118,19 @@ std::string ledger(const Run& run) {
         l.frames, l.handed_over, l.deadlines_met,
         l.frames > 0 ? 100.0 * static_cast<double>(l.deadlines_met) / static_cast<double>(l.frames) : 0.0, l.stale,
         run.verdict.lockstep ? " In lockstep the clock stands still while a frame is made: "
-                               "times of making and handing over tell nothing here."
+                               "these times mean nothing here."
                              : "");
     if (run.verdict.lockstep || l.frames == 0) return out;
-    out +=
-        "<table><tr><th>[ms]</th><th class=\"n\">p50</th><th class=\"n\">p90</th><th class=\"n\">p99</th>"
-        "<th class=\"n\">p99.9</th><th class=\"n\">max</th></tr>\n";
+    HtmlTable table{"[ms]", "#p50", "#p90", "#p99", "#p99.9", "#max"};
     const auto row = [&](const char* name, const Distribution& d) {
-        if (d.count == 0) return;
-        out += fmt::format("<tr><td>{}</td>", name);
-        for (const double v : {d.p50, d.p90, d.p99, d.p999, d.max})
-            out += fmt::format("<td class=\"n\">{:.2f}</td>", v);
-        out += "</tr>\n";
+        const auto text = [](double v) { return fmt::format("{:.2f}", v); };
+        if (d.count > 0) table.row({name, text(d.p50), text(d.p90), text(d.p99), text(d.p999), text(d.max)});
     };
     row("pose command to hand-over", l.latency_ms);
     row("middle of the exposure to hand-over", l.exposure_to_hand_over_ms);
     row("rendering", l.render_ms);
     row("hand-over after its deadline (negative: before)", l.late_ms);
-    return out + "</table>\n" + latency_chart(run.folder);
+    return out + table.html() + charts_of(run.folder, {{"latency", "Pose command to hand-over, for each frame"}});
 }
 
 std::string pictures(const Run& run) {
@@ -168,11 +182,9 @@ std::string events(const Run& run) {
     for (const GateResult& g : run.verdict.gates)
         if (g.state == GateState::failed && g.t_first_s) all.emplace_back(*g.t_first_s, "gate failed: " + g.name);
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    std::string out = "<h2>What happened</h2>\n<table><tr><th class=\"n\">t [s]</th><th>event</th></tr>\n";
-    for (const auto& [t, what] : all)
-        out +=
-            fmt::format("<tr><td class=\"n\">{:.2f}</td><td style=\"width:100%\">{}</td></tr>\n", t, escape(what));
-    return out + "</table>\n";
+    HtmlTable table{"#t [s]", "event"};
+    for (const auto& [t, what] : all) table.row({fmt::format("{:.2f}", t), escape(what)});
+    return "<h2>What happened</h2>\n" + table.html();
 }
 
 std::string how(const Run& run) {
@@ -198,9 +210,9 @@ std::string how(const Run& run) {
 
 std::string rehearsal_page(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict,
                            const nlohmann::json& record, const std::string& folder) {
-    const Run run{{scenario, bus, verdict}, record, folder};
-    return page_around(scenario.title, head(run) + gates(run) + approach(run) + motion(run) + errors(run) +
-                                           contact(run) + pictures(run) + ledger(run) + events(run) + how(run));
+    const Run run{scenario, bus, verdict, record, folder};
+    return page_around(scenario.title, head(run) + gates(run) + approach(run) + errors(run) + contact(run) +
+                                           pictures(run) + ledger(run) + events(run) + how(run));
 }
 
 }  // namespace narpa::rehearsal

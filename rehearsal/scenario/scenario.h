@@ -8,15 +8,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/pose.h"
 #include "base/result.h"
-#include "rehearsal/docking/capture_envelope.h"
+#include "rehearsal/docking/port_state.h"
 
 namespace narpa::rehearsal {
 
@@ -52,6 +54,8 @@ struct TargetMotion {
     Vec3 rate_deg_s{};      ///< body axes, at time 0; against LVLH or against inertial space
 };
 
+inline constexpr std::array<std::string_view, 12> kThrusterGroupNames{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
+                                                                      "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
 /// Six pairs of thruster groups, one for each direction of force and torque along the chaser's body axes.
 struct Thrusters {
     double force_n = 400, torque_n_m = 400;  ///< of a group that fires
@@ -126,7 +130,7 @@ struct Gates {
         double from_m = 20;     ///< judged nearer than this
     };
     struct NavigationError {
-        double sigmas = 4;    ///< |error| of each of the six, in standard deviations as told on CAN
+        double sigmas = 4;    ///< |error| of each of the six, in standard deviations as sent on CAN
         double share = 0.99;  ///< of the estimates that are within
         double position_m = std::numeric_limits<double>::infinity();  ///< largest error once it has measured
         double attitude_deg = std::numeric_limits<double>::infinity();

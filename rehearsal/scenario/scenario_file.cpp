@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kLongest_s = 1e6;
 constexpr Range kAngle_deg{.low = -360, .high = 360};
-constexpr std::array<std::string_view, 12> kAxes{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
-                                                 "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
 
 /// Sets `value` where the table has the key.
 void read(TableReader& table, std::string_view key, double& value, const Range& range = kAnyNumber) {
@@ -33,6 +31,11 @@ Vec3 unit(TableReader& table, std::string_view key, const Vec3& otherwise) {
     if (norm(v) > 0) return normalized(v);
     table.fail(key, "expected a direction, not [0, 0, 0]");
     return otherwise;
+}
+
+const Body* body_named(const Scene& scene, const std::string& name) {
+    const auto body = std::ranges::find(scene.bodies, name, &Body::name);
+    return body == scene.bodies.end() ? nullptr : &*body;
 }
 
 Rigid3 read_port(TableReader& table) {
@@ -62,11 +65,11 @@ void read_orbit(TableReader& root, Orbit& orbit) {
     table->finish();
 }
 
-Vehicle read_vehicle(TableReader& root, const char* name, const Scene& scene) {
-    Vehicle v;
+/// Ends with the table's reader: the target has more keys.
+std::optional<TableReader> read_vehicle(TableReader& root, const char* name, const Scene& scene, Vehicle& v) {
     root.require(name, fmt::format("a table [{}]", name));
     auto table = root.table(name);
-    if (!table) return v;
+    if (!table) return table;
     table->require("body", "the name of a body of the scene");
     v.body = table->text("body").value_or("");
     read(*table, "centre_of_mass_m", v.centre_of_mass_m);
@@ -77,36 +80,30 @@ Vehicle read_vehicle(TableReader& root, const char* name, const Scene& scene) {
     const double largest = std::max({inertia.x, inertia.y, inertia.z});
     if (2 * largest > inertia.x + inertia.y + inertia.z)
         table->fail("inertia_kg_m2", "no moment may exceed the sum of the two others");
-    const auto body =
-        std::find_if(scene.bodies.begin(), scene.bodies.end(), [&](const Body& b) { return b.name == v.body; });
-    if (table->has("body") && body == scene.bodies.end()) {
+    const Body* body = body_named(scene, v.body);
+    if (table->has("body") && !body) {
         table->fail("body", fmt::format("\"{}\" is no body of {}", v.body, scene.file));
-    } else if (body != scene.bodies.end()) {
+    } else if (body) {
         if (!body->can_id)
             table->fail("body", fmt::format("\"{}\" has no can_id in {}, expected one: its pose is commanded",
                                             v.body, scene.file));
         v.can_id = body->can_id.value_or(0);
     }
-    return v;
+    return table;
 }
 
 void read_target(TableReader& root, Scenario& s, const Scene& scene) {
-    s.target = read_vehicle(root, "target", scene);
-    for (const Body& b : scene.bodies)
-        if (b.name == s.target.body) s.q_world_target = b.initial.T_world_body.q;
-    auto table = root.table("target");
+    auto table = read_vehicle(root, "target", scene, s.target);
     if (!table) return;
-    for (const char* key : {"body", "centre_of_mass_m", "port", "mass_kg", "inertia_kg_m2"}) (void)table->has(key);
+    if (const Body* body = body_named(scene, s.target.body)) s.q_world_target = body->initial.T_world_body.q;
     read(*table, "with_lvlh", s.target_motion.with_lvlh);
     read(*table, "rate_deg_s", s.target_motion.rate_deg_s);
     table->finish();
 }
 
 void read_chaser(TableReader& root, Scenario& s, const Scene& scene) {
-    s.chaser = read_vehicle(root, "chaser", scene);
-    auto table = root.table("chaser");
+    auto table = read_vehicle(root, "chaser", scene, s.chaser);
     if (!table) return;
-    for (const char* key : {"body", "centre_of_mass_m", "port", "mass_kg", "inertia_kg_m2"}) (void)table->has(key);
     if (!s.chaser.body.empty() && s.chaser.body == s.target.body)
         table->fail("body", "is the target too, expected another body");
     table->finish();
@@ -117,11 +114,10 @@ void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
     if (!table) return;
     table->require("body", "the name of a body of the scene");
     const std::string name = table->text("body").value_or("");
-    for (const Body& b : scene.bodies)
-        if (b.name == name && b.can_id) {
-            s.attractor.emplace(name, *b.can_id);
-            s.q_world_attractor = b.initial.T_world_body.q;
-        }
+    if (const Body* body = body_named(scene, name); body && body->can_id) {
+        s.attractor.emplace(name, *body->can_id);
+        s.q_world_attractor = body->initial.T_world_body.q;
+    }
     if (table->has("body") && !s.attractor)
         table->fail("body", fmt::format("\"{}\" is no body with a can_id of {}", name, scene.file));
     if (s.orbit.model == Orbit::Model::free)
@@ -194,8 +190,7 @@ std::vector<std::string> read_sensors(TableReader& table, const char* key, const
                                       const Scene& scene, const std::string& chaser) {
     const std::vector<std::string> names = table.texts(key).value_or(std::vector<std::string>{});
     for (const std::string& name : names) {
-        const auto found =
-            std::find_if(sensors.begin(), sensors.end(), [&](const Sensor& sensor) { return sensor.name == name; });
+        const auto found = std::ranges::find(sensors, name, &Sensor::name);
         if (found == sensors.end())
             table.fail(key, fmt::format("\"{}\" is not in {}", name, scene.file));
         else if (found->mount < 0 || scene.bodies[static_cast<std::size_t>(found->mount)].name != chaser)
@@ -257,9 +252,10 @@ void read_faults(TableReader& root, std::vector<Fault>& faults) {
         if (!turns) table.refuse("value", "belongs to attitude_bias and target_rate");
         fault.axis = thruster ? table.text("axis").value_or("") : "";
         if (turns) fault.value = table.vec3("value", kAngle_deg).value_or(Vec3{});
-        if (thruster && table.has("axis") && std::find(kAxes.begin(), kAxes.end(), fault.axis) == kAxes.end())
+        if (thruster && table.has("axis") &&
+            std::ranges::find(kThrusterGroupNames, fault.axis) == kThrusterGroupNames.end())
             table.fail("axis", fmt::format("\"{}\" is no group of thrusters, expected one of {}", fault.axis,
-                                           fmt::join(kAxes, ", ")));
+                                           fmt::join(kThrusterGroupNames, ", ")));
         table.finish();
         faults.push_back(fault);
     }

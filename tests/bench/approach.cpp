@@ -15,7 +15,7 @@
 namespace narpa::test {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 const std::string kIss = NARPA_SOURCE_DIR "/../shared/assets/spacecraft/iss/iss.obj";
 
 Result<std::unique_ptr<World>> small_world(const std::string& path, int factor) {
@@ -49,7 +49,7 @@ TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
     const ApproachBand& all = features.bands.back();
     EXPECT_EQ(all.frames, 6);
     EXPECT_GE(all.found, 5);
-    EXPECT_LT(all.rotation_rms_rad, 0.1 * kDegree);
+    EXPECT_LT(all.rotation_rms_rad, 0.1 * kRadPerDeg);
     EXPECT_EQ(features.basin.front().trials, 2);
     EXPECT_NEAR(features.frames.front().range_m, 60, 6);
     EXPECT_NEAR(features.frames.back().range_m, 2, 0.2);
@@ -94,7 +94,7 @@ TEST(BenchApproach, FindsTheIssBeforeTheEarthAtTheEdgeOfEclipse) {
     ASSERT_TRUE(runs) << runs.error().text();
     const ApproachBand& all = runs->front().bands.back();
     EXPECT_GE(all.found, 2);
-    EXPECT_LT(all.rotation_rms_rad, 0.3 * kDegree);
+    EXPECT_LT(all.rotation_rms_rad, 0.3 * kRadPerDeg);
 }
 
 }  // namespace

@@ -175,7 +175,7 @@ TEST(BenchConvergence, AnOddNumberOfImagesHasTheRightVariance) {
     EXPECT_NEAR(std::sqrt(mean.variance_of_mean()), true_rmse(3 * 4), 4 * 0.014 * true_rmse(3 * 4));
 }
 
-TEST(BenchConvergence, FitsAPowerLawExactlyAndKnowsWhereThereIsNone) {
+TEST(BenchConvergence, FitsAPowerLawExactlyAndReportsWhereThereIsNone) {
     std::vector<ErrorRow> found;
     for (const int spp : {2, 10, 300})
         found.push_back({spp, 4, {3 * std::pow(spp, -0.75), 0.01 * spp}, {}, {}, {}});

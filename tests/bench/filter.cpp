@@ -14,9 +14,8 @@ TEST(BenchFilter, ErrorsAreConsistentWithTheCovariance) {
     settings.runs = 40;
     settings.seconds = 30;
     const auto runs = run_filter(filter_cases(), settings);
-    ASSERT_TRUE(runs) << runs.error().text();
-    EXPECT_EQ(runs->size(), 5u);
-    for (const FilterRun& r : *runs) {
+    EXPECT_EQ(runs.size(), 5u);
+    for (const FilterRun& r : runs) {
         SCOPED_TRACE(r.name);
         EXPECT_NEAR(r.nees(), 12, r.band());
         EXPECT_NEAR(r.nis, 6, 4 * std::sqrt(12.0 / static_cast<double>(r.updates)));
@@ -26,12 +25,10 @@ TEST(BenchFilter, ErrorsAreConsistentWithTheCovariance) {
         EXPECT_NEAR(last.position_rms_m / last.position_sigma_m, 1, 4 / std::sqrt(2.0 * 3 * settings.runs) + 0.1);
         EXPECT_LT(r.gated, 0.002 * static_cast<double>(r.updates) + 1);
         EXPECT_EQ(to_json(r).at("times").size(), 30u);
-        EXPECT_NE(in_words(*runs).find(r.name), std::string::npos);
+        EXPECT_NE(in_words(runs).find(r.name), std::string::npos);
     }
     const auto again = run_filter(filter_cases(), settings);
-    ASSERT_TRUE(again);
-    EXPECT_EQ(runs->back().times.back().nees, again->back().times.back().nees);
-    EXPECT_FALSE(run_filter(filter_cases(), {.runs = 0}));
+    EXPECT_EQ(runs.back().times.back().nees, again.back().times.back().nees);
 }
 
 }  // namespace

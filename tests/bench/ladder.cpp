@@ -102,7 +102,7 @@ TEST(BenchLadder, AMissingPredictionIsAFaultUnlessTheFrameLeftSomethingOut) {
         r.step = step;
         EXPECT_TRUE(bench_faults(beside_the_loop({r})).empty());
     }
-    r.predicted = 0.1;  // what is told counts whatever the step
+    r.predicted = 0.1;  // a prediction is judged whatever the step
     EXPECT_EQ(bench_faults(beside_the_loop({r})).size(), 1u);
 }
 
@@ -133,7 +133,7 @@ TEST(BenchLadder, SmallBudgetsCountOnlyWhereTheyAreJudged) {
 TEST(BenchLadder, RatiosOfTheCraftMustHold) {
     CraftRatios good{};
     good.cost.frame_s = 1.5, good.cost.raw.primary_s = 0.6, good.cost.raw.shadow_s = 0.4;
-    good.space = {0.1, 0.039, 1};  // from afar it is only told
+    good.space = {0.1, 0.039, 1};  // from afar it is only reported
     good.still_and_moved = {0.1, 0.1009};
     good.load_s = 0.29;
     EXPECT_TRUE(bench_faults(good).empty());

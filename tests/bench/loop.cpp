@@ -1,4 +1,4 @@
-// `narpa bench loop` as it is run, and its parts: counts and the shape of what it tells; never times.
+// `narpa bench loop` as it is run, and its parts: counts and the shape of its output; never times.
 #include <gtest/gtest.h>
 #include <sched.h>
 
@@ -114,7 +114,7 @@ TEST(BenchLoop, FailsWhereItWasInterrupted) {
     EXPECT_EQ(nlohmann::json::parse(done.out)["faults"].back(), "interrupted before the end");
 }
 
-TEST(BenchLoop, SaysWhatIsWrongWithItsInput) {
+TEST(BenchLoop, BadInputIsReported) {
     const Done load = bench("--load 1023", " 2>&1 >/dev/null");
     EXPECT_EQ(load.status, 2);
     EXPECT_NE(load.out.find("--load 1023: this processor is not there"), std::string::npos) << load.out;
@@ -123,7 +123,7 @@ TEST(BenchLoop, SaysWhatIsWrongWithItsInput) {
     EXPECT_NE(scene.out.find("no_such_scene.toml"), std::string::npos) << scene.out;
 }
 
-TEST(CompetingLoad, KeepsProcessesOnTheirProcessorsAndTakesThemAway) {
+TEST(CompetingLoad, KeepsProcessesOnTheirProcessorsAndEndsThem) {
     const int cpu = processors(1).front();
     std::vector<int> processes;
     {

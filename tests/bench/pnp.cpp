@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/pnp.h"
-#include "bench/pnp_trial.h"
 #include "estimator/pose/pose_estimate.h"
 #include "tests/support/temporary_folder.h"
 
@@ -46,12 +45,12 @@ TEST(PnpBench, EveryMethodSolvesTheSameTrials) {
     options.noise_px = {0.5};
     options.ranges_m = {20};
     options.hard_cases = false;
-    std::size_t told = 0;
+    std::size_t reported = 0;
     const StopFlag stop{false};
     const auto cells = run_pnp_bench(
-        options, [&](std::size_t, std::size_t of) { told += of; }, stop);
+        options, [&](std::size_t, std::size_t of) { reported += of; }, stop);
     ASSERT_EQ(cells.size(), 1u);
-    EXPECT_EQ(told, 1u);
+    EXPECT_EQ(reported, 1u);
     for (const char* name : {kPnpCold, kPnpWarm, kPnpPeerCold, kPnpPeerWarm, "ITERATIVE", "EPNP", "SQPNP"}) {
         const PnpRow* row = cells[0].row(name);
         ASSERT_NE(row, nullptr) << name;
@@ -61,10 +60,10 @@ TEST(PnpBench, EveryMethodSolvesTheSameTrials) {
     // All refining methods end in the same minimum, at the bound: an RMS over 60 trials is within 0.3 of 1.
     const PnpRow *cold = cells[0].row(kPnpCold), *peer = cells[0].row(kPnpPeerCold);
     EXPECT_EQ(cold->failed, 0);
-    EXPECT_NEAR(cold->rotation_rms, 1, 0.3);
-    EXPECT_NEAR(cold->rotation_rms, peer->rotation_rms, 0.01);
-    EXPECT_NEAR(cells[0].row(kPnpWarm)->rotation_rms, cold->rotation_rms, 0.01);
-    EXPECT_EQ(judge(cells).more_failures, 0);
+    EXPECT_NEAR(cold->rotation_rms_bounds, 1, 0.3);
+    EXPECT_NEAR(cold->rotation_rms_bounds, peer->rotation_rms_bounds, 0.01);
+    EXPECT_NEAR(cells[0].row(kPnpWarm)->rotation_rms_bounds, cold->rotation_rms_bounds, 0.01);
+    EXPECT_EQ(judge(cells).cells_with_more_failures, 0);
     const nlohmann::json document = to_json(cells);
     EXPECT_EQ(document[0]["points"], 12);
     EXPECT_EQ(document[0]["rows"].size(), cells[0].rows.size());
@@ -78,12 +77,12 @@ TEST(PnpBench, VerdictComparesErrorsFailuresAndTimes) {
     cell.rows.push_back({kPnpPeerCold, 1000, 0.9, 1.05, 0.9, 1.05, 0.001, 0, 20});
     cell.rows.push_back({kPnpPeerWarm, 1000, 0.9, 1.05, 0.9, 1.05, 0, 0, 8});
     const PnpVerdict verdict = judge({cell});
-    EXPECT_EQ(verdict.worst_rms, 1.2);
-    EXPECT_EQ(verdict.more_failures, 1);
+    EXPECT_EQ(verdict.worst_rms_bounds, 1.2);
+    EXPECT_EQ(verdict.cells_with_more_failures, 1);
     EXPECT_EQ(verdict.cold_time_ratio, 0.5);
     EXPECT_EQ(verdict.warm_time_ratio, 0.25);
     cell.rows[0].failed = 0.002;  // within chance of 0.001
-    EXPECT_EQ(judge({cell}).more_failures, 0);
+    EXPECT_EQ(judge({cell}).cells_with_more_failures, 0);
 }
 
 struct PnpDone {

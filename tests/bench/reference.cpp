@@ -123,7 +123,7 @@ TEST(BenchReference, ThePlainLoopConvergesToTheSameLampLight) {
     expect_same_image(*shipped("cornell/cornell.toml", 16, RenderSettings::Method::path), 256, 0.002);
 }
 
-TEST(BenchReference, TheLoopSaysWhatIsBeyondIt) {
+TEST(BenchReference, TheLoopRejectsScenesItCannotRender) {
     auto scene = read_scene(std::string(NARPA_BUILD_DIR) + "/scenes/docking/docking.toml");
     ASSERT_TRUE(scene);
     const BodyPoses at(scene->bodies.size());

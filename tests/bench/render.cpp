@@ -55,7 +55,7 @@ TEST(BenchRender, TheCornellBoxConvergesToItsReferenceWithoutBias) {
     EXPECT_LT(document["reference"]["mean"], 1.0);
 }
 
-TEST(BenchRender, AFailedComparisonEndsWithStatusOneAndSaysSo) {
+TEST(BenchRender, AFailedComparisonEndsWithStatusOne) {
     // The even light of [ambient] on a surface that fills the view: no sample differs from another.
     const test::TemporaryFolder folder;
     std::ofstream(folder / "flat.toml")
@@ -108,7 +108,7 @@ TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {
         ASSERT_EQ(rung["cpu_seconds"].size(), 2u);
         for (const auto& frame : rung["cpu_seconds"]) EXPECT_GT(frame.get<double>(), 0) << rung;
         if (!rung["loop"].get<bool>()) {
-            EXPECT_GT(rung["predicted"].get<double>(), 0) << rung;  // of direct light each frame tells
+            EXPECT_GT(rung["predicted"].get<double>(), 0) << rung;  // by direct light each frame has one
             EXPECT_GT(rung["phase_s"]["rays"].get<double>(), 0) << rung;
             continue;
         }

@@ -7,7 +7,7 @@
 #include "drivers/lidar/packet_source.h"
 #include "emulator/lidar_unit.h"
 #include "protocols/little_endian.h"
-#include "rehearsal/navigation/sweep_buffer.h"
+#include "rehearsal/navigation/sensor_inputs.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/allocation_counter.h"
 

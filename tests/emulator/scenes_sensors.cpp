@@ -12,7 +12,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 class DockingSensors : public testing::Test {
 protected:
@@ -90,7 +90,7 @@ TEST_F(DockingSensors, LidarSeesTheStationAheadAndTheChaserOnlyBehind) {
         int on_station = 0;
         for (int elevation = -15; elevation <= 15; elevation += 2)
             for (int azimuth = -90; azimuth < 90; ++azimuth) {
-                const double e = elevation * kDegree, a = azimuth * kDegree;
+                const double e = elevation * kRadPerDeg, a = azimuth * kRadPerDeg;
                 const Ray beam{T.t, T.q * Vec3{std::cos(e) * std::sin(a), std::cos(e) * std::cos(a), std::sin(e)}};
                 const LidarReturn seen = shoot(render_scene->tracer(), at, beam, lidar.range_max_m);
                 on_station += seen.body == 0;

@@ -1,8 +1,8 @@
 // R(q), its derivatives, the image formation and one damped step against 60-digit numbers.
 #include <gtest/gtest.h>
 
-#include "estimator/pose/crp.h"
 #include "estimator/pose/levenberg_marquardt.h"
+#include "tests/estimator/crp.h"
 #include "tests/support/oracle.h"
 
 namespace narpa {

@@ -1,8 +1,4 @@
 // Render and compare, dense: from five degrees and five per cent off to the pose of a frame.
-#include "estimator/dense/dense_alignment.h"
-#include "base/constants.h"
-#include "estimator/view/model_view.h"
-
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
@@ -10,6 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "base/constants.h"
+#include "estimator/dense/dense_alignment.h"
+#include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
 #include "renderer/scene/scene_file.h"
 
@@ -127,15 +126,9 @@ TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
     says(frame, {Quat{2, 0, 0, 0}, {}}, {}, {}, "quaternion of norm 1");
     says(frame, truth, {}, std::vector<float>(5), "variances of 5 pixels");
     says(frame, truth, {}, std::vector<float>(frame.dn.size(), -1), "negative");
-    DenseOptions o;
-    o.coarsest = 3;
-    says(frame, truth, o, {}, "coarsest");
-    o = {};
-    o.rays_per_pixel = std::numeric_limits<double>::quiet_NaN();
-    says(frame, truth, o, {}, "rays_per_pixel");
 }
 
-TEST_F(DockingFrame, SaysThatTheTargetIsNotInThePicture) {
+TEST_F(DockingFrame, ReportsThatTheTargetIsOutsideTheImage) {
     const MeasuredImage frame = frame_at(truth, false);
     DenseAlignment dense(*render_scene, camera, 0);
     for (const Vec3& place : {Vec3{500, 0, 60}, Vec3{0, 0, -60}}) {

@@ -79,7 +79,7 @@ TEST(PhotometricFit, EliminatesTheExposureAsTheWholeInverseDoes) {
     const auto eq = equations(model.images(), model.sensor, {}, {}, {});
     const Matrix6 whole = eq.information.inverse().topLeftCorner<6, 6>();
     EXPECT_LT((eq.pose_information() * whole - Matrix6::Identity()).norm(), 1e-9);
-    // Knowing the exposure tells more of the pose.
+    // A known exposure gives more information on the pose.
     const auto known = equations(model.images(), model.sensor, {}, {0, 0}, {});
     const Matrix6 gained = known.pose_information() - eq.pose_information();
     EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6>(gained).eigenvalues()[0], -1e-9 * gained.norm());
@@ -175,7 +175,7 @@ TEST(DenseBound, ErrorsAreThoseThatNoiseMakes) {
     const double ratio = std::sqrt(to_bound / (6 * kFrames));
     EXPECT_LT(ratio, 1.5);
     EXPECT_GT(ratio, 1 - 4 / std::sqrt(2.0 * 6 * kFrames)) << "better than can be";
-    // The render's own noise is told rather too large than too small.
+    // The render's own noise is overestimated rather than underestimated.
     EXPECT_LT(to_covariance / kFrames, 6 + 4 * std::sqrt(12.0 / kFrames));
     EXPECT_GT(to_covariance / kFrames, 6.0 / 3);
 }

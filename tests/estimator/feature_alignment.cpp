@@ -1,12 +1,11 @@
 // The pose by rendering and comparing points: convergence, covariance, and saying so where there is nothing to see.
-#include "estimator/features/feature_alignment.h"
-#include "base/constants.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "estimator/features/flow_noise.h"
+#include "base/constants.h"
+#include "estimator/features/feature_alignment.h"
+#include "estimator/features/feature_matcher.h"
 #include "renderer/camera/detector.h"
 #include "renderer/scene/scene_file.h"
 
@@ -98,7 +97,7 @@ TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
     EXPECT_EQ(one.align(frame, at_, guess).T_camera_target, other.align(frame, at_, guess).T_camera_target);
 }
 
-TEST_F(FeatureAlignmentTest, SaysThatThereIsNothingToMatch) {
+TEST_F(FeatureAlignmentTest, ReportsThatThereIsNothingToMatch) {
     FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2));
     MeasuredImage dark = frame_at(20, 1);
     std::fill(dark.dn.begin(), dark.dn.end(), 64.f);
@@ -107,21 +106,6 @@ TEST_F(FeatureAlignmentTest, SaysThatThereIsNothingToMatch) {
     Rigid3 behind = truth_;
     behind.t.z = -behind.t.z;
     EXPECT_EQ(alignment.align(frame_at(20, 1), at_, behind).status, FeatureStatus::few_matches);
-}
-
-TEST_F(FeatureAlignmentTest, EachKindOfFeatureLeadsThere) {
-    const MeasuredImage frame = frame_at(12, 1);
-    std::mt19937_64 random(6);
-    const Rigid3 guess = off_by(1.5, random);
-    for (const FeatureKind kind : {FeatureKind::sift, FeatureKind::akaze, FeatureKind::orb, FeatureKind::corners}) {
-        FeatureSettings settings;
-        settings.kind = kind;
-        settings.renders_max = 4;
-        FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2), settings);
-        const FeatureEstimate e = alignment.align(frame, at_, guess);
-        ASSERT_TRUE(e.ok()) << name(kind) << ": " << name(e.status);
-        EXPECT_LT(error_between(e.T_camera_target, truth_).head<3>().norm(), 0.5 * kRadPerDeg) << name(kind);
-    }
 }
 
 /// A corner of light, followed under noise: its place scatters as predicted.
@@ -143,7 +127,6 @@ TEST(FlowNoise, ScattersAsPredicted) {
             const auto v = static_cast<float>(light(x, y) - sensor.black_dn);
             view.pixels[static_cast<std::size_t>(y * kSize + x)] = {v, v, v};
         }
-    FeatureMatcher matcher(FeatureKind::corners, 1);
     const std::vector<std::uint8_t> everywhere(kSize * kSize, 255);
     double predicted = 0, measured = 0, mean_u = 0, mean_v = 0;
     std::vector<FeatureMatch> all;
@@ -157,7 +140,7 @@ TEST(FlowNoise, ScattersAsPredicted) {
             }
         const ToneScale tones(frame, sensor);
         const TonedImage toned = tones.toned(frame);
-        const auto matches = matcher.match(tones.toned(view), toned, everywhere);
+        const auto matches = match_corners(tones.toned(view), toned, everywhere, 1);
         ASSERT_EQ(matches.size(), 1u);
         all.push_back(matches[0]);
         mean_u += matches[0].frame_u / kTrials, mean_v += matches[0].frame_v / kTrials;

@@ -1,4 +1,4 @@
-// The filter against simulated truth: are its errors what its covariance says, over a hundred runs?
+// The filter against simulated truth: do its errors agree with its covariance, over a hundred runs?
 #include <gtest/gtest.h>
 
 #include "filter_flight.h"
@@ -13,7 +13,7 @@ double band95(double degrees_of_freedom, double samples) {
     return 1.96 * std::sqrt(2 * degrees_of_freedom / samples);
 }
 
-TEST(FilterConsistency, ErrorsAreWhatTheCovarianceSays) {
+TEST(FilterConsistency, ErrorsAgreeWithTheCovariance) {
     constexpr int kRuns = 100, kSteps = 40;
     std::uint64_t seed = 0;
     for (const Case& c : cases()) {

@@ -23,7 +23,7 @@ Eigen::Matrix<double, N, 1> draw(const Eigen::Matrix<double, N, N>& covariance, 
     return Eigen::LLT<Eigen::Matrix<double, N, N>>(covariance).matrixL() * white;
 }
 
-/// A camera knows range ten times less well than direction, and tilt goes with sideways.
+/// A camera measures range ten times less well than direction, and tilt goes with sideways.
 inline Matrix6 camera_like() {
     Matrix6 L = Matrix6::Zero();
     L.diagonal() << 8e-3, 8e-3, 3e-3, 4e-3, 4e-3, 6e-2;

@@ -162,7 +162,7 @@ TEST(FilterMotion, ErrorsLeadFromOneStateToTheOther) {
     }
 }
 
-TEST(FilterMotion, SaysWhatIsWrongWithAModel) {
+TEST(FilterMotion, BadModelsAreReported) {
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     MotionModel m;
     EXPECT_TRUE(check(m));

@@ -1,4 +1,5 @@
-// ICP on shapes whose symmetries are known: which motions it says it cannot see, and that it leaves these alone.
+// ICP on shapes whose symmetries are known: which motions it reports as unobservable, and that it leaves these
+// alone.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -115,7 +116,7 @@ Vector6 start_error() {
     return 0.1 * e;
 }
 
-TEST(IcpShapes, SaysWhichMotionsItCannotSee) {
+TEST(IcpShapes, UnobservableMotionsAreReported) {
     for (const Shape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
         Scene scene;
@@ -125,9 +126,8 @@ TEST(IcpShapes, SaysWhichMotionsItCannotSee) {
         ASSERT_TRUE(tracer);
         IcpSettings settings;
         settings.noise = {0.002, 0};
-        auto icp = CloudIcp::create(*tracer, 0, settings);
-        ASSERT_TRUE(icp) << icp.error().text();
-        const auto e = icp->align(returns(shape.draw, 4000, 0.002, 5), {}, displaced(kTruth, start_error()));
+        CloudIcp icp(*tracer, 0, settings);
+        const auto e = icp.align(returns(shape.draw, 4000, 0.002, 5), {}, displaced(kTruth, start_error()));
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_EQ(e->observability.unobserved, shape.unobserved);
         EXPECT_TRUE(e->settled);
@@ -171,7 +171,7 @@ TEST(IcpShapes, NothingDriftsAlongThem) {
             settings.noise = {0.002, 0};
             settings.iterations = iterations;
             settings.settled = 0;
-            return *CloudIcp::create(*tracer, 0, settings)->align(points, {}, start);
+            return *CloudIcp(*tracer, 0, settings).align(points, {}, start);
         };
         const CloudEstimate early = after(5), late = after(55);
         EXPECT_EQ(late.iterations, 55);

@@ -7,8 +7,8 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pose/pnp.h"
-#include "estimator/pose/pnp_bound.h"
 #include "estimator/pose/pnp_ceres.h"
+#include "estimator/pose/pnp_refine.h"
 #include "estimator/stereo/stereo_matcher.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
@@ -90,7 +90,7 @@ TEST_F(EquidistantPoints, CeresAgreesAndOutliersAreFound) {
     EXPECT_LT(error_between(s.fit.T_camera_body, truth).norm(), 0.02);
 }
 
-TEST_F(EquidistantPoints, PixelsWhoseRaysLookBackwardsAreRefused) {
+TEST_F(EquidistantPoints, PixelsWhoseRaysPointBackwardsAreRejected) {
     see(10, 0.5);
     pixels[3] = {640 + 500 * 1.7, 500};
     EXPECT_EQ(PnpSolver(64).solve(input(0.5)).status, PnpStatus::behind_camera);

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "estimator/pose/crp.h"
 #include "estimator/pose/levenberg_marquardt.h"
+#include "tests/estimator/crp.h"
 #include "tests/estimator/pnp_support.h"
 
 namespace narpa {

@@ -3,9 +3,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "estimator/pose/cholesky6.h"
-#include "estimator/pose/pnp_bound.h"
+#include "estimator/pose/levenberg_marquardt.h"
 #include "estimator/pose/pnp_ceres.h"
+#include "estimator/pose/pnp_refine.h"
 #include "tests/estimator/pnp_support.h"
 
 namespace narpa {
@@ -18,7 +18,7 @@ protected:
 };
 
 TEST_F(PnpReference, EndsWhereCeresEnds) {
-    for (const Loss kind : {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey}) {
+    for (const Loss kind : {Loss::none, Loss::cauchy}) {
         for (const std::size_t n : {12u, 25u}) {
             for (int trial = 0; trial < 10; ++trial) {
                 const Rigid3 truth{test::random_attitude(random_), {0.4, -0.1, 18}};

@@ -1,11 +1,11 @@
-// Poses without a guess: how often, how exactly, and whether doubts are told.
+// Poses without a guess: how often, how exactly, and whether doubtful poses are flagged.
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "base/constants.h"
 #include "estimator/pose/pnp.h"
-#include "estimator/pose/pnp_bound.h"
+#include "estimator/pose/pnp_refine.h"
 #include "tests/estimator/pnp_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -190,7 +190,7 @@ TEST_F(SolvePnp, NothingButOutliersIsNoConsensus) {
 }
 
 // Seen from the cylinder over three points, the camera may slide along it unnoticed.
-TEST_F(SolvePnp, DangerCylinderIsTold) {
+TEST_F(SolvePnp, DangerCylinderIsFlagged) {
     PnpRefiner refiner(8);
     std::uniform_real_distribution<double> turn(-M_PI, M_PI);
     const auto seen_from = [&](double radius) {

@@ -34,7 +34,7 @@ struct Seen {
     [[nodiscard]] PnpInput input() const { return {camera, body_m, pixels, sigma_px}; }
 };
 
-/// sigma_px 0: exact pixels, of which the solver is told 1 px.
+/// sigma_px 0: exact pixels, for which the solver gets 1 px.
 inline Seen see(std::mt19937_64& random, std::vector<Vec3> points, const Rigid3& T_camera_body, double sigma_px) {
     std::normal_distribution<double> n;
     Seen seen{kPaperCamera, T_camera_body, std::move(points), {}, sigma_px > 0 ? sigma_px : 1.0};

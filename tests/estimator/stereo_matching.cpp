@@ -1,6 +1,4 @@
 // Sparse stereo on pictures of a tilted plane, computed here: matches and covariances against the exact geometry.
-#include "estimator/stereo/stereo_matcher.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,6 +8,7 @@
 #include <random>
 
 #include "estimator/pose/pose_estimate.h"
+#include "estimator/stereo/stereo_matcher.h"
 
 namespace narpa {
 namespace {
@@ -166,7 +165,7 @@ TEST(StereoMatcher, RefusesWhatRepeats) {
     EXPECT_GT(found->counts.ambiguous, 20);
 }
 
-TEST(StereoMatcher, FindsNothingInOtherPictures) {
+TEST(StereoMatcher, FindsNothingInOtherImages) {
     Views v = views(kAside, waves());
     v.right = views(kAside, [other = waves()](double x, double y) { return other(50 - y, x); }).right;
     const auto found = match_stereo(v.pair, v.left, v.right, settings());
@@ -175,7 +174,7 @@ TEST(StereoMatcher, FindsNothingInOtherPictures) {
     EXPECT_GT(found->counts.unlike, 100);
 }
 
-TEST(StereoMatcher, FindsNothingInNoiseOrInWhatIsFull) {
+TEST(StereoMatcher, FindsNothingInNoiseOrInSaturatedImages) {
     Views v = views(kAside, [](double, double) { return 1800; });
     add_noise(v.pair.left, 1, v.left), add_noise(v.pair.right, 2, v.right);
     auto found = match_stereo(v.pair, v.left, v.right, settings());
@@ -220,7 +219,7 @@ TEST(StereoMatcher, GainAndOffsetDoNotMatter) {
         EXPECT_LT((p.match.px - right_px(v.pair, truth(v.pair.left, {}, p.left_px))).norm(), 0.01);
 }
 
-TEST(StereoMatcher, SaysWhatIsWrong) {
+TEST(StereoMatcher, BadInputIsReported) {
     const Views good = views(kAside, waves());
     const auto error = [](const Views& v, const StereoSettings& s) {
         const auto found = match_stereo(v.pair, v.left, v.right, s);
@@ -256,7 +255,7 @@ TEST(StereoMatcher, SurvivesLinesThatPassTheOtherCamera) {
     }
 }
 
-TEST(SplineImage, PassesThroughThePixelsAndKnowsItsSlope) {
+TEST(SplineImage, PassesThroughThePixelsWithItsSlope) {
     MeasuredImage image{40, 32, {}};
     std::mt19937_64 random(9);
     std::uniform_real_distribution<float> uniform(0, 4000);

@@ -1,13 +1,12 @@
 // Two-view triangulation against 60-digit arithmetic, its covariance against random draws, and where it must
 // refuse.
-#include "estimator/stereo/triangulation.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <random>
 
 #include "estimator/pose/pose_estimate.h"
+#include "estimator/stereo/triangulation.h"
 #include "tests/support/oracle.h"
 
 namespace narpa {
@@ -157,7 +156,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Geometry{"turned", {exp_rotation({0.02, -0.05, 0.3}), {-30, 1, -5}}, {-60, 30, 790}, 0.1}),
     [](const auto& at) { return std::string(at.param.name); });
 
-TEST(StereoTriangulation, AVerticalBaselineSeesTheDepthInTheRows) {
+TEST(StereoTriangulation, AVerticalBaselineGivesTheDepthFromTheRows) {
     const StereoPair pair = pair_with({{}, {0, -30, 0}});
     const Vector3d point(10, 5, 800);
     const Vector2d left = left_of(pair, point), right = right_of(pair, point);
@@ -198,7 +197,7 @@ TEST(StereoTriangulation, NothingIsTriangulatedAtTheEpipole) {
     EXPECT_FALSE(printed_depth_m(forward, {0, 0}, {0, 0}));
 }
 
-TEST(StereoTriangulation, TellsFarFromBehind) {
+TEST(StereoTriangulation, DistinguishesFarFromBehind) {
     const StereoPair pair = descent_pair();
     const auto status = [&](const Vector3d& point) {
         return triangulate(pair, pixel(left_of(pair, point), 0.1), pixel(right_of(pair, point), 0.1)).status;

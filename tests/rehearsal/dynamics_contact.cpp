@@ -143,7 +143,7 @@ TEST(Ending, IsAtTheDurationOrWhenTheNavigationIsDoneOrHasLeft) {
     EXPECT_EQ(leaving.ending(), Ending::left);
 }
 
-TEST(Start, IsWhereTheScenarioSays) {
+TEST(Start, IsWhereTheScenarioHasIt) {
     Scenario scenario = quiet(Orbit::Model::two_body);
     scenario.q_world_target = normalized(Quat{1, 2, 3, 4});
     scenario.target.T_body_port.q = normalized(Quat{1, 0, 1, 0});
@@ -167,7 +167,7 @@ TEST(Start, IsWhereTheScenarioSays) {
     expect_near(q_target * Vec3{0, 0, 1}, q_chaser * Vec3{0, 0, 1}, 1e-12);
 }
 
-TEST(Start, IsDispersedAsTheScenarioSays) {
+TEST(Start, HasTheScenariosDispersion) {
     Scenario scenario = quiet();
     scenario.start.position_sigma_m = {1, 2, 3};
     scenario.start.velocity_sigma_m_s = {0.01, 0.02, 0.03};
@@ -191,7 +191,7 @@ TEST(Start, IsDispersedAsTheScenarioSays) {
         }
 }
 
-TEST(AttitudeSensor, HasTheNoiseThatTheScenarioSays) {
+TEST(AttitudeSensor, HasTheScenariosNoise) {
     Scenario scenario = quiet();
     scenario.attitude_sensor = {0.01, 0.004};
     scenario.start.rate_deg_s = {0.1, 0, 0};

@@ -1,7 +1,6 @@
 // How bodies move by themselves: orbits, tumbling.
 #include "estimator/filter/motion_model.h"
 #include "rehearsal/dynamics/orbit_motion.h"
-#include "rehearsal/dynamics/rigid_body.h"
 #include "tests/rehearsal/dynamics_support.h"
 
 namespace narpa::rehearsal {

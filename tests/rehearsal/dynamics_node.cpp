@@ -1,6 +1,4 @@
 // The dynamics on a bus with a scripted navigation that uses the truth.
-#include "rehearsal/dynamics/node.h"
-
 #include <atomic>
 #include <chrono>
 #include <fstream>
@@ -11,6 +9,7 @@
 
 #include "drivers/can/buses.h"
 #include "protocols/can/messages.h"
+#include "rehearsal/dynamics/node.h"
 #include "tests/drivers/can_support.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/support/command.h"
@@ -181,7 +180,7 @@ std::vector<std::uint8_t> bytes_of(const std::vector<CanFrame>& frames) {
     return bytes;
 }
 
-TEST_F(DynamicsOnSlcan, ANavigationThatKnowsTheTruthHoldsItsStation) {
+TEST_F(DynamicsOnSlcan, ANavigationWithTheTruthHoldsItsStation) {
     const Flown flown = fly_in_lockstep(dispersed(), lockstep(), *hub, bus, hold);
     ASSERT_TRUE(flown.document) << flown.document.error().text();
     EXPECT_EQ((*flown.document)["ending"], "duration");
@@ -203,7 +202,7 @@ TEST_F(DynamicsOnSlcan, TheSameSeedGivesTheSameBytes) {
     EXPECT_NE(bytes_of(a.frames), bytes_of(other.frames));
 }
 
-TEST_F(DynamicsOnSlcan, EachPeriodSaysWhatHappensThenTheAttitudeThenPosesChaserLast) {
+TEST_F(DynamicsOnSlcan, EachPeriodSendsReportThenAttitudeThenPosesChaserLast) {
     Scenario s = quiet(Orbit::Model::two_body);
     s.attractor = {"earth", 0x120};
     s.duration_s = 2;
@@ -233,19 +232,19 @@ TEST_F(DynamicsOnSlcan, EachPeriodSaysWhatHappensThenTheAttitudeThenPosesChaserL
         EXPECT_EQ(flown.poses[i].command.t_valid_ns, ns(0.5 * static_cast<double>(i / 2)));
 }
 
-TEST_F(DynamicsOnSlcan, ContactIsToldAtItsInstantWithThePosesOfThatInstant) {
+TEST_F(DynamicsOnSlcan, ContactIsReportedAtItsInstantWithThePosesOfThatInstant) {
     Scenario s = quiet();
     s.start.position_m = {0.1, 0, 0};
     s.start.velocity_m_s = {-0.0713, 0, 0};
     const Flown flown = fly_in_lockstep(s, lockstep(), *hub, bus, rest);
     ASSERT_TRUE(flown.document) << flown.document.error().text();
     const std::int64_t contact_ns = ns(0.1 / 0.0713);
-    const auto told = std::find_if(flown.reports.begin(), flown.reports.end(),
-                                   [](const DynamicsReport& r) { return r.phase == DynamicsPhase::captured; });
-    ASSERT_NE(told, flown.reports.end());
-    EXPECT_NEAR(static_cast<double>(told->t_ns - contact_ns), 0, 2);
+    const auto reported = std::find_if(flown.reports.begin(), flown.reports.end(),
+                                       [](const DynamicsReport& r) { return r.phase == DynamicsPhase::captured; });
+    ASSERT_NE(reported, flown.reports.end());
+    EXPECT_NEAR(static_cast<double>(reported->t_ns - contact_ns), 0, 2);
     const auto pose = std::find_if(flown.poses.begin(), flown.poses.end(), [&](const Partner::Pose& p) {
-        return p.base_id == s.chaser.can_id && p.command.t_valid_ns == told->t_ns;
+        return p.base_id == s.chaser.can_id && p.command.t_valid_ns == reported->t_ns;
     });
     ASSERT_NE(pose, flown.poses.end());
     // The chaser's x axis is the world's -x: it still comes at its speed.
@@ -278,7 +277,7 @@ TEST_F(DynamicsOnSlcan, CommandsOfAnotherTimeOrTwiceAreRefusedAndCounted) {
     EXPECT_NEAR((*flown)["impulse_n_s"][0].get<double>(), 300, 1e-9);
 }
 
-TEST_F(DynamicsOnSlcan, SilenceIsAnErrorThatSaysWhatWasWaitedFor) {
+TEST_F(DynamicsOnSlcan, MissingMessagesAreAnErrorThatNamesThem) {
     const Scenario s = quiet();
     Partner silent(*hub, s);
     DynamicsOptions o = lockstep();

@@ -100,14 +100,6 @@ TEST(Thrusters, MisalignmentOfAGroupIsConstantInARun) {
     expect_near(second, first, 1e-12);
 }
 
-TEST(Thrusters, NamesOfGroups) {
-    EXPECT_EQ(thruster_group("+fx"), 0);
-    EXPECT_EQ(thruster_group("-fz"), 5);
-    EXPECT_EQ(thruster_group("-tz"), 11);
-    EXPECT_FALSE(thruster_group("fx"));
-    EXPECT_FALSE(thruster_group("+gx"));
-}
-
 Scenario with_fault(Fault::Kind kind, double from_s, double until_s, const std::string& axis = "",
                     const Vec3& value = {}) {
     Scenario s = quiet();
@@ -161,25 +153,6 @@ TEST(Faults, CommandsAreLostWhileItLasts) {
     EXPECT_FALSE(s.apply(command({100, 0, 0})));
     expect_near(fired(s, command({100, 0, 0})).force_n, {}, 0);
     EXPECT_TRUE(s.apply(command({100, 0, 0})));
-}
-
-TEST(Faults, OfAnUnknownThrusterAreRejected) {
-    const auto s = Simulation::create(with_fault(Fault::Kind::thruster_off, 0, 1, "fx"), 1);
-    ASSERT_FALSE(s);
-    EXPECT_NE(s.error().what.find("\"fx\""), std::string::npos);
-    EXPECT_NE(s.error().what.find("expected +fx"), std::string::npos);
-}
-
-TEST(Simulation, RejectsInvalidBodies) {
-    Scenario s = quiet();
-    s.chaser.mass_kg = 0;
-    EXPECT_NE(Simulation::create(s, 1).error().what.find("chaser: mass_kg"), std::string::npos);
-    s = quiet();
-    s.target.inertia_kg_m2(1, 1) = -1;
-    EXPECT_NE(Simulation::create(s, 1).error().what.find("target: inertia_kg_m2"), std::string::npos);
-    s = quiet();
-    s.pose_rate_hz = 3.5;
-    EXPECT_NE(Simulation::create(s, 1).error().what.find("pose_rate_hz"), std::string::npos);
 }
 
 }  // namespace

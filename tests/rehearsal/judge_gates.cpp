@@ -93,9 +93,9 @@ TEST(Judge, ABounceIsNoDocking) {
 TEST(Judge, CorridorViolationsNameFirstWorstAndLeg) {
     Scenario s = small_scenario();
     s.gates.corridor = Gates::Corridor{10, 0.5, 20};
-    std::vector<std::string> told;
+    std::vector<std::string> reported;
     const Verdict v = judge(s, docking(s, good_contact(s), DynamicsPhase::captured, 3),
-                            [&](const GateResult& g) { told.push_back(g.name); });
+                            [&](const GateResult& g) { reported.push_back(g.name); });
     const GateResult& g = gate(v, "corridor");
     EXPECT_EQ(g.state, State::failed);
     EXPECT_EQ(g.t_first_s, 5);
@@ -103,7 +103,7 @@ TEST(Judge, CorridorViolationsNameFirstWorstAndLeg) {
     EXPECT_NE(g.reason.find("at t = 5.00 s (leg 1 \"far\", moving): 3.000 m off the axis 5.00 m before the port"),
               std::string::npos)
         << g.reason;
-    EXPECT_EQ(told, std::vector<std::string>{"corridor"});
+    EXPECT_EQ(reported, std::vector<std::string>{"corridor"});
     // The same path, judged from 4 m on only.
     s.gates.corridor->from_m = 4;
     EXPECT_EQ(gate(judge(s, docking(s, good_contact(s), DynamicsPhase::captured, 3)), "corridor").state,
@@ -216,10 +216,10 @@ TEST(Judge, AnAbortFailsAtOnceUnlessItIsAllowed) {
     Messages m(s);
     m.period(0, chaser_at(s, {9, 0, 0}));
     m.command(1, GuidancePhase::retreating, 1, AbortReason::lost);
-    std::vector<std::string> told;
-    const Verdict v = judge(s, m, [&](const GateResult& g) { told.push_back(g.reason); });
-    ASSERT_EQ(told.size(), 1u);
-    EXPECT_EQ(told[0], "the navigation gave up at t = 1.00 s in leg 2 \"last\": lost");
+    std::vector<std::string> reported;
+    const Verdict v = judge(s, m, [&](const GateResult& g) { reported.push_back(g.reason); });
+    ASSERT_EQ(reported.size(), 1u);
+    EXPECT_EQ(reported[0], "the navigation gave up at t = 1.00 s in leg 2 \"last\": lost");
     EXPECT_FALSE(v.passed);
     s.gates.complete = false;
     m.report(2, DynamicsPhase::finished);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/can/can_bus.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/judge/judge.h"
 
@@ -125,8 +126,8 @@ inline Messages docking(const Scenario& s, const Motion& at_contact,
     return m;
 }
 
-inline Verdict judge(const Scenario& s, const Messages& m, Judge::Failure told = {}) {
-    Judge judge(s, std::move(told));
+inline Verdict judge(const Scenario& s, const Messages& m, Judge::Failure reported = {}) {
+    Judge judge(s, std::move(reported));
     for (const CanFrame& f : m.frames) judge.accept(f, m.ns(0));
     return judge.finish();
 }
@@ -136,6 +137,15 @@ inline const GateResult& gate(const Verdict& v, const std::string& name) {
         if (g.name == name) return g;
     static const GateResult none;
     return none;
+}
+
+/// The verdict on a candump log.
+inline Result<Verdict> judge_log(const Scenario& scenario, const std::string& path) {
+    auto log = open_can_bus("log:" + path, CanRole::hub);
+    if (!log) return log.error();
+    Judge judge(scenario);
+    for (ReceivedFrame received; (*log)->receive(received);) judge.accept(received.frame, received.t_received_ns);
+    return judge.finish();
 }
 
 }  // namespace narpa::rehearsal::test

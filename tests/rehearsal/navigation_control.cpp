@@ -231,7 +231,7 @@ TEST(FlightControl, MovesThePortToTheReferenceAndHoldsIt) {
         worst_rad = std::max(worst_rad, loop.plant.off_docked_rad());
     }
     EXPECT_LT(worst_m, 0.02);
-    EXPECT_LT(worst_rad, 0.2 * kDegree);
+    EXPECT_LT(worst_rad, 0.2 * kRadPerDeg);
 }
 
 /// The port is 3.2 m before the centre of mass: it stays in place while the chaser rotates by ten degrees.
@@ -246,7 +246,7 @@ TEST(FlightControl, ThePortStaysWhileTheChaserRotates) {
         worst_m = std::max(worst_m, norm(loop.plant.port().T_port_chaser_port.t - r.position_m));
         centre_m = std::max(centre_m, norm(loop.plant.motion.position_m - before));
     }
-    EXPECT_LT(loop.plant.off_docked_rad(), 0.2 * kDegree);
+    EXPECT_LT(loop.plant.off_docked_rad(), 0.2 * kRadPerDeg);
     EXPECT_GT(centre_m, 0.5);
     EXPECT_LT(worst_m, 0.08);
 }
@@ -271,7 +271,7 @@ TEST(FlightControl, FollowsTheLegsToContact) {
     EXPECT_NEAR(port.velocity_m_s.x, -0.075, 0.005);
     EXPECT_LT(std::hypot(port.velocity_m_s.y, port.velocity_m_s.z), 0.005);
     EXPECT_LT(std::hypot(port.T_port_chaser_port.t.y, port.T_port_chaser_port.t.z), 0.02);
-    EXPECT_LT(loop.plant.off_docked_rad(), 0.3 * kDegree);
+    EXPECT_LT(loop.plant.off_docked_rad(), 0.3 * kRadPerDeg);
 }
 
 /// Before the port of a target that turns it stays where it is, and turns with it.
@@ -288,7 +288,7 @@ TEST(FlightControl, FollowsARotatingTarget) {
         worst_m = std::max(worst_m, norm(loop.plant.port().T_port_chaser_port.t - r.position_m));
     }
     EXPECT_LT(worst_m, 0.05);
-    EXPECT_LT(loop.plant.off_docked_rad(), 0.2 * kDegree);
+    EXPECT_LT(loop.plant.off_docked_rad(), 0.2 * kRadPerDeg);
 }
 
 TEST(RelativeMotion, RoundTripsAndVelocityIsItsRateOfChange) {

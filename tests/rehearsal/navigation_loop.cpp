@@ -26,23 +26,23 @@ struct Flight {
 /// `seen(t_s)`: whether a sensor sees the target then. Its noise: 0.05 degrees, 2 cm.
 template <class Seen>
 Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
-    auto simulation = Simulation::create(s, seed);
+    Simulation simulation(s, seed);
     auto autopilot = Autopilot::create(s, 1);
-    EXPECT_TRUE(simulation && autopilot);
+    EXPECT_TRUE(autopilot);
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     Vector6 sigma;
-    sigma << Eigen::Vector3d::Constant(0.05 * kDegree), Eigen::Vector3d::Constant(0.02);
+    sigma << Eigen::Vector3d::Constant(0.05 * kRadPerDeg), Eigen::Vector3d::Constant(0.02);
     Flight flight;
     for (std::int64_t t_ns = 0; t_ns < 400'000'000'000; t_ns += s.period_ns()) {
-        while (simulation->t_ns() < t_ns) simulation->advance_to(t_ns);
-        const AttitudeReport attitude = simulation->measure_attitude();
+        while (simulation.t_ns() < t_ns) simulation.advance_to(t_ns);
+        const AttitudeReport attitude = simulation.measure_attitude();
         if (t_ns == 0) {
             EXPECT_TRUE((*autopilot)->start(0, attitude));
         }
         (*autopilot)->take(attitude);
-        (*autopilot)->take(simulation->phase(), t_ns);
-        const Truth truth = simulation->truth();
+        (*autopilot)->take(simulation.phase(), t_ns);
+        const Truth truth = simulation.truth();
         const Rigid3 T_chaser_target = inverse(truth.chaser.T_world_body) * truth.target.T_world_body;
         if (seen(1e-9 * static_cast<double>(t_ns))) {
             Vector6 error;
@@ -58,12 +58,12 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
         flight.errors.push_back(error_between(e.T_chaser_target, T_chaser_target).cwiseQuotient(deviations));
         if (flight.last().phase == GuidancePhase::docked) break;
         if (flight.last().phase == GuidancePhase::retreating) {
-            flight.farthest_m = std::max(flight.farthest_m, norm(simulation->port().position_m()));
-            flight.axial_m.push_back(simulation->port().position_m().x);
+            flight.farthest_m = std::max(flight.farthest_m, norm(simulation.port().position_m()));
+            flight.axial_m.push_back(simulation.port().position_m().x);
         }
-        simulation->apply(flight.last());
+        simulation.apply(flight.last());
     }
-    flight.contact = simulation->contact();
+    flight.contact = simulation.contact();
     return flight;
 }
 

@@ -1,7 +1,5 @@
 // The navigation on its wires: a hub that plays the emulator and the dynamics, frames through a FIFO, and what
 // comes back on CAN.
-#include "rehearsal/navigation/node.h"
-
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -11,6 +9,7 @@
 
 #include "drivers/video/video_sink.h"
 #include "protocols/can/messages.h"
+#include "rehearsal/navigation/node.h"
 #include "tests/drivers/can_support.h"
 #include "tests/rehearsal/simulated_sensors.h"
 #include "tests/support/command.h"
@@ -33,7 +32,7 @@ Scenario docking() {
 }
 
 /// The navigation's messages.
-struct Heard {
+struct Sent {
     std::vector<CanFrame> frames;
     std::vector<NavigationEstimate> estimates;
     std::vector<ActuatorCommand> commands;
@@ -41,7 +40,7 @@ struct Heard {
     Status ended{Ok{}};
 };
 
-Heard fly(const std::string& folder, std::int64_t cycles) {
+Sent fly(const std::string& folder, std::int64_t cycles) {
     const Scenario s = docking();
     auto model = SceneModel::create(s);
     EXPECT_TRUE(model);
@@ -59,18 +58,18 @@ Heard fly(const std::string& folder, std::int64_t cycles) {
     options.lockstep = true;
     options.log = folder + "/log";
     StopFlag stop{false}, ready{false};
-    Heard heard;
-    std::thread navigation([&] { heard.ended = navigate(s, options, stop, [&] { ready = true; }); });
+    Sent sent;
+    std::thread navigation([&] { sent.ended = navigate(s, options, stop, [&] { ready = true; }); });
 
     MessageDecoder<NavigationEstimate> estimates;
     MessageDecoder<ActuatorCommand> commands;
     const auto listen = [&](std::int64_t t_ns) {
         for (ReceivedFrame received; hub->receive(received);) {
-            heard.frames.push_back(received.frame);
+            sent.frames.push_back(received.frame);
             NavigationEstimate e;
-            if (estimates.accept(received.frame, t_ns, e) == DecodeStatus::complete) heard.estimates.push_back(e);
+            if (estimates.accept(received.frame, t_ns, e) == DecodeStatus::complete) sent.estimates.push_back(e);
             ActuatorCommand c;
-            if (commands.accept(received.frame, t_ns, c) == DecodeStatus::complete) heard.commands.push_back(c);
+            if (commands.accept(received.frame, t_ns, c) == DecodeStatus::complete) sent.commands.push_back(c);
         }
     };
     const auto send = [&](const auto& message) {
@@ -95,22 +94,22 @@ Heard fly(const std::string& folder, std::int64_t cycles) {
         hub->send(encode(Heartbeat{t_ns, RunState::lockstep}));
         EXPECT_TRUE(turn_until(*hub, [&] {
             listen(t_ns);
-            return heard.commands.size() > static_cast<std::size_t>(k);
+            return sent.commands.size() > static_cast<std::size_t>(k);
         }));
-        if (heard.commands.size() != static_cast<std::size_t>(k + 1) ||
-            heard.estimates.size() != static_cast<std::size_t>(k + 1))
+        if (sent.commands.size() != static_cast<std::size_t>(k + 1) ||
+            sent.estimates.size() != static_cast<std::size_t>(k + 1))
             break;
-        heard.errors_m.push_back(norm(heard.estimates.back().T_chaser_target.t - test::chaser_target(plant).t));
-        plant.fly({heard.commands.back().impulse_n_s, heard.commands.back().angular_impulse_n_m_s}, 1);
+        sent.errors_m.push_back(norm(sent.estimates.back().T_chaser_target.t - test::chaser_target(plant).t));
+        plant.fly({sent.commands.back().impulse_n_s, sent.commands.back().angular_impulse_n_m_s}, 1);
     }
     send(DynamicsReport{static_cast<std::uint8_t>(cycles), cycles * s.period_ns(), 0, DynamicsPhase::finished});
     navigation.join();
-    return heard;
+    return sent;
 }
 
 TEST(NavigationNode, AnswersEachPeriodAndRepeatsItself) {
     const narpa::test::TemporaryFolder folder, other;
-    const Heard one = fly(folder / "", 3);
+    const Sent one = fly(folder / "", 3);
     EXPECT_TRUE(one.ended) << one.ended.error().text();
     ASSERT_EQ(one.commands.size(), 3u);
     ASSERT_EQ(one.estimates.size(), 3u);
@@ -125,7 +124,7 @@ TEST(NavigationNode, AnswersEachPeriodAndRepeatsItself) {
     std::ifstream csv(folder / "log/navigation.csv");
     EXPECT_EQ(std::count(std::istreambuf_iterator<char>(csv), {}, '\n'), 4);
 
-    const Heard again = fly(other / "", 3);
+    const Sent again = fly(other / "", 3);
     ASSERT_EQ(again.frames.size(), one.frames.size());
     for (std::size_t i = 0; i < one.frames.size(); ++i) EXPECT_TRUE(same(one.frames[i], again.frames[i])) << i;
 }

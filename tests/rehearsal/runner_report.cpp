@@ -4,8 +4,7 @@
 #include <fstream>
 
 #include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/report_charts.h"
-#include "rehearsal/runner/report_page.h"
+#include "rehearsal/runner/report.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/rehearsal/markup.h"
 #include "tests/support/temporary_folder.h"
@@ -55,10 +54,10 @@ TEST(Page, OfARunThatNeverStartedIsWellFormed) {
     const Scenario s = full_scenario();
     const std::string page = page_of(s, Messages(s), "/nowhere");
     EXPECT_EQ(markup_error(page), "");
-    EXPECT_NE(page.find("the emulator was never heard"), std::string::npos);
+    EXPECT_NE(page.find("the emulator sent nothing"), std::string::npos);
 }
 
-TEST(Page, WithoutMatplotlibIsWholeAndSaysWhatIsMissing) {
+TEST(Page, WithoutMatplotlibIsWholeAndNamesWhatIsMissing) {
     const Scenario s = full_scenario();
     const std::string page = page_of(s, docking(s, chaser_at(s, {0, 0.02, 0}, {-0.07, 0, 0})), "/nowhere");
     EXPECT_EQ(markup_error(page), "");
@@ -72,7 +71,7 @@ TEST(Charts, HaveWhatWasOnTheBus) {
     Judge judge(s);
     for (const CanFrame& f : m.frames) judge.accept(f, m.ns(0));
     const Verdict v = judge.finish();
-    const nlohmann::json d = rehearsal_plot({s, judge.bus(), v});
+    const nlohmann::json d = rehearsal_plot(s, judge.bus(), v);
     EXPECT_EQ(d["plot"], "rehearsal");
     const std::size_t poses = judge.bus().truth.size();
     ASSERT_GT(poses, 0u);
@@ -87,11 +86,12 @@ TEST(Charts, HaveWhatWasOnTheBus) {
 }
 
 TEST(Charts, BecomePartOfThePage) {
+    const std::initializer_list<PageChart> kRates{{"range", "Range over time"}, {"rates", "Rates over time"}};
     const narpa::test::TemporaryFolder folder;
-    EXPECT_NE(motion_charts(folder / "").find("narpa-plot charts.json"), std::string::npos);
+    EXPECT_NE(charts_of(folder / "", kRates).find("narpa-plot charts.json"), std::string::npos);
     std::filesystem::create_directory(folder / "charts");
     std::ofstream(folder / "charts/range.svg") << "foobar";
-    const std::string html = motion_charts(folder / "");
+    const std::string html = charts_of(folder / "", kRates);
     EXPECT_EQ(markup_error(html), "");
     EXPECT_NE(html.find("alt=\"Range over time\" src=\"data:image/svg+xml;base64,Zm9vYmFy\""), std::string::npos);
     EXPECT_EQ(html.find("Rates"), std::string::npos) << "what was not drawn";

@@ -101,7 +101,7 @@ TEST(Whole, EndsAfterTooLongWithoutProgress) {
     ASSERT_TRUE(done) << done.error().text();
     EXPECT_NE(done->verdict.headline.find("but nothing moved for 0.3 s"), std::string::npos)
         << done->verdict.headline;
-    EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics were never heard"), std::string::npos);
+    EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics sent nothing"), std::string::npos);
 }
 
 TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
@@ -126,14 +126,14 @@ TEST(Whole, WaitsForANavigationStartedByTheUser) {
     o.navigation = "none";
     std::FILE* own = nullptr;
     int asked = 0;
-    std::string told;
+    std::string printed;
     Console console = kSilent;
     console.print = [&](std::string_view words) {
-        if (words.starts_with("start your own navigation now")) told = words;
+        if (words.starts_with("start your own navigation now")) printed = words;
     };
     const auto value = [&](const std::string& key) {
-        const auto at = told.find("\n  " + key + "=") + key.size() + 4;
-        return told.substr(at, told.find('\n', at) - at);
+        const auto at = printed.find("\n  " + key + "=") + key.size() + 4;
+        return printed.substr(at, printed.find('\n', at) - at);
     };
     console.navigation_ready = [&] {
         if (++asked < 20) return false;

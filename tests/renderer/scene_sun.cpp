@@ -10,7 +10,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 std::int64_t utc_ns(int year, unsigned month, unsigned day, int hour, int minute) {
     using namespace std::chrono;
@@ -21,12 +21,12 @@ std::int64_t utc_ns(int year, unsigned month, unsigned day, int hour, int minute
 
 /// From the vernal equinox along the ecliptic of J2000.
 Vec3 at_ecliptic_longitude(double degrees) {
-    const double l = degrees * kDegree, obliquity = 23.4392911 * kDegree;
+    const double l = degrees * kRadPerDeg, obliquity = 23.4392911 * kRadPerDeg;
     return {std::cos(l), std::sin(l) * std::cos(obliquity), std::sin(l) * std::sin(obliquity)};
 }
 
 double angle_deg(const Vec3& a, const Vec3& b) {
-    return std::atan2(norm(cross(a, b)), dot(a, b)) / kDegree;
+    return std::atan2(norm(cross(a, b)), dot(a, b)) / kRadPerDeg;
 }
 
 // Equinoxes and solstices of 2000 to the minute (US Naval Observatory, Earth's Seasons). Apparent longitude of date

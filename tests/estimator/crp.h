@@ -1,4 +1,4 @@
-/// estimator/pose/crp.h - classical Rodrigues parameters, and the image formation that the paper differentiates by
+/// tests/estimator/crp.h - classical Rodrigues parameters, and the image formation that the paper differentiates by
 /// them.
 ///
 /// q = axis * tan(angle / 2). R(q) = (I + [q x])^-1 (I - [q x]) is the passive direction-cosine matrix: it takes

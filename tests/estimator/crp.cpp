@@ -1,4 +1,4 @@
-#include "estimator/pose/crp.h"
+#include "tests/estimator/crp.h"
 
 #include <Eigen/Geometry>
 

@@ -1,13 +1,8 @@
-#include "rehearsal/runner/report_charts.h"
-
-#include <fmt/format.h>
-
-#include <algorithm>
+// The plot documents of the reports.
 #include <nlohmann/json.hpp>
 
-#include "base/base64.h"
 #include "plot/plot.h"
-#include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/report.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -102,8 +97,7 @@ json of_latency(const BusRecord& bus, bool lockstep) {
 
 }  // namespace
 
-json rehearsal_plot(const Report& report) {
-    const auto& [scenario, bus, verdict] = report;
+json rehearsal_plot(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict) {
     using S = TruthState;
     json truth = columns<S>(bus.truth, {{"position_m", [](const S& s) { return of(s.position_m()); }},
                                         {"range_m", [](const S& s) { return json(s.range_m()); }},
@@ -148,74 +142,8 @@ json campaign_plot(const Scenario& scenario, std::span<const json> contacts) {
             {"runs", runs}};
 }
 
-namespace {
-
-struct PageChart {
-    std::string_view name, title;  ///< the file's, without .svg; the text for people who cannot see it
-};
-
-std::string charts_folder(const std::string& folder) {
-    return folder + "/charts";
-}
-
-std::string charts_of(const std::string& folder, std::initializer_list<PageChart> charts) {
-    std::string out;
-    for (const auto& [name, title] : charts)
-        if (const std::string svg = read_text(fmt::format("{}/{}.svg", charts_folder(folder), name)); !svg.empty())
-            out += fmt::format("<img class=\"chart\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\"/>\n",
-                               escape(title), base64(svg));
-    if (!out.empty()) return "<div class=\"charts\">\n" + out + "</div>\n";
-    return "<p class=\"soft\">The charts were not drawn: that needs python3-matplotlib. "
-           "<code>narpa-plot charts.json</code> in this folder draws them.</p>\n";
-}
-
-}  // namespace
-
 Status draw_charts(const std::string& folder, const json& document) {
-    return write_plot(charts_folder(folder), document);
-}
-
-std::string approach_charts(const std::string& folder) {
-    return charts_of(folder, {{"above", "From above"},
-                              {"side", "From the side"},
-                              {"front", "From the front"},
-                              {"contact", "The last three metres, from the front"}});
-}
-std::string motion_charts(const std::string& folder) {
-    return charts_of(folder, {{"range", "Range over time"}, {"rates", "Rates over time"}});
-}
-std::string error_charts(const std::string& folder) {
-    return charts_of(folder, {{"position_x", "Position error along x"},
-                              {"position_y", "Position error along y"},
-                              {"position_z", "Position error along z"},
-                              {"attitude_x", "Attitude error about x"},
-                              {"attitude_y", "Attitude error about y"},
-                              {"attitude_z", "Attitude error about z"}});
-}
-std::string latency_chart(const std::string& folder) {
-    return charts_of(folder, {{"latency", "Pose command to hand-over, for each frame"}});
-}
-std::string campaign_contact_charts(const std::string& folder) {
-    return charts_of(
-        folder, {{"where", "Where the ports met"}, {"rates", "Rates at contact"}, {"angles", "Angles at contact"}});
-}
-
-std::string contact_bars(const ContactConditions& conditions) {
-    std::string rows;
-    for (const ContactCondition& c : conditions) {
-        // Full scale is a third beyond the limit, or at the value where that is more.
-        const double percent = 100 / std::max(c.max * 1.33, c.value * 1.05);
-        const std::string asked =
-            c.min > 0 ? fmt::format("{:g} to {:g}", c.min, c.max) : fmt::format("at most {:g}", c.max);
-        rows += fmt::format(
-            "<tr><td>{}</td><td class=\"bar\"><i class=\"asked\" style=\"left:{:.1f}%;width:{:.1f}%\"></i>"
-            "<i class=\"{}\" style=\"width:{:.1f}%\"></i></td><td class=\"n\"><b>{:.4g}</b> "
-            "{}</td><td>{}{}</td></tr>\n",
-            escape(c.title), c.min * percent, (c.max - c.min) * percent, c.within() ? "value" : "value beyond",
-            std::max(0.3, c.value * percent), c.value, escape(c.unit), asked, c.within() ? "" : " - beyond");
-    }
-    return "<table class=\"bars\"><tr><th>condition</th><th></th><th class=\"n\">value</th><th>asked</th></tr>\n" +
-           rows + "</table>\n";
+    return write_plot(folder + "/charts", document);
 }
 
 }  // namespace narpa::rehearsal

@@ -277,7 +277,7 @@ Command add_bench_estimate(Parser bench_command) {
     const Option nominal = c.flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c.flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases").excludes(nominal);
     c.option("--seed", o->pnp.seed, "pnp: of all draws").shows_default();
-    c.option("--scene", o->scene, "approach: scene file (default: the docking scene that narpa brings along)");
+    c.option("--scene", o->scene, "approach: scene file (default: the docking scene that is installed with narpa)");
     c.option("--camera", o->camera, "approach: name of the camera (default: the first)");
     c.option("--target", o->target, "approach: name of the body (default: the first that it can be)");
     c.option("--size", o->size, "approach: pixels of the camera's longer side").range(32, 10'000).shows_default();

@@ -106,7 +106,7 @@ Command add_bench_loop(Parser bench_command) {
     o->run.duration_s = 10;
     const Parser c = bench_command.subcommand(
         "loop", "The real-time loop, alone and under load from other processes: jitter, latency, deadlines");
-    c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that narpa brings along)");
+    c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that is installed with narpa)");
     c.option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
         .range(0.1, 86400.0)
         .shows_default();

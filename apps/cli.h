@@ -32,7 +32,7 @@ Command add_rehearse(Parser app);
 /// Of `narpa bench`.
 Command add_bench_render(Parser bench);
 Command add_bench_loop(Parser bench);
-Command add_bench_estimate(CLI::App& bench);
+Command add_bench_estimate(Parser bench);
 
 /// Prints a line on standard error.
 void say(std::string_view text);

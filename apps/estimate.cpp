@@ -16,7 +16,6 @@
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
-#include "estimator/cloud/sweep_points.h"
 #include "estimator/view/measured_image.h"
 #include "protocols/lidar/lidar_model.h"
 
@@ -247,11 +246,10 @@ Outcome estimate_sweep(const OneOptions& o) {
                             o.tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;
     settings.noise.range_m = o.range_noise_m;
-    auto icp = CloudIcp::create((*world)->tracer(), *target, settings);
-    if (!icp) return icp.error();
+    CloudIcp icp((*world)->tracer(), *target, settings);
     TracingThreads threads(o.threads);
     std::optional<Result<CloudEstimate>> found;
-    threads.arena.execute([&] { found.emplace(icp->align(*points, motion, guess, search_m)); });
+    threads.arena.execute([&] { found.emplace(icp.align(*points, motion, guess, search_m)); });
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
     nlohmann::json document = show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name),

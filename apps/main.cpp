@@ -87,9 +87,8 @@ Command add_bench(Parser app) {
 }
 
 constexpr const char* kDescription =
-    "narpa stands where a spacecraft's camera and LiDAR would stand: poses in on CAN, camera frames out on V4L2, "
-    "LiDAR "
-    "packets out on UDP.";
+    "narpa emulates a spacecraft's camera and LiDAR: poses in on CAN, camera frames out on V4L2, LiDAR packets "
+    "out on UDP.";
 constexpr const char* kFooter =
     "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.";
 

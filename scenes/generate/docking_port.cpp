@@ -5,9 +5,9 @@
 namespace narpa::scenes {
 namespace {
 
-constexpr double kHatchX = -0.45;     ///< of the hatch, behind the interface plane
-constexpr double kStandOffX = -0.15;  ///< plane of the target's raised cross
-constexpr double kHullRadius = 0.92;  ///< of the port's forward rim
+constexpr double kPortHatchX = -0.45;  ///< of the hatch, behind the interface plane
+constexpr double kStandOffX = -0.15;   ///< plane of the target's raised cross
+constexpr double kHullRadius = 0.92;   ///< of the port's forward rim
 
 /// Point on a circle about the port's axis.
 Vec3 polar(double x, double r, double angle) {
@@ -30,7 +30,13 @@ void adapter(Mesh& mesh) {
     mesh.material("aluminium");
     // Forward bulkhead and tunnel wall: a ring with the hatch's seat inside.
     lathe(mesh, {},
-          {{-0.5, 0}, {-0.5, 0.97}, {-0.16, 0.97}, {-0.12, 0.93}, {-0.12, 0.66}, {kHatchX, 0.63}, {kHatchX, 0}},
+          {{-0.5, 0},
+           {-0.5, 0.97},
+           {-0.16, 0.97},
+           {-0.12, 0.93},
+           {-0.12, 0.66},
+           {kPortHatchX, 0.63},
+           {kPortHatchX, 0}},
           128);
     mesh.material("dark_grey");
     for (const double a : {-2.3, -1.55, -0.85})
@@ -137,10 +143,10 @@ void petals_and_latches(Mesh& mesh) {
 /// on a stand-off before it. Seen along the axis the two coincide; off the axis the parallax shows.
 void hatch_and_target(Mesh& mesh) {
     mesh.begin("port_hatch", "hatch");
-    const double front = kHatchX + 0.03;
+    const double front = kPortHatchX + 0.03;
     lathe_facing(mesh, {},
-                 {{kHatchX - 0.02, 0},
-                  {kHatchX - 0.02, 0.60},
+                 {{kPortHatchX - 0.02, 0},
+                  {kPortHatchX - 0.02, 0.60},
                   {front - 0.02, 0.60},
                   {front, 0.58},
                   {front, 0.475},

@@ -1,6 +1,7 @@
 // The approach bench: results on the docking scene and on a model of the ISS before the Earth at the edge of
 // eclipse, and its plots.
 #include "bench/approach.h"
+#include "base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +16,6 @@
 namespace narpa::test {
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 const std::string kIss = NARPA_SOURCE_DIR "/../shared/assets/spacecraft/iss/iss.obj";
 
 Result<std::unique_ptr<World>> small_world(const std::string& path, int factor) {

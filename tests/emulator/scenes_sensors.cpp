@@ -5,14 +5,13 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/constants.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa {
 namespace {
-
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 class DockingSensors : public testing::Test {
 protected:

@@ -85,14 +85,14 @@ std::vector<RangePoint> returns(const Draw& draw, int count, double noise_m, std
     return points;
 }
 
-struct Shape {
+struct SweptShape {
     const char* name;
     Draw draw;
     int unobserved;
     std::function<void(Scene&)> add;
 };
 const auto add_box = [](Scene& s) { test::add_mesh(s, test::box(2, 2, 2)); };
-const std::vector<Shape> kShapes{
+const std::vector<SweptShape> kShapes{
     {"sphere", on_sphere, 3, [](Scene& s) { test::add_sphere(s, 1, {}); }},
     {"open cylinder", on_cylinder(0), 2, [](Scene& s) { test::add_mesh(s, cylinder(720, false)); }},
     {"cylinder and cap", on_cylinder(0.2), 1, [](Scene& s) { test::add_mesh(s, cylinder(720, true)); }},
@@ -117,7 +117,7 @@ Vector6 start_error() {
 }
 
 TEST(IcpShapes, UnobservableMotionsAreReported) {
-    for (const Shape& shape : kShapes) {
+    for (const SweptShape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
         Scene scene;
         scene.materials.push_back(test::lambert(0.5f));
@@ -157,7 +157,7 @@ TEST(IcpShapes, EigenvaluesOfACubeAreKnown) {
 }
 
 TEST(IcpShapes, NothingDriftsAlongThem) {
-    for (const Shape& shape : kShapes) {
+    for (const SweptShape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
         Scene scene;
         scene.materials.push_back(test::lambert(0.5f));

@@ -17,9 +17,9 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kFocal_px = 1319.4792168823421;  // 500 x 500, 30 degrees from corner to corner
+constexpr double kPaperFocal_px = 1319.4792168823421;  // 500 x 500, 30 degrees from corner to corner
 
-StereoPair pair_with(const Rigid3& T_right_left, double focal_px = kFocal_px) {
+StereoPair pair_with(const Rigid3& T_right_left, double focal_px = kPaperFocal_px) {
     StereoPair pair;
     pair.left.fx = pair.left.fy = pair.right.fx = pair.right.fy = focal_px;
     pair.T_right_left = T_right_left;
@@ -165,7 +165,7 @@ TEST(StereoTriangulation, AVerticalBaselineGivesTheDepthFromTheRows) {
     ASSERT_EQ(p.status, TriangulationStatus::good);
     EXPECT_LT((p.point_m - point).norm(), 1e-9);
     // sigma_z = sqrt(2) sigma z^2 / (f b)
-    EXPECT_NEAR(std::sqrt(p.covariance_m2(2, 2)), std::sqrt(2.0) * 0.1 * 800 * 800 / (kFocal_px * 30), 1e-3);
+    EXPECT_NEAR(std::sqrt(p.covariance_m2(2, 2)), std::sqrt(2.0) * 0.1 * 800 * 800 / (kPaperFocal_px * 30), 1e-3);
 }
 
 TEST(StereoTriangulation, AnExactLeftPixelKeepsThePointOnItsRay) {

@@ -1,4 +1,5 @@
 // How bodies move by themselves: orbits, tumbling.
+#include "base/constants.h"
 #include "estimator/filter/motion_model.h"
 #include "rehearsal/dynamics/orbit_motion.h"
 #include "tests/rehearsal/dynamics_support.h"

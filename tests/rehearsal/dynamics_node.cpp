@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 
+#include "base/constants.h"
 #include "drivers/can/buses.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/dynamics/node.h"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/constants.h"
 #include "tests/rehearsal/navigation_plant.h"
 
 namespace narpa::rehearsal {

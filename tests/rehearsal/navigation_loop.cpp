@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "base/constants.h"
 #include "rehearsal/dynamics/simulation.h"
 #include "rehearsal/navigation/autopilot.h"
 #include "tests/rehearsal/navigation_plant.h"

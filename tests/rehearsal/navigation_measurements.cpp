@@ -1,6 +1,7 @@
 // Pose measurements from rendered frames and simulated sweeps of the docking.
 #include <gtest/gtest.h>
 
+#include "base/constants.h"
 #include "rehearsal/navigation/measurements.h"
 #include "rehearsal/navigation/sensor_inputs.h"
 #include "tests/rehearsal/simulated_sensors.h"

@@ -8,7 +8,7 @@ namespace narpa {
 namespace {
 
 using namespace test;
-using Kind = Material::Kind;
+using MaterialKind = Material::Kind;
 
 /// What a unit sphere under irradiance 1 sends to a far viewer at phase angle a; a flat Lambert disc of albedo 1
 /// that faces both sends 1, so this is the geometric albedo times the phase function. Photometric latitude and
@@ -52,7 +52,7 @@ double seeliger_phase(double a) {
 constexpr double kPhases[] = {0, 1, 5, 20, 45, 70, 90, 120, 150, 170};
 
 TEST(DiscIntegrated, LambertSphereTo0_1PerCent) {
-    const TestMaterial m = material("lambert", Kind::lambert, 0.6);
+    const TestMaterial m = material("lambert", MaterialKind::lambert, 0.6);
     for (const double degrees : kPhases) {
         const double a = degrees * kPi / 180, expected = 0.6 * 2 / 3 * lambert_phase(a);
         EXPECT_NEAR(disc(m, a), expected, 1e-3 * expected) << degrees;
@@ -65,7 +65,7 @@ TEST(DiscIntegrated, LambertSphereTo0_1PerCent) {
 TEST(DiscIntegrated, LommelSeeligerSphereTo0_1PerCent) {
     for (const float g : {0.0f, -0.3f, 0.2f, -0.6f}) {
         const TestMaterial m =
-            material("seeliger", Kind::lommel_seeliger, 0.4, [&](Material& x) { x.asymmetry = g; });
+            material("seeliger", MaterialKind::lommel_seeliger, 0.4, [&](Material& x) { x.asymmetry = g; });
         for (const double degrees : kPhases) {
             const double a = degrees * kPi / 180, asymmetry = static_cast<double>(g);
             const double particle = (1 - asymmetry * asymmetry) /
@@ -82,7 +82,7 @@ TEST(DiscIntegrated, LommelSeeligerSphereTo0_1PerCent) {
 
 // Its directional albedo: w / 2 (1 - mu ln((1 + mu) / mu)).
 TEST(LommelSeeliger, DirectionalAlbedoIsItsClosedForm) {
-    const TestMaterial m = material("seeliger", Kind::lommel_seeliger, 0.8);
+    const TestMaterial m = material("seeliger", MaterialKind::lommel_seeliger, 0.8);
     for (const double mu : {0.05, 0.3, 0.7, 1.0}) {
         const double expected = 0.4 * (1 - mu * std::log((1 + mu) / mu));
         EXPECT_NEAR(albedo(m, at_angle(std::acos(mu))), expected, 2e-3 * expected) << mu;
@@ -108,7 +108,7 @@ TEST(HenyeyGreenstein, HasMeanOneAndItsAsymmetry) {
 // McEwen 1996: at full phase a Lommel-Seeliger disc, without limb darkening, of the normal albedo; further on a
 // mixture whose disc is that of its two parts.
 TEST(LunarLambert, IsFlatAtFullPhaseAndMixesBeyond) {
-    const TestMaterial m = material("moon", Kind::lunar_lambert, 0.12);
+    const TestMaterial m = material("moon", MaterialKind::lunar_lambert, 0.12);
     const Surface s = m.surface();
     for (const double degrees : {0.0, 30.0, 60.0, 85.0}) {
         const Vec3 v = at_angle(degrees * kPi / 180);
@@ -159,7 +159,7 @@ TEST(Hapke, IsotropicGrainsMeetChandrasekharsSolution) {
     EXPECT_NEAR(ExactH(1).at(1), 2.9078, 2e-3);  // S. Chandrasekhar, "Radiative Transfer", table XI
     for (const double w : {0.1, 0.5, 0.9, 1.0}) {
         const ExactH h(w);
-        const TestMaterial m = material("hapke", Kind::hapke, w, [](Material& x) {
+        const TestMaterial m = material("hapke", MaterialKind::hapke, w, [](Material& x) {
             x.hapke = {0, 0, 0, 0.05f, 0};
         });
         Random random(8);
@@ -176,7 +176,8 @@ TEST(Hapke, IsotropicGrainsMeetChandrasekharsSolution) {
 TEST(Hapke, SmoothSphereMeetsItsDiscIntegratedForm) {
     for (const double w : {0.05, 0.3, 0.7}) {
         const Hapke parameters{0.3f, 0.5f, 0.8f, 0.08f, 0};
-        const TestMaterial m = material("hapke", Kind::hapke, w, [&](Material& x) { x.hapke = parameters; });
+        const TestMaterial m =
+            material("hapke", MaterialKind::hapke, w, [&](Material& x) { x.hapke = parameters; });
         const double gamma = std::sqrt(1 - w), r0 = (1 - gamma) / (1 + gamma);
         for (const double degrees : {0.0, 2.0, 10.0, 40.0, 80.0, 120.0, 150.0}) {
             const double a = degrees * kPi / 180, b = 0.3, c = 0.5;
@@ -193,15 +194,15 @@ TEST(Hapke, SmoothSphereMeetsItsDiscIntegratedForm) {
 }
 
 TEST(Hapke, DarkGrainsAreLommelSeeligerAndSlopesVanishWithTheirAngle) {
-    const TestMaterial dark = material("dark", Kind::hapke, 1e-4, [](Material& m) {
+    const TestMaterial dark = material("dark", MaterialKind::hapke, 1e-4, [](Material& m) {
         m.hapke = {0.4f, 1, 0, 0.05f, 0};
     });
     const TestMaterial seeliger =
-        material("seeliger", Kind::lommel_seeliger, 1e-4, [](Material& m) { m.asymmetry = -0.4f; });
-    const TestMaterial smooth = material("smooth", Kind::hapke, 0.4, [](Material& m) {
+        material("seeliger", MaterialKind::lommel_seeliger, 1e-4, [](Material& m) { m.asymmetry = -0.4f; });
+    const TestMaterial smooth = material("smooth", MaterialKind::hapke, 0.4, [](Material& m) {
         m.hapke = {0.3f, 0.5f, 1, 0.1f, 0};
     });
-    const TestMaterial slopes = material("slopes", Kind::hapke, 0.4, [](Material& m) {
+    const TestMaterial slopes = material("slopes", MaterialKind::hapke, 0.4, [](Material& m) {
         m.hapke = {0.3f, 0.5f, 1, 0.1f, 1e-4f};
     });
     Random random(9);
@@ -220,7 +221,9 @@ TEST(Hapke, DarkGrainsAreLommelSeeligerAndSlopesVanishWithTheirAngle) {
 // theta-bar).
 TEST(Hapke, SlopesDarkenLargePhases) {
     const auto soil = [](float roughness) {
-        return material("soil", Kind::hapke, 0.2, [=](Material& m) { m.hapke = {0.3f, 0.5f, 0, 0.1f, roughness}; });
+        return material("soil", MaterialKind::hapke, 0.2, [=](Material& m) {
+            m.hapke = {0.3f, 0.5f, 0, 0.1f, roughness};
+        });
     };
     const TestMaterial smooth = soil(0), rough = soil(0.4f);
     const auto ratio = [&](double degrees) {
@@ -262,8 +265,9 @@ inline constexpr PublishedHapke kPublishedHapke[] = {
 // The parameters give back the geometric albedo that their authors published with them, to its last digit.
 TEST(Hapke, PublishedParametersGiveThePublishedAlbedo) {
     for (const PublishedHapke& body : kPublishedHapke) {
-        const TestMaterial m = material(body.body, Kind::hapke, static_cast<double>(body.single_scattering_albedo),
-                                        [&](Material& x) { x.hapke = body.parameters; });
+        const TestMaterial m =
+            material(body.body, MaterialKind::hapke, static_cast<double>(body.single_scattering_albedo),
+                     [&](Material& x) { x.hapke = body.parameters; });
         EXPECT_NEAR(disc(m, 0), body.geometric_albedo, body.geometric_albedo > 0.1 ? 0.005 : 0.0005) << body.body;
     }
 }

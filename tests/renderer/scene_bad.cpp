@@ -7,18 +7,8 @@
 namespace narpa {
 namespace {
 
+using test::BadScene;
 using test::TemporaryFolder;
-
-struct BadScene {
-    const char* name;
-    const char* text;
-    int line, column;
-    const char* words;  ///< that the message holds
-};
-
-void PrintTo(const BadScene& bad, std::ostream* out) {
-    *out << bad.name;
-}
 
 // What a case does not bring itself comes after it, so that places stay.
 std::string completed(std::string text) {

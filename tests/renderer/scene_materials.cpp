@@ -11,23 +11,16 @@
 namespace narpa {
 namespace {
 
+using test::BadScene;
 using test::data_file;
 using test::TemporaryFolder;
 
+#undef BALL
 #define BALL "[[body]]\nname = \"x\"\nsphere = {radius_m = 1}\n"
 #define LIGHT "[[light]]\nname = \"l\"\n"
 #define PATH "[render]\nmethod = \"path\"\n"
 constexpr const char* kRest =
     "\n[ambient]\nradiance = 1\n[[camera]]\nname = \"c\"\nresolution = [64, 48]\nfov_diagonal_deg = 30\n";
-
-struct BadScene {
-    const char *name, *text;
-    int line, column;
-    const char* words;  ///< that the message holds
-};
-void PrintTo(const BadScene& bad, std::ostream* out) {
-    *out << bad.name;
-}
 
 const BadScene kBadMaterials[] = {
     {"KindUnknown", BALL "material = {kind = \"chrome\"}\n", 4, 20,

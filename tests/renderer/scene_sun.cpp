@@ -3,14 +3,13 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/constants.h"
 #include "renderer/scene/scene_file.h"
 #include "renderer/scene/sun_direction.h"
 #include "tests/renderer/scene_support.h"
 
 namespace narpa {
 namespace {
-
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 std::int64_t utc_ns(int year, unsigned month, unsigned day, int hour, int minute) {
     using namespace std::chrono;

@@ -13,6 +13,16 @@
 
 namespace narpa::test {
 
+/// A scene file with a mistake, and the error that it gets.
+struct BadScene {
+    const char *name, *text;
+    int line, column;
+    const char* words;  ///< that the message has
+};
+inline void PrintTo(const BadScene& bad, std::ostream* out) {
+    *out << bad.name;
+}
+
 /// A new folder that goes when the test ends; in memory where there is such a place, as some tests write thousands
 /// of files.
 class TemporaryFolder {

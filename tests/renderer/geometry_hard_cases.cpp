@@ -87,8 +87,9 @@ long double nearest_by_hand(const Mesh& m, const Vec3& origin, const Vec3& direc
     const LongVec3 o = vec_cast<long double>(origin), d = vec_cast<long double>(direction);
     long double best = std::numeric_limits<long double>::infinity();
     for (const auto& f : m.faces) {
-        const LongVec3 a = vec_cast<long double>(m.positions[f[0]]), e1 = vec_cast<long double>(m.positions[f[1]]) - a,
-                   e2 = vec_cast<long double>(m.positions[f[2]]) - a, p = cross(d, e2);
+        const LongVec3 a = vec_cast<long double>(m.positions[f[0]]),
+                       e1 = vec_cast<long double>(m.positions[f[1]]) - a,
+                       e2 = vec_cast<long double>(m.positions[f[2]]) - a, p = cross(d, e2);
         const long double det = dot(e1, p);
         if (det == 0) continue;
         const LongVec3 s = o - a, q = cross(s, e1);
@@ -119,7 +120,7 @@ TEST(FarFromTheOrigin, RangeOfASmallBodyIsExactToTenMicrometresAtAnyDistance) {
             const double skipped = distance - 20;
             using LongVec3 = Vec<long double>;
             const LongVec3 start = vec_cast<long double>(eye) +
-                               vec_cast<long double>(ray.direction) * static_cast<long double>(skipped);
+                                   vec_cast<long double>(ray.direction) * static_cast<long double>(skipped);
             const long double t = static_cast<long double>(skipped) +
                                   nearest_by_hand(s.meshes[0], vec_cast<double>(start), ray.direction);
             worst = std::max(worst, static_cast<double>(std::abs(t - static_cast<long double>(hit.range_m))));

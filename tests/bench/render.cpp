@@ -85,7 +85,7 @@ TEST(BenchRender, TheAblationSwitchesOffEachMechanism) {
         ++off;
     }
     EXPECT_EQ(full, 3U);
-    EXPECT_EQ(off, 8U);
+    EXPECT_EQ(off, 7U);
 }
 
 TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {

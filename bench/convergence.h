@@ -57,7 +57,7 @@ struct ErrorRow {
     std::size_t images = 0;
     Estimate rmse;  ///< over pixels and bands, the reference's own noise taken out
     /// The same of errors in parts of the pixel's own radiance (or of a hundredth of the mean level, where that is
-    /// more): RMSE tells of the brightest edges, this of the image as the eye sees it.
+    /// more): the brightest edges dominate RMSE; this weighs all parts of the image.
     Estimate relative_rmse;
     Estimate bias;  ///< mean error over pixels, bands and images; the reference's own error is part of its own
     /// Mean over pixels of the squared bias of each, which finds what cancels over the image: the product of the

@@ -172,7 +172,7 @@ Result<double> printed_depth_m(const StereoPair& pair, const Vector2d& left_px, 
     const double above = t.z * U_r - f_r * t.x, below = (column - depth).sum();
     if (std::abs(below) <= kRounding * (column.abs().sum() + depth.abs().sum()))
         return Error{
-            "the column of the right pixel tells nothing of the depth, expected a baseline with a part along "
+            "the column of the right pixel does not depend on the depth, expected a baseline with a part along "
             "the rows and a point away from the epipole"};
     return above / below;
 }

@@ -191,8 +191,7 @@ inline constexpr auto kActuatorSignals = laid_out(std::to_array<Signal>({
 inline constexpr SetLayout kActuatorLayout{"Actuator", "What the thrusters are to do within one control period",
                                            kActuatorFrames, kActuatorSignals, 208};
 
-// --- Where the navigation estimates the target
-// --------------------------------------------------------------------
+// --- The navigation's estimate of the target ----------------------------------------------------------------
 
 inline constexpr std::array<std::string_view, 10> kNavigationFrames{
     "NavigationTime",       "NavigationPositionX",  "NavigationPositionY", "NavigationPositionZ",

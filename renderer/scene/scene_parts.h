@@ -57,11 +57,11 @@ std::optional<int> read_material(TableReader& body, const std::string& name, Sce
 int add_grey_material(const std::string& name, Scene& scene);
 
 struct Mounting {
-    int mount = -1;  ///< body it rides on; -1 is the world
+    int mount = -1;  ///< body that carries it; -1 is the world
     Rigid3 T_mount_thing{};
 };
 
-/// The attitude that looks along `forward` (unit), upright with `right` (unit, across `forward`) at its right.
+/// A sensor's attitude from its boresight `forward` and its `right` axis: unit vectors, orthogonal, parent axes.
 using AttitudeOf = Quat (*)(const Vec3& forward, const Vec3& right);
 Quat camera_attitude(const Vec3& forward, const Vec3& right);  ///< x right, y down, z forward; lights too
 Quat lidar_attitude(const Vec3& forward, const Vec3& right);   ///< x right, y forward, z up

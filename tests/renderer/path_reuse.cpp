@@ -23,13 +23,13 @@ struct Picture {
     }
 };
 
-/// What the pixels' middles see, in batches.
+/// Rays through the pixel centres and their first hits, in batches.
 struct View {
     std::array<Ray, kPixels> rays;
     std::array<Hit, kPixels> first;
     std::array<std::uint32_t, kPixels> number;
-    std::array<RayBatch, kPixels / kLanes> ray_packets;
-    std::array<HitBatch, kPixels / kLanes> hit_packets;
+    std::array<RayBatch, kPixels / kLanes> ray_batches;
+    std::array<HitBatch, kPixels / kLanes> hit_batches;
 
     View(const RenderScene& render_scene, const BodyPoses& at, const Vec3& eye, const Vec3& target,
          double width_m) {
@@ -41,11 +41,11 @@ struct View {
             rays[i] = ray_to(eye, target + width_m * (x * across + y * down));
             first[i] = render_scene.tracer().intersect(at, rays[i], kInfinity);
             number[i] = static_cast<std::uint32_t>(i);
-            ray_packets[i / kLanes].n = kLanes;
-            ray_packets[i / kLanes].put(i % kLanes, rays[i]);
+            ray_batches[i / kLanes].n = kLanes;
+            ray_batches[i / kLanes].put(i % kLanes, rays[i]);
         }
-        for (std::size_t k = 0; k < ray_packets.size(); ++k)
-            render_scene.tracer().intersect(at, ray_packets[k], render_scene.tracer().all_bodies(), hit_packets[k]);
+        for (std::size_t k = 0; k < ray_batches.size(); ++k)
+            render_scene.tracer().intersect(at, ray_batches[k], render_scene.tracer().all_bodies(), hit_batches[k]);
     }
 };
 
@@ -67,8 +67,8 @@ std::uint64_t together(const RenderScene& render_scene, const BodyPoses& at, con
     const LitSurfaces nothing_known{};
     std::array<PathStart, kReuseGroup> first;
     for (std::size_t i = 0; i < kPixels; ++i)
-        first[i] = {&view.ray_packets[i / kLanes],
-                    &view.hit_packets[i / kLanes],
+        first[i] = {&view.ray_batches[i / kLanes],
+                    &view.hit_batches[i / kLanes],
                     &nothing_known,
                     i % kLanes,
                     view.number[i],

@@ -33,25 +33,41 @@ function(narpa_compile_options target)
   endif()
 endfunction()
 
-# narpa_export(NAME) - names a library narpa::NAME, here and in the installed package, where it belongs to the component
-# of its top-level folder. NAME is a folder's path with "_" for "/".
+# narpa_export(NAME) - installs the library narpa::NAME in the package's component of its top-level folder. NAME is a
+# folder's path with "_" for "/".
 function(narpa_export name)
-  add_library(narpa::${name} ALIAS narpa_${name})
   set_target_properties(narpa_${name} PROPERTIES EXPORT_NAME ${name})
   string(REGEX REPLACE "_.*" "" component ${name})
   install(TARGETS narpa_${name} EXPORT narpa-${component})
+  set_property(GLOBAL APPEND PROPERTY NARPA_COMPONENTS ${component})
 endfunction()
 
-# narpa_room(FOLDER [SIMD] LINKS ROOMS...) - one library of all sources below FOLDER except main.cpp. LINKS names the
-# rooms whose headers it may include; tests/layout holds every #include against these lists. SIMD: the room's loops over
-# the lanes of a ray batch are to become vector code.
+# narpa_link(TARGET NAME=LIBRARY...) - links libraries that only the target's sources include. LIBRARY, often an imported
+# target, is linked here and -lNAME in the installed package: its users need the library but not its CMake package, of
+# which those of Ceres and Imath print warnings and dozens of lines. "NAME" alone: both are the same.
+function(narpa_link target)
+  string(REGEX REPLACE "^narpa_([a-z]+).*" "\\1" component ${target})
+  foreach(entry ${ARGN})
+    string(REGEX REPLACE "=.*" "" name ${entry})
+    string(REGEX REPLACE "^[^=]*=" "" library ${entry})
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:${library}> $<INSTALL_INTERFACE:${name}>)
+    set_property(GLOBAL APPEND PROPERTY NARPA_${component}_LIBRARIES ${name})
+  endforeach()
+endfunction()
+
+# narpa_room(FOLDER [SIMD] [INTERNAL] LINKS ROOMS...) - one library of all sources below FOLDER except main.cpp. LINKS
+# names the rooms whose headers it may include; tests/layout holds every #include against these lists. SIMD: the room's
+# loops over the lanes of a ray batch are to become vector code. INTERNAL: it is not installed.
 function(narpa_room folder)
-  cmake_parse_arguments(arg "SIMD" "" "LINKS" ${ARGN})
+  cmake_parse_arguments(arg "SIMD;INTERNAL" "" "LINKS" ${ARGN})
   string(REPLACE "/" "_" name ${folder})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
   add_library(narpa_${name} STATIC ${sources})
-  narpa_export(${name})
+  add_library(narpa::${name} ALIAS narpa_${name})
+  if(NOT arg_INTERNAL)
+    narpa_export(${name})
+  endif()
   set_target_properties(narpa_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_include_directories(narpa_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                   $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
@@ -74,7 +90,7 @@ endfunction()
 function(narpa_use_opencv target)
   target_include_directories(${target} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
   list(TRANSFORM ARGN PREPEND opencv_)
-  target_link_libraries(${target} PRIVATE ${ARGN})
+  narpa_link(${target} ${ARGN})
 endfunction()
 
 function(narpa_executable name)
@@ -84,9 +100,29 @@ endfunction()
 
 function(narpa_install_package)
   set(dir ${CMAKE_INSTALL_LIBDIR}/cmake/narpa)
-  foreach(component base plot protocols drivers renderer estimator rehearsal emulator)
+  get_property(components GLOBAL PROPERTY NARPA_COMPONENTS)
+  list(REMOVE_DUPLICATES components)
+  get_property(rooms GLOBAL PROPERTY NARPA_ROOMS)
+  set(narpa_components "set(narpa_components ${components})\n")
+  foreach(component ${components})
     install(EXPORT narpa-${component} NAMESPACE narpa:: DESTINATION ${dir} FILE narpa-${component}.cmake)
+    set(uses "")
+    foreach(room ${rooms})
+      if(room MATCHES "^${component}[/:]")
+        string(REGEX REPLACE "^[^:]*:" "" links "${room}")
+        string(REGEX MATCHALL "[a-z]+(/[a-z]+)?" links "${links}")
+        list(TRANSFORM links REPLACE "/.*" "")
+        list(APPEND uses ${links})
+      endif()
+    endforeach()
+    list(REMOVE_DUPLICATES uses)
+    list(REMOVE_ITEM uses ${component})
+    get_property(libraries GLOBAL PROPERTY NARPA_${component}_LIBRARIES)
+    list(REMOVE_DUPLICATES libraries)
+    string(APPEND narpa_components "set(narpa_${component}_uses ${uses})\n"
+                                   "set(narpa_${component}_libraries ${libraries})\n")
   endforeach()
+  string(REPLACE ";" " " narpa_components "${narpa_components}")
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/narpaConfig.cmake.in ${CMAKE_BINARY_DIR}/narpaConfig.cmake
                                 INSTALL_DESTINATION ${dir})
   write_basic_package_version_file(${CMAKE_BINARY_DIR}/narpaConfigVersion.cmake COMPATIBILITY SameMajorVersion)

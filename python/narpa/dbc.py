@@ -12,8 +12,7 @@ HERE = Path(__file__).resolve().parent
 
 def shipped_dbc():
     """The DBC file that belongs to narpa: one body "chaser" at 0x100, camera 0, and the messages of a closed loop."""
-    installed = HERE / "narpa.dbc"
-    return installed if installed.exists() else HERE.parents[1] / "protocols/can/narpa.dbc"
+    return HERE.parents[1] / "protocols/can/narpa.dbc"  # in the repository and in PREFIX/share/narpa
 
 
 @dataclass(frozen=True)

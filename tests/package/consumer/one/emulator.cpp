@@ -1,12 +1,11 @@
-// A project of somebody else's: finds the installed package and uses it, from the scene file to a range.
-#include <cstdio>
-
+// From a scene file to a range.
 #include <narpa/emulator/world.h>
 #include <narpa/renderer/scene/scene_file.h>
+#include <cstdio>
+#include <string>
 
-int main(int argc, char** argv) {
-    if (argc < 2) return 2;
-    auto scene = narpa::read_scene(argv[1]);
+int main(int, char** argv) {
+    auto scene = narpa::read_scene(argv[1] + std::string("/docking/docking.toml"));
     if (!scene) return std::puts(scene.error().text().c_str()), 2;
     auto world = narpa::World::create(*std::move(scene));
     if (!world) return std::puts(world.error().text().c_str()), 2;

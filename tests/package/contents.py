@@ -1,0 +1,59 @@
+"""Checks an installed tree: what it has, that its programs start and find their files there, and its size.
+
+Usage: contents.py PREFIX
+"""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+MOST_MB = 130  # two thirds are the meshes of the scenes
+IMPORT_EXAMPLE = """
+import sys
+sys.path = [sys.argv[1]] + [path for path in sys.path if "share/narpa" not in path]
+try:
+    import dynamics
+except ModuleNotFoundError as error:
+    if error.name.startswith("narpa"):
+        raise
+"""
+
+prefix = Path(sys.argv[1])
+share = prefix / "share/narpa"
+wrong = []
+
+for name in [
+    "bin/narpa", "bin/narpa-dynamics", "bin/narpa-navigation", "bin/narpa-plot",
+    "share/narpa/LICENSE", "share/narpa/README.md", "share/narpa/docs/scene.md", "share/narpa/docs/interfaces.md",
+    "share/narpa/protocols/can/README.md", "share/narpa/protocols/can/narpa.dbc",
+    "share/narpa/examples/dynamics.py", "share/narpa/python/narpa/can.py",
+    "share/narpa/scenes/docking/docking.toml", "share/narpa/scenes/docking/station.obj",
+    "share/narpa/scenes/rehearsal/docking.toml",
+]:  # fmt: skip
+    if not (prefix / name).is_file():
+        wrong.append(f"{name} is missing")
+if (prefix / "lib/libnarpa_bench.a").exists():
+    wrong.append("lib/libnarpa_bench.a is installed, though nothing uses it")
+
+for program in (prefix / "bin").iterdir():
+    if b".debug_info" in program.read_bytes():
+        wrong.append(f"bin/{program.name} has debug information")
+
+environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(share / "python"), "PYTHONDONTWRITEBYTECODE": "1"}
+for command in [
+    [prefix / "bin/narpa", "--version"],
+    [prefix / "bin/narpa", "check", share / "scenes/cornell/cornell.toml"],
+    [prefix / "bin/narpa-plot", "--help"],
+    [sys.executable, "-c", "from narpa import dbc; dbc.read()"],
+    [sys.executable, "-c", IMPORT_EXAMPLE, share / "examples"],
+]:
+    ran = subprocess.run(command, env=environment, cwd=prefix, capture_output=True, text=True)
+    if ran.returncode:
+        wrong.append(f"{' '.join(map(str, command))}: exit {ran.returncode}: {ran.stderr.strip()[-300:]}")
+
+sizes = [os.lstat(path).st_size for path in prefix.rglob("*") if path.is_file()]
+total = sum(sizes) / 1e6
+if total > MOST_MB:
+    wrong.append(f"{total:.0f} MB are installed, more than {MOST_MB}")
+print("\n".join(wrong) or f"{len(sizes)} files, {total:.0f} MB")
+sys.exit(bool(wrong))

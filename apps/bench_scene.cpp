@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "base/program_beside.h"
 #include "renderer/camera/camera_model.h"
 
 namespace narpa::cli {
@@ -10,7 +11,7 @@ namespace narpa::cli {
 Result<std::string> shipped_scene(const std::string& name) {
     namespace fs = std::filesystem;
     std::error_code error;
-    const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
+    const fs::path program = program_folder();
     for (const char* folder : {"../scenes", "../share/narpa/scenes"})
         if (const fs::path file = (program / folder / name).lexically_normal(); fs::exists(file, error))
             return file.string();

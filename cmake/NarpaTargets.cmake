@@ -94,7 +94,10 @@ function(narpa_use_opencv target)
 endfunction()
 
 function(narpa_executable name)
-  add_executable(${name} ${ARGN} ${PROJECT_SOURCE_DIR}/apps/program/assimp_assertions.cpp)
+  add_executable(${name} ${ARGN})
+  if(TARGET narpa-mesh-reader AND NOT name STREQUAL "narpa-mesh-reader")
+    add_dependencies(${name} narpa-mesh-reader)  # any program that reads scenes starts it
+  endif()
   narpa_compile_options(${name})
 endfunction()
 

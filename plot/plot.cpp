@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "base/base64.h"
+#include "base/program_beside.h"
 
 namespace narpa {
 namespace {
@@ -29,9 +30,7 @@ constexpr int kMatplotlibMissing = 3, kNotStarted = 127;
 /// What the environment variable NARPA_PLOT names, or narpa-plot beside the running program, or the one on PATH.
 std::string plot_program() {
     if (const char* named = std::getenv("NARPA_PLOT")) return named;
-    std::error_code none;
-    const fs::path beside = fs::read_symlink("/proc/self/exe", none).parent_path() / "narpa-plot";
-    return fs::exists(beside, none) ? beside.string() : "narpa-plot";
+    return program_beside("narpa-plot");
 }
 
 /// Runs a program at the usual priority, its standard output on our standard error. Returns its exit status.

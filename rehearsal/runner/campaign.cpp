@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "base/program_beside.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/report.h"
 #include "rehearsal/runner/run_folder.h"
@@ -32,7 +33,7 @@ ChildProcess::Command command_for(const CampaignOptions& o, const std::string& f
     const int threads = r.threads > 0 ? r.threads : std::max(1, cores / o.jobs);
     ChildProcess::Command c;
     c.name = "the rehearsal";
-    c.line = {(r.programs.empty() ? program_folder() : r.programs) + "/narpa",
+    c.line = {(r.programs.empty() ? program_folder().string() : r.programs) + "/narpa",
               "rehearse",
               r.scenario,
               "-o",

@@ -160,11 +160,6 @@ std::string value_of(const std::string& lines, const std::string& key) {
     return all.substr(begin, all.find('\n', begin) - begin);
 }
 
-std::string program_folder() {
-    std::error_code unknown;
-    return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
-}
-
 std::string read_text(const std::string& file) {
     std::ifstream in(file);
     return {std::istreambuf_iterator<char>(in), {}};

@@ -58,8 +58,6 @@ private:
 /// The value of a line KEY=VALUE; empty where there is none.
 [[nodiscard]] std::string value_of(const std::string& lines, const std::string& key);
 
-/// The folder of the running program.
-[[nodiscard]] std::string program_folder();
 /// The last line of a text file that is not blank; empty where there is none.
 [[nodiscard]] std::string last_line(const std::string& file);
 [[nodiscard]] std::string read_text(const std::string& file);

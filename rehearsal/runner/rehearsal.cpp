@@ -11,6 +11,7 @@
 #include <ctime>
 #include <filesystem>
 
+#include "base/program_beside.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/judge/judge.h"
 #include "rehearsal/runner/child_process.h"
@@ -64,7 +65,7 @@ private:
     [[nodiscard]] std::string in_folder(const std::string& name) const { return options_.folder + "/" + name; }
     [[nodiscard]] std::uint64_t seed() const { return options_.seed.value_or(scenario_.seed); }
     [[nodiscard]] std::string program(const std::string& name) const {
-        return (options_.programs.empty() ? program_folder() : options_.programs) + "/" + name;
+        return (options_.programs.empty() ? program_folder().string() : options_.programs) + "/" + name;
     }
     static Error interrupted() { return {"interrupted", "", 0, 0, ErrorKind::failed}; }
 

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/mesh_process.h"
 #include "renderer/scene/mesh_readers.h"
 
 namespace narpa {
@@ -235,9 +236,13 @@ std::string texture_path(const std::string& mesh_path, std::string name) {
     return (other ? beside : as_written).string();
 }
 
-Result<MeshFile> read_mesh(const std::string& path, double scale) {
+Result<MeshFile> read_mesh(const std::string& path, double scale, const MeshReaderLimits& limits) {
     if (const Status plain = check_plain_file(path); !plain) return plain.error();
-    Result<TriangleSoup> soup = extension_of(path) == ".obj" ? read_obj(path) : read_soup_with_assimp(path);
+    const std::string extension = extension_of(path);
+    if (extension != ".obj" && !is_read_in_process(extension))
+        return Error{.what = fmt::format("not a mesh format that can be read, expected {}", kMeshExtensions),
+                     .file = path};
+    Result<TriangleSoup> soup = extension == ".obj" ? read_obj(path) : read_soup_in_process(path, limits);
     if (!soup) return soup.error();
     take_textures_off_bare_triangles(*soup, path);
     if (soup->triangles.empty())

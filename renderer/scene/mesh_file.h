@@ -1,5 +1,5 @@
-/// renderer/scene/mesh_file.h - mesh files -> triangles, by Assimp, and OBJ by our own reader (mesh_readers.h says
-/// why).
+/// renderer/scene/mesh_file.h - mesh files -> triangles: OBJ by our own reader (mesh_readers.h says why), others by
+/// Assimp in a process of its own (mesh_process.h).
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,12 @@
 #include "renderer/scene/scene.h"
 
 namespace narpa {
+
+/// Of narpa-mesh-reader, the process that reads all formats but OBJ.
+struct MeshReaderLimits {
+    std::uint64_t memory_bytes = std::uint64_t{4} << 30;  ///< of the process; of what it sends, too
+    int seconds = 60;                                     ///< wall time
+};
 
 /// An image that a mesh file's material names: not read yet.
 struct MeshTexture {
@@ -40,12 +46,11 @@ struct MeshFile {
     std::vector<std::string> warnings;
 };
 
-/// Reads OBJ + MTL, glTF, PLY, STL, 3DS, DAE and the other formats of Assimp; `scale` turns the file's unit into
-/// metres and is applied in double. Node transforms are applied. Faces are triangulated; points and lines are left
-/// out. Normals are kept where the file gives them, and never computed. Dropped and counted: triangles with a
-/// coordinate that is not finite, triangles whose height is below 2^-24 of their longest side (float cannot hold
-/// their normal), and second copies of a triangle, whichever way round. Errors name the mesh file, and the line
-/// where it is an OBJ.
-Result<MeshFile> read_mesh(const std::string& path, double scale);
+/// Reads OBJ + MTL, glTF, PLY, STL, 3DS and DAE; `scale` turns the file's unit into metres and is applied in
+/// double. Node transforms are applied. Faces are triangulated; points and lines are left out. Normals are kept
+/// where the file gives them, and never computed. Dropped and counted: triangles with a coordinate that is not
+/// finite, triangles whose height is below 2^-24 of their longest side (float cannot hold their normal), and second
+/// copies of a triangle, whichever way round. Errors name the mesh file, and the line where it is an OBJ.
+Result<MeshFile> read_mesh(const std::string& path, double scale, const MeshReaderLimits& limits = {});
 
 }  // namespace narpa

@@ -13,9 +13,6 @@
 #include "base/result.h"
 #include "renderer/scene/mesh_file.h"
 
-struct aiMaterial;
-struct aiScene;
-
 namespace narpa {
 
 struct TriangleSoup {
@@ -37,8 +34,6 @@ struct TriangleSoup {
 
 /// Most materials of a mesh.
 inline constexpr std::size_t kMaxMaterials = 65535;
-
-Result<TriangleSoup> read_soup_with_assimp(const std::string& path);
 
 /// In small letters, with its dot: ".obj".
 std::string extension_of(const std::string& path);
@@ -73,10 +68,6 @@ struct MtlMaterial {
     [[nodiscard]] bool transparent() const { return d ? *d < 1 : tr && *tr > 0; }
 };
 MeshMaterial from_mtl(const MtlMaterial& given);
-
-/// A material that Assimp read from the file `path`. `warnings` gets what is passed over.
-MeshMaterial from_assimp(const aiScene& scene, const aiMaterial& m, const std::string& path,
-                         std::vector<std::string>& warnings);
 
 /// Lambert, or Phong where ks > 0; every band clamped to [0, 1] and both scaled so that kd + ks <= 1.
 Material diffuse_and_lobe(std::string name, Rgb kd, Rgb ks, float exponent, const Rgb& emission);

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "renderer/scene/mesh_readers.h"
+#include "renderer/mesh_reader/assimp_reader.h"
 
 namespace narpa {
 
@@ -22,23 +22,25 @@ float number(const aiMaterial& m, const char* key, unsigned type, unsigned index
     return x;
 }
 
-/// What 3DS, PLY, DAE and others give.
-Material classic_material(const aiMaterial& m) {
-    return diffuse_and_lobe(m.GetName().C_Str(), colour(m, AI_MATKEY_COLOR_DIFFUSE, {0.5f, 0.5f, 0.5f}),
-                            colour(m, AI_MATKEY_COLOR_SPECULAR, {}), number(m, AI_MATKEY_SHININESS, 0),
-                            colour(m, AI_MATKEY_COLOR_EMISSIVE, {}));
+/// What 3DS, PLY, DAE and STL give.
+PlainMaterial::Numbers classic_material(const aiMaterial& m) {
+    return {.diffuse = colour(m, AI_MATKEY_COLOR_DIFFUSE, {0.5f, 0.5f, 0.5f}),
+            .specular = colour(m, AI_MATKEY_COLOR_SPECULAR, {}),
+            .emission = colour(m, AI_MATKEY_COLOR_EMISSIVE, {}),
+            .exponent = number(m, AI_MATKEY_SHININESS, 0)};
 }
 
 /// glTF 2.0's metallic-roughness, KHR_materials_transmission and KHR_materials_ior.
-Material gltf_material(const aiMaterial& m) {
+PlainMaterial::Numbers gltf_material(const aiMaterial& m) {
     constexpr float kGlass = 0.5f;  // of the light that goes through
-    const std::string name = m.GetName().C_Str();
-    const Rgb emission = colour(m, AI_MATKEY_COLOR_EMISSIVE, {});
-    const float ior = number(m, AI_MATKEY_REFRACTI, 1.5f);
-    if (number(m, AI_MATKEY_TRANSMISSION_FACTOR, 0) >= kGlass) return smooth_glass(name, ior, emission);
-    return metallic_roughness(name, colour(m, AI_MATKEY_BASE_COLOR, {1, 1, 1}),
-                              number(m, AI_MATKEY_METALLIC_FACTOR, 1), number(m, AI_MATKEY_ROUGHNESS_FACTOR, 1),
-                              ior, emission);
+    using Kind = PlainMaterial::Kind;
+    const bool is_glass = number(m, AI_MATKEY_TRANSMISSION_FACTOR, 0) >= kGlass;
+    return {.kind = is_glass ? Kind::glass : Kind::metallic_roughness,
+            .diffuse = colour(m, AI_MATKEY_BASE_COLOR, {1, 1, 1}),
+            .emission = colour(m, AI_MATKEY_COLOR_EMISSIVE, {}),
+            .metallic = number(m, AI_MATKEY_METALLIC_FACTOR, 1),
+            .roughness = number(m, AI_MATKEY_ROUGHNESS_FACTOR, 1),
+            .ior = number(m, AI_MATKEY_REFRACTI, 1.5f)};
 }
 
 /// Reads the images that a material names, and warns about what is not supported.
@@ -101,18 +103,17 @@ bool is_gltf(const std::string& path) {
 
 }  // namespace
 
-MeshMaterial from_assimp(const aiScene& scene, const aiMaterial& m, const std::string& path,
-                         std::vector<std::string>& warnings) {
+PlainMaterial from_assimp(const aiScene& scene, const aiMaterial& m, const std::string& path,
+                          std::vector<std::string>& warnings) {
     const bool gltf = is_gltf(path);
     TextureFinder textures(scene, m, path, warnings);
-    MeshMaterial out{.material = gltf ? gltf_material(m) : classic_material(m)};
+    PlainMaterial out{.numbers = gltf ? gltf_material(m) : classic_material(m), .name = m.GetName().C_Str()};
     out.colour = textures.find(aiTextureType_BASE_COLOR);
     if (!out.colour.named()) out.colour = textures.find(aiTextureType_DIFFUSE);
     out.emission = textures.find(aiTextureType_EMISSIVE);
     out.normal = textures.find(aiTextureType_NORMALS);
-    out.material.normal_scale =
-        std::clamp(number(m, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1), 0.0f, 100.0f);
-    const bool opaque = out.material.kind != Material::Kind::dielectric;
+    out.numbers.normal_scale = number(m, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1);
+    const bool opaque = out.numbers.kind != PlainMaterial::Kind::glass;
     if (opaque && (number(m, AI_MATKEY_OPACITY, 1) < 1 || number(m, AI_MATKEY_TRANSMISSION_FACTOR, 0) > 0))
         textures.warn("transparent materials are drawn opaque");
     if (gltf && textures.has(aiTextureType_UNKNOWN))

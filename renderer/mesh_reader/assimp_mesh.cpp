@@ -1,12 +1,15 @@
+#include <assimp/importerdesc.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <exception>
+#include <iterator>
+#include <sstream>
 
+#include "renderer/mesh_reader/assimp_reader.h"
 #include "renderer/scene/file_bytes.h"
-#include "renderer/scene/mesh_readers.h"
 #include "renderer/scene/text_cursor.h"
 
 namespace narpa {
@@ -38,18 +41,16 @@ class Walk {
 public:
     Walk(const aiScene& scene, const std::string& path) : scene_(scene), path_(path) {}
 
-    Result<TriangleSoup> read() {
+    MeshMessage read() {
         if (scene_.mNumMaterials > kMaxMaterials)
-            return Error{
-                .what = fmt::format("{} materials, at most {} can be used", scene_.mNumMaterials, kMaxMaterials),
-                .file = path_};
+            return {.error =
+                        fmt::format("{} materials, at most {} can be used", scene_.mNumMaterials, kMaxMaterials)};
         for (unsigned i = 0; i < scene_.mNumMaterials; ++i)
-            soup_.materials.push_back(from_assimp(scene_, *scene_.mMaterials[i], path_, soup_.warnings));
-        if (soup_.materials.empty()) soup_.materials.emplace_back();  // grey 0.5
+            materials_.push_back(from_assimp(scene_, *scene_.mMaterials[i], path_, soup_.warnings));
+        if (materials_.empty()) materials_.push_back({.numbers = {.diffuse = {0.5f, 0.5f, 0.5f}}, .name = {}});
         warn_of_lost_textures();
         if (scene_.mRootNode) read_node(*scene_.mRootNode, aiMatrix4x4t<double>());
-        if (!problem_.empty()) return Error{.what = problem_, .file = path_};
-        return std::move(soup_);
+        return {.error = problem_, .soup = std::move(soup_), .materials = std::move(materials_)};
     }
 
 private:
@@ -71,9 +72,9 @@ private:
     }
 
     void read_part(const aiMesh& part, const aiMatrix4x4t<double>& T) {
-        if (part.mMaterialIndex >= soup_.materials.size()) {
+        if (part.mMaterialIndex >= materials_.size()) {
             problem_ = fmt::format("a part has material {}, counted from 0, of {}", part.mMaterialIndex,
-                                   soup_.materials.size());
+                                   materials_.size());
             return;
         }
         const auto first_position = static_cast<std::uint32_t>(soup_.positions.size());
@@ -134,22 +135,35 @@ private:
     const aiScene& scene_;
     const std::string& path_;
     TriangleSoup soup_;
+    std::vector<PlainMaterial> materials_;
     std::string problem_;
 };
 
+/// Assimp tries all importers, by what the file begins with, when that of the extension fails: dozens of formats.
+void keep_importer_of(const std::string& path, Assimp::Importer& importer) {
+    const std::string extension = extension_of(path).substr(1);
+    for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
+        std::istringstream extensions(importer.GetImporterInfo(i)->mFileExtensions);
+        const std::istream_iterator<std::string> first(extensions), last;
+        if (std::find(first, last, extension) == last) importer.UnregisterLoader(importer.GetImporter(i));
+    }
+}
+
 }  // namespace
 
-Result<TriangleSoup> read_soup_with_assimp(const std::string& path) {
+MeshMessage read_with_assimp(const std::string& path) {
+    const auto cannot = [](std::string_view why) {
+        return MeshMessage{.error = fmt::format("not a mesh that can be read: {}", why)};
+    };
     try {
-        if (const Status header = check_ply_header(path); !header) return header.error();
+        if (const Status header = check_ply_header(path); !header)
+            return {.error = header.error().what, .line = header.error().line, .column = header.error().column};
         Assimp::Importer importer;
+        keep_importer_of(path, importer);
         const aiScene* scene = importer.ReadFile(path, 0);
-        if (!scene)
-            return Error{.what = fmt::format("not a mesh that can be read: {}", importer.GetErrorString()),
-                         .file = path};
-        return Walk(*scene, path).read();
+        return scene ? Walk(*scene, path).read() : cannot(importer.GetErrorString());
     } catch (const std::exception& e) {
-        return Error{.what = fmt::format("not a mesh that can be read: {}", e.what()), .file = path};
+        return cannot(e.what());
     }
 }
 

@@ -1,0 +1,22 @@
+/// base/program_beside.h - programs of ours that another one starts.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace narpa {
+
+/// The folder of the running program.
+[[nodiscard]] inline std::filesystem::path program_folder() {
+    std::error_code unknown;
+    return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
+}
+
+/// A program beside the running one; where there is none, its bare name, which posix_spawnp looks for on PATH.
+[[nodiscard]] inline std::string program_beside(const std::string& name) {
+    std::error_code none;
+    const std::filesystem::path beside = program_folder() / name;
+    return std::filesystem::exists(beside, none) ? beside.string() : name;
+}
+
+}  // namespace narpa

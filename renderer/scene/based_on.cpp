@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/toml_depth.h"
 
 namespace narpa {
 namespace {
@@ -23,6 +24,7 @@ Result<toml::table> parse(const std::string& path, const std::string& head, int 
     constexpr int kDeepest = 8;
     const auto text = read_file(path);
     if (!text) return text.error();
+    if (const Status depth_is_good = check_toml_depth(*text, path); !depth_is_good) return depth_is_good.error();
     toml::table table = toml::parse(std::string_view(*text), std::string_view(path));
     const toml::node* const based_on = table.at_path(head + ".based_on").node();
     if (!based_on) return table;

@@ -176,6 +176,32 @@ TEST_P(BadSceneFile, SaysWhereAndWhat) {
 INSTANTIATE_TEST_SUITE_P(Scene, BadSceneFile, testing::ValuesIn(kBad),
                          [](const auto& one) { return std::string(one.param.name); });
 
+std::string times(int n, const std::string& text) {
+    std::string out;
+    for (int i = 0; i < n; ++i) out += text;
+    return out;
+}
+
+TEST(SceneFile, NestingIsBoundedBeforeTheParser) {
+    const TemporaryFolder folder;
+    const auto error_of = [&](const std::string& text) {
+        const std::string path = folder.write("s.toml", text);
+        const Result<Scene> scene = read_scene(path);
+        return scene ? std::string() : scene.error().text().substr(path.size());
+    };
+    const std::string parts = ": a key of more than 32 parts, expected fewer dots",
+                      levels = ": more than 32 arrays and tables inside one another, expected fewer";
+    EXPECT_EQ(error_of("[scene]\n" + times(200'000, "a.") + "a = 1\n"), ":2:64" + parts);
+    EXPECT_EQ(error_of("[" + times(200'000, "'a' . ") + "a]\n"), ":1:192" + parts);
+    EXPECT_EQ(error_of("a = " + times(200'000, "[")), ":1:37" + levels);
+    EXPECT_EQ(error_of(times(200'000, "a={")), ":1:99" + levels);
+    EXPECT_EQ(error_of("x = [\"\"\"\"\"\"\"\"," + times(40, "a.") + "a]\n"), ":1:78" + parts);
+    // Dots and brackets of texts and comments do not count.
+    const std::string dots = times(40, "a.") + times(40, "[");
+    EXPECT_EQ(error_of("# " + dots + "\n[scene]\nname = \"" + dots + "\"\n"),
+              ":1:1: the scene has no \"body\", expected at least one [[body]]");
+}
+
 TEST(SceneFile, MissingFileIsBadInput) {
     const Result<Scene> scene = read_scene("/nowhere/at/all.toml");
     ASSERT_FALSE(scene);

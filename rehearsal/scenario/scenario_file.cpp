@@ -26,13 +26,6 @@ void read(TableReader& table, std::string_view key, bool& value) {
     value = table.boolean(key).value_or(value);
 }
 
-Vec3 unit(TableReader& table, std::string_view key, const Vec3& otherwise) {
-    const Vec3 v = table.vec3(key).value_or(otherwise);
-    if (norm(v) > 0) return normalized(v);
-    table.fail(key, "expected a direction, not [0, 0, 0]");
-    return otherwise;
-}
-
 const Body* body_named(const Scene& scene, const std::string& name) {
     const auto body = std::ranges::find(scene.bodies, name, &Body::name);
     return body == scene.bodies.end() ? nullptr : &*body;
@@ -58,8 +51,8 @@ void read_orbit(TableReader& root, Orbit& orbit) {
     orbit.model = table->choice<Orbit::Model>("model", kModels).value_or(orbit.model);
     read(*table, "radius_m", orbit.radius_m, kPositive);
     read(*table, "mu_m3_s2", orbit.mu_m3_s2, kPositive);
-    orbit.up = unit(*table, "up", orbit.up);
-    orbit.along = unit(*table, "along", orbit.along);
+    orbit.up = table->direction("up").value_or(orbit.up);
+    orbit.along = table->direction("along").value_or(orbit.along);
     if (std::abs(dot(orbit.up, orbit.along)) > 1e-6)
         table->fail("along", "expected a direction at right angles to `up`: the orbit is circular");
     table->finish();
@@ -165,7 +158,7 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
         leg.name = table.text("name").value_or(fmt::format("leg {}", legs.size() + 1));
         leg.arc_deg = table.number("arc_deg", {.low = -3600, .high = 3600});
         if (leg.arc_deg) {
-            leg.axis = unit(table, "axis", leg.axis);
+            leg.axis = table.direction("axis").value_or(leg.axis);
             table.refuse("to_m", "this leg is an arc, expected either `to_m` or `arc_deg`");
         } else {
             table.require("to_m", "[x, y, z] in the target's port axes, or `arc_deg`");

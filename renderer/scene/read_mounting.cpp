@@ -31,13 +31,13 @@ void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
     if (table.has("attitude_wxyz")) table.fail("look_at", "there is an attitude_wxyz too, expected one of the two");
     if (!target) return;
     const Vec3 line = *target - T.t;
-    if (!(norm(line) > 1e-9) || !std::isfinite(norm(line)))
+    if (!(norm(line) > 1e-9) || !is_finite(line))
         return table.fail("look_at", "is the place that it looks from, expected another point");
-    const Vec3 right = cross(normalized(line), up);
-    if (!(norm(right) > 1e-6 * norm(up)) || !std::isfinite(norm(right)))
+    const Vec3 forward = normalized(scaled_to_one(line)), above = scaled_to_one(up), right = cross(forward, above);
+    if (!(norm(right) > 1e-6 * norm(above)))
         return table.fail("look_at",
                           fmt::format("lies along up = [{}, {}, {}], expected another \"up\"", up.x, up.y, up.z));
-    T.q = attitude_of(normalized(line), normalized(right));
+    T.q = attitude_of(forward, normalized(right));
 }
 
 }  // namespace

@@ -78,13 +78,8 @@ void read_sun(TableReader& root, Scene& scene, bool has_epoch) {
     sun.irradiance_w_m2 = table->number("irradiance_w_m2", kPositive).value_or(sun.irradiance_w_m2);
     if (const auto d = table->number("angular_diameter_deg", {.low = 0, .high = 180, .high_open = true}))
         sun.angular_diameter_rad = *d * kPi / 180.0;
-    if (const auto direction = table->vec3("direction")) {
-        const double length = norm(*direction);
-        if (length > 1e-100 && std::isfinite(length)) {
-            sun.direction = *direction / length;
-        } else {
-            table->fail("direction", "expected a direction towards the Sun, of any length but 0");
-        }
+    if (const auto direction = table->direction("direction")) {
+        sun.direction = *direction;
     } else if (!table->has("direction")) {
         if (has_epoch) {
             sun.direction = sun_direction_gcrs(scene.epoch_unix_ns);

@@ -203,6 +203,20 @@ std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) 
     return Vec3{(*v)[0], (*v)[1], (*v)[2]};
 }
 
+Vec3 scaled_to_one(const Vec3& a) {
+    const double largest = std::fmax(std::fmax(std::abs(a.x), std::abs(a.y)), std::abs(a.z));
+    if (!(largest > 0)) return a;
+    const int e = -std::ilogb(largest);
+    return {std::scalbn(a.x, e), std::scalbn(a.y, e), std::scalbn(a.z, e)};
+}
+
+std::optional<Vec3> TableReader::direction(std::string_view key) {
+    const auto v = vec3(key);
+    if (!v) return std::nullopt;
+    if (*v == Vec3{}) return fail(key, "expected a direction, of any length but 0"), std::nullopt;
+    return normalized(scaled_to_one(*v));
+}
+
 std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, const Range& range) {
     const auto v = numbers(key, 2, range);
     if (!v) return std::nullopt;

@@ -62,6 +62,10 @@ inline constexpr Range kPositive{.low = 0, .low_open = true};
 inline constexpr Range kNotNegative{.low = 0};
 inline constexpr Range kUnit{.low = 0, .high = 1};
 
+/// A finite vector times a power of two that brings its largest component into [1, 2), so that no square overflows
+/// or vanishes, and no rounding changes. Zero stays zero.
+Vec3 scaled_to_one(const Vec3& a);
+
 /// The keys that a table has when its `kind` is this word, beside those that every kind has.
 struct KindKeys {
     std::string_view kind;
@@ -87,6 +91,8 @@ public:
     /// An array of texts.
     std::optional<std::vector<std::string>> texts(std::string_view key);
     std::optional<Vec3> vec3(std::string_view key, const Range& range = kAnyNumber);
+    /// A unit vector from one of any length but 0.
+    std::optional<Vec3> direction(std::string_view key);
     std::optional<std::array<double, 2>> pair(std::string_view key, const Range& range = kAnyNumber);
     /// One number for the three bands, or [r, g, b].
     std::optional<Rgb> rgb(std::string_view key, const Range& range);

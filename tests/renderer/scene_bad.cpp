@@ -57,6 +57,7 @@ const BadScene kBad[] = {
     {"Atmosphere", "[atmosphere]\nheight_m = 1\n", 1, 1, "atmosphere: not in this version"},
     {"SunWithoutDirection", "[sun]\nirradiance_w_m2 = 1\n", 1, 1, "[sun] has no \"direction\""},
     {"SunDirectionZero", "[sun]\ndirection = [0, 0, 0]\n", 2, 13, "of any length but 0"},
+    {"UpZero", CAMERA "fov_diagonal_deg = 9\nlook_at = [1, 0, 4]\nup = [0, 0, 0]\n", 5, 11, "lies along up"},
     {"SunDirectionOfTwo", "[sun]\ndirection = [1, 0]\n", 2, 13,
      "got an array of 2, expected an array of 3 numbers"},
     {"SunDirectionNaN", "[sun]\ndirection = [1, nan, 0]\n", 2, 17,

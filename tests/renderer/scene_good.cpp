@@ -173,6 +173,22 @@ TEST(SceneFile, LookAtPutsTheTargetAheadAndUpUpward) {
     expect_near(T.q * Vec3{1, 0, 0}, {0, -1, 0}, 1e-15);           // x is right: looking along +x, right is -y
 }
 
+TEST(SceneFile, DirectionsMayHaveAnyLength) {
+    const auto read = [](const char* sun, const char* up) {
+        return read_good_text(std::string("[sun]\ndirection = ") + sun + "\n" + kSphere + kCamera +
+                              "position_m = [1, 2, 3]\nlook_at = [4, 5, 6]\nup = " + up + "\n");
+    };
+    const Scene unit = read("[0.6, 0, -0.8]", "[0, 1, 0.5]");
+    for (const auto& [sun, up] : {std::pair("[6e-301, 0, -8e-301]", "[0, 2e-300, 1e-300]"),
+                                  std::pair("[6e300, 0, -8e300]", "[0, 1e308, 5e307]")}) {
+        const Scene s = read(sun, up);
+        expect_near(s.sun->direction, unit.sun->direction, 1e-15);
+        expect_near(s.cameras[0].T_mount_camera.q.vec(), unit.cameras[0].T_mount_camera.q.vec(), 1e-15);
+    }
+    EXPECT_NEAR(norm(read("[0, 5e-324, 0]", "[0, 1, 0]").sun->direction), 1, 1e-15)
+        << "the smallest number there is";
+}
+
 TEST(SceneFile, DefaultsAreTheManuals) {
     const Scene s = read_good_text(std::string("[sun]\ndirection = [0, 0, 5]\n") + kSphere + kCamera);
     EXPECT_EQ(s.name, "s");

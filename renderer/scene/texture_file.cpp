@@ -1,5 +1,7 @@
 #include "renderer/scene/texture_file.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -7,6 +9,7 @@
 
 #include "renderer/material/texture_lookup.h"
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/image_header.h"
 
 namespace narpa {
 namespace {
@@ -85,13 +88,20 @@ Result<Texture> from_image(const std::string& name, const cv::Mat& bgr, const Te
 
 Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,
                                const TextureUse& use) {
+    const Error no_image{.what = "not an image that can be read, expected PNG, JPEG, TIFF, WebP, BMP or PNM",
+                         .file = name};
     try {
         if (bytes.empty()) return Error{.what = "empty file, expected an image", .file = name};
+        const std::optional<ImageSize> size = image_size(bytes);
+        if (!size) return no_image;
+        if (size->width > kMostPixels || size->height > kMostPixels / size->width)
+            return Error{.what = fmt::format("an image of {} x {} pixels, expected at most {} of them", size->width,
+                                             size->height, kMostPixels),
+                         .file = name};
         const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
         const cv::Mat bgr =
             cv::imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-        if (bgr.empty())
-            return Error{.what = "not an image that can be read, expected PNG, JPEG, TIFF ...", .file = name};
+        if (bgr.empty()) return no_image;
         return from_image(name, bgr, use);
     } catch (const std::exception& e) {
         return Error{.what = std::string("image cannot be decoded: ") + e.what(), .file = name};

@@ -25,7 +25,10 @@ struct TextureUse {
     Texture::Wrap wrap = Texture::Wrap::repeat;
 };
 
-/// Any format that OpenCV decodes (PNG, JPEG, TIFF, WebP, BMP, PNM ...). Errors name the file.
+/// Most pixels of an image; with its coarser levels it takes 8 bytes for each, and twice that while it is read.
+inline constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 28;
+
+/// PNG, JPEG, TIFF, WebP, BMP and PNM, whatever the file's name; OpenCV decodes them. Errors name the file.
 Result<Texture> read_texture(const std::string& path, const TextureUse& use = {});
 /// The same from an image held in memory; `name` is for errors.
 Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,

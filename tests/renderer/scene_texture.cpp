@@ -170,5 +170,47 @@ TEST(TextureFile, WhatIsNoImageGivesAnError) {
     }
 }
 
+TEST(TextureFile, FormatsOfTheManualAreRead) {
+    const TemporaryFolder folder;
+    const cv::Mat image(31, 50, CV_8UC3, cv::Scalar(0, 0, 255));
+    for (const char* name : {"t.png", "t.jpg", "t.tiff", "t.webp", "t.bmp", "t.ppm", "t.pgm", "t.pbm"}) {
+        const bool is_grey = std::string(name) == "t.pgm" || std::string(name) == "t.pbm";
+        cv::imwrite(folder / name, is_grey ? cv::Mat(31, 50, CV_8UC1, cv::Scalar(255)) : image);
+        const Result<Texture> t = read_texture(folder / name);
+        ASSERT_TRUE(t) << t.error().text();
+        EXPECT_EQ(t->width, 50);
+        EXPECT_EQ(t->height, 31);
+        EXPECT_GT(t->rgb[0], 60'000) << name;
+    }
+}
+
+TEST(TextureFile, OtherFormatsAndTooManyPixelsAreRefusedBeforeTheyAreDecoded) {
+    const TemporaryFolder folder;
+    const auto error_of = [&](const std::string& path) {
+        const Result<Texture> t = read_texture(path);
+        return t ? "" : t.error().text().substr(path.size());
+    };
+    cv::imwrite(folder / "t.ras", cv::Mat(1, 1, CV_8UC3, cv::Scalar(1, 2, 3)));  // Sun raster
+    EXPECT_EQ(error_of(folder / "t.ras"),
+              ": not an image that can be read, expected PNG, JPEG, TIFF, WebP, BMP or PNM");
+    const std::string words = " pixels, expected at most 268435456 of them";
+    EXPECT_EQ(error_of(folder.write("t.ppm", "P6 # comment 1 1\n20000 20000\n255\n")),
+              ": an image of 20000 x 20000" + words);
+    EXPECT_EQ(error_of(folder.write("u.ppm", "P6 99999999999999999999 1 255\n")),
+              ": an image of 2147483648 x 1" + words);
+    // A size written over that of a good file.
+    const auto with_bytes = [&](const char* name, std::size_t at, const std::string& bytes) {
+        cv::imwrite(folder / name, cv::Mat(2, 2, CV_8UC3, cv::Scalar(1, 2, 3)));
+        std::string file = test::read_text(folder / name);
+        return folder.write(name, file.replace(at, bytes.size(), bytes));
+    };
+    EXPECT_EQ(error_of(with_bytes("t.png", 16, std::string("\x00\x00\x80\x00\x00\x00\x80\x00", 8))),
+              ": an image of 32768 x 32768" + words);
+    EXPECT_EQ(error_of(with_bytes("t.bmp", 18, std::string("\x00\x80\x00\x00\x00\x80\xff\xff", 8))),
+              ": an image of 32768 x 32768" + words);
+    const std::string jpeg("\xff\xd8\xff\xe0\x00\x04??\xff\xc0\x00\x11\x08\x80\x00\x80\x01", 17);
+    EXPECT_EQ(error_of(folder.write("t.jpg", jpeg + "\x03")), ": an image of 32769 x 32768" + words);
+}
+
 }  // namespace
 }  // namespace narpa

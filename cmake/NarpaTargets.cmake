@@ -13,6 +13,10 @@ endif()
 
 option(NARPA_UNITY "Compile several sources of a target at once: a faster whole build, slower single changes" OFF)
 set(NARPA_SANITIZE "" CACHE STRING "Sanitizers for every target: address,undefined or thread")
+set(NARPA_SANITIZED 0)
+if(NARPA_SANITIZE)
+  set(NARPA_SANITIZED 1)  # for code that has to know
+endif()
 find_program(NARPA_CCACHE ccache)
 if(NARPA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${NARPA_CCACHE})

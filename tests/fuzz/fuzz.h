@@ -1,0 +1,65 @@
+/// tests/fuzz/fuzz.h - what fuzz targets share. Each target is a program that defines LLVMFuzzerTestOneInput:
+/// driver.cpp calls it, or clang's libFuzzer.
+#pragma once
+
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <string>
+#include <string_view>
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+namespace narpa::fuzz {
+
+/// Ends the program where a reader let through what it must not.
+inline void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "fuzz: does not hold: %s\n", what);
+    std::abort();
+}
+
+inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
+    return {reinterpret_cast<const char*>(data), size};
+}
+
+/// A folder for readers of files, in memory where there is such a place; removed when the program ends.
+class InputFolder {
+public:
+    InputFolder() {
+        const bool in_memory = ::access("/dev/shm", W_OK) == 0;
+        std::string pattern = std::string(in_memory ? "/dev/shm" : "/tmp") + "/narpa-fuzz-XXXXXX";
+        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
+        path_ = pattern;
+    }
+    InputFolder(const InputFolder&) = delete;
+    InputFolder& operator=(const InputFolder&) = delete;
+    ~InputFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+
+    [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+    [[nodiscard]] const std::string& path() const { return path_; }
+    /// Writes a file and returns its path.
+    std::string write(const std::string& name, std::string_view bytes) const {
+        std::string file = *this / name;
+        std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+        return file;
+    }
+    /// Files of tests/data/scenes that seeds name.
+    void copy_scene_data() const {
+        for (const char* name : {"cube.obj", "cube.mtl", "checker.ppm", "normals.ppm"})
+            std::filesystem::copy_file(std::string(NARPA_SOURCE_DIR "/tests/data/scenes/") + name, *this / name);
+    }
+
+private:
+    std::string path_;
+};
+
+}  // namespace narpa::fuzz

@@ -1,0 +1,21 @@
+// A stream of slcan text, as a client sends it.
+#include "protocols/can/slcan.h"
+
+#include "tests/fuzz/can_frames.h"
+#include "tests/fuzz/fuzz.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    using namespace narpa;
+    SlcanLines lines;
+    std::span<const char> rest(reinterpret_cast<const char*>(data), size);
+    while (lines.next(rest)) {
+        fuzz::require(!lines.line().empty() && lines.line().size() <= 64, "a line has 1 to 64 characters");
+        CanFrame frame;
+        if (!decode_slcan(lines.line(), frame)) continue;
+        fuzz::require(fuzz::is_valid(frame) && !frame.fd, "a frame is a classic frame");
+        std::array<char, kSlcanMaxLine> again{};
+        fuzz::require(encode_slcan(frame, again) > 0, "a frame can be written again");
+    }
+    fuzz::require(rest.empty(), "all bytes are used");
+    return 0;
+}

@@ -71,6 +71,8 @@ Result<RunRecord> read_run_record(const std::string& folder) {
         document = json::parse(text);
     } catch (const json::parse_error& e) {
         return error_at(file, text, e.byte > 0 ? e.byte - 1 : 0, "not JSON, expected the record of a run");
+    } catch (const json::exception& e) {  // a number beyond double
+        return error_at(file, text, 0, e.what());
     }
     for (const auto& [at, is_good, expected] :
          {whole_number("/format", kFormat, kFormat),

@@ -94,10 +94,11 @@ std::string describe_message(const Scenario& s, const std::string& line) {
 Result<json> read_record(const std::string& folder) {
     const std::string file = folder + "/rehearsal.json";
     json record = json::parse(read_text(file), nullptr, false);
-    const bool good = record.is_object() && record.value("format", 0) == 1 && record.contains("scenario") &&
-                      record["scenario"].is_string() && record.contains("scenario_hash") &&
-                      record.contains("mode") && record["mode"].is_string() && record.contains("seed") &&
-                      record["seed"].is_number_unsigned();
+    const auto is_text = [&](const char* key) { return record.contains(key) && record[key].is_string(); };
+    const bool good = record.is_object() && record.contains("format") && record["format"] == 1 &&
+                      is_text("scenario") && is_text("scenario_hash") && is_text("mode") &&
+                      record.contains("seed") && record["seed"].is_number_unsigned() && is_text("dynamics") &&
+                      is_text("navigation");
     if (!good) return Error{"is not the record of a rehearsal", file};
     return record;
 }

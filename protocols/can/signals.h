@@ -7,6 +7,7 @@
 /// (Intel) bit order throughout. README.md in this folder shows it with a worked example.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -69,9 +70,13 @@ struct SetLayout {
     std::uint16_t fd_counter_bit = 0;  ///< where the counter lies in the FD frame; 0: no FD form
 };
 
-/// Signals follow each other on CAN FD: sets their places. One that states no length is as long as on classic CAN.
-template <std::size_t N>
-[[nodiscard]] constexpr std::array<Signal, N> laid_out(std::array<Signal, N> signals) {
+/// The signals of all lists. They follow each other on CAN FD: sets their places. One that states no length is as
+/// long as on classic CAN.
+template <std::size_t... N>
+[[nodiscard]] constexpr auto laid_out(const std::array<Signal, N>&... lists) {
+    std::array<Signal, (N + ...)> signals{};
+    auto* end = signals.data();
+    ((end = std::copy(lists.begin(), lists.end(), end)), ...);
     std::uint16_t bit = 0;
     for (Signal& s : signals) {
         s.fd = {0, bit, s.fd.length > 0 ? s.fd.length : s.classic.length};
@@ -91,25 +96,35 @@ inline constexpr double kAttitudeSteps = 4194304.0;  ///< 2^22: 1 and -1 fit exa
 inline constexpr double kVelocitySteps_per_m_s = 5e4;
 inline constexpr double kRateSteps_per_rad_s = 5e4;
 
+/// Classic frames 0 to 5.
+[[nodiscard]] constexpr std::array<Signal, 8> pose_signals(std::string_view time, std::string_view position,
+                                                           std::string_view attitude) {
+    return {{
+        {"Time", "ns", time, 1, false, {0, 0, 48}},
+        {"PositionX", "m", position, kPositionSteps_per_m, true, {1, 0, 48}},
+        {"PositionY", "m", position, kPositionSteps_per_m, true, {2, 0, 48}},
+        {"PositionZ", "m", position, kPositionSteps_per_m, true, {3, 0, 48}},
+        {"AttitudeW", "", attitude, kAttitudeSteps, true, {4, 0, 24}},
+        {"AttitudeX", "", attitude, kAttitudeSteps, true, {4, 24, 24}},
+        {"AttitudeY", "", attitude, kAttitudeSteps, true, {5, 0, 24}},
+        {"AttitudeZ", "", attitude, kAttitudeSteps, true, {5, 24, 24}},
+    }};
+}
+
 inline constexpr std::array<std::string_view, 9> kPoseFrames{
     "Time", "PositionX", "PositionY", "PositionZ", "AttitudeWX", "AttitudeYZ", "MotionX", "MotionY", "MotionZ"};
 
-inline constexpr auto kPoseSignals = laid_out(std::to_array<Signal>({
-    {"Time", "ns", "Time of validity: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
-    {"PositionX", "m", "Body origin in world axes", kPositionSteps_per_m, true, {1, 0, 48}},
-    {"PositionY", "m", "Body origin in world axes", kPositionSteps_per_m, true, {2, 0, 48}},
-    {"PositionZ", "m", "Body origin in world axes", kPositionSteps_per_m, true, {3, 0, 48}},
-    {"AttitudeW", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 0, 24}},
-    {"AttitudeX", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {4, 24, 24}},
-    {"AttitudeY", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 0, 24}},
-    {"AttitudeZ", "", "Hamilton quaternion, body to world", kAttitudeSteps, true, {5, 24, 24}},
-    {"VelocityX", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {6, 0, 30}, {0, 0, 32}},
-    {"VelocityY", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {7, 0, 30}, {0, 0, 32}},
-    {"VelocityZ", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {8, 0, 30}, {0, 0, 32}},
-    {"RateX", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {6, 30, 18}, {0, 0, 24}},
-    {"RateY", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {7, 30, 18}, {0, 0, 24}},
-    {"RateZ", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {8, 30, 18}, {0, 0, 24}},
-}));
+inline constexpr auto kPoseSignals = laid_out(
+    pose_signals("Time of validity: simulation clock modulo 2^48 ns", "Body origin in world axes",
+                 "Hamilton quaternion, body to world"),
+    std::to_array<Signal>({
+        {"VelocityX", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {6, 0, 30}, {0, 0, 32}},
+        {"VelocityY", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {7, 0, 30}, {0, 0, 32}},
+        {"VelocityZ", "m/s", "Velocity in world axes", kVelocitySteps_per_m_s, true, {8, 0, 30}, {0, 0, 32}},
+        {"RateX", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {6, 30, 18}, {0, 0, 24}},
+        {"RateY", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {7, 30, 18}, {0, 0, 24}},
+        {"RateZ", "rad/s", "Angular rate in body axes", kRateSteps_per_rad_s, true, {8, 30, 18}, {0, 0, 24}},
+    }));
 
 inline constexpr SetLayout kPoseLayout{
     "Pose", "Commanded pose: on classic CAN the nine frames of one counter take effect together", kPoseFrames,
@@ -118,33 +133,34 @@ inline constexpr SetLayout kPoseLayout{
 // --- Telemetry: the pose that narpa estimates from its own frames -----------------------------------------------
 
 inline constexpr double kSigmaRotationSteps_per_rad = 1e7;
-inline constexpr std::string_view kAboutCameraAxis = "Standard deviation of the attitude about the camera's axis",
-                                  kAboutChaserAxis = "Standard deviation of the attitude about the chaser's axis";
 inline constexpr auto kEstimateStateChoices = numbered(kEstimateStates);
+
+/// Classic frames 6 to 8: of the position, and of the attitude about the axes that `about` names.
+[[nodiscard]] constexpr std::array<Signal, 6> sigma_signals(std::string_view about) {
+    constexpr std::string_view position = "Standard deviation of the position";
+    return {{
+        {"SigmaX", "m", position, kPositionSteps_per_m, false, {6, 0, 24}},
+        {"SigmaY", "m", position, kPositionSteps_per_m, false, {6, 24, 24}},
+        {"SigmaZ", "m", position, kPositionSteps_per_m, false, {7, 0, 24}},
+        {"SigmaRotX", "rad", about, kSigmaRotationSteps_per_rad, false, {7, 24, 24}},
+        {"SigmaRotY", "rad", about, kSigmaRotationSteps_per_rad, false, {8, 0, 24}},
+        {"SigmaRotZ", "rad", about, kSigmaRotationSteps_per_rad, false, {8, 24, 24}},
+    }};
+}
 
 inline constexpr std::array<std::string_view, 10> kEstimateFrames{
     "EstimateTime",       "EstimatePositionX", "EstimatePositionY",  "EstimatePositionZ",  "EstimateAttitudeWX",
     "EstimateAttitudeYZ", "EstimateSigmaXY",   "EstimateSigmaZRotX", "EstimateSigmaRotYZ", "EstimateState"};
 
-inline constexpr auto kEstimateSignals = laid_out(std::to_array<Signal>({
-    {"Time", "ns", "Middle of the exposure: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
-    {"PositionX", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {1, 0, 48}},
-    {"PositionY", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {2, 0, 48}},
-    {"PositionZ", "m", "Target's origin in camera axes", kPositionSteps_per_m, true, {3, 0, 48}},
-    {"AttitudeW", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 0, 24}},
-    {"AttitudeX", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {4, 24, 24}},
-    {"AttitudeY", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 0, 24}},
-    {"AttitudeZ", "", "Hamilton quaternion, target to camera", kAttitudeSteps, true, {5, 24, 24}},
-    {"SigmaX", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 0, 24}},
-    {"SigmaY", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 24, 24}},
-    {"SigmaZ", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {7, 0, 24}},
-    {"SigmaRotX", "rad", kAboutCameraAxis, kSigmaRotationSteps_per_rad, false, {7, 24, 24}},
-    {"SigmaRotY", "rad", kAboutCameraAxis, kSigmaRotationSteps_per_rad, false, {8, 0, 24}},
-    {"SigmaRotZ", "rad", kAboutCameraAxis, kSigmaRotationSteps_per_rad, false, {8, 24, 24}},
-    {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}},
-    {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}},
-    {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {}, kEstimateStateChoices},
-}));
+inline constexpr auto kEstimateSignals =
+    laid_out(pose_signals("Middle of the exposure: simulation clock modulo 2^48 ns",
+                          "Target's origin in camera axes", "Hamilton quaternion, target to camera"),
+             sigma_signals("Standard deviation of the attitude about the camera's axis"),
+             std::to_array<Signal>({
+                 {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}},
+                 {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}},
+                 {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {}, kEstimateStateChoices},
+             }));
 
 inline constexpr SetLayout kEstimateLayout{"Estimate",
                                            "Pose of the target that narpa estimates from its own frames",
@@ -198,25 +214,15 @@ inline constexpr std::array<std::string_view, 10> kNavigationFrames{
     "NavigationAttitudeWX", "NavigationAttitudeYZ", "NavigationSigmaXY",   "NavigationSigmaZRotX",
     "NavigationSigmaRotYZ", "NavigationCycle"};
 
-inline constexpr auto kNavigationSignals = laid_out(std::to_array<Signal>({
-    {"Time", "ns", "Of validity: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
-    {"PositionX", "m", "Target's origin in the chaser's axes", kPositionSteps_per_m, true, {1, 0, 48}},
-    {"PositionY", "m", "Target's origin in the chaser's axes", kPositionSteps_per_m, true, {2, 0, 48}},
-    {"PositionZ", "m", "Target's origin in the chaser's axes", kPositionSteps_per_m, true, {3, 0, 48}},
-    {"AttitudeW", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {4, 0, 24}},
-    {"AttitudeX", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {4, 24, 24}},
-    {"AttitudeY", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {5, 0, 24}},
-    {"AttitudeZ", "", "Hamilton quaternion, target to chaser", kAttitudeSteps, true, {5, 24, 24}},
-    {"SigmaX", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 0, 24}},
-    {"SigmaY", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {6, 24, 24}},
-    {"SigmaZ", "m", "Standard deviation of the position", kPositionSteps_per_m, false, {7, 0, 24}},
-    {"SigmaRotX", "rad", kAboutChaserAxis, kSigmaRotationSteps_per_rad, false, {7, 24, 24}},
-    {"SigmaRotY", "rad", kAboutChaserAxis, kSigmaRotationSteps_per_rad, false, {8, 0, 24}},
-    {"SigmaRotZ", "rad", kAboutChaserAxis, kSigmaRotationSteps_per_rad, false, {8, 24, 24}},
-    {"Cycle", "", "Number of the control period", 1, false, {9, 0, 32}},
-    {"Frames", "", "Camera frames taken since the estimate before", 1, false, {9, 32, 8}},
-    {"Sweeps", "", "LiDAR sweeps taken since the estimate before", 1, false, {9, 40, 8}},
-}));
+inline constexpr auto kNavigationSignals =
+    laid_out(pose_signals("Of validity: simulation clock modulo 2^48 ns", "Target's origin in the chaser's axes",
+                          "Hamilton quaternion, target to chaser"),
+             sigma_signals("Standard deviation of the attitude about the chaser's axis"),
+             std::to_array<Signal>({
+                 {"Cycle", "", "Number of the control period", 1, false, {9, 0, 32}},
+                 {"Frames", "", "Camera frames taken since the estimate before", 1, false, {9, 32, 8}},
+                 {"Sweeps", "", "LiDAR sweeps taken since the estimate before", 1, false, {9, 40, 8}},
+             }));
 
 inline constexpr SetLayout kNavigationLayout{"Navigation",
                                              "The target beside the chaser as the navigation believes it",

@@ -25,6 +25,7 @@ constexpr std::int64_t kPacketPeriodNs = kBlocks * kBlockPeriodNs;
 constexpr std::size_t kReturnBytes = 2 + 1, kBlockBytes = 2 + 2 + kShotsPerBlock * kReturnBytes;
 constexpr std::size_t kTimeOffset = kBlocks * kBlockBytes, kModeOffset = kTimeOffset + 4,
                       kProductOffset = kModeOffset + 1, kDataPacketBytes = kProductOffset + 1;
+constexpr std::uint8_t kNoReflectivity = 255;  // without a return; README.md, "Data packet"
 constexpr std::uint8_t kReturnStrongest = 0x37, kReturnLast = 0x38, kProductVlp16 = 0x22;
 
 // Position packet: unused, time stamp, PPS state, unused, NMEA sentence and zeros (section 9.3.3).
@@ -186,7 +187,7 @@ public:
             std::uint8_t* at = out.data() + return_offset(i);
             const std::uint16_t range_2mm = to_range_2mm(range_m[i]);
             put_le(at, range_2mm);
-            at[2] = range_2mm == 0 ? std::uint8_t{0} : to_percent(reflectivity[i]);
+            at[2] = range_2mm == 0 ? kNoReflectivity : to_percent(reflectivity[i]);
         }
         put_le(out.data() + kTimeOffset, past_hour_us(epoch_unix_ns + start_ns));
         out[kModeOffset] = kReturnStrongest;

@@ -8,10 +8,12 @@ import struct
 import numpy as np
 
 PORT, PACKET_BYTES = 2368, 1206
+BUFFER_BYTES, SO_RCVBUFFORCE = 4 << 20, 33  # asm-generic/socket.h; the socket module has no name for it
 BLOCKS, LASERS = 12, 16
 LASER_PERIOD_S, SEQUENCE_PERIOD_S = 2.304e-6, 55.296e-6
 RANGE_STEP_M, AZIMUTH_STEP_DEG = 0.002, 0.01
 STRONGEST_RETURN, VLP_16 = 0x37, 0x22
+NO_REFLECTIVITY = 255  # what a packet has in place of one where there is no return
 ELEVATION_DEG = np.array([-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15], float)
 # Height of each laser over the sensor's origin ("vertical correction", table 9-1).
 HEIGHT_M = 1e-3 * np.array([11.2, -0.7, 9.7, -2.2, 8.1, -3.7, 6.6, -5.1, 5.1, -6.6, 3.7, -8.1, 2.2, -9.7, 0.7, -11.2])
@@ -59,14 +61,18 @@ def encode(azimuths_deg, ranges_m, reflectivities=0, t_s=0.0):
     blocks["azimuth_cdeg"] = np.round(np.asarray(azimuths_deg) / AZIMUTH_STEP_DEG).astype(int) % 36000
     steps = np.round(np.asarray(ranges_m, float).reshape(BLOCKS, 32) / RANGE_STEP_M)
     blocks["returns"]["range"] = np.where((steps > 0) & (steps < 65536), steps, 0)
-    blocks["returns"]["reflectivity"] = np.where(blocks["returns"]["range"] > 0, np.broadcast_to(reflectivities, (24, 16)).reshape(BLOCKS, 32), 0)
+    blocks["returns"]["reflectivity"] = np.where(blocks["returns"]["range"] > 0, np.broadcast_to(reflectivities, (24, 16)).reshape(BLOCKS, 32), NO_REFLECTIVITY)
     return blocks.tobytes() + struct.pack("<IBB", int(t_s * 1e6) % 3_600_000_000, STRONGEST_RETURN, VLP_16)
 
 
 def receive(port=PORT, host="", timeout_s=None):
     """Packets as they arrive over UDP, until none has come for so many seconds."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)  # the default holds 92 packets, 0.12 s
+        # The default buffer holds 92 packets, 0.12 s. Only root may exceed net.core.rmem_max.
+        try:
+            listener.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, BUFFER_BYTES)
+        except PermissionError:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
         listener.bind((host, port))
         listener.settimeout(timeout_s)
         while True:

@@ -96,7 +96,8 @@ TEST(Vlp16, PacketHasTheManualsBytes) {
     const Bytes b = encoded(753, 5.0, r);
     const std::array<std::uint8_t, 7> head{0xFF, 0xEE, 0x24, 0x8C, 0xE8, 0x03, 50};  // 35876 = 0x8C24
     EXPECT_TRUE(std::equal(head.begin(), head.end(), b.begin()));
-    const std::array<std::uint8_t, 10> block1{0xFF, 0xEE, 0x38, 0x8C, 0, 0, 0, 0xFF, 0xFF, 100};  // 358.9558272 deg
+    const std::array<std::uint8_t, 10> block1{0xFF, 0xEE, 0x38, 0x8C, 0,
+                                              0,    0xFF, 0xFF, 0xFF, 100};  // 358.9558272 deg
     EXPECT_TRUE(std::equal(block1.begin(), block1.end(), b.begin() + 100));
     const std::array<std::uint8_t, 6> tail{0x8D, 0x3F, 0x0F, 0x00, 0x37, 0x22};  // 999309 us = 0x0F3F8D
     EXPECT_TRUE(std::equal(tail.begin(), tail.end(), b.begin() + 1200));
@@ -164,7 +165,7 @@ TEST(Vlp16, OriginHeightsAreThoseOfBeamsThatCrossInOnePoint) {
     }
 }
 
-TEST(Vlp16, NoReturnWhereThereIsNoneOrItIsTooFar) {
+TEST(Vlp16, NoReturnWhereThereIsNoneOrItIsTooFarWhateverTheReflectivity) {
     Returns r;
     r.reflectivity.fill(0.5F);
     r.range_m.fill(0);
@@ -179,7 +180,7 @@ TEST(Vlp16, NoReturnWhereThereIsNoneOrItIsTooFar) {
     for (int i = 0; i < kShots; ++i) {
         const std::uint8_t* at = &bytes[static_cast<std::size_t>(100 * (i / 32) + 4 + 3 * (i % 32))];
         EXPECT_EQ(get_le<std::uint16_t>(at), i == 7 ? 1 : 0) << i;
-        EXPECT_EQ(at[2], i == 7 ? 50 : 0) << i;
+        EXPECT_EQ(at[2], i == 7 ? 50 : 255) << i;
     }
     Points found;
     EXPECT_EQ(vlp16().points(bytes, found), 1U);

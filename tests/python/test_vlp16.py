@@ -1,8 +1,12 @@
 """narpa.vlp16: packets as the VLP-16's manual (63-9243 Rev. D) describes them, and captures of them."""
+import os
 import socket
 import struct
 import tempfile
+import threading
+import time
 import unittest
+from pathlib import Path
 
 import needs
 
@@ -12,6 +16,12 @@ import numpy as np
 from narpa import vlp16
 
 AZIMUTHS = (350 + 0.4 * np.arange(12)) % 360  # deg: past 0 within the packet
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
 
 
 def packet(ranges, t_s=12.5):
@@ -45,16 +55,32 @@ class Packets(unittest.TestCase):
         self.assertEqual(len(vlp16.decode(packet(np.full((24, 16), 140.0)))), 0, "beyond what a packet can say")
         self.assertEqual(len(vlp16.decode(packet(np.full((24, 16), 3.0)))), 384)
 
+    def test_a_shot_without_a_return_has_the_reflectivity_that_narpa_writes(self):
+        self.assertEqual(packet(np.zeros((24, 16)))[4:7], b"\0\0\xff")
+
     def test_errors_say_what_was_expected(self):
         good = packet(np.zeros((24, 16)))
         for bad, what in ((b"", "expected 1206"), (b"\0" + good[1:], "FF EE"), (good[:-1] + b"\x21", "0x21, expected 0x22")):
             with self.assertRaisesRegex(ValueError, what):
                 vlp16.decode(bad)
 
-    def test_arrive_over_udp(self):
+    def test_a_second_of_packets_waits_for_the_reader(self):
+        limit = int(Path("/proc/sys/net/core/rmem_max").read_text())
+        if os.geteuid() != 0 and limit < 1 << 20:
+            self.skipTest(f"net.core.rmem_max is {limit}, and only root may exceed it")
+        port = free_port()
+        packets = vlp16.receive(port, "127.0.0.1", timeout_s=0.2)
+        self.assertEqual(list(packets), [])  # it binds when it is first read
+        packets = vlp16.receive(port, "127.0.0.1", timeout_s=5)
+        data = packet(np.zeros((24, 16)))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-            s.bind(("127.0.0.1", 0))
-            port = s.getsockname()[1]
+            threading.Timer(0.5, lambda: [s.sendto(data, ("127.0.0.1", port)) for _ in range(755)]).start()
+            next(packets)
+            time.sleep(1)
+            self.assertEqual([next(packets) for _ in range(754)], 754 * [data])
+
+    def test_arrive_over_udp(self):
+        port = free_port()
         packets = vlp16.receive(port, "127.0.0.1", timeout_s=0.2)
         self.assertEqual(list(packets), [])
 

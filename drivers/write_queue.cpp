@@ -1,8 +1,6 @@
 #include "drivers/write_queue.h"
 
 #include <poll.h>
-#include <pthread.h>
-#include <signal.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -12,21 +10,12 @@
 #include <system_error>
 
 #include "base/time.h"
+#include "drivers/background_thread.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::int64_t kFlushNs = 1'000'000'000;
-
-// Signals belong to the thread that started the program; a reader that leaves must not raise SIGPIPE here.
-std::thread start_without_signals(auto body) {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    std::thread thread(body);
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    return thread;
-}
 
 }  // namespace
 
@@ -40,7 +29,7 @@ WriteQueue::WriteQueue(QueueWriter& writer, std::size_t slots, std::size_t slot_
     wake_fd_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (wake_fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
     sem_init(&free_slots_, 0, static_cast<unsigned>(slots));
-    thread_ = start_without_signals([this] { run(); });
+    thread_ = start_without_signals([this] { run(); });  // a reader that leaves must not raise SIGPIPE
 }
 
 WriteQueue::~WriteQueue() {

@@ -106,7 +106,10 @@ json LidarSensor::report() const {
     json sinks = json::array();
     for (const auto& sink : sinks_) {
         const PacketCounters c = sink->counters();
-        sinks.push_back({{"sink", sink->description()}, {"sent", c.sent}, {"dropped", c.dropped}});
+        sinks.push_back({{"sink", sink->description()},
+                         {"sent", c.sent},
+                         {"dropped", c.dropped},
+                         {"receiver_dropped", c.receiver_dropped}});
     }
     return {{"name", name()},
             {"packets", s.packets},
@@ -234,9 +237,16 @@ std::string LidarSensor::in_words() const {
     std::string out = fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
                                   name(), s.packets, sweeps(), s.skipped, s.returns, s.shots);
     out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(s.fire), latency(s.hand_over));
-    for (const auto& sink : sinks_)
-        out += fmt::format("    -> {}: {} sent, {} dropped\n", sink->description(), sink->counters().sent,
-                           sink->counters().dropped);
+    for (const auto& sink : sinks_) {
+        const PacketCounters c = sink->counters();
+        out += fmt::format("    -> {}: {} sent, {} dropped", sink->description(), c.sent, c.dropped);
+        if (c.receiver_dropped > 0)
+            out += fmt::format(
+                "; {} lost at a receiver on this machine: its socket's buffer was full, expected a larger "
+                "SO_RCVBUF (docs/interfaces.md)",
+                c.receiver_dropped);
+        out += "\n";
+    }
     return out;
 }
 

@@ -15,6 +15,8 @@ namespace narpa {
 struct PacketCounters {
     std::uint64_t sent = 0;
     std::uint64_t dropped = 0;  ///< socket buffer full, no receiver, disk full
+    /// Of those sent by UDP: lost at a receiver on this machine, whose socket's buffer was full.
+    std::uint64_t receiver_dropped = 0;
 };
 
 /// Each kind has its own port (LidarNetwork). `udp:HOST:PORT` sets the data port; position packets keep their
@@ -27,7 +29,8 @@ public:
     /// Sends one datagram. Never blocks. `t_ns` is the simulation time at which the instrument would send it;
     /// a capture stamps the packet with it.
     virtual bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept = 0;
-    /// Waits, at most a second, until what was sent is written; then the counters are final.
+    /// Waits, at most a second, until what was sent is written; then the counters are final. Before,
+    /// `receiver_dropped` may be half a second old.
     virtual void flush() noexcept = 0;
     [[nodiscard]] virtual PacketCounters counters() const noexcept = 0;
     [[nodiscard]] virtual std::string description() const = 0;

@@ -16,6 +16,7 @@
 #include "drivers/can/descriptor.h"
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/packet_source.h"
+#include "drivers/lidar/receiver_watch.h"
 
 namespace narpa {
 namespace {
@@ -40,6 +41,7 @@ public:
     UdpSink(Descriptor fd, const Destination& data, int port, int position_port_offset, const std::string& host)
         : fd_(std::move(fd)),
           destinations_{data, data},
+          receivers_(data.address, {port, position_port_offset == 0 ? 0 : port + position_port_offset}),
           description_("UDP to " + host + ", data port " + std::to_string(port)) {
         destinations_[0].set_port(port);
         destinations_[1].set_port(port + position_port_offset);
@@ -58,13 +60,14 @@ public:
         ++(sent ? sent_ : dropped_);
         return sent;
     }
-    void flush() noexcept override {}
-    PacketCounters counters() const noexcept override { return {sent_, dropped_}; }
+    void flush() noexcept override { receivers_.update(); }
+    PacketCounters counters() const noexcept override { return {sent_, dropped_, receivers_.dropped()}; }
     std::string description() const override { return description_; }
 
 private:
     Descriptor fd_;
     std::array<Destination, 2> destinations_;
+    ReceiverWatch receivers_;
     std::string description_;
     std::atomic<std::uint64_t> sent_{0}, dropped_{0};
 };

@@ -35,6 +35,11 @@ public:
     Receiver& operator=(const Receiver&) = delete;
 
     [[nodiscard]] bool bound() const { return bound_; }
+    /// A packet has come.
+    [[nodiscard]] bool waits() const {
+        std::uint8_t byte = 0;
+        return ::recv(fd_, &byte, 1, MSG_DONTWAIT | MSG_PEEK) >= 0;
+    }
     [[nodiscard]] Bytes receive() const {
         Bytes bytes(2000);
         const ssize_t n = ::recv(fd_, bytes.data(), bytes.size(), 0);
@@ -75,6 +80,55 @@ TEST(UdpSink, DataAndPositionPacketsReachTheirPorts) {
         return;
     }
     GTEST_SKIP() << "no pair of free ports on loopback";
+}
+
+/// A free port for packets of data and position on loopback.
+int free_port() {
+    for (int port = 24'000; port < 24'300; ++port)
+        if (Receiver(port).bound() && Receiver(port + kPositionPortOffset).bound()) return port;
+    return 0;
+}
+
+TEST(UdpSink, CountsWhatAReceiverOnThisMachineLoses) {
+    const int port = free_port();
+    if (port == 0) GTEST_SKIP() << "no pair of free ports on loopback";
+    const auto send = [](PacketSink& sink, int packets) {
+        for (int i = 0; i < packets; ++i) sink.send(PacketKind::data, counted_bytes(1206, i), i);
+        sink.flush();
+    };
+    for (const std::string host : {"127.0.0.1", "127.0.0.2", "[::1]"}) {
+        SCOPED_TRACE(host);
+        const Receiver receiver(port);
+        auto sink = open_packet_sink("udp:" + host + ":" + std::to_string(port), vlp16().spec().network, 0, false);
+        if (!sink) continue;  // no such address family here
+        send(**sink, 754);    // a second's
+        const std::uint64_t lost = (*sink)->counters().receiver_dropped;
+        if (host != "127.0.0.1") {
+            EXPECT_EQ(lost, 0U) << "the receiver is at another address";
+            continue;
+        }
+        std::uint64_t received = 0;
+        while (receiver.waits()) received += !receiver.receive().empty();
+        EXPECT_GT(lost, 0U) << "the default buffer holds 92 packets";
+        EXPECT_EQ(received + lost, 754U);
+        send(**sink, 5);
+        EXPECT_EQ((*sink)->counters().receiver_dropped, lost) << "it has room again";
+
+        const auto second = opened("udp:127.0.0.1:" + std::to_string(port));
+        send(*second, 10);
+        EXPECT_EQ(second->counters().receiver_dropped, 0U) << "losses of before are not its own";
+    }
+}
+
+TEST(UdpSink, CountsWhatAReceiverThatCameLaterLoses) {
+    const int port = free_port();
+    if (port == 0) GTEST_SKIP() << "no pair of free ports on loopback";
+    const auto sink = opened("udp:127.0.0.1:" + std::to_string(port));
+    const Receiver receiver(port);
+    for (int i = 0; i < 754; ++i) sink->send(PacketKind::data, counted_bytes(1206, i), i);
+    // By itself, twice a second.
+    for (int i = 0; i < 200 && sink->counters().receiver_dropped == 0; ++i) ::usleep(50'000);
+    EXPECT_GT(sink->counters().receiver_dropped, 0U);
 }
 
 TEST(UdpSink, SendingWithoutReceiverIsNoError) {

@@ -174,6 +174,9 @@ Outcome fly(const FlyOptions& o) {
     const CanCounters& c = (*bus)->counters();
     say(fmt::format("{} commands sent from {:.3f} s on, {} frames dropped, {} frames received", player.commands,
                     static_cast<double>(player.start_ns()) * 1e-9, player.frames_dropped, c.received));
+    if ((*bus)->ended() && player.frames_dropped > 0)  // a log
+        return Error{fmt::format("{} frames could not be written", player.frames_dropped), o.bus, 0, 0,
+                     ErrorKind::failed};
     return nlohmann::json{{"commands", player.commands},   {"start_ns", player.start_ns()},
                           {"frames_sent", c.sent},         {"frames_dropped", player.frames_dropped},
                           {"frames_received", c.received}, {"rows", rows->size()},

@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <mutex>
 
@@ -65,8 +67,12 @@ nlohmann::json to_json(const Error& e) {
               {"exit_status", exit_status(e.kind)}}}};
 }
 
-void print_json(const nlohmann::json& document) {
+/// False: standard output did not take it.
+bool print_json(const nlohmann::json& document) {
     fmt::print("{}\n", document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    if (std::fflush(stdout) == 0) return true;
+    say(fmt::format("narpa: standard output cannot be written: {}", std::strerror(errno)));
+    return false;
 }
 
 int finish(const Outcome& outcome, bool json) {
@@ -75,7 +81,7 @@ int finish(const Outcome& outcome, bool json) {
         if (json) print_json(to_json(outcome.error()));
         return exit_status(outcome.error().kind);
     }
-    if (json) print_json(*outcome);
+    if (json && !print_json(*outcome)) return exit_status(ErrorKind::failed);
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
 }
 

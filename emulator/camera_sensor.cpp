@@ -161,11 +161,11 @@ void CameraSensor::log(const FrameLedger& l) noexcept {
 }
 
 Status CameraSensor::finish() {
-    for (const auto& sink : sinks_) sink->flush();
-    if (!sheet_) return Ok{};
-    Status truth = truth_log_->close(), ledger = ledger_log_->close();
-    Status sheet = sheet_->write(folder_ + "/" + unit_.camera().name + ".png");
-    for (Status* s : {&truth, &ledger, &sheet})
+    const Status video = finish_all(sinks_);
+    if (!sheet_) return video;
+    const Status truth = truth_log_->close(), ledger = ledger_log_->close();
+    const Status sheet = sheet_->write(folder_ + "/" + unit_.camera().name + ".png");
+    for (const Status* s : {&video, &truth, &ledger, &sheet})
         if (!*s) return s->error();
     return Ok{};
 }

@@ -44,8 +44,7 @@ std::uint64_t LidarSensor::drops() const noexcept {
 }
 
 Status LidarSensor::finish() {
-    for (const auto& sink : sinks_) sink->flush();
-    return Ok{};
+    return finish_all(sinks_);
 }
 
 }  // namespace narpa

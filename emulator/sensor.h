@@ -65,6 +65,17 @@ public:
     [[nodiscard]] virtual std::string in_words() const = 0;
 };
 
+/// Flushes the sinks. Returns the first file that could not be written.
+template <class Sink>
+Status finish_all(const std::vector<std::unique_ptr<Sink>>& sinks) {
+    Status first = Ok{};
+    for (const auto& sink : sinks) {
+        sink->flush();
+        if (first) first = sink->failure();
+    }
+    return first;
+}
+
 template <class Sink>
 [[nodiscard]] std::vector<std::string> descriptions(const std::vector<std::unique_ptr<Sink>>& sinks) {
     std::vector<std::string> texts;

@@ -33,6 +33,8 @@ public:
     /// `receiver_dropped` may be half a second old.
     virtual void flush() noexcept = 0;
     [[nodiscard]] virtual PacketCounters counters() const noexcept = 0;
+    /// An Error when the sink is a file that did not take every packet; final after a flush.
+    [[nodiscard]] virtual Status failure() const { return Ok{}; }
     [[nodiscard]] virtual std::string description() const = 0;
 };
 

@@ -105,9 +105,11 @@ public:
     void abandon(std::span<const std::uint8_t>) noexcept override { ++lost; }
 
     std::atomic<std::uint64_t> sent{0}, lost{0};
+    std::atomic<int> error{0};  // errno of the file
 
 private:
     void take_back() noexcept {
+        error = errno;
         abandon({});
         ::__fpurge(file_);
         std::clearerr(file_);
@@ -145,6 +147,16 @@ public:
     void flush() noexcept override { queue_.flush(); }
     PacketCounters counters() const noexcept override { return {writer_.sent, queue_.dropped() + writer_.lost}; }
     std::string description() const override { return description_; }
+    Status failure() const override {
+        const int reason = writer_.error;
+        if (reason == 0) return Ok{};
+        return Error{description_ + ": " + std::to_string(writer_.lost) +
+                         " packets could not be written: " + std::strerror(reason),
+                     {},
+                     0,
+                     0,
+                     ErrorKind::failed};
+    }
 
 private:
     std::string description_;

@@ -17,6 +17,7 @@ public:
     void abandon(std::span<const std::uint8_t>) noexcept override { ++failed; }
 
     std::atomic<std::uint64_t> written{0}, no_reader{0}, failed{0}, reconnects{0};
+    std::atomic<int> file_error{0};  ///< errno of a file that did not take a frame
 };
 /// The sink of a writer, which gets frames of the format alone.
 std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,

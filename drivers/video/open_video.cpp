@@ -1,5 +1,6 @@
 #include <sys/stat.h>
 
+#include <cstring>
 #include <exception>
 
 #include "drivers/video/backends.h"
@@ -28,6 +29,16 @@ public:
         return {writer_->written, queue_.dropped(), writer_->no_reader, writer_->failed, writer_->reconnects};
     }
     std::string description() const override { return description_; }
+    Status failure() const override {
+        const int reason = writer_->file_error;
+        if (reason == 0) return Ok{};
+        return Error{description_ + ": " + std::to_string(writer_->failed) +
+                         " frames could not be written: " + std::strerror(reason),
+                     {},
+                     0,
+                     0,
+                     ErrorKind::failed};
+    }
 
 private:
     std::unique_ptr<VideoWriter> writer_;

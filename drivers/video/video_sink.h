@@ -35,6 +35,8 @@ public:
     /// Waits, at most a second, until what was sent is written; then the counters are final.
     virtual void flush() noexcept = 0;
     [[nodiscard]] virtual VideoCounters counters() const noexcept = 0;
+    /// An Error when the sink is a file that did not take every frame; final after a flush.
+    [[nodiscard]] virtual Status failure() const { return Ok{}; }
     [[nodiscard]] virtual std::string description() const = 0;
 };
 

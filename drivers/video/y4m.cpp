@@ -94,6 +94,7 @@ public:
 
 private:
     void take_back() noexcept {
+        file_error = errno;
         ++failed;
         if (::ftruncate(fd_.get(), end_of_last_frame_) == 0) ::lseek(fd_.get(), end_of_last_frame_, SEEK_SET);
     }

@@ -140,6 +140,10 @@ TEST_F(PcapSink, FileEndsWithAWholeRecordAndGoesOnWhenThereIsRoom) {
     EXPECT_EQ(at_limit, 3U);
     EXPECT_EQ(sink->counters().sent, 3U);
     EXPECT_EQ(sink->counters().dropped, 3U);
+    ASSERT_FALSE(sink->failure());
+    EXPECT_NE(sink->failure().error().text().find("3 packets could not be written: File too large"),
+              std::string::npos)
+        << sink->failure().error().text();
     sink->send(PacketKind::data, payload(1206, 6), 0);
     sink->flush();
     EXPECT_EQ(records_of(test::read_file(path_)).size(), 4U);

@@ -149,6 +149,9 @@ TEST(Y4mSink, FullDiskIsCounted) {
     sink->flush();
     EXPECT_EQ(sink->counters().failed, 5U);
     EXPECT_EQ(sink->counters().written, 0U);
+    ASSERT_FALSE(sink->failure());
+    EXPECT_EQ(sink->failure().error().text(),
+              "Y4M to " + path + ": 5 frames could not be written: No space left on device");
 }
 
 // A limit on the file's size stands for a disk that fills up and is cleaned up again.

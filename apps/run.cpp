@@ -57,6 +57,7 @@ Outcome run(const RunCommandOptions& options) {
         if (!estimator) return estimator.error();
         o.estimate = *estimator;
     }
+    o.on_refusal = [](const std::string& what) { say("note: " + what); };
     if (!o.lockstep) keep_heap();
     auto scene = load_scene(options.scene);
     if (!scene) return scene.error();

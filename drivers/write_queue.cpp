@@ -55,6 +55,12 @@ bool WriteQueue::push(std::span<const std::uint8_t> item) noexcept {
     return true;
 }
 
+bool WriteQueue::crowded() noexcept {
+    int free_slots = 0;
+    ::sem_getvalue(&free_slots_, &free_slots);
+    return !wait_when_full_ && static_cast<std::size_t>(free_slots) < slots_ / 2;
+}
+
 void WriteQueue::flush() noexcept {
     flush_deadline_ns_.store(monotonic_ns() + kFlushNs, std::memory_order_release);
     // The ring is empty when every slot is free.

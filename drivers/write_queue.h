@@ -47,6 +47,8 @@ public:
     bool push(std::span<const std::uint8_t> item) noexcept;
     /// Gives the writer one second for what is still in the ring, drops the rest. Called by the pushing thread.
     void flush() noexcept;
+    /// Less than half of the slots are free, and a push would not wait: what matters less is better left out.
+    [[nodiscard]] bool crowded() noexcept;
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
     /// For the writer: how long it may still block. -1: without limit; then it should call this repeatedly.

@@ -1,16 +1,22 @@
 #include "emulator/can_node.h"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <limits>
+#include <utility>
 
 #include "base/time.h"
 #include "protocols/can/candump.h"
 
 namespace narpa {
 
-CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded)
-    : bus_(bus), log_(log), pace_(pace_recorded && bus.recorded()) {
+CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep)
+    : bus_(bus),
+      log_(log),
+      lockstep_(lockstep),
+      pace_(!lockstep && bus.recorded()),
+      ahead_max_ns_(std::llround(world.scene().render.command_ahead_max_s * 1e9)) {
     for (std::size_t i = 0; i < world.scene().bodies.size(); ++i)
         if (PoseTrack* track = world.track(i))
             listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id), -1});
@@ -27,8 +33,11 @@ void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
 bool CanNode::receive(std::int64_t t_now_ns, bool& moved) noexcept {
     moved = false;
     if (!next_frame(t_now_ns)) return false;
-    log_frame(received_.frame, t_now_ns);
-    moved = take(received_.frame, t_now_ns);
+    const PoseStatus status = take(received_.frame, t_now_ns, moved);
+    const bool commands = status == PoseStatus::partial || status == PoseStatus::complete;
+    commands || (!received_.frame.extended && is_closed_loop(received_.frame.id))
+        ? log_frame(received_.frame, t_now_ns)
+        : log_other(received_.frame, t_now_ns);
     return true;
 }
 
@@ -38,25 +47,40 @@ bool CanNode::next_frame(std::int64_t t_now_ns) noexcept {
     return !waiting_;
 }
 
-bool CanNode::take(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
+/// The status of the body whose frame it is.
+PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept {
     for (Listener& l : listeners_) {
         PoseCommand command;
         const PoseStatus status = l.decoder.accept(frame, t_now_ns, command);
         if (status == PoseStatus::not_mine) continue;
-        if (status != PoseStatus::complete) return false;
+        if (status != PoseStatus::complete) return status;
+        if (command.t_valid_ns > latest_ns(*l.track, t_now_ns)) {
+            ++counters_.too_far_ahead;
+            return status;
+        }
         switch (l.track->push(command, t_now_ns)) {
-            case TrackStatus::past: ++counters_.past; return false;
-            case TrackStatus::overrun: ++counters_.overrun; return false;
+            case TrackStatus::past: ++counters_.past; return status;
+            case TrackStatus::overrun: ++counters_.overrun; return status;
             case TrackStatus::taken: break;
         }
         if (l.last_counter >= 0)
             counters_.missed += static_cast<std::uint8_t>(command.counter - l.last_counter - 1);
         l.last_counter = command.counter;
         ++counters_.taken;
-        return true;
+        moved = true;
+        return status;
     }
     ++counters_.foreign;
-    return false;
+    return PoseStatus::not_mine;
+}
+
+/// The latest time that the body's next command may have. In lockstep the clock follows the commands: its first one
+/// may have any time, and a recorded one may follow a pause of the recording.
+std::int64_t CanNode::latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept {
+    if (!lockstep_) return t_now_ns + ahead_max_ns_;
+    if (!track.commanded()) return std::numeric_limits<std::int64_t>::max();
+    const std::int64_t t_recorded_ns = bus_.recorded() ? received_.t_received_ns : t_now_ns;
+    return std::max({t_now_ns, t_recorded_ns, track.newest_ns()}) + ahead_max_ns_;
 }
 
 void CanNode::send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept {
@@ -70,17 +94,35 @@ void CanNode::send(const EstimateReport& estimate, std::int64_t t_now_ns) noexce
 void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
     heartbeat.counter = heartbeat_counter_++;
     put(encode(heartbeat), t_now_ns);
+    log_left_out(t_now_ns);
 }
 
 void CanNode::put(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
     if (bus_.send(frame)) log_frame(frame, t_now_ns);
 }
 
-void CanNode::log_frame(const CanFrame& frame, std::int64_t t_ns) noexcept {
+void CanNode::log_frame(const CanFrame& frame, std::int64_t t_ns, std::string_view interface) noexcept {
     if (!log_) return;
     std::array<char, kCandumpMaxLine> line;
-    const std::size_t n = format_candump({t_ns, frame}, "narpa", line);
+    const std::size_t n = format_candump({t_ns, frame}, interface, line);
     log_->append({line.data(), n});
+}
+
+void CanNode::log_other(const CanFrame& frame, std::int64_t t_ns) noexcept {
+    if (!log_) return;
+    if (const std::int64_t second = t_ns / kSecond_ns; second != log_second_)
+        log_second_ = second, logged_others_ = 0;
+    if (logged_others_ < kOtherFramesPerSecond && !log_->crowded()) {
+        ++logged_others_;
+        log_frame(frame, t_ns);
+    } else {
+        ++left_out_;
+        ++counters_.not_logged;
+    }
+}
+
+void CanNode::log_left_out(std::int64_t t_ns) noexcept {
+    if (left_out_ > 0) log_frame(lost_frames(std::exchange(left_out_, 0)), t_ns, "not_logged");
 }
 
 bool CanNode::commanded() const noexcept {
@@ -101,7 +143,8 @@ std::int64_t CanNode::first_ns() const noexcept {
 }
 
 std::vector<std::pair<std::string_view, std::uint64_t>> CommandCounters::rejected() const {
-    std::vector<std::pair<std::string_view, std::uint64_t>> causes{{"past", past}, {"overrun", overrun}};
+    std::vector<std::pair<std::string_view, std::uint64_t>> causes{
+        {"past", past}, {"overrun", overrun}, {"too_far_ahead", too_far_ahead}};
     for (std::size_t i = 0; i < kDecodeStatusCount; ++i) {
         const auto status = static_cast<DecodeStatus>(i);
         const bool good =

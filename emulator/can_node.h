@@ -17,22 +17,30 @@ namespace narpa {
 
 /// Commands accepted and rejected; the bus has counters of its own.
 struct CommandCounters {
-    std::uint64_t taken = 0;    ///< complete commands accepted by a track
-    std::uint64_t past = 0;     ///< time of validity not after the newest: late, repeated, out of order
-    std::uint64_t overrun = 0;  ///< further ahead than the track is deep
+    std::uint64_t taken = 0;          ///< complete commands accepted by a track
+    std::uint64_t past = 0;           ///< time of validity not after the newest: late, repeated, out of order
+    std::uint64_t overrun = 0;        ///< further ahead than the track is deep
+    std::uint64_t too_far_ahead = 0;  ///< time of validity beyond the scene's command_ahead_max_s
     std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, by PoseDecoder
     std::uint64_t foreign = 0;                                  ///< frames of other identifiers
+    std::uint64_t not_logged = 0;                               ///< frames left out of the log
     std::uint64_t missed = 0;                                   ///< lost commands, by gaps in the counters
 
     /// Frames and commands rejected, by cause.
     [[nodiscard]] std::vector<std::pair<std::string_view, std::uint64_t>> rejected() const;
 };
 
+/// The log has every command, every message of a closed loop and everything that narpa sends. Of other frames it
+/// has at most kOtherFramesPerSecond of the simulation clock (a full bus of 1 Mbit/s carries about 8000), and fewer
+/// where the disk is slow; the others are counted, and a line of the log states how many: protocols/can/README.md.
 class CanNode {
 public:
-    /// `log` may be null. All outlive the node. `pace_recorded`: frames of a recorded bus wait for their time (real
-    /// time); otherwise they are received at once (lockstep).
-    CanNode(World& world, CanBus& bus, RowLog* log, bool pace_recorded);
+    static constexpr std::uint64_t kOtherFramesPerSecond = 10'000;
+    static constexpr std::size_t kLogLines = 16'384;
+
+    /// `log` may be null. All outlive the node. In real time frames of a recorded bus wait for their time; in
+    /// lockstep they are received at once.
+    CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep);
 
     [[nodiscard]] CanBus& bus() noexcept { return bus_; }
     [[nodiscard]] const CanBus& bus() const noexcept { return bus_; }
@@ -54,6 +62,8 @@ public:
     [[nodiscard]] std::int64_t first_ns() const noexcept;
 
     [[nodiscard]] CommandCounters counters() const noexcept;
+    /// Commands refused for that so far.
+    [[nodiscard]] std::uint64_t too_far_ahead() const noexcept { return counters_.too_far_ahead; }
 
 private:
     struct Listener {
@@ -62,18 +72,25 @@ private:
         int last_counter = -1;
     };
     bool next_frame(std::int64_t t_now_ns) noexcept;
-    bool take(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
+    PoseStatus take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept;
+    [[nodiscard]] std::int64_t latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept;
     void put(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
-    void log_frame(const CanFrame& frame, std::int64_t t_ns) noexcept;
+    void log_frame(const CanFrame& frame, std::int64_t t_ns, std::string_view interface = "narpa") noexcept;
+    void log_other(const CanFrame& frame, std::int64_t t_ns) noexcept;
+    void log_left_out(std::int64_t t_ns) noexcept;
 
     CanBus& bus_;
     RowLog* log_;
-    bool pace_;
+    bool lockstep_, pace_;
+    std::int64_t ahead_max_ns_;
     ReceivedFrame received_{};
     bool waiting_ = false;  ///< received_ is not due yet
     std::vector<Listener> listeners_;
     CommandCounters counters_{};
     std::uint8_t heartbeat_counter_ = 0;
+    std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged
+    std::uint64_t logged_others_ = 0;
+    std::uint32_t left_out_ = 0;  ///< since the last line that states it
 };
 
 }  // namespace narpa

@@ -167,11 +167,11 @@ Status Emulator::open() {
         if (!bus) return bus.error();
         bus_ = *std::move(bus);
         if (logs) {
-            auto log = RowLog::create(options_.log_folder + "/can.log", "", options_.lockstep);
+            auto log = RowLog::create(options_.log_folder + "/can.log", "", options_.lockstep, CanNode::kLogLines);
             if (!log) return log.error();
             can_log_ = *std::move(log);
         }
-        can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), !options_.lockstep);
+        can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), options_.lockstep);
     }
     auto sensors = open_sensors(*world_, options_, can_ != nullptr);
     if (!sensors) return sensors.error();
@@ -184,10 +184,27 @@ Status Emulator::open() {
     return Ok{};
 }
 
+std::string Emulator::refusal() const {
+    return fmt::format(
+        "pose commands refused because they are for more than {:g} s ahead (command_ahead_max_s in [render]): {}",
+        world_->scene().render.command_ahead_max_s, can_->too_far_ahead());
+}
+
+void Emulator::note_losses() {
+    if (!can_) return;
+    if (can_->too_far_ahead() > 0) notices_.push_back(refusal());
+    if (const std::uint64_t n = can_->counters().not_logged; n > 0)
+        notices_.push_back(
+            fmt::format("frames of others that are not in can.log, because there were more than {} a second or the "
+                        "disk was slow: {}",
+                        CanNode::kOtherFramesPerSecond, n));
+}
+
 Status Emulator::run(const StopFlag& stop) {
     options_.lockstep ? run_lockstep(stop) : run_real_time(stop);
     if (no_priority_ || threads_->refused())
         notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
+    note_losses();
     Status status = Ok{};
     const auto keep_first = [&](const Status& done) {
         if (!done && status) status = done.error();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,8 +28,9 @@ struct RunOptions {
     std::string log_folder;  ///< empty: no log
     int threads = 0;         ///< tracing threads; 0: one per core, or one per entry of `cpus`
     std::vector<int> cpus;   ///< processors that tracing threads are bound to in real time; empty: any
-    std::optional<TrackerOptions> estimate{};  ///< estimate a target's pose during the run
-    std::string estimate_camera;               ///< empty: the first camera with a sink
+    std::optional<TrackerOptions> estimate{};              ///< estimate a target's pose during the run
+    std::string estimate_camera;                           ///< empty: the first camera with a sink
+    std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, at the first command too far ahead
 };
 
 class Emulator {
@@ -62,7 +64,8 @@ public:
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
     /// In real time, from time 0 to the last item.
     [[nodiscard]] PageFaults page_faults() const noexcept { return page_faults_; }
-    /// What the kernel did not permit; filled by `run`.
+    /// What the user should know of the run: what the kernel did not permit, what was refused or left out. Filled
+    /// by `run`.
     [[nodiscard]] const std::vector<std::string>& notices() const noexcept { return notices_; }
 
 private:
@@ -81,6 +84,9 @@ private:
     /// the last heartbeat. One thread calls them.
     void send_telemetry(std::int64_t t_ns) noexcept;
     void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
+
+    [[nodiscard]] std::string refusal() const;
+    void note_losses();
 
     void run_lockstep(const StopFlag& stop);
     void advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFlag& stop);

@@ -18,7 +18,6 @@ namespace {
 constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
-constexpr int kFramesPerTurn = 4096;                     // bounds one turn of the CAN thread on a saturated bus
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
 /// Calls f on the threads on which the sensor works.
@@ -144,7 +143,7 @@ void Emulator::run_estimator(const StopFlag& stop) {
 void Emulator::run_lockstep(const StopFlag& stop) {
     LockstepClock clock;
     clock.end_at(end_ns_);
-    bool started = false, moved = false;
+    bool started = false, moved = false, refused = false;
     send_heartbeat(0, RunState::starting);
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
         if (!can_->receive(t_ns(), moved)) {
@@ -152,6 +151,8 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             can_->bus().wait(kLockstepWaitNs);
             continue;
         }
+        if (can_->too_far_ahead() > 0 && !std::exchange(refused, true) && options_.on_refusal)
+            options_.on_refusal(refusal());
         if (!moved || !can_->commanded()) continue;
         if (!std::exchange(started, true))
             for (const auto& sensor : sensors_) sensor->start_at(can_->first_ns());

@@ -53,6 +53,7 @@ json bus_document(const CanNode& node) {
             {"bus_off", b.bus_off},
             {"interface_down", b.interface_down},
             {"foreign_frames", c.foreign},
+            {"frames_not_logged", c.not_logged},
             {"commands_taken", c.taken},
             {"commands_missed", c.missed},
             {"rejected", rejected}};

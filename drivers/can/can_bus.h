@@ -62,6 +62,9 @@ protected:
     CanCounters counters_{};
 };
 
+/// A reader does its other work after this many frames: a flooded bus always has a next one.
+inline constexpr int kFramesPerTurn = 4096;
+
 /// `hub` is the side of `narpa run`, `client` that of programs that command it (`narpa fly`). They differ where a
 /// bus has a server (slcan) or a direction (log: a hub reads it, a client writes it).
 enum class CanRole : std::uint8_t { hub, client };

@@ -19,7 +19,8 @@ bool RemoteClock::accept(const ReceivedFrame& received) noexcept {
 }
 
 void RemoteClock::listen(CanBus& bus) noexcept {
-    for (ReceivedFrame received; bus.receive(received);) accept(received);
+    ReceivedFrame received;
+    for (int i = 0; i < kFramesPerTurn && bus.receive(received); ++i) accept(received);
 }
 
 void RemoteClock::start_here() noexcept {

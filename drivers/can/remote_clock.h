@@ -17,7 +17,7 @@ class RemoteClock {
 public:
     /// Updates the clock by a heartbeat; false: the frame is not one.
     bool accept(const ReceivedFrame& received) noexcept;
-    /// Reads all frames that have arrived and drops those that are not heartbeats.
+    /// Reads frames that have arrived, at most kFramesPerTurn, and drops those that are not heartbeats.
     void listen(CanBus& bus) noexcept;
     /// Without heartbeats: time 0 is now.
     void start_here() noexcept;

@@ -6,24 +6,19 @@
 #include <cstring>
 
 namespace narpa {
-namespace {
-
-constexpr std::size_t kLines = 4096;  // 2 MB: seconds of a saturated bus, minutes of frames
-
-}  // namespace
 
 Result<std::unique_ptr<RowLog>> RowLog::create(const std::string& path, std::string_view header,
-                                               bool wait_when_full) {
+                                               bool wait_when_full, std::size_t lines) {
     std::FILE* file = std::fopen(path.c_str(), "we");
     if (!file) return Error{fmt::format("cannot be written: {}", std::strerror(errno)), path};
     std::fwrite(header.data(), 1, header.size(), file);
-    return std::unique_ptr<RowLog>(new RowLog(path, file, wait_when_full));
+    return std::unique_ptr<RowLog>(new RowLog(path, file, wait_when_full, lines));
 }
 
-RowLog::RowLog(std::string path, std::FILE* file, bool wait_when_full)
+RowLog::RowLog(std::string path, std::FILE* file, bool wait_when_full, std::size_t lines)
     : path_(std::move(path)),
       file_(file),
-      queue_(std::make_unique<WriteQueue>(*this, kLines, kMaxLine, wait_when_full)) {}
+      queue_(std::make_unique<WriteQueue>(*this, lines, kMaxLine, wait_when_full)) {}
 
 RowLog::~RowLog() {
     (void)close();

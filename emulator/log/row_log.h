@@ -15,20 +15,22 @@ namespace narpa {
 class RowLog final : public QueueWriter {
 public:
     /// Creates the file and writes `header` (with its line end) first. One thread appends. `wait_when_full`: a
-    /// lockstep run waits for the disk where a real-time run drops the line and counts it.
+    /// lockstep run waits for the disk where a real-time run drops the line and counts it. `lines` wait at most.
     static Result<std::unique_ptr<RowLog>> create(const std::string& path, std::string_view header,
-                                                  bool wait_when_full);
+                                                  bool wait_when_full, std::size_t lines = 4096);
     ~RowLog() override;
 
     /// A line with its line end; longer than kMaxLine is dropped and counted. Allocates nothing.
     void append(std::string_view line) noexcept;
+    /// Lines come faster than they can be written.
+    [[nodiscard]] bool crowded() const noexcept { return queue_->crowded(); }
     /// Writes out what was appended and closes the file; an Error when any line was lost.
     Status close();
 
     static constexpr std::size_t kMaxLine = 512;
 
 private:
-    RowLog(std::string path, std::FILE* file, bool wait_when_full);
+    RowLog(std::string path, std::FILE* file, bool wait_when_full, std::size_t lines);
     void write(std::span<const std::uint8_t> item, const WriteQueue&) noexcept override;
     void abandon(std::span<const std::uint8_t>) noexcept override { ++lost_; }
 

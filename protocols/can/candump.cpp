@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "protocols/can/hex.h"
+#include "protocols/little_endian.h"
 
 namespace narpa {
 namespace {
@@ -73,6 +74,18 @@ const char* get_content(std::string_view text, CanFrame& frame) {
 }
 
 }  // namespace
+
+CanFrame lost_frames(std::uint32_t count) noexcept {
+    constexpr std::uint32_t controller_problem = 0x4;
+    constexpr std::uint8_t receive_overflow = 0x01;
+    CanFrame frame;
+    frame.error = true;
+    frame.id = controller_problem;
+    frame.size = 8;
+    frame.data[1] = receive_overflow;
+    put_le(&frame.data[4], count);
+    return frame;
+}
 
 const char* parse_candump(std::string_view line, CandumpLine& out) noexcept {
     CandumpLine read;

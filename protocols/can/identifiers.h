@@ -23,6 +23,11 @@ inline constexpr std::uint32_t kEstimateBaseId = 0x710;
 inline constexpr std::uint32_t kActuatorBaseId = 0x720, kNavigationBaseId = 0x730;  ///< from navigation
 inline constexpr std::uint32_t kAttitudeBaseId = 0x740, kDynamicsBaseId = 0x750;    ///< from dynamics
 
+/// Of a message between navigation and dynamics.
+[[nodiscard]] constexpr bool is_closed_loop(std::uint32_t id) noexcept {
+    return id >= kActuatorBaseId && id < kDynamicsBaseId + kBaseIdStep;
+}
+
 inline constexpr std::int64_t kHeartbeatPeriodNs = 100'000'000;  ///< in real time; in lockstep one per command
 
 [[nodiscard]] constexpr std::uint32_t ledger_base_id(std::uint8_t camera) noexcept {

@@ -135,7 +135,8 @@ private:
 
     // --- Commands in ---
     Status receive() {
-        for (ReceivedFrame received; bus_.receive(received);) {
+        ReceivedFrame received;
+        for (int i = 0; i < kFramesPerTurn && bus_.receive(received); ++i) {
             if (clock_.accept(received)) continue;
             ActuatorCommand command;
             if (decoder_.accept(received.frame, clock_time_ns(), command) != DecodeStatus::complete) continue;

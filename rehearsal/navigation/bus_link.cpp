@@ -10,7 +10,8 @@ BusLink::BusLink(std::unique_ptr<CanBus> bus) : bus_(std::move(bus)) {
 
 void BusLink::receive(std::int64_t timeout_ns) {
     if (timeout_ns > 0) bus_->wait(timeout_ns);
-    for (ReceivedFrame received; bus_->receive(received);) {
+    ReceivedFrame received;
+    for (int i = 0; i < kFramesPerTurn && bus_->receive(received); ++i) {
         const CanFrame& frame = received.frame;
         if (clock_.accept(received)) continue;
         const std::int64_t now_ns = clock_.newest().t_ns;

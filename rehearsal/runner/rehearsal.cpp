@@ -253,7 +253,8 @@ private:
 
     void receive() {
         bus_->wait(kBusWait_ns);
-        for (ReceivedFrame received; bus_->receive(received);)
+        ReceivedFrame received;
+        for (int i = 0; i < kFramesPerTurn && bus_->receive(received); ++i)
             judge_.accept(received.frame, std::max<std::int64_t>(judge_.bus().t_heartbeat_ns, 0));
     }
 

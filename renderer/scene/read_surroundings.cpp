@@ -125,6 +125,9 @@ void read_render(TableReader& root, Scene& scene) {
     read_budget(*table, render);
     render.seed = static_cast<std::uint64_t>(table->integer("seed", 0, INT64_MAX).value_or(0));
     render.stale_after_s = table->number("stale_after_s", kPositive).value_or(render.stale_after_s);
+    // The wire's times are unambiguous within 39 h.
+    render.command_ahead_max_s =
+        table->number("command_ahead_max_s", {.low = 0.001, .high = 140'000}).value_or(render.command_ahead_max_s);
     table->finish();
 }
 

@@ -131,7 +131,8 @@ struct RenderSettings {
     std::int64_t budget_ns = 0;     ///< > 0: a frame is handed over within so long of its exposure's end
     std::uint64_t budget_rays = 0;  ///< > 0: a frame takes at most so many rays of all kinds
     std::uint64_t seed = 0;
-    double stale_after_s = 0.5;  ///< commands older than this: the body holds still and is reported stale
+    double stale_after_s = 0.5;       ///< commands older than this: the body holds still and is reported stale
+    double command_ahead_max_s = 60;  ///< commands for a time further ahead are refused
 };
 
 struct Scene {

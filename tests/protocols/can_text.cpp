@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -243,6 +245,15 @@ TEST(CanCandump, KnownLines) {
     EXPECT_EQ(candump(line), "(0000000000.000500) vcan0 7FF#R4\n");
     line.frame.size = 0;
     EXPECT_EQ(candump(line), "(0000000000.000500) vcan0 7FF#R\n");
+}
+
+TEST(CanCandump, StatesHowManyFramesAreNotInTheLogAsTheReadmeShows) {
+    std::array<char, kCandumpMaxLine> out;
+    const std::size_t n = format_candump({12'100'000'000, lost_frames(77'411)}, "not_logged", out);
+    const std::string line(out.data(), n);
+    EXPECT_EQ(line, "(0000000012.100000) not_logged 20000004#00010000632E0100\n");
+    std::ifstream readme(NARPA_SOURCE_DIR "/protocols/can/README.md");
+    EXPECT_NE(std::string(std::istreambuf_iterator<char>(readme), {}).find(line), std::string::npos);
 }
 
 TEST(CanCandump, ReadsWhatOthersWrite) {

@@ -57,6 +57,7 @@ TEST(SceneFile, ReadsSurroundings) {
     EXPECT_EQ(s.render.spp, 4);
     EXPECT_EQ(s.render.seed, 7u);
     EXPECT_EQ(s.render.stale_after_s, 0.5);
+    EXPECT_EQ(s.render.command_ahead_max_s, 30);
     EXPECT_TRUE(s.warnings.empty());
 }
 
@@ -214,6 +215,7 @@ TEST(SceneFile, DefaultsAreTheManuals) {
     EXPECT_EQ(s.render.max_depth, 8);
     EXPECT_EQ(s.render.spp, 1);
     EXPECT_EQ(s.render.stale_after_s, 0.5);
+    EXPECT_EQ(s.render.command_ahead_max_s, 60);
 }
 
 TEST(SceneFile, WhiteIsTheAmbientWhereThereIsNoSun) {

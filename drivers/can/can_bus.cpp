@@ -2,27 +2,18 @@
 
 #include <net/if.h>
 
-#include <charconv>
-#include <optional>
-
+#include "base/read_number.h"
 #include "drivers/can/buses.h"
 
 namespace narpa {
 namespace {
 
-std::optional<std::uint16_t> port_number(std::string_view text) {
-    std::uint16_t port = 0;
-    const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), port);
-    if (failure != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-    return port;
-}
-
 CanBusResult open_slcan(std::string_view text, CanRole role) {
-    const auto port = port_number(text);
+    std::uint16_t port = 0;
     // Port 0 lets the kernel choose; only a listening socket can do that.
-    if (!port || (*port == 0 && role == CanRole::client))
+    if (!read_number(text, port) || (port == 0 && role == CanRole::client))
         return Error{"slcan:" + std::string(text) + ": expected a TCP port from 1 to 65535, such as slcan:29537"};
-    return role == CanRole::hub ? open_slcan_hub(*port) : open_slcan_client(*port);
+    return role == CanRole::hub ? open_slcan_hub(port) : open_slcan_client(port);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 namespace narpa {
 
@@ -18,6 +19,17 @@ struct Datagram {
     bool truncated = false;
     std::int64_t t_received_ns = 0;  ///< CLOCK_MONOTONIC
     std::uint32_t lost = 0;          ///< datagrams dropped by the kernel so far (SO_RXQ_OVFL); 0: no count
+};
+
+/// What Datagram::lost, which has 32 bits and wraps, has grown by.
+class LossCount {
+public:
+    [[nodiscard]] std::uint32_t increase_to(std::uint32_t lost) noexcept {
+        return lost == 0 ? 0 : lost - std::exchange(last_, lost);
+    }
+
+private:
+    std::uint32_t last_ = 0;
 };
 
 /// Does not wait. `source`, where given, gets the sender's address.

@@ -93,7 +93,7 @@ public:
                 continue;
             }
             down_ = false;
-            note_lost(d.lost);
+            counters_.receive_overflow += losses_.increase_to(d.lost);
             if (d.bytes != CAN_MTU && d.bytes != CANFD_MTU) {
                 ++counters_.malformed;
             } else if ((raw.can_id & CAN_ERR_FLAG) != 0) {
@@ -144,12 +144,6 @@ private:
         if (reason == ENODEV || reason == ENXIO) bound_ = false;
     }
 
-    void note_lost(std::uint32_t total) noexcept {
-        if (total == 0) return;
-        counters_.receive_overflow += static_cast<std::uint32_t>(total - lost_);
-        lost_ = total;
-    }
-
     /// The interface was removed: an interface of the same name may have been made since.
     bool bind_again() noexcept {
         if (!retry_.due()) return false;
@@ -159,14 +153,14 @@ private:
         if (!fresh || !bind_to(fresh.get(), found.index)) return false;
         fd_ = std::move(fresh);
         carries_fd_ = found.carries_fd;
-        lost_ = 0;
+        losses_ = {};
         return bound_ = true;
     }
 
     Descriptor fd_;
     std::string interface_;
     bool carries_fd_, bound_ = true, down_ = false;
-    std::uint32_t lost_ = 0;
+    LossCount losses_;
     RetryTimer retry_{};
 };
 

@@ -29,10 +29,7 @@ public:
             const Datagram d =
                 receive_datagram(in_.get(), bytes, reinterpret_cast<sockaddr*>(&source), sizeof source);
             if (d.bytes < 0) return false;
-            if (d.lost != 0) {
-                counters_.receive_overflow += static_cast<std::uint32_t>(d.lost - lost_);
-                lost_ = d.lost;
-            }
+            counters_.receive_overflow += losses_.increase_to(d.lost);
             // The group loops our own frames back.
             if (source.sin_port == own_.sin_port && source.sin_addr.s_addr == own_.sin_addr.s_addr) continue;
             const auto datagram = std::span<const std::uint8_t>(bytes).first(static_cast<std::size_t>(d.bytes));
@@ -83,7 +80,7 @@ private:
     Descriptor in_, out_;
     sockaddr_in group_, own_;
     std::string text_;
-    std::uint32_t lost_ = 0;
+    LossCount losses_;
 };
 
 sockaddr_in ipv4(in_addr address, std::uint16_t port) {

@@ -6,12 +6,12 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
 #include <utility>
 
+#include "base/read_number.h"
 #include "drivers/can/datagram.h"
 #include "drivers/can/descriptor.h"
 #include "drivers/lidar/backends.h"
@@ -84,9 +84,7 @@ std::pair<std::string, std::string> split_port(std::string_view text) {
 /// 1 to 65535, or nothing.
 std::optional<int> port_number(std::string_view text) {
     std::uint16_t port = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-    if (error != std::errc{} || end != text.data() + text.size() || port == 0) return std::nullopt;
-    return port;
+    return read_number(text, port) && port > 0 ? std::optional<int>(port) : std::nullopt;
 }
 
 Result<int> data_port(std::string_view text, const std::string& address, int position_port_offset) {
@@ -122,7 +120,7 @@ public:
         for (;;) {
             const Datagram d = receive_datagram(fd_.get(), bytes);
             if (d.bytes >= 0) {
-                note_lost(d.lost);
+                counters_.lost += losses_.increase_to(d.lost);
                 const bool good = d.bytes > 0 && !d.truncated;
                 ++(good ? counters_.received : counters_.refused);
                 if (good) return static_cast<std::size_t>(d.bytes);
@@ -137,16 +135,9 @@ public:
     [[nodiscard]] std::string description() const override { return description_; }
 
 private:
-    /// The kernel's count has 32 bits and wraps.
-    void note_lost(std::uint32_t total) noexcept {
-        if (total == 0) return;
-        counters_.lost += static_cast<std::uint32_t>(total - lost_);
-        lost_ = total;
-    }
-
     Descriptor fd_;
     std::string description_;
-    std::uint32_t lost_ = 0;
+    LossCount losses_;
 };
 
 }  // namespace

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <charconv>
 #include <string_view>
 #include <vector>
+
+#include "base/read_number.h"
 
 namespace narpa {
 
@@ -16,13 +17,6 @@ namespace narpa {
         if (end == line.size()) return cells;
         start = end + 1;
     }
-}
-
-/// The whole text is the number; `base`: of integers.
-template <class... Base>
-[[nodiscard]] bool read_number(std::string_view text, auto& value, Base... base) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);
-    return error == std::errc{} && end == text.data() + text.size();
 }
 
 }  // namespace narpa

@@ -1,9 +1,9 @@
 #include "protocols/can/candump.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 
+#include "base/read_number.h"
 #include "protocols/can/hex.h"
 #include "protocols/little_endian.h"
 
@@ -21,12 +21,6 @@ std::string_view next_word(std::string_view& rest) {
     return word;
 }
 
-/// Digits and nothing else.
-bool get_number(std::string_view text, std::uint64_t& value) {
-    const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return failure == std::errc{} && end == text.data() + text.size();
-}
-
 /// "(1700000000.250000)" with up to nine decimals, read as integers so that no nanosecond is lost.
 bool get_stamp(std::string_view text, std::int64_t& t_ns) {
     constexpr std::uint64_t max_s = 9'000'000'000;  // seconds that fit 64-bit nanoseconds
@@ -35,8 +29,8 @@ bool get_stamp(std::string_view text, std::int64_t& t_ns) {
     const std::size_t point = std::min(text.find('.'), text.size());
     const std::string_view decimals = text.substr(std::min(point + 1, text.size()));
     std::uint64_t seconds = 0, ns = 0;
-    if (!get_number(text.substr(0, point), seconds) || seconds > max_s) return false;
-    if (decimals.size() > 9 || (!decimals.empty() && !get_number(decimals, ns))) return false;
+    if (!read_number(text.substr(0, point), seconds) || seconds > max_s) return false;
+    if (decimals.size() > 9 || (!decimals.empty() && !read_number(decimals, ns))) return false;
     for (std::size_t digits = decimals.size(); digits < 9; ++digits) ns *= 10;
     t_ns = static_cast<std::int64_t>(seconds * 1'000'000'000 + ns);
     return true;

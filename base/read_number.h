@@ -1,0 +1,16 @@
+/// base/read_number.h - numbers as texts.
+#pragma once
+
+#include <charconv>
+#include <string_view>
+
+namespace narpa {
+
+/// The whole text is the number; `base`: of integers.
+template <class... Base>
+[[nodiscard]] bool read_number(std::string_view text, auto& value, Base... base) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);
+    return error == std::errc{} && end == text.data() + text.size();
+}
+
+}  // namespace narpa

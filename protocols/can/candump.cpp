@@ -110,7 +110,7 @@ const char* parse_candump(std::string_view line, CandumpLine& out) noexcept {
 std::size_t format_candump(const CandumpLine& line, std::string_view interface,
                            std::span<char, kCandumpMaxLine> out) noexcept {
     const CanFrame& frame = line.frame;
-    const std::int64_t t_us = line.t_ns / 1000;
+    const std::int64_t t_us = std::max<std::int64_t>(line.t_ns, 0) / 1000;
     const int head =
         std::snprintf(out.data(), out.size(), "(%010lld.%06lld) %.*s ", static_cast<long long>(t_us / 1'000'000),
                       static_cast<long long>(t_us % 1'000'000),

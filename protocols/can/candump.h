@@ -28,8 +28,8 @@ inline constexpr std::size_t kCandumpMaxLine = 224;
 /// Returns nullptr when the line (without its line end) is good, else what was expected; `out` is then as it was.
 [[nodiscard]] const char* parse_candump(std::string_view line, CandumpLine& out) noexcept;
 
-/// Writes the line with its LF, microseconds as candump does; `interface` at most 15 characters. Returns its
-/// length.
+/// Writes the line with its LF, microseconds as candump does and a time before 0 as 0; `interface` at most 15
+/// characters. Returns its length.
 [[nodiscard]] std::size_t format_candump(const CandumpLine& line, std::string_view interface,
                                          std::span<char, kCandumpMaxLine> out) noexcept;
 

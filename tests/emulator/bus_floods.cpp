@@ -166,7 +166,9 @@ TEST_F(BusFlood, ALogWithFramesLeftOutIsPlayedLikeAnyOther) {
     ASSERT_TRUE(rows->close());
     auto again = open_can_bus("log:" + path, CanRole::hub);
     ASSERT_TRUE(again) << again.error().text();
-    CanNode reader(*world_, **again, nullptr, true);
+    auto world = World::create(scene(small_scene()));
+    ASSERT_TRUE(world);
+    CanNode reader(**world, **again, nullptr, true);
     bool moved = false;
     while (reader.receive(0, moved)) {
     }

@@ -247,6 +247,12 @@ TEST(CanCandump, KnownLines) {
     EXPECT_EQ(candump(line), "(0000000000.000500) vcan0 7FF#R\n");
 }
 
+TEST(CanCandump, HasNoStampBeforeZero) {
+    std::array<char, kCandumpMaxLine> out;
+    const std::size_t n = format_candump({-49'939'000, frame_of(0x123, {1})}, "narpa", out);
+    EXPECT_EQ(std::string(out.data(), n), "(0000000000.000000) narpa 123#01\n");
+}
+
 TEST(CanCandump, StatesHowManyFramesAreNotInTheLogAsTheReadmeShows) {
     std::array<char, kCandumpMaxLine> out;
     const std::size_t n = format_candump({12'100'000'000, lost_frames(77'411)}, "not_logged", out);

@@ -148,8 +148,6 @@ std::string why_it_ended(int status, const MeshReaderLimits& limits) {
     if (WIFEXITED(status) && WEXITSTATUS(status) == kOutOfMemory)
         return fmt::format("the mesh reader ran out of memory (limit {:.3g} GiB)",
                            static_cast<double>(limits.memory_bytes) / (std::uint64_t{1} << 30));
-    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
-        return fmt::format("the mesh reader took longer than {} s", limits.seconds);
     const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
                                                 : fmt::format("exit status {}", WEXITSTATUS(status));
     return fmt::format("the mesh reader crashed ({})", how);

@@ -72,11 +72,14 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vec3> corn
         out.push_back({left[(i + n - 1) % n], left[i], left[(i + 1) % n]});
         left.erase(left.begin() + static_cast<std::ptrdiff_t>(i));
     };
-    const bool fan = is_strictly_convex(flat);
+    bool fan = is_strictly_convex(flat);
     while (left.size() > 3) {
         std::size_t ear = 1;
         while (!fan && ear < left.size() && !is_ear(flat, left, ear)) ++ear;
-        if (!fan && ear == left.size()) ear = is_ear(flat, left, 0) ? 0 : 1;  // no ear: it crosses itself
+        if (ear == left.size()) {
+            ear = is_ear(flat, left, 0) ? 0 : 1;
+            fan = ear == 1;  // no ear: it crosses itself, and a search for each triangle would take minutes
+        }
         cut(ear);
     }
     cut(1);

@@ -107,7 +107,7 @@ TEST_F(RealTime, ARecordedBusIsWaitedForAsleep) {
     ASSERT_TRUE(world);
     auto bus = open_can_bus("log:" + log, CanRole::hub);
     ASSERT_TRUE(bus);
-    CanNode node(**world, **bus, nullptr, true);
+    CanNode node(**world, **bus, nullptr, false);
     bool moved = false;
     ASSERT_TRUE(node.receive(0, moved));
     ASSERT_FALSE(node.receive(0, moved));  // due in an hour

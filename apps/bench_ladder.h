@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/cli.h"
-#include "bench/gates.h"
+#include "bench/convergence.h"
 
 namespace narpa::cli {
 
@@ -22,10 +22,6 @@ struct LadderOptions {
 
 Outcome bench_ladder(const LadderOptions& options);
 
-void print_ladder(const SceneLadder& l);
-void print_ablation(const SceneLadder& l);
-void print_ratios(const CraftRatios& r);
-[[nodiscard]] nlohmann::json describe(const SceneLadder& l);
-[[nodiscard]] nlohmann::json describe(const CraftRatios& r);
+[[nodiscard]] nlohmann::json to_json(const Estimate& e);
 
 }  // namespace narpa::cli

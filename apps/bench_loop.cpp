@@ -63,13 +63,8 @@ Outcome bench_loop(LoopBenchOptions o) {
         if (!cpus) return cpus.error();
         o.run.cpus = *std::move(cpus);
     }
-    if (o.scene.empty()) {
-        auto shipped = shipped_scene("docking/docking.toml");
-        if (!shipped) return shipped.error();
-        o.scene = *shipped;
-    }
     keep_heap();
-    auto scene = load_scene(o.scene);
+    auto scene = scene_or_shipped(o.scene, "docking/docking.toml");
     if (!scene) return scene.error();
     if (scene->cameras.empty()) return Error{"has no camera, expected one at least", scene->file};
     o.budget.override_scene(scene->render);

@@ -1,26 +1,21 @@
-// narpa bench render - how fast the error of a image falls: RMSE, bias and time at several numbers of samples.
+// narpa bench render - how fast the error of an image falls: RMSE, bias and time at several numbers of samples.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
-#include <memory>
+#include <numeric>
 
 #include "apps/bench_ladder.h"
 #include "apps/bench_scene.h"
 #include "apps/cli.h"
-#include "bench/convergence.h"
-#include "emulator/camera_unit.h"
-#include "emulator/clock.h"
-#include "emulator/threads.h"
+#include "bench/budget_ladder.h"
 #include "plot/plot.h"
 
 namespace narpa::cli {
 namespace {
 
-constexpr std::uint32_t kReferenceImages = 16;  // their scatter is the reference's own noise
-constexpr int kDefaultSize = 64;                // px, the longer side
+constexpr int kDefaultSize = 64;  // px, the longer side
 
 struct RenderBenchOptions {
     std::string scene, camera, size, plot;
@@ -42,98 +37,25 @@ Status choose_size(const std::string& text, Camera& camera) {
     return Ok{};
 }
 
-/// The camera's images at one number of samples, each with random numbers of its own: frame k has those of k.
-class ImageSeries {
-public:
-    static Result<ImageSeries> create(Scene scene, std::size_t camera, int spp, std::uint64_t seed) {
-        scene.render.spp = spp;
-        scene.render.seed = seed;
-        auto world = World::create(std::move(scene));
-        if (!world) return world.error();
-        return ImageSeries(*std::move(world), camera);
-    }
-    /// All images show the scene at its beginning. The first call takes memory, so it is not one to measure.
-    std::span<const Rgb> render(TracingThreads& threads, std::uint32_t frame) {
-        const std::int64_t start_ns = monotonic_ns();
-        threads.arena.execute([&] { unit_->expose(frame, 0); });
-        seconds_ = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
-        return unit_->radiance().pixels;
-    }
-    /// Of the last image.
-    [[nodiscard]] double seconds() const noexcept { return seconds_; }
-
-private:
-    ImageSeries(std::unique_ptr<World> world, std::size_t camera)
-        : world_(std::move(world)), unit_(std::make_unique<CameraUnit>(*world_, camera)) {}
-    std::unique_ptr<World> world_;
-    std::unique_ptr<CameraUnit> unit_;
-    double seconds_ = 0;
-};
-
-struct Measured {
-    std::vector<ErrorRow> rows;
-    std::vector<double> seconds;  ///< a image, mean
-    double reference_level = 0, reference_noise = 0, reference_seconds = 0;
-};
-
-Result<Measured> measure(const RenderBenchOptions& o, const Scene& scene, std::size_t camera,
-                         TracingThreads& threads) {
-    Measured m;
-    Progress progress;
-    const auto pixels = static_cast<std::size_t>(scene.cameras[camera].width) *
-                        static_cast<std::size_t>(scene.cameras[camera].height);
-
-    ImageMean reference(pixels);
-    const int reference_spp = o.reference_spp / static_cast<int>(kReferenceImages);
-    auto many = ImageSeries::create(scene, camera, reference_spp, scene.render.seed + 1);
-    if (!many) return many.error();
-    for (std::uint32_t k = 0; k < kReferenceImages; ++k) {
-        progress.show(fmt::format("reference {}/{}", k, kReferenceImages));
-        reference.add(many->render(threads, k));
-        m.reference_seconds += many->seconds();
-    }
-    m.reference_level = reference.level().value;
-    m.reference_noise = std::sqrt(reference.variance_of_mean());
-
-    std::uint32_t frame = 0;  // goes on from row to row: no two images share random numbers
-    for (const int spp : o.spp) {
-        auto images = ImageSeries::create(scene, camera, spp, scene.render.seed);
-        if (!images) return images.error();
-        ErrorAgainst error(reference);
-        double seconds = 0;
-        images->render(threads, frame);
-        for (int k = 0; k < o.seeds; ++k) {
-            progress.show(fmt::format("{} spp {}/{}", spp, k, o.seeds));
-            error.add(images->render(threads, frame++));
-            seconds += images->seconds();
-        }
-        m.rows.push_back(error.row(spp));
-        m.seconds.push_back(seconds / o.seeds);
-    }
-    return m;
+double mean_s(const Rung& r) {
+    return std::accumulate(r.seconds.begin(), r.seconds.end(), 0.0) / static_cast<double>(r.seconds.size());
 }
 
-nlohmann::json estimate_json(const Estimate& e) {
-    return {{"value", e.value}, {"standard_error", e.standard_error}};
+double samples_per_second(const Rung& r, const Camera& c) {
+    return static_cast<double>(c.width) * c.height * r.spp / mean_s(r);
 }
 
-double samples_per_second(const Camera& c, int spp, double seconds) {
-    return static_cast<double>(c.width) * c.height * spp / seconds;
-}
-
-nlohmann::json describe(const Measured& m, const Camera& c) {
+nlohmann::json rows(const Ladder& ladder, const Camera& c) {
     nlohmann::json rows = nlohmann::json::array();
-    for (std::size_t i = 0; i < m.rows.size(); ++i) {
-        const ErrorRow& r = m.rows[i];
+    for (const Rung& r : ladder.rungs)
         rows.push_back({{"spp", r.spp},
                         {"seeds", r.images},
-                        {"rmse", estimate_json(r.rmse)},
-                        {"relative_rmse", estimate_json(r.relative_rmse)},
-                        {"bias", estimate_json(r.bias)},
-                        {"pixel_bias_squared", estimate_json(r.pixel_bias_squared)},
-                        {"render_s", m.seconds[i]},
-                        {"samples_per_s", samples_per_second(c, r.spp, m.seconds[i])}});
-    }
+                        {"rmse", to_json(r.rmse)},
+                        {"relative_rmse", to_json(r.relative_rmse)},
+                        {"bias", to_json(r.bias)},
+                        {"pixel_bias_squared", to_json(r.pixel_bias_squared)},
+                        {"render_s", mean_s(r)},
+                        {"samples_per_s", samples_per_second(r, c)}});
     return rows;
 }
 
@@ -141,20 +63,16 @@ std::string text(const Estimate& e, int digits) {
     return fmt::format("{:.{}f} +- {:.{}f}", e.value, digits, e.standard_error, digits);
 }
 
-void tell_table(const Measured& m, const Camera& c) {
+void print_table(const Ladder& ladder, const Camera& c) {
     say(fmt::format("{:>6} {:>24} {:>8} {:>18} {:>20} {:>6} {:>10} {:>10}", "spp", "RMSE, W/(m^2 sr)", "of mean",
                     "relative, %", "mean error, sigmas", "pixels", "s/image", "Msample/s"));
-    for (std::size_t i = 0; i < m.rows.size(); ++i) {
-        const ErrorRow& r = m.rows[i];
+    for (const Rung& r : ladder.rungs) {
         const Estimate relative{100 * r.relative_rmse.value, 100 * r.relative_rmse.standard_error};
         say(fmt::format(
             "{:>6} {:>12.5g} +- {:<8.2g} {:>7.2f}% {:>18} {:>13.2e} {:>+6.1f} {:>+6.1f} {:>10.4g} {:>10.3f}", r.spp,
-            r.rmse.value, r.rmse.standard_error, 100 * r.rmse.value / m.reference_level, text(relative, 2),
-            r.bias.value, r.bias.sigmas(), r.pixel_bias_squared.sigmas(), m.seconds[i],
-            1e-6 * samples_per_second(c, r.spp, m.seconds[i])));
+            r.rmse.value, r.rmse.standard_error, 100 * r.rmse.value / ladder.level, text(relative, 2), r.bias.value,
+            r.bias.sigmas(), r.pixel_bias_squared.sigmas(), mean_s(r), 1e-6 * samples_per_second(r, c)));
     }
-    say(fmt::format("slope: RMSE {}, relative {}", text(fit_slope(m.rows), 3),
-                    text(fit_slope(m.rows, &ErrorRow::relative_rmse), 3)));
 }
 
 Outcome bench_render(RenderBenchOptions o) {
@@ -169,15 +87,10 @@ Outcome bench_render(RenderBenchOptions o) {
         if (spp < 2 || spp > 65535)
             return Error{fmt::format(
                 "--spp {}, expected 2 to 65535: 1 is no sample but the ray through the pixel's centre", spp)};
-    if (o.scene.empty()) {
-        auto shipped = shipped_scene("cornell/cornell.toml");
-        if (!shipped) return shipped.error();
-        o.scene = *shipped;
-    }
     std::sort(o.spp.begin(), o.spp.end());
     o.spp.erase(std::unique(o.spp.begin(), o.spp.end()), o.spp.end());
 
-    auto scene = load_scene(o.scene);
+    auto scene = scene_or_shipped(o.scene, "cornell/cornell.toml");
     if (!scene) return scene.error();
     auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
     if (!index) return index.error();
@@ -186,18 +99,30 @@ Outcome bench_render(RenderBenchOptions o) {
     camera.format = PixelFormat::grey;  // radiance is what is looked at
     camera.embedded_line = false;
 
+    auto world = World::create(*scene);
+    if (!world) return world.error();
     TracingThreads threads(o.threads);
-    auto measured = measure(o, *scene, *index, threads);
-    if (!measured) return measured.error();
+    const int n_threads = threads.arena.max_concurrency();
+    LadderSettings settings;
+    settings.spp = o.spp;
+    settings.rays_per_pixel.clear();
+    settings.frames = o.seeds;
+    settings.reference_spp = o.reference_spp;
+    settings.bands = true;
+    const Progress progress;
+    const Ladder ladder = measure_ladder(**world, *index, settings, {}, threads,
+                                         [&](const std::string& step) { progress.show(step); });
 
-    const std::vector<std::string> faults = convergence_faults(measured->rows);
+    const std::vector<ErrorRow> errors(ladder.rungs.begin(), ladder.rungs.end());
+    const Estimate slope = fit_slope(errors), relative_slope = fit_slope(errors, &ErrorRow::relative_rmse);
+    const std::vector<std::string> faults = convergence_faults(errors);
     const std::string title = fmt::format("{}, camera \"{}\", {} x {}, {} seeds, reference {} spp", scene->name,
                                           camera.name, camera.width, camera.height, o.seeds, o.reference_spp);
     say(title);
     say(fmt::format("reference: mean {:.6g} W/(m^2 sr), noise {:.2g} RMS (taken out), {:.1f} s, {} threads",
-                    measured->reference_level, measured->reference_noise, measured->reference_seconds,
-                    threads.arena.max_concurrency()));
-    tell_table(*measured, camera);
+                    ladder.level, ladder.reference_noise, ladder.reference_s, n_threads));
+    print_table(ladder, camera);
+    say(fmt::format("slope: RMSE {}, relative {}", text(slope, 3), text(relative_slope, 3)));
     for (const std::string& fault : faults) say("failed: " + fault);
     nlohmann::json document{{"passed", faults.empty()},
                             {"faults", faults},
@@ -205,15 +130,15 @@ Outcome bench_render(RenderBenchOptions o) {
                             {"camera", camera.name},
                             {"width", camera.width},
                             {"height", camera.height},
-                            {"threads", threads.arena.max_concurrency()},
+                            {"threads", n_threads},
                             {"reference",
                              {{"spp", o.reference_spp},
-                              {"mean", measured->reference_level},
-                              {"noise_rms", measured->reference_noise},
-                              {"render_s", measured->reference_seconds}}},
-                            {"rows", describe(*measured, camera)},
-                            {"slope", estimate_json(fit_slope(measured->rows))},
-                            {"relative_slope", estimate_json(fit_slope(measured->rows, &ErrorRow::relative_rmse))}};
+                              {"mean", ladder.level},
+                              {"noise_rms", ladder.reference_noise},
+                              {"render_s", ladder.reference_s}}},
+                            {"rows", rows(ladder, camera)},
+                            {"slope", to_json(slope)},
+                            {"relative_slope", to_json(relative_slope)}};
     if (!o.plot.empty()) {
         nlohmann::json plot = document;
         plot.update({{"plot", "convergence"}, {"title", title}});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/cli.h"
 #include "base/program_beside.h"
 #include "renderer/camera/camera_model.h"
 
@@ -16,6 +17,14 @@ Result<std::string> shipped_scene(const std::string& name) {
         if (const fs::path file = (program / folder / name).lexically_normal(); fs::exists(file, error))
             return file.string();
     return Error{"is not beside the program, expected the name of a SCENE", name};
+}
+
+Result<Scene> scene_or_shipped(const std::string& file, const std::string& shipped,
+                               std::optional<RenderSettings::Method> method) {
+    if (!file.empty()) return load_scene(file, method);
+    auto found = shipped_scene(shipped);
+    if (!found) return found.error();
+    return load_scene(*found, method);
 }
 
 void resize(Camera& c, int width, int height) {

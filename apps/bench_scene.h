@@ -1,6 +1,7 @@
 /// apps/bench_scene.h - scenes that come with narpa, at other sizes.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "base/result.h"
@@ -10,6 +11,10 @@ namespace narpa::cli {
 
 /// Where the scenes lie that narpa brings along: beside the folder of the program, in a build and when installed.
 [[nodiscard]] Result<std::string> shipped_scene(const std::string& name);
+
+/// The scene of this file; of an empty name the one that narpa brings along.
+[[nodiscard]] Result<Scene> scene_or_shipped(const std::string& file, const std::string& shipped,
+                                             std::optional<RenderSettings::Method> method = {});
 
 /// The same view with other pixels.
 void resize(Camera& camera, int width, int height);

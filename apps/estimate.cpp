@@ -2,6 +2,7 @@
 // with covariance, bound and truth.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -22,28 +23,27 @@
 namespace narpa::cli {
 namespace {
 
-/// Of a single file. The truth is where scene, trajectory and --pose have the bodies; the guess lies off it.
-struct OneOptions {
-    std::string scene, sensor;  ///< the sensor's name; empty: the first
-    std::string frame, sweep;   ///< FILE.raw: the device's bytes; FILE.pcap
+struct EstimateOptions {
+    std::string input, sensor;  ///< the sensor's name; empty: the first
+    TrackerFlags tracker;
+    int threads = 0;
+
+    // Of a logged run
+    std::string scene, csv, picture;
+    int every = 1;
+
+    // Of a single file. The truth is where scene, trajectory and --pose have the bodies; the guess lies off it.
+    std::string frame, sweep;  ///< FILE.raw: the device's bytes; FILE.pcap
     double time_s = 0;
     double range_noise_m = RangeNoise{}.range_m;  ///< of the sweep, standard deviation
     PoseOptions pose;
-    TrackerOptions tracker;
-    int threads = 0;
-};
 
-struct EstimateOptions {
-    std::string input, camera, scene, csv, picture;
-    int every = 1;
-    TrackerFlags tracker;
-    OneOptions one;  ///< of a single file
     std::vector<Option> only_of_files, only_of_logs;
 };
 
 /// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
 Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, FrameTracker& tracker) {
-    TracingThreads threads(o.one.threads);
+    TracingThreads threads(o.threads);
     const Progress progress;
     std::vector<TrackedFrame> tracked;
     for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
@@ -75,7 +75,7 @@ Status write_rows(const std::string& path, const std::vector<TrackedFrame>& trac
 }
 
 Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_options) {
-    auto run = Replay::open(o.input, o.camera, o.scene);
+    auto run = Replay::open(o.input, o.sensor, o.scene);
     if (!run) return run.error();
     auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), tracker_options);
     if (!tracker) return tracker.error();
@@ -83,28 +83,29 @@ Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_opt
     if (!tracked) return tracked.error();
     const Scene& scene = (*run)->world().scene();
     const std::string target = scene.bodies[(*tracker)->target()].name;
+    const std::string_view method = kEstimateMethods[static_cast<std::size_t>(tracker_options.method)];
     const EstimateSummary summary = summarise(*tracked);
-    say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target,
-                    kEstimateMethods[static_cast<std::size_t>(tracker_options.method)], in_words(summary)));
+    say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target, method,
+                    in_words(summary)));
     if (!o.csv.empty())
         if (auto written = write_rows(o.csv, *tracked); !written) return written.error();
     if (!o.picture.empty()) {
-        const std::string title = fmt::format("{}: {} seen by {}, by {}", scene.name, target, (*run)->camera().name,
-                                              kEstimateMethods[static_cast<std::size_t>(tracker_options.method)]);
+        const std::string title =
+            fmt::format("{}: {} seen by {}, by {}", scene.name, target, (*run)->camera().name, method);
         if (auto written = plot_estimates(o.picture, title, *tracked); !written) return written.error();
     }
     return nlohmann::json{{"passed", summary.measured > 0},
                           {"log", o.input},
                           {"camera", (*run)->camera().name},
                           {"target", target},
-                          {"method", kEstimateMethods[static_cast<std::size_t>(tracker_options.method)]},
+                          {"method", method},
                           {"summary", to_json(summary)}};
 }
 
 // --- One frame or one sweep in a file ---------------------------------------------------------------------------
 
-Result<std::unique_ptr<World>> world_of(const OneOptions& o, std::int64_t t_ns, std::int64_t until_ns) {
-    auto scene = load_scene(o.scene);
+Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t_ns, std::int64_t until_ns) {
+    auto scene = load_scene(o.input);
     if (!scene) return scene.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
     auto world = World::create(*std::move(scene));
@@ -129,12 +130,9 @@ nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& cov
                     what, T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z, error.head<3>().norm() / kDegree,
                     error.tail<3>().norm(), rotation_sigma(covariance) / kDegree, position_sigma(covariance),
                     rotation_sigma(bound) / kDegree, position_sigma(bound), nees));
-    nlohmann::json rows = nlohmann::json::array();
-    for (int i = 0; i < 6; ++i) {
-        nlohmann::json row = nlohmann::json::array();
-        for (int j = 0; j < 6; ++j) row.push_back(covariance(i, j));
-        rows.push_back(row);
-    }
+    std::array<std::array<double, 6>, 6> rows{};
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) rows[std::size_t(i)][std::size_t(j)] = covariance(i, j);
     return {{"passed", true},
             {"pose", pose_json(T)},
             {"truth", pose_json(truth)},
@@ -190,14 +188,14 @@ SweepMotion motion_between(const Rigid3& T_lidar_target, const Rigid3& later, do
     return {(later.t - T_lidar_target.t) / dt_s, rotation_vector(later.q * conjugate(T_lidar_target.q)) / dt_s};
 }
 
-Outcome estimate_frame(const OneOptions& o) {
+Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_options) {
     const std::int64_t t_ns = std::llround(o.time_s * 1e9);
     auto world = world_of(o, t_ns, t_ns);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
     const auto camera = sensor_named(scene.cameras, o.sensor, "camera", scene.file);
     if (!camera) return camera.error();
-    auto tracker = FrameTracker::create(**world, *camera, o.tracker);
+    auto tracker = FrameTracker::create(**world, *camera, tracker_options);
     if (!tracker) return tracker.error();
     auto bytes = bytes_of(o.frame);
     if (!bytes) return bytes.error();
@@ -217,7 +215,7 @@ Outcome estimate_frame(const OneOptions& o) {
     return document;
 }
 
-Outcome estimate_sweep(const OneOptions& o) {
+Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) {
     const std::int64_t t_ns = std::llround(o.time_s * 1e9);
     constexpr std::int64_t kLater_ns = 10'000'000;
     auto world = world_of(o, t_ns, t_ns + kLater_ns);
@@ -226,7 +224,7 @@ Outcome estimate_sweep(const OneOptions& o) {
     const auto index = sensor_named(scene.lidars, o.sensor, "LiDAR", scene.file);
     if (!index) return index.error();
     const Lidar& lidar = scene.lidars[*index];
-    auto target = target_of(**world, lidar.mount, lidar.name, o.tracker.target);
+    auto target = target_of(**world, lidar.mount, lidar.name, tracker.target);
     if (!target) return target.error();
     auto points = points_of(o.sweep, lidar);
     if (!points) return points.error();
@@ -240,10 +238,10 @@ Outcome estimate_sweep(const OneOptions& o) {
     };
     const Rigid3 truth = T_lidar_target_at(t_ns);
     const SweepMotion motion = motion_between(truth, T_lidar_target_at(t_ns + kLater_ns), kLater_ns * 1e-9);
-    std::mt19937_64 random(o.tracker.seed);
-    const Rigid3 guess = off_truth(truth, o.tracker, random);
-    const double search_m = 0.01 * o.tracker.start_percent * norm(truth.t) +
-                            o.tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
+    std::mt19937_64 random(tracker.seed);
+    const Rigid3 guess = off_truth(truth, tracker, random);
+    const double search_m = 0.01 * tracker.start_percent * norm(truth.t) +
+                            tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;
     settings.noise.range_m = o.range_noise_m;
     CloudIcp icp((*world)->tracer(), *target, settings);
@@ -278,15 +276,11 @@ Outcome estimate(const EstimateOptions& o) {
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
     if (of_log) return estimate_log(o, *tracker);
-    OneOptions one = o.one;
-    one.scene = o.input;
-    one.sensor = o.camera;
-    one.tracker = *tracker;
     if (!std::filesystem::exists(o.input, error))
         return Error{"is not there, expected the folder of a logged run or a scene file", o.input};
-    if (one.frame.empty() == one.sweep.empty())
+    if (o.frame.empty() == o.sweep.empty())
         return Error{"with a scene, expected one of --frame FILE.raw and --sweep FILE.pcap", o.input};
-    return one.frame.empty() ? estimate_sweep(one) : estimate_frame(one);
+    return o.frame.empty() ? estimate_sweep(o, *tracker) : estimate_frame(o, *tracker);
 }
 
 }  // namespace
@@ -298,21 +292,20 @@ Command add_estimate(Parser app) {
                                     "with the truth and the bound");
     c.option("INPUT", o->input, "Folder that `run --log` has written, or a scene file with --frame or --sweep")
         .required();
-    c.option("--camera,--lidar", o->camera, "Name of the camera or LiDAR (default: the first of the scene)");
-    c.option("--frame", o->one.frame,
-             "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
-    c.option("--sweep", o->one.sweep, "FILE.pcap: the LiDAR's data packets, from the first on for one turn");
-    c.option("--time", o->one.time_s, "Simulation time of the frame or the sweep's first shot, s")
+    c.option("--camera,--lidar", o->sensor, "Name of the camera or LiDAR (default: the first of the scene)");
+    c.option("--frame", o->frame, "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
+    c.option("--sweep", o->sweep, "FILE.pcap: the LiDAR's data packets, from the first on for one turn");
+    c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot, s")
         .range(-9e9, 9e9)
         .finite();
-    c.option("--range-noise", o->one.range_noise_m, "Standard deviation of the sweep's ranges, m")
+    c.option("--range-noise", o->range_noise_m, "Standard deviation of the sweep's ranges, m")
         .range(1e-6, 1e3)
         .shows_default();
-    o->one.pose.add_to(c);
+    o->pose.add_to(c);
     c.option("--scene", o->scene, "Scene file (default: the run's)");
     o->tracker.add_to(c, "");
     c.option("--every", o->every, "Use every N-th frame").range(1, 1000000);
-    c.option("--threads", o->one.threads, "Threads (default: all cores)").range(0, 1024);
+    c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
     c.option("--csv", o->csv, "FILE.csv: a row for each frame");
     c.option("-o,--output", o->picture, "FILE.png: errors over time, with three standard deviations and bound");
     for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})

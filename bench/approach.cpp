@@ -9,10 +9,10 @@
 #include <random>
 
 #include "base/time.h"
-#include "bench/approach_frames.h"
 #include "bench/statistics.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
+#include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {
@@ -21,6 +21,15 @@ namespace {
 constexpr std::array kBandEnds{std::numeric_limits<double>::infinity(), 30.0, 10.0, 3.0, 0.0};
 /// A pose counts as found where at most this fraction of the start's error is left.
 constexpr double kFoundPart = 0.2;
+
+/// RMS offset of the camera from the line of approach, and of its aim from the target's origin, over the range.
+constexpr double kOffset = 0.03;
+
+BodyPoses at_time_0(const World& world) {
+    BodyPoses at(world.scene().bodies.size());
+    world.place(0, -1, at);
+    return at;
+}
 
 /// One method, initialised for the camera and the target.
 class Method {
@@ -53,7 +62,7 @@ public:
             out.claimed = e.ok(), out.renders = static_cast<int>(e.rounds.size());
             T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
         } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
-            out.claimed = e->status == DenseStatus::converged, out.renders = static_cast<int>(e->steps.size());
+            out.claimed = e->status == DenseStatus::converged, out.renders = e->renders;
             T = e->T_camera_body, covariance = e->covariance;
         }
         out.ms = seconds_since(start_ns) * 1e3;
@@ -78,35 +87,79 @@ private:
 
 ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, double to_m) {
     ApproachBand b{from_m, to_m};
-    double turn = 0, shift = 0, turn_of_bound = 0, shift_of_bound = 0, renders = 0;
-    int bounded = 0;
+    Mean turn, shift, turn_of_bound, shift_of_bound, renders;
     std::vector<double> ms, nees;
     for (const ApproachFrame& f : frames) {
         if (f.range_m >= from_m || f.range_m < to_m) continue;
         ++b.frames;
         b.wrong += f.claimed && !f.found;
         ms.push_back(f.ms);
-        renders += f.renders;
+        renders.add(f.renders);
         if (!f.found) continue;
         ++b.found;
-        turn += f.rotation_rad * f.rotation_rad, shift += f.position_m * f.position_m;
+        turn.add(f.rotation_rad), shift.add(f.position_m);
         nees.push_back(f.nees);
         if (!(f.bound_rotation_rad > 0)) continue;
-        ++bounded;
-        turn_of_bound += std::pow(f.rotation_rad / f.bound_rotation_rad, 2);
-        shift_of_bound += std::pow(f.position_m / f.bound_position_m, 2);
+        turn_of_bound.add(f.rotation_rad / f.bound_rotation_rad);
+        shift_of_bound.add(f.position_m / f.bound_position_m);
     }
-    if (b.found > 0) b.rotation_rms_rad = std::sqrt(turn / b.found), b.position_rms_m = std::sqrt(shift / b.found);
-    if (bounded > 0) {
-        b.rotation_of_bound = std::sqrt(turn_of_bound / bounded);
-        b.position_of_bound = std::sqrt(shift_of_bound / bounded);
-    }
+    b.rotation_rms_rad = turn.rms(), b.position_rms_m = shift.rms();
+    b.rotation_of_bound = turn_of_bound.rms(), b.position_of_bound = shift_of_bound.rms();
     b.nees_median = quantile(nees, 0.5), b.ms_median = quantile(ms, 0.5);
-    b.renders_mean = b.frames > 0 ? renders / b.frames : 0;
+    b.renders_mean = renders.mean();
     return b;
 }
 
 }  // namespace
+
+ApproachFrames::ApproachFrames(const World& world, const Camera& camera, std::size_t target,
+                               const ApproachOptions& options)
+    : options_(options),
+      camera_(camera),
+      at_(at_time_0(world)),
+      sensor_(sensor_model(camera)),
+      view_(world.render_scene(), camera_, target, at_),
+      bytes_(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})),
+      made_{{}, at_, {}, {}} {}
+
+/// Near the line of approach, looking nearly at the target's origin.
+Rigid3 ApproachFrames::pose(double range_m, std::uint32_t number) const {
+    std::mt19937_64 random(options_.seed * 1'000'003 + number);
+    std::normal_distribution<double> normal;
+    const auto some = [&](double sigma) {
+        const double x = sigma * normal(random), y = sigma * normal(random), z = sigma * normal(random);
+        return Vec3{x, y, z};
+    };
+    const Vec3 position = range_m * (normalized(options_.along) + some(kOffset));
+    const Vec3 z = normalized(-position);  // the camera looks along its z, its y is down
+    const Vec3 x = normalized(cross(z, options_.up));
+    const Quat aimed = quat_from_columns(x, cross(z, x), z);
+    return inverse({aimed * exp_rotation(some(kOffset)), position});
+}
+
+const ApproachView& ApproachFrames::make(int k, int n) {
+    const double part = n > 1 ? static_cast<double>(k) / (n - 1) : 0;
+    return make_at(options_.from_m * std::pow(options_.to_m / options_.from_m, part),
+                   static_cast<std::uint32_t>(k));
+}
+
+const ApproachView& ApproachFrames::make_at(double range_m, std::uint32_t number) {
+    made_.truth = pose(range_m, number);
+    FrameSettings settings;
+    settings.spp = options_.frame_spp;
+    settings.seed = ~options_.seed;  // not that of the renders that it is compared with
+    settings.frame = number;
+    view_.render(made_.truth, settings, true);
+    expose(camera_, view_.radiance(), settings.seed, number, bytes_);
+    made_.at.T_world_body = view_.placement().T_world_body;
+    made_.image = *measured_image(camera_, bytes_);  // of the camera's own size
+    const auto& [r, g, b] = sensor_.dn_per_radiance;
+    const auto dn_per_mean = static_cast<float>(r + g + b);
+    made_.variance_dn2.clear();
+    for (const float v : view_.aovs().variance) made_.variance_dn2.push_back(v * dn_per_mean * dn_per_mean);
+    made_.variance_dn2.resize(made_.image.dn.size());  // without the embedded line
+    return made_;
+}
 
 std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_index, std::size_t target,
                                       const ApproachOptions& o, TracingThreads& threads,

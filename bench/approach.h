@@ -11,6 +11,8 @@
 #include "base/stop.h"
 #include "emulator/frame_tracker.h"
 #include "emulator/threads.h"
+#include "estimator/view/measured_image.h"
+#include "estimator/view/model_view.h"
 
 namespace narpa {
 
@@ -20,8 +22,6 @@ struct ApproachOptions {
     double from_m = 100, to_m = 1.2;  ///< range, target's origin to camera; in equal steps of its logarithm
     Vec3 along{1, 0, 0};              ///< from the target towards the camera, target axes
     Vec3 up{0, 0, 1};                 ///< up in the image, target axes
-    double offset_of_range =
-        0.03;  ///< RMS offset of the camera from that line and of its aim from the target's origin
     double start_deg = 5, start_percent = 5;
     int frame_spp = 16;                               ///< of the frames that are estimated from
     std::vector<double> basin{2, 5, 10, 15, 20, 30};  ///< errors of the starts, degrees and per cent; empty: none
@@ -64,6 +64,35 @@ struct ApproachRun {
     std::vector<BasinCell> basin;
 };
 
+/// A frame of the approach as the camera exposes it, with its true pose.
+struct ApproachView {
+    Rigid3 truth{};  ///< T_camera_target
+    BodyPoses at;    ///< of every body
+    MeasuredImage image;
+    std::vector<float> variance_dn2;  ///< of the Monte Carlo noise, which no real sensor has
+};
+
+class ApproachFrames {
+public:
+    ApproachFrames(const World& world, const Camera& camera, std::size_t target, const ApproachOptions& options);
+
+    /// Frame k of n.
+    const ApproachView& make(int k, int n);
+    /// At this range, with the noise and the offsets of this number.
+    const ApproachView& make_at(double range_m, std::uint32_t number);
+
+private:
+    [[nodiscard]] Rigid3 pose(double range_m, std::uint32_t number) const;
+
+    const ApproachOptions& options_;
+    Camera camera_;
+    BodyPoses at_;
+    SensorModel sensor_;
+    ModelView view_;
+    std::vector<std::uint8_t> bytes_;
+    ApproachView made_;
+};
+
 /// `target` and the camera are of the world's scene, placed as the approach goes; other bodies stay where the scene
 /// has them at time 0. `progress` is called with each step. Returns the results so far once `stop` is
 /// set.
@@ -72,14 +101,11 @@ struct ApproachRun {
                                                     const std::function<void(const std::string&)>& progress,
                                                     const StopFlag& stop);
 
-[[nodiscard]] nlohmann::json to_json(const ApproachRun& run);
+[[nodiscard]] nlohmann::json to_json(const std::vector<ApproachRun>& runs);
 /// A table for people.
 [[nodiscard]] std::string in_words(const std::vector<ApproachRun>& runs);
-/// Plots (plot/plot.h) errors and bounds over the range, and how far off a start may be.
-[[nodiscard]] Status plot_approach(const std::string& path, const std::string& title,
-                                   const std::vector<ApproachRun>& runs);
-/// Plots five frames of the approach, the renders at the poses that the points lead to, and the distances of the
-/// matches before and after each solution (a figure of the paper).
+/// Plots (plot/plot.h) five frames of the approach, the renders at the poses that the points lead to, and the
+/// distances of the matches before and after each solution (a figure of the paper).
 [[nodiscard]] Status plot_approach_frames(const std::string& path, const World& world, std::size_t camera,
                                           std::size_t target, const ApproachOptions& options,
                                           TracingThreads& threads);

@@ -4,29 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <memory>
 
 #include "base/time.h"
+#include "bench/statistics.h"
 #include "renderer/camera/detector.h"
 
 namespace narpa {
 namespace {
 
-constexpr int kReferenceImages = 16;  // their scatter gives the reference's own noise
-
-/// Replaces the bands by their mean.
-void grey(std::vector<Rgb>& pixels) {
-    for (Rgb& p : pixels) {
-        const float m = mean_band(p);
-        p = {m, m, m};
-    }
-}
-
 /// One rung while it is measured.
 struct Candidate {
-    Candidate(Rung rung_, const FrameSettings& settings_, const ImageMean& reference)
-        : rung(std::move(rung_)), settings(settings_), error(reference) {}
     Rung rung;
     FrameSettings settings;
     ErrorAgainst error;
@@ -35,57 +23,67 @@ struct Candidate {
     bool predicts = true;  ///< all frames so far
 };
 
+/// The camera at one moment, and the image that every candidate renders into.
 struct View {
+    View(const World& world_, std::size_t index, const LadderSettings& settings, TracingThreads& threads_)
+        : world(world_),
+          camera(world.scene().cameras[index]),
+          bands(settings.bands),
+          threads(threads_),
+          at(world.scene().bodies.size()),
+          image(camera.width, camera.height),
+          bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})) {
+        world.place(settings.t_ns, camera.mount, at);
+        T_world_camera = world.sensor_pose(camera.mount, camera.T_mount_camera, at);
+    }
     const World& world;
     const Camera& camera;
-    BodyPoses at;
-    Rigid3 T_world_camera;
-    RadianceImage image;
+    const bool bands;
     TracingThreads& threads;
-    std::vector<std::uint8_t> bytes{};
+    BodyPoses at;
+    Rigid3 T_world_camera{};
+    RadianceImage image;
+    std::vector<std::uint8_t> bytes;
     std::vector<double> detector_s{};
+
+    FrameAccount render(CameraRenderer& renderer, const FrameSettings& settings) {
+        return threads.arena.execute([&] { return renderer.render(at, T_world_camera, settings, image); });
+    }
+    /// Of the last frame, as errors are taken of it.
+    std::span<const Rgb> pixels() {
+        for (Rgb& p : image.pixels)
+            if (!bands) p = Rgb{1, 1, 1} * mean_band(p);
+        return image.pixels;
+    }
 };
 
 /// Renders frame `number`; returns its account, of the loop the rays alone.
-FrameAccount render(View& v, Candidate& c, const ReferenceLoop* loop, std::uint32_t number) {
+FrameAccount render(View& v, Candidate& c, const ReferenceLoop& loop, std::uint32_t number) {
     c.settings.frame = number;
+    if (c.renderer) return v.render(*c.renderer, c.settings);
     FrameAccount account;
-    v.threads.arena.execute([&] {
-        if (c.renderer)
-            account = c.renderer->render(v.at, v.T_world_camera, c.settings, v.image);
-        else
-            account.rays = loop->render(v.camera, v.T_world_camera, c.settings, v.image);
-    });
+    v.threads.arena.execute([&] { account.rays = loop(v.camera, v.T_world_camera, c.settings, v.image); });
     return account;
 }
 
-/// Of all threads.
-double cpu_s() {
-    timespec t{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-void expose(View& v, const FrameSettings& s) {
+void measure(View& v, Candidate& c, const ReferenceLoop& loop, std::uint32_t number, int frames) {
     const std::int64_t start_ns = monotonic_ns();
-    v.threads.arena.execute([&] { expose(v.camera, v.image, s.seed, s.frame, v.bytes); });
-    v.detector_s.push_back(seconds_since(start_ns));
-}
-
-void measure(View& v, Candidate& c, const ReferenceLoop* loop, std::uint32_t number, int frames) {
-    const std::int64_t start_ns = monotonic_ns();
-    const double cpu_start_s = cpu_s();
+    const double cpu_start_s = cpu_s(CLOCK_PROCESS_CPUTIME_ID);
     const FrameAccount account = render(v, c, loop, number);
     c.rung.seconds.push_back(seconds_since(start_ns));
-    c.rung.cpu_seconds.push_back(cpu_s() - cpu_start_s);
-    if (!c.rung.loop) expose(v, c.settings);
+    c.rung.cpu_seconds.push_back(cpu_s(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_s);
+    if (!c.rung.loop) {
+        const std::int64_t detector_start_ns = monotonic_ns();
+        v.threads.arena.execute([&] { expose(v.camera, v.image, c.settings.seed, number, v.bytes); });
+        v.detector_s.push_back(seconds_since(detector_start_ns));
+    }
     c.rung.step = std::max(c.rung.step, account.step);
     c.rung.rays += static_cast<double>(account.rays) / frames;
     c.rung.samples += static_cast<double>(account.samples) / frames;
     for (std::size_t k = 0; k < kPhases; ++k) c.rung.phase_ns[k] += account.phase_ns[k] / frames;
     c.predicts = c.predicts && account.standard_error >= 0;
     c.predicted_squares += account.standard_error * account.standard_error / frames;
-    grey(v.image.pixels);
-    c.error.add(v.image.pixels);
+    c.error.add(v.pixels());
 }
 
 ImageMean reference_of(View& v, FrameSettings settings, int spp,
@@ -94,25 +92,48 @@ ImageMean reference_of(View& v, FrameSettings settings, int spp,
     settings.spp = std::max(2, spp / kReferenceImages);
     ++settings.seed;  // shares no random numbers with what is measured
     CameraRenderer renderer(v.world.render_scene(), v.camera);
-    for (std::uint32_t k = 0; k < kReferenceImages; ++k) {
+    for (int k = 0; k < kReferenceImages; ++k) {
         progress(fmt::format("reference {}/{}", k, kReferenceImages));
-        settings.frame = k;
-        v.threads.arena.execute([&] { renderer.render(v.at, v.T_world_camera, settings, v.image); });
-        grey(v.image.pixels);
-        mean.add(v.image.pixels);
+        settings.frame = static_cast<std::uint32_t>(k);
+        v.render(renderer, settings);
+        mean.add(v.pixels());
     }
     return mean;
 }
 
-}  // namespace
-
-double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    if (values.size() % 2 == 1) return *middle;
-    return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+/// Every rung that is to be measured, and how it is rendered.
+std::vector<std::pair<Rung, FrameSettings>> planned(const LadderSettings& s, const FrameSettings& base,
+                                                    const Camera& camera, bool with_loop) {
+    std::vector<std::pair<Rung, FrameSettings>> all;
+    const auto add = [&](std::string name) -> auto& {
+        all.emplace_back(Rung{}, base).first.name = std::move(name);
+        return all.back();
+    };
+    for (const int spp : s.spp) add(fmt::format("{} spp", spp)).second.spp = spp;
+    for (const double per_pixel : s.rays_per_pixel) {
+        auto& [rung, settings] = add(fmt::format("{:g} rays/px", per_pixel));
+        rung.adaptive = true;
+        settings.budget.kind = FrameBudget::Kind::rays;
+        settings.budget.rays = static_cast<std::uint64_t>(per_pixel * camera.width * camera.height);
+    }
+    for (auto& [rung, settings] : all) rung.spp = settings.spp, settings.times = true;
+    if (s.ablation) {
+        const auto middle = all[all.size() / 2];
+        for (const NamedMechanism& m : kMechanisms) {
+            auto& [rung, settings] = all.emplace_back(middle);
+            rung.without = m.name;
+            settings.mechanisms.*m.on = false;
+        }
+    }
+    for (const int spp : with_loop ? s.loop_spp : std::vector<int>{}) {
+        auto& [rung, settings] = add(fmt::format("loop {} spp", spp));
+        rung.loop = true;
+        settings.spp = spp;
+    }
+    return all;
 }
+
+}  // namespace
 
 double Rung::median_s() const {
     return median(seconds);
@@ -121,77 +142,35 @@ double Rung::median_cpu_s() const {
     return median(cpu_seconds);
 }
 
-Ladder measure_ladder(const World& world, std::size_t camera_index, const LadderSettings& s,
-                      const ReferenceLoop* loop, TracingThreads& threads,
-                      const std::function<void(const std::string&)>& progress) {
-    const Camera& camera = world.scene().cameras[camera_index];
-    View v{world, camera, BodyPoses(world.scene().bodies.size()), {}, {camera.width, camera.height}, threads};
-    world.place(s.t_ns, camera.mount, v.at);
-    v.T_world_camera = world.sensor_pose(camera.mount, camera.T_mount_camera, v.at);
-    const RenderSettings& render_settings = world.scene().render;
+Ladder measure_ladder(const World& world, std::size_t camera, const LadderSettings& s, const ReferenceLoop& loop,
+                      TracingThreads& threads, const std::function<void(const std::string&)>& progress) {
+    View v(world, camera, s, threads);
     FrameSettings base;
-    base.seed = render_settings.seed;
-    base.method = render_settings.method;
-    base.max_depth = render_settings.max_depth;
+    base.seed = world.scene().render.seed;
+    base.method = world.scene().render.method;
+    base.max_depth = world.scene().render.max_depth;
+    const std::int64_t start_ns = monotonic_ns();
     const ImageMean reference = reference_of(v, base, s.reference_spp, progress);
+    Ladder ladder;
+    ladder.level = reference.level().value;
+    ladder.reference_noise = std::sqrt(reference.variance_of_mean());
+    ladder.reference_s = seconds_since(start_ns);
 
     std::vector<Candidate> candidates;
-    const auto add = [&](Rung rung, const FrameSettings& settings) {
-        candidates.emplace_back(std::move(rung), settings, reference);
-        if (!candidates.back().rung.loop)
-            candidates.back().renderer = std::make_unique<CameraRenderer>(world.render_scene(), camera);
-    };
-    const auto named = [](std::string name, bool is_loop, bool adaptive) {
-        Rung rung;
-        rung.name = std::move(name), rung.loop = is_loop, rung.adaptive = adaptive;
-        return rung;
-    };
-    const auto add_spp = [&](int spp, const NamedMechanism* off = nullptr) {
-        Rung rung = named(fmt::format("{} spp", spp), false, false);
-        FrameSettings settings = base;
-        settings.spp = spp;
-        settings.times = true;
-        if (off != nullptr) settings.mechanisms.*off->on = false, rung.without = off->name;
-        add(std::move(rung), settings);
-    };
-    const auto add_rays = [&](double per_pixel, const NamedMechanism* off = nullptr) {
-        Rung rung = named(fmt::format("{:g} rays/px", per_pixel), false, true);
-        FrameSettings settings = base;
-        settings.times = true;
-        settings.budget.kind = FrameBudget::Kind::rays;
-        settings.budget.rays = static_cast<std::uint64_t>(per_pixel * camera.width * camera.height);
-        if (off != nullptr) settings.mechanisms.*off->on = false, rung.without = off->name;
-        add(std::move(rung), settings);
-    };
-    for (const int spp : s.spp) add_spp(spp);
-    for (const double per_pixel : s.rays_per_pixel) add_rays(per_pixel);
-    for (const NamedMechanism& m : kMechanisms)
-        if (std::find(s.without.begin(), s.without.end(), m.name) != s.without.end()) {
-            if (!s.spp.empty())
-                add_spp(s.spp[s.spp.size() / 2], &m);
-            else
-                add_rays(s.rays_per_pixel[s.rays_per_pixel.size() / 2], &m);
-        }
-    for (const int spp : loop != nullptr ? s.loop_spp : std::vector<int>{}) {
-        FrameSettings settings = base;
-        settings.spp = spp;
-        add(named(fmt::format("loop {} spp", spp), true, false), settings);
+    for (auto& [rung, settings] : planned(s, base, v.camera, static_cast<bool>(loop))) {
+        Candidate& c = candidates.emplace_back(Candidate{std::move(rung), settings, ErrorAgainst(reference)});
+        if (!c.rung.loop) c.renderer = std::make_unique<CameraRenderer>(world.render_scene(), v.camera);
+        render(v, c, loop, 0);  // the first frame allocates
     }
-
-    v.bytes.resize(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
-    for (Candidate& c : candidates) render(v, c, loop, 0);  // the first frame allocates
     std::uint32_t number = 1;
     for (int k = 0; k < s.frames; ++k)
         for (Candidate& c : candidates) {
             progress(fmt::format("{} {}/{}", c.rung.name, k, s.frames));
             measure(v, c, loop, number++, s.frames);
         }
-
-    Ladder ladder{reference.level().value, std::sqrt(reference.variance_of_mean()), median(v.detector_s), {}};
+    ladder.detector_s = median(v.detector_s);
     for (Candidate& c : candidates) {
-        const ErrorRow row = c.error.row(c.settings.spp);
-        c.rung.rmse = row.rmse;
-        c.rung.bias = row.bias;
+        static_cast<ErrorRow&>(c.rung) = c.error.row(c.rung.spp);
         if (c.predicts && !c.rung.loop) c.rung.predicted = std::sqrt(c.predicted_squares);
         ladder.rungs.push_back(std::move(c.rung));
     }
@@ -200,43 +179,42 @@ Ladder measure_ladder(const World& world, std::size_t camera_index, const Ladder
 
 namespace {
 
-/// Logarithms of error and time of some rungs.
-using Line = std::vector<std::array<double, 2>>;
-double time_at(const Line& line, std::size_t k, double error) {
-    const auto& [e0, t0] = line[k - 1];
-    const auto& [e1, t1] = line[k];
-    return std::exp(t0 + (t1 - t0) * (error - e0) / (e1 - e0));
+/// Seconds to an error, along straight lines between these rungs in the logarithms of time and error. None where
+/// their errors do not enclose it; `beyond`: there the outer lines go on.
+std::optional<double> time_to_error(double error, const std::vector<const Rung*>& rungs,
+                                    double (Rung::*seconds)() const, bool beyond) {
+    std::vector<std::array<double, 2>> line;
+    for (const Rung* r : rungs)
+        if (r->rmse.value > 0) line.push_back({std::log(r->rmse.value), std::log((r->*seconds)())});
+    std::sort(line.begin(), line.end(), std::greater<>());
+    if (line.size() < 2 || error <= 0) return {};
+    const double x = std::log(error);
+    if (!beyond && (x > line.front()[0] || x < line.back()[0])) return {};
+    std::size_t k = 1;
+    while (k + 1 < line.size() && x < line[k][0]) ++k;
+    const auto [x0, y0] = line[k - 1];
+    const auto [x1, y1] = line[k];
+    if (x0 == x1) return {};
+    return std::exp(y0 + (y1 - y0) * (x - x0) / (x1 - x0));
 }
 
 }  // namespace
 
 std::optional<double> speed_up(const Ladder& ladder, const Rung& rung, TimeBy by) {
-    const auto seconds = [&](const Rung& r) { return by == TimeBy::wall ? r.median_s() : r.median_cpu_s(); };
-    Line line;
+    const auto seconds = by == TimeBy::wall ? &Rung::median_s : &Rung::median_cpu_s;
+    std::vector<const Rung*> loop;
     for (const Rung& r : ladder.rungs)
-        if (r.loop && r.rmse.value > 0) line.push_back({std::log(r.rmse.value), std::log(seconds(r))});
-    if (rung.rmse.value <= 0) return {};
-    const double error = std::log(rung.rmse.value);
-    for (std::size_t k = 1; k < line.size(); ++k) {
-        const double e0 = line[k - 1][0], e1 = line[k][0];
-        if ((error > e0) == (error > e1) || e0 == e1) continue;
-        return time_at(line, k, error) / seconds(rung);
-    }
-    return {};
+        if (r.loop) loop.push_back(&r);
+    const auto s = time_to_error(rung.rmse.value, loop, seconds, false);
+    return s ? std::optional(*s / (rung.*seconds)()) : std::nullopt;
 }
 
 std::optional<double> cost_at_equal_error(const Ladder& ladder, const Rung& rung) {
-    Line line;
+    std::vector<const Rung*> full;
     for (const Rung& r : ladder.rungs)
-        if (!r.loop && r.without.empty() && r.rmse.value > 0)
-            line.push_back({std::log(r.rmse.value), std::log(r.median_cpu_s())});
-    std::sort(line.begin(), line.end(), std::greater<>());
-    if (line.size() < 2 || rung.rmse.value <= 0) return {};
-    const double error = std::log(rung.rmse.value);
-    std::size_t k = 1;
-    while (k + 1 < line.size() && error < line[k][0]) ++k;
-    if (line[k - 1][0] == line[k][0]) return {};
-    return rung.median_cpu_s() / time_at(line, k, error);
+        if (!r.loop && r.without.empty()) full.push_back(&r);
+    const auto s = time_to_error(rung.rmse.value, full, &Rung::median_cpu_s, true);
+    return s ? std::optional(rung.median_cpu_s() / *s) : std::nullopt;
 }
 
 std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by, double rays_least) {

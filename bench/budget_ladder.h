@@ -1,9 +1,8 @@
 /// bench/budget_ladder.h - time and error of one camera's frames at several budgets, beside those of the plain loop
 /// of reference_loop.h and of the renderer with one mechanism switched off, in one run.
 ///
-/// Errors are those of the mean of the three bands, W m^-2 sr^-1, against a reference of many samples whose own
-/// noise is subtracted (convergence.h). All candidates take turns, so that other load on the machine affects all
-/// alike.
+/// Errors are against a reference of many samples whose own noise is subtracted (convergence.h), W m^-2 sr^-1. All
+/// candidates take turns, so that other load on the machine affects all alike.
 #pragma once
 
 #include <array>
@@ -24,16 +23,18 @@ namespace narpa {
 inline constexpr std::array<const char*, kPhases> kPhaseNames{"aim",         "rays",     "shading",
                                                               "shadow_rays", "indirect", "passes"};
 
+/// Of the reference: their scatter gives its own noise.
+inline constexpr int kReferenceImages = 16;
+
 struct LadderSettings {
     std::vector<int> spp{1, 4, 16};
     std::vector<double> rays_per_pixel{2, 4, 8, 16};  ///< as FrameBudget::rays
     std::vector<int> loop_spp{1, 4, 16, 64, 256};     ///< of the plain loop, where there is one
-    /// Mechanisms to switch off one at a time, by name (kMechanisms), at the middle one of `spp` or
-    /// `rays_per_pixel`.
-    std::vector<std::string> without{};
+    bool ablation = false;     ///< kMechanisms switched off one at a time, at the middle one of the budgets
     int frames = 9;            ///< at each budget, each with random numbers of its own; >= 2
-    int reference_spp = 4096;  ///< in sixteen images
+    int reference_spp = 4096;  ///< in kReferenceImages
     std::int64_t t_ns = 0;     ///< the moment that the scene shows
+    bool bands = false;        ///< errors of each band, instead of the mean of the three
 };
 
 /// The mechanisms that an ablation switches off.
@@ -51,7 +52,7 @@ inline constexpr std::array<NamedMechanism, 7> kMechanisms{
      {"coarse steps", &Mechanisms::coarse_steps}}};
 
 /// One budget, or one number of samples of the plain loop.
-struct Rung {
+struct Rung : ErrorRow {
     std::string name;
     std::string without;  ///< the mechanism that is off; empty: none
     bool loop = false, adaptive = false;
@@ -59,9 +60,8 @@ struct Rung {
     std::vector<double> cpu_seconds;      ///< the same, summed over the threads; least sensitive to other load
     double rays = 0, samples = 0;         ///< a frame, mean
     FrameStep step = FrameStep::refined;  ///< the coarsest of all frames
-    Estimate rmse, bias;
-    std::optional<double> predicted;  ///< the frames' own standard error, RMS; none: a frame has no estimate
-    PhaseTimes phase_ns{};            ///< a frame, mean, of all threads
+    std::optional<double> predicted;      ///< the frames' own standard error, RMS; none: a frame has no estimate
+    PhaseTimes phase_ns{};                ///< a frame, mean, of all threads
 
     [[nodiscard]] double median_s() const;
     [[nodiscard]] double median_cpu_s() const;
@@ -74,13 +74,12 @@ struct Ladder {
     double level = 0, reference_noise = 0;  ///< of the reference, W m^-2 sr^-1
     double detector_s = 0;                  ///< detector and conversion of a frame, median
     std::vector<Rung> rungs;
+    double reference_s = 0;  ///< time of the reference
 };
 
-double median(std::vector<double> values);
-
-/// `loop`: null where it cannot render the scene. `progress` is called with a line of text.
+/// `loop`: empty where it cannot render the scene. `progress` is called with a line of text.
 [[nodiscard]] Ladder measure_ladder(const World& world, std::size_t camera, const LadderSettings& settings,
-                                    const ReferenceLoop* loop, TracingThreads& threads,
+                                    const ReferenceLoop& loop, TracingThreads& threads,
                                     const std::function<void(const std::string&)>& progress);
 
 /// Wall time, or CPU time of all threads.

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "bench/approach.h"
-#include "bench/approach_frames.h"
 #include "bench/stereo.h"
 #include "estimator/features/feature_alignment.h"
 #include "plot/plot.h"
@@ -30,12 +29,6 @@ nlohmann::json thumbnail(int width, int height, const SensorModel& sensor, DnAt&
 }
 
 }  // namespace
-
-Status plot_approach(const std::string& path, const std::string& title, const std::vector<ApproachRun>& runs) {
-    nlohmann::json document{{"plot", "approach"}, {"title", title}, {"runs", nlohmann::json::array()}};
-    for (const ApproachRun& run : runs) document["runs"].push_back(to_json(run));
-    return write_plot(path, document);
-}
 
 Status plot_approach_frames(const std::string& path, const World& world, std::size_t camera_index,
                             std::size_t target, const ApproachOptions& o, TracingThreads& threads) {

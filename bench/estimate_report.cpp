@@ -19,16 +19,6 @@ using nlohmann::json;
 
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
-json to_json(const Spread& s) {
-    return {{"median", s.median},
-            {"lower_quartile", s.lower_quartile},
-            {"upper_quartile", s.upper_quartile},
-            {"whiskers", {s.low, s.high}},
-            {"outliers", s.outliers},
-            {"largest", s.largest},
-            {"rms", s.rms}};
-}
-
 std::string name_of(EstimateMethod m) {
     return std::string(kEstimateMethods[static_cast<std::size_t>(m)]);
 }
@@ -50,6 +40,11 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ApproachFrame, range_m, found, claimed, rotat
                                    bound_rotation_rad, bound_position_m, nees, ms, renders)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StereoCounts, accepted, cut_off, unlike, ambiguous, inconsistent, unsettled,
                                    off_line, without_depth)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Spread, median, lower_quartile, upper_quartile, whiskers, outliers, largest, rms)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(IcpRun, start_angle_deg, start_distance_fraction, starts, found, told,
+                                   unobserved, rotation_rms_deg, translation_rms_m, rotation_to_bound,
+                                   translation_to_bound, nees, points, iterations, microseconds_p50,
+                                   microseconds_p99)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FilterTime, t_s, nees, position_rms_m, position_sigma_m, attitude_rms_rad,
                                    attitude_sigma_rad)
 
@@ -92,8 +87,12 @@ json to_json(const PnpVerdict& v) {
 
 // Approach
 
-json to_json(const ApproachRun& run) {
-    return {{"method", name_of(run.method)}, {"bands", run.bands}, {"basin", run.basin}, {"frames", run.frames}};
+json to_json(const std::vector<ApproachRun>& runs) {
+    json all = json::array();
+    for (const ApproachRun& run : runs)
+        all.push_back(
+            {{"method", name_of(run.method)}, {"bands", run.bands}, {"basin", run.basin}, {"frames", run.frames}});
+    return all;
 }
 
 std::string in_words(const std::vector<ApproachRun>& runs) {
@@ -135,8 +134,8 @@ json to_json(const StereoBench& bench) {
     for (const bool fine : {false, true})
         for (int axis = 0; axis < 3; ++axis) {
             json& at = out[fine ? "between_pixels" : "whole_pixels"][kAxes[static_cast<std::size_t>(axis)]];
-            at["absolute_m"] = to_json(bench.errors(fine, axis, false));
-            at["over_range"] = to_json(bench.errors(fine, axis, true));
+            at["absolute_m"] = bench.errors(fine, axis, false);
+            at["over_range"] = bench.errors(fine, axis, true);
         }
     out["corners"] = bench.counts;
     return out;
@@ -163,22 +162,8 @@ std::string in_words(const StereoBench& bench) {
 
 // ICP
 
-json to_json(const IcpRun& r) {
-    return {{"start_angle_deg", r.starts.angle_deg},
-            {"start_distance_fraction", r.starts.distance_fraction},
-            {"starts", r.starts.count},
-            {"found", r.found},
-            {"told", r.told},
-            {"unobserved", r.unobserved},
-            {"rotation_rms_deg", r.rotation_rms_deg},
-            {"translation_rms_m", r.translation_rms_m},
-            {"rotation_to_bound", r.rotation_to_bound},
-            {"translation_to_bound", r.translation_to_bound},
-            {"nees", r.nees},
-            {"points", r.points},
-            {"iterations", r.iterations},
-            {"microseconds_p50", r.microseconds_p50},
-            {"microseconds_p99", r.microseconds_p99}};
+json to_json(const std::vector<IcpRun>& runs) {
+    return json(runs);
 }
 
 std::string in_words(const std::vector<IcpRun>& runs) {
@@ -189,8 +174,8 @@ std::string in_words(const std::vector<IcpRun>& runs) {
         text += fmt::format(
             "{:9.1f} {:6.1f} {:7} {:6.1f}% {:7} {:7} {:9.1f} {:5.1f} {:14.2f} {:6.2f} {:5.2f} {:7.0f} {:6.1f} "
             "{:8.0f} {:8.0f}\n",
-            r.starts.angle_deg, 100 * r.starts.distance_fraction, r.starts.count, 100 * r.found_fraction(),
-            r.starts.count - r.found - r.told, r.unobserved, 1e3 * r.rotation_rms_deg, 1e3 * r.translation_rms_m,
+            r.start_angle_deg, 100 * r.start_distance_fraction, r.starts, 100 * r.found_fraction(),
+            r.starts - r.found - r.told, r.unobserved, 1e3 * r.rotation_rms_deg, 1e3 * r.translation_rms_m,
             r.rotation_to_bound, r.translation_to_bound, r.nees, r.points, r.iterations, r.microseconds_p50,
             r.microseconds_p99);
     return text;
@@ -198,17 +183,20 @@ std::string in_words(const std::vector<IcpRun>& runs) {
 
 // Filter
 
-json to_json(const FilterRun& r) {
-    return {{"name", r.name},
-            {"runs", r.runs},
-            {"nees", r.nees()},
-            {"band", {kFilterStates - r.band(), kFilterStates + r.band()}},
-            {"inside_band", r.inside_band()},
-            {"nis", r.nis},
-            {"updates", r.updates},
-            {"gated", r.gated},
-            {"update_microseconds", r.update_microseconds},
-            {"times", r.times}};
+json to_json(const std::vector<FilterRun>& runs) {
+    json all = json::array();
+    for (const FilterRun& r : runs)
+        all.push_back({{"name", r.name},
+                       {"runs", r.runs},
+                       {"nees", r.nees()},
+                       {"band", {kFilterStates - r.band(), kFilterStates + r.band()}},
+                       {"inside_band", r.inside_band()},
+                       {"nis", r.nis},
+                       {"updates", r.updates},
+                       {"gated", r.gated},
+                       {"update_microseconds", r.update_microseconds},
+                       {"times", r.times}});
+    return all;
 }
 
 std::string in_words(const std::vector<FilterRun>& runs) {

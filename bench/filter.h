@@ -26,7 +26,6 @@ struct FilterCase {
 struct FilterBenchSettings {
     int runs = 100;
     int seconds = 60;
-    std::uint64_t seed = 1;
 };
 
 inline constexpr int kFilterStates = 12;
@@ -54,7 +53,7 @@ struct FilterRun {
 [[nodiscard]] std::vector<FilterRun> run_filter(const std::vector<FilterCase>& cases,
                                                 const FilterBenchSettings& settings);
 
-[[nodiscard]] nlohmann::json to_json(const FilterRun& run);
+[[nodiscard]] nlohmann::json to_json(const std::vector<FilterRun>& runs);
 /// A table, a line for each case.
 [[nodiscard]] std::string in_words(const std::vector<FilterRun>& runs);
 

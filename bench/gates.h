@@ -2,8 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -20,29 +18,27 @@ struct FrameCost {
     double frame_s = 0;  ///< from poses to bytes: radiance, detector, conversion
     double radiance_s = 0, detector_s = 0, hand_over_s = 0;  ///< hand-over: one copy of the bytes
     PhaseTimes phase_ns{};                                   ///< of one frame, all threads
-    RawCost raw;                                             ///< seconds: medians
+    RawCost raw;
     [[nodiscard]] double to_raw() const { return frame_s / raw.seconds(); }
 };
 
-/// One sample a pixel by direct light, beside Embree's calls on the same rays. An Error where not all is triangles.
-[[nodiscard]] Result<FrameCost> frame_against_raw(const World& world, std::size_t camera, int rounds,
-                                                  TracingThreads& threads);
-
-/// Medians, seconds.
-struct TwoFrames {
-    double first_s = 0, second_s = 0;
+/// Of the craft at full size, by direct light with one sample a pixel. Medians, seconds.
+struct CraftRatios {
+    FrameCost near, far;  ///< of those cameras, beside Embree's calls on the same rays
+    /// Frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at its edge,
+    /// and all of, both from near by through one lens.
+    double far_s = 0, edge_s = 0, filled_s = 0;
+    /// With all bodies at rest, and with each of them somewhere else (by 0.1 mm and 0.01 mrad, so that it shows the
+    /// same) in every frame.
+    double still_s = 0, moved_s = 0;
+    double load_s = 0;  ///< from the name of the file to the first frame's bytes
 };
-/// Frames of several cameras, in their order.
-[[nodiscard]] std::vector<double> frames_of(const World& world, std::span<const std::size_t> cameras, int rounds,
-                                            TracingThreads& threads);
-/// Frames of one camera with all bodies at rest, and with each of them somewhere else (by 0.1 mm and 0.01 mrad, so
-/// that it shows the same) in every frame.
-[[nodiscard]] TwoFrames still_and_moved(const World& world, std::size_t camera, int rounds,
-                                        TracingThreads& threads);
 
-/// From the name of the file to the first frame's bytes. `load` reads the scene as the bench has it.
-[[nodiscard]] Result<double> load_to_first_frame(const std::function<Result<Scene>()>& load, std::size_t camera,
-                                                 int rounds, TracingThreads& threads);
+/// `load` reads the scene as the bench has it, with cameras near, far, edge and filled. `rounds`: frames that give
+/// a median; `loads`: the same of first frames. Errors: `load`'s; no such camera; bodies that are not triangles.
+[[nodiscard]] Result<CraftRatios> measure_ratios(const std::function<Result<Scene>()>& load, int rounds, int loads,
+                                                 TracingThreads& threads,
+                                                 const std::function<void(const std::string&)>& progress);
 
 /// One scene.
 struct SceneLadder {
@@ -52,19 +48,6 @@ struct SceneLadder {
     double speed_up_from = 0;   ///< judged over budgets of at least so many rays a pixel
     Ladder ladder;
 };
-/// Frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at its edge, and
-/// all of, both from near by through one lens. Medians, seconds.
-struct EmptySpace {
-    double far_s = 0, edge_s = 0, filled_s = 0;
-};
-/// Of the craft at full size.
-struct CraftRatios {
-    FrameCost cost, far;
-    EmptySpace space;
-    TwoFrames still_and_moved;
-    double load_s = 0;
-};
-
 /// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover, triangles as
 /// large; seconds that moved bodies cost; seconds to the first frame; predicted to measured error.
 inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.04, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;

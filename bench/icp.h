@@ -8,35 +8,22 @@
 #include <vector>
 
 #include "emulator/world.h"
-#include "estimator/cloud/cloud_icp.h"
-#include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
 
 /// Starts, each with its own sweep: off the truth by the angle about a random axis, and by the fraction of the
 /// distance in a random direction.
 struct IcpStarts {
-    double angle_deg = 5;
-    double distance_fraction = 0.05;
-    int count = 1000;
+    double start_angle_deg = 5;
+    double start_distance_fraction = 0.05;
+    int starts = 1000;
 };
 
-/// Where the LiDAR stands, how the target moves, what noise its ranges have.
-struct IcpBenchSettings {
-    double distance_min_m = 10, distance_max_m = 40;  ///< from the target's origin
-    double cone_deg = 20;  ///< the LiDAR is seen from the target so far off its x axis at most; 180: anywhere
-    double velocity_m_s = 0.1, rate_rad_s = 0.02;  ///< of the target during the sweep, on each axis at most
-    const LidarModel* model = lidar_models().front();
-    double rotation_hz = 10;
-    double range_max_m = 100;
-    double range_noise_m = 0.02;  ///< before the model rounds them
-    std::uint64_t seed = 1;
-    IcpSettings icp{};  ///< but for the noise of its ranges, which is that above
-};
+/// The LiDAR's distances from the target's origin.
+inline constexpr double kIcpDistanceMin_m = 10, kIcpDistanceMax_m = 40;
 
 /// RMS over its bound: of the root mean square of error over the bound's standard deviation, three axes together.
-struct IcpRun {
-    IcpStarts starts;
+struct IcpRun : IcpStarts {
     int found = 0;       ///< within ten standard deviations of the bound that holds at the truth
     int told = 0;        ///< of the others, those that the estimator itself calls not credible
     int unobserved = 0;  ///< of the found, those with unobservable motions; excluded below
@@ -46,15 +33,15 @@ struct IcpRun {
     double points = 0, iterations = 0;                  ///< mean
     double microseconds_p50 = 0, microseconds_p99 = 0;  ///< of an alignment: CPU time of its one thread
 
-    [[nodiscard]] double found_fraction() const { return static_cast<double>(found) / starts.count; }
+    [[nodiscard]] double found_fraction() const { return static_cast<double>(found) / starts; }
 };
 
 /// `target`: the body's index. `progress` is called with the starts done and the total.
-[[nodiscard]] std::vector<IcpRun> run_icp(const World& world, std::size_t target, const IcpBenchSettings& settings,
+[[nodiscard]] std::vector<IcpRun> run_icp(const World& world, std::size_t target,
                                           const std::vector<IcpStarts>& starts,
-                                          const std::function<void(int, int)>& progress = {});
+                                          const std::function<void(int, int)>& progress);
 
-[[nodiscard]] nlohmann::json to_json(const IcpRun& run);
+[[nodiscard]] nlohmann::json to_json(const std::vector<IcpRun>& runs);
 /// A table, a line for each.
 [[nodiscard]] std::string in_words(const std::vector<IcpRun>& runs);
 

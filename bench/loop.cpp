@@ -22,9 +22,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<std::pair<const char*, double>, 5> kPercentiles{
-    {{"p50", 0.5}, {"p90", 0.9}, {"p99", 0.99}, {"p99.9", 0.999}, {"max", 1.0}}};
-
 /// The child's whole life. It has a copy of the parent's memory and touches nothing of it.
 [[noreturn]] void keep_busy(int cpu, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -36,52 +33,18 @@ constexpr std::array<std::pair<const char*, double>, 5> kPercentiles{
     for (volatile std::uint64_t n = 0;;) n = n + 1;
 }
 
-template <class PercentileOf>
-json percentiles(PercentileOf value) {
-    json out = json::object();
-    for (const auto& [name, p] : kPercentiles) out[name] = value(p);
-    return out;
-}
-template <class H>
-json percentiles_ms(const H& h) {
-    return percentiles([&](double p) { return h.percentile_ns(p) * 1e-6; });
-}
-
 json to_json(const CameraRun& c) {
-    const CameraStats& s = c.stats;
-    json steps = json::object();
-    for (std::size_t i = 0; i < kStepNames.size(); ++i) steps[std::string(kStepNames[i])] = s.steps[i];
-    return {{"name", c.name},
-            {"period_ms", static_cast<double>(c.period_ns) * 1e-6},
-            {"allowance_ms", static_cast<double>(c.allowance_ns) * 1e-6},
-            {"frames", s.frames},
-            {"handed_over", s.handed_over},
-            {"skipped", s.skipped},
-            {"late", s.deadline_missed},
-            {"late_fraction", c.late_fraction()},
-            {"incomplete", c.incomplete()},
-            {"steps", steps},
-            {"wake_late_ms", percentiles_ms(s.wake_late)},
-            {"render_ms", percentiles_ms(s.render)},
-            {"radiance_ms", percentiles_ms(s.radiance)},
-            {"sensor_ms", percentiles_ms(s.sensor)},
-            {"send_ms", percentiles_ms(s.send)},
-            {"samples_per_pixel", percentiles([&](double p) { return s.samples_1e3.percentile_ns(p) * 1e-3; })},
-            {"expected_error", s.error_1e9.count() > 0
-                                   ? percentiles([&](double p) { return s.error_1e9.percentile_ns(p) * 1e-9; })
-                                   : json(nullptr)},
-            {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
-            {"hand_over_after_deadline_ms", lateness(s.late)},
-            {"allowance_used", percentiles([&](double p) { return c.allowance_used(p); })}};
-}
-
-json to_json(const LidarRun& l) {
-    return {{"name", l.name},
-            {"packets", l.stats.packets},
-            {"skipped", l.stats.skipped},
-            {"wake_late_ms", percentiles_ms(l.stats.wake_late)},
-            {"fire_ms", percentiles_ms(l.stats.fire)},
-            {"due_to_sent_ms", percentiles_ms(l.stats.hand_over)}};
+    json out = c.report;
+    out.update({{"period_ms", static_cast<double>(c.period_ns) * 1e-6},
+                {"allowance_ms", static_cast<double>(c.allowance_ns) * 1e-6},
+                {"late", c.stats.deadline_missed},
+                {"late_fraction", c.late_fraction()},
+                {"incomplete", c.incomplete()},
+                {"radiance_ms", percentiles(c.stats.radiance, 1e-6)},
+                {"sensor_ms", percentiles(c.stats.sensor, 1e-6)},
+                {"send_ms", percentiles(c.stats.send, 1e-6)}});
+    for (const auto& [name, p] : kPercentiles) out["allowance_used"][name] = c.allowance_used(p);
+    return out;
 }
 
 /// "1.23 / 4.56 / 7.89": median, 99.9 of 100 and the largest, ms.
@@ -108,7 +71,7 @@ CameraRun of(const CameraSensor& feed, const RenderSettings& render) {
     const CameraUnit& unit = feed.unit();
     const std::int64_t period = unit.camera().period_ns;
     return {unit.camera().name, period, render.budget_ns > 0 ? render.budget_ns : period - unit.exposure_ns() / 2,
-            feed.stats()};
+            feed.stats(), feed.report()};
 }
 
 }  // namespace
@@ -153,7 +116,7 @@ Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunO
     for (const CameraSensor* camera : (*emulator)->sensors_of<CameraSensor>())
         run.cameras.push_back(of(*camera, scene.render));
     for (const LidarSensor* lidar : (*emulator)->sensors_of<LidarSensor>())
-        run.lidars.push_back({std::string(lidar->name()), lidar->stats()});
+        run.lidars.push_back({std::string(lidar->name()), lidar->stats(), lidar->report()});
     return run;
 }
 
@@ -178,7 +141,7 @@ std::vector<std::string> loop_faults(const std::vector<LoopRun>& runs, double la
 json to_json(const LoopRun& run) {
     json cameras = json::array(), lidars = json::array();
     for (const CameraRun& c : run.cameras) cameras.push_back(to_json(c));
-    for (const LidarRun& l : run.lidars) lidars.push_back(to_json(l));
+    for (const LidarRun& l : run.lidars) lidars.push_back(l.report);
     return {{"name", run.name},
             {"load", run.load},
             {"cameras", cameras},

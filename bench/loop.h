@@ -2,7 +2,7 @@
 /// busy.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -34,6 +34,7 @@ struct CameraRun {
     std::int64_t period_ns = 0;
     std::int64_t allowance_ns = 0;  ///< from the end of the exposure to the deadline of the hand-over
     CameraStats stats;
+    nlohmann::json report{};  ///< CameraSensor::report
 
     /// Frames without a whole image; there must be none.
     [[nodiscard]] std::uint64_t incomplete() const noexcept { return stats.steps.back(); }
@@ -46,6 +47,7 @@ struct CameraRun {
 struct LidarRun {
     std::string name;
     LidarStats stats;
+    nlohmann::json report{};  ///< LidarSensor::report
 };
 
 struct LoopRun {

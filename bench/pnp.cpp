@@ -1,30 +1,17 @@
 #include "bench/pnp.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
-#include <optional>
 
+#include "base/time.h"
+#include "bench/pnp_methods.h"
 #include "bench/statistics.h"
-#include "estimator/pose/pnp.h"
-#include "estimator/pose/pnp_ceres.h"
 #include "estimator/pose/pnp_refine.h"
 
 namespace narpa {
 namespace {
 
 constexpr double kPixels = 500;
-
-Vec3 random_direction(std::mt19937_64& random) {
-    std::normal_distribution<double> n;
-    return normalized(Vec3{n(random), n(random), n(random)});
-}
-
-Quat random_attitude(std::mt19937_64& random) {
-    std::normal_distribution<double> n;
-    return normalized(Quat{n(random), n(random), n(random), n(random)});
-}
 
 /// The body's z axis this far from the line of sight, in any direction, and turned about itself by any angle.
 Quat tilted(std::mt19937_64& random, double tilt_min_deg, double tilt_max_deg) {
@@ -36,11 +23,14 @@ Quat tilted(std::mt19937_64& random, double tilt_min_deg, double tilt_max_deg) {
 
 Quat attitude(PnpScene scene, std::mt19937_64& random) {
     switch (scene) {
-        case PnpScene::half_turn: return exp_rotation(random_direction(random) * (179.9 * kDegree));
+        case PnpScene::half_turn: return displaced({}, random_error(179.9 * kDegree, 0, random)).q;
         case PnpScene::plane: return tilted(random, 20, 70);
         case PnpScene::plane_facing: return tilted(random, 0, 5);
         case PnpScene::camera_plane: return tilted(random, 0, 10);
-        default: return random_attitude(random);
+        default: {
+            std::normal_distribution<double> n;
+            return normalized(Quat{n(random), n(random), n(random), n(random)});
+        }
     }
 }
 
@@ -103,146 +93,15 @@ std::optional<PnpTrial> draw_trial(const PnpSetting& s, std::mt19937_64& random)
     return trial;
 }
 
-Rigid3 tracked_pose(const PnpTrial& trial, std::mt19937_64& random) {
-    return {normalized(exp_rotation(random_direction(random) * kDegree) * trial.T_camera_body.q),
-            trial.T_camera_body.t + random_direction(random) * (0.01 * trial.T_camera_body.t.z)};
-}
-
 namespace {
 
+/// Errors beyond so many bounds are failures.
 constexpr double kFailedAtBounds = 10;
-constexpr std::size_t kPointsMax = 1024;
-
-struct PoseResult {
-    std::optional<Rigid3> T_camera_body;
-    bool flagged = false;
-};
-
-/// A method that solves a trial; `start` is the tracked pose.
-struct Method {
-    std::string name;
-    std::function<PoseResult(const PnpTrial&, const Rigid3& start)> solve;
-};
-
-// OpenCV's methods.
-
-struct CvTrial {
-    cv::Mat K, points, pixels;
-
-    explicit CvTrial(const PnpTrial& t)
-        : K((cv::Mat_<double>(3, 3) << t.camera.fx, 0, t.camera.cx, 0, t.camera.fy, t.camera.cy, 0, 0, 1)),
-          points(static_cast<int>(t.body_m.size()), 1, CV_64FC3, const_cast<Vec3*>(t.body_m.data())),
-          pixels(static_cast<int>(t.pixels.size()), 1, CV_64FC2, const_cast<Pixel*>(t.pixels.data())) {}
-};
-
-PoseResult as_result(const cv::Mat& rotation, const cv::Mat& translation) {
-    const Rigid3 T{exp_rotation({rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2)}),
-                   {translation.at<double>(0), translation.at<double>(1), translation.at<double>(2)}};
-    if (!std::isfinite(norm(T.q)) || !is_finite(T.t)) return {};
-    return {T};
-}
-
-/// No pose where OpenCV throws: a method that does not take so few points, or this shape.
-PoseResult opencv(const PnpTrial& trial, cv::SolvePnPMethod method) {
-    const CvTrial t(trial);
-    cv::Mat r, tr;
-    try {
-        if (!cv::solvePnP(t.points, t.pixels, t.K, cv::noArray(), r, tr, false, method)) return {};
-        return as_result(r, tr);
-    } catch (const cv::Exception&) {
-        return {};
-    }
-}
-
-PoseResult opencv_ransac(const PnpTrial& trial) {
-    const CvTrial t(trial);
-    cv::Mat r, tr;
-    std::vector<int> inliers;
-    constexpr int kIterations = 100;
-    constexpr double kConfidence = 0.99;
-    try {
-        if (!cv::solvePnPRansac(t.points, t.pixels, t.K, cv::noArray(), r, tr, false, kIterations,
-                                static_cast<float>(std::sqrt(kInlierSquaredResidual) * trial.sigma_px), kConfidence,
-                                inliers, cv::SOLVEPNP_EPNP))
-            return {};
-        std::vector<cv::Point3d> points;
-        std::vector<cv::Point2d> pixels;
-        for (const int i : inliers)
-            points.push_back(t.points.at<cv::Point3d>(i)), pixels.push_back(t.pixels.at<cv::Point2d>(i));
-        cv::solvePnPRefineLM(points, pixels, t.K, cv::noArray(), r, tr);
-        return as_result(r, tr);
-    } catch (const cv::Exception&) {
-        return {};
-    }
-}
-
-PoseResult of_fit(const PnpFit& fit) {
-    return fit.ok() || fit.status == PnpStatus::no_convergence ? PoseResult{fit.T_camera_body} : PoseResult{};
-}
-
-/// The best minimum that Ceres reaches from these starts.
-PoseResult best_by_ceres(const PnpTrial& trial, std::span<const Rigid3> starts) {
-    std::optional<PnpFit> best;
-    for (const Rigid3& start : starts) {
-        PnpFit fit = refine_with_tiny_solver(trial.input(), start);
-        if (fit.ok() && (!best || fit.chi2 < best->chi2)) best = fit;
-    }
-    return best ? of_fit(*best) : PoseResult{};
-}
-
-std::vector<Method> methods(const PnpSetting& setting) {
-    const bool flat = setting.scene == PnpScene::plane || setting.scene == PnpScene::plane_facing;
-    auto solver = std::make_shared<PnpSolver>(kPointsMax);
-    auto refiner = std::make_shared<PnpRefiner>(kPointsMax);
-    PnpOptions options;
-    options.outliers = setting.outliers > 0;
-    RefineOptions warm;
-    if (options.outliers) warm.loss = {Loss::cauchy, 2};
-
-    std::vector<Method> all;
-    all.push_back({kPnpCold, [solver, options](const PnpTrial& t, const Rigid3&) {
-                       const PnpSolution& s = solver->solve(t.input(), options);
-                       if (!s.ok() && s.status != PnpStatus::no_convergence) return PoseResult{};
-                       return PoseResult{s.fit.T_camera_body, s.ambiguous() || s.imprecise};
-                   }});
-    all.push_back({kPnpWarm, [refiner, warm](const PnpTrial& t, const Rigid3& start) {
-                       return of_fit(refiner->refine(t.input(), start, warm));
-                   }});
-    if (options.outliers) {
-        all.push_back({"Ceres Cauchy warm", [](const PnpTrial& t, const Rigid3& start) {
-                           return of_fit(refine_with_ceres(t.input(), start, {Loss::cauchy, 2}));
-                       }});
-        all.push_back({kPnpPeerOutliers, [](const PnpTrial& t, const Rigid3&) { return opencv_ransac(t); }});
-        return all;
-    }
-    all.push_back({kPnpPeerWarm, [](const PnpTrial& t, const Rigid3& start) {
-                       return of_fit(refine_with_tiny_solver(t.input(), start));
-                   }});
-    all.push_back({kPnpPeerCold, [flat](const PnpTrial& t, const Rigid3&) {
-                       PnpPoints points(kPointsMax);
-                       points.assign(t.input());
-                       std::vector<BodyPoint> normalised;
-                       for (std::size_t i = 0; i < points.size(); ++i)
-                           normalised.push_back({points.centred_body_m(i), points.normalised(i)});
-                       std::vector<CentredPose> poses;
-                       opencv_poses(normalised, flat, poses);
-                       std::vector<Rigid3> starts;
-                       for (const CentredPose& pose : poses) starts.push_back(points.uncentred(pose));
-                       return best_by_ceres(t, starts);
-                   }});
-    for (const auto& [name, method] : {std::pair{"ITERATIVE", cv::SOLVEPNP_ITERATIVE},
-                                       {"EPNP", cv::SOLVEPNP_EPNP},
-                                       {"SQPNP", cv::SOLVEPNP_SQPNP},
-                                       {"IPPE", cv::SOLVEPNP_IPPE}}) {
-        if (method == cv::SOLVEPNP_IPPE && !flat) continue;
-        all.push_back({name, [m = method](const PnpTrial& t, const Rigid3&) { return opencv(t, m); }});
-    }
-    return all;
-}
 
 /// Results of one method in a cell.
 struct Tally {
     std::vector<double> rotation, position, us;
+    Mean rotation_rms, position_rms;
     int trials = 0, failed = 0, flagged = 0;
 
     void add(const PnpTrial& trial, const PoseResult& result, double took_us) {
@@ -254,25 +113,30 @@ struct Tally {
             const double r = e.head<3>().norm() / trial.bound_rotation_rad;
             const double p = e.tail<3>().norm() / trial.bound_position_m;
             good = r <= kFailedAtBounds && p <= kFailedAtBounds;
-            if (good) rotation.push_back(r), position.push_back(p);
+            if (good) {
+                rotation.push_back(r), position.push_back(p);
+                rotation_rms.add(r), position_rms.add(p);
+            }
         }
-        failed += good ? 0 : 1;
-        flagged += !good && result.flagged ? 1 : 0;
+        failed += !good;
+        flagged += !good && result.flagged;
     }
-    PnpRow row(const std::string& name) {
-        PnpRow r{name, trials, 0, rms(rotation), 0, rms(position), 0, 0, 0};
-        r.rotation_median_bounds = quantile(rotation, 0.5), r.position_median_bounds = quantile(position, 0.5),
-        r.median_us = quantile(us, 0.5);
-        r.failed = trials > 0 ? static_cast<double>(failed) / trials : 0;
-        r.flagged = failed > 0 ? static_cast<double>(flagged) / failed : 0;
-        return r;
+    [[nodiscard]] PnpRow row(const std::string& name) const {
+        return {name,
+                trials,
+                quantile(rotation, 0.5),
+                rotation_rms.rms(),
+                quantile(position, 0.5),
+                position_rms.rms(),
+                static_cast<double>(failed) / std::max(1, trials),
+                static_cast<double>(flagged) / std::max(1, failed),
+                quantile(us, 0.5)};
     }
 };
 
 PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, const StopFlag& stop) {
-    using Clock = std::chrono::steady_clock;
     std::mt19937_64 random(options.seed);
-    const std::vector<Method> all = methods(setting);
+    const std::vector<PnpMethod> all = pnp_methods(setting);
     std::vector<Tally> tallies(all.size());
     std::vector<double> bound_rotation, bound_position;
     // OpenCV needs milliseconds for each trial with many outliers.
@@ -281,12 +145,13 @@ PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, cons
     for (int done = 0; done < trials && left > 0 && !stop; --left) {
         const auto trial = draw_trial(setting, random);
         if (!trial) continue;
-        const Rigid3 start = tracked_pose(*trial, random);
+        // A tracker's prediction: off by one degree and one per cent of the range.
+        const Rigid3& truth = trial->T_camera_body;
+        const Rigid3 start = displaced(truth, random_error(kDegree, 0.01 * truth.t.z, random));
         for (std::size_t m = 0; m < all.size(); ++m) {
-            const auto begin = Clock::now();
+            const std::int64_t start_ns = monotonic_ns();
             const PoseResult result = all[m].solve(*trial, start);
-            const std::chrono::duration<double, std::micro> took = Clock::now() - begin;
-            tallies[m].add(*trial, result, took.count());
+            tallies[m].add(*trial, result, 1e6 * seconds_since(start_ns));
         }
         bound_rotation.push_back(trial->bound_rotation_rad);
         bound_position.push_back(trial->bound_position_m / setting.range_m);
@@ -297,7 +162,7 @@ PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, cons
                  setting.noise_px,
                  setting.range_m,
                  setting.outliers,
-                 quantile(bound_rotation, 0.5) * 180 / M_PI,
+                 quantile(bound_rotation, 0.5) / kDegree,
                  quantile(bound_position, 0.5),
                  {}};
     for (std::size_t m = 0; m < all.size(); ++m) cell.rows.push_back(tallies[m].row(all[m].name));
@@ -310,16 +175,12 @@ std::vector<PnpSetting> settings(const PnpBenchOptions& o) {
         for (const double noise : o.noise_px)
             for (const double range : o.ranges_m) all.push_back({PnpScene::nominal, n, noise, range, 0});
     if (!o.hard_cases) return all;
-    for (const int n : {6, 10, 30}) {
-        all.push_back({PnpScene::half_turn, n, 0.5, 30, 0});
-        all.push_back({PnpScene::plane, n, 0.5, 30, 0});
-        all.push_back({PnpScene::plane_facing, n, 0.5, 30, 0});
-        all.push_back({PnpScene::plane, n, 0.5, 100, 0});
-        all.push_back({PnpScene::line, n, 0.5, 30, 0});
-        all.push_back({PnpScene::tiny, n, 0.1, 200, 0});
-        all.push_back({PnpScene::tiny, n, 0.5, 200, 0});
-        all.push_back({PnpScene::camera_plane, n, 0.5, 2, 0});
-    }
+    constexpr PnpSetting kHard[] = {{PnpScene::half_turn, 0, 0.5, 30},    {PnpScene::plane, 0, 0.5, 30},
+                                    {PnpScene::plane_facing, 0, 0.5, 30}, {PnpScene::plane, 0, 0.5, 100},
+                                    {PnpScene::line, 0, 0.5, 30},         {PnpScene::tiny, 0, 0.1, 200},
+                                    {PnpScene::tiny, 0, 0.5, 200},        {PnpScene::camera_plane, 0, 0.5, 2}};
+    for (const int n : {6, 10, 30})
+        for (PnpSetting hard : kHard) hard.points = n, all.push_back(hard);
     for (const double outliers : {0.2, 0.5})
         for (const int n : {10, 30, 100})
             for (const double range : {10.0, 30.0}) all.push_back({PnpScene::nominal, n, 0.5, range, outliers});

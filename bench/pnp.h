@@ -43,9 +43,6 @@ struct PnpTrial {
 /// None where the points do not determine the pose or lie behind the camera: draw again.
 [[nodiscard]] std::optional<PnpTrial> draw_trial(const PnpSetting& setting, std::mt19937_64& random);
 
-/// The true pose with an error of one degree and one percent of the range: a tracker's prediction.
-[[nodiscard]] Rigid3 tracked_pose(const PnpTrial& trial, std::mt19937_64& random);
-
 struct PnpBenchOptions {
     int trials = 1000;  ///< of each cell; a fifth of it where half the points are outliers
     std::vector<int> points{4, 6, 10, 30, 100};

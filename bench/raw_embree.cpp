@@ -1,17 +1,14 @@
 #include "bench/raw_embree.h"
 
-#include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <limits>
+#include <memory>
 
 #include "base/each_isa.h"
+#include "base/time.h"
 #include "bench/raw_embree_scene.h"
-#include "emulator/clock.h"
 
 namespace narpa {
 namespace {
@@ -24,17 +21,9 @@ struct RawHit {
     Vec3f normal;  ///< not unit
 };
 
-using Region = tbb::blocked_range2d<int>;
 using TileHits = std::array<RawHit, static_cast<std::size_t>(kRawTile* kRawTile)>;
 std::size_t place(int x, int y) {
     return static_cast<std::size_t>(y * kRawTile + x);
-}
-
-/// Calls `work(tile)` for tiles of the image.
-template <class Work>
-void over_tiles(const Camera& camera, const Work& work) {
-    tbb::parallel_for(Region(0, camera.height, kRawTile, 0, camera.width, kRawTile), work,
-                      tbb::simple_partitioner());
 }
 
 /// Rays through 4 x 4 pixels.
@@ -76,25 +65,8 @@ struct ShadowRays {
     }
 };
 
-}  // namespace
-
-struct RawEmbree::Impl {
-    RawScene raw;
-};
-
-Result<RawEmbree> RawEmbree::create(const Scene& scene, const BodyPoses& at) {
-    auto raw = RawScene::build(scene, at);
-    if (!raw) return raw.error();
-    return RawEmbree(std::make_unique<Impl>(Impl{*std::move(raw)}));
-}
-RawEmbree::RawEmbree(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-RawEmbree::RawEmbree(RawEmbree&&) noexcept = default;
-RawEmbree::~RawEmbree() = default;
-
-namespace {
-
 /// Traces the rays through a tile's pixel centres. `hits`: out, row by row.
-std::uint64_t trace_primary(const RawAim& a, RTCScene scene, const Region& tile, TileHits& hits) {
+std::uint64_t trace_primary(const RawAim& a, RTCScene scene, const RawTile& tile, TileHits& hits) {
     alignas(64) RTCRayHit16 q{};
     alignas(64) std::array<int, 16> valid{};
     std::uint64_t met = 0;
@@ -118,7 +90,7 @@ std::uint64_t trace_primary(const RawAim& a, RTCScene scene, const Region& tile,
 }
 
 /// Traces shadow rays from all hits of a tile that face the Sun, 4 x 4 pixels after 4 x 4 pixels.
-void trace_shadows(const RawAim& a, RTCScene scene, const Region& tile, const TileHits& hits, const Vec3f& sun,
+void trace_shadows(const RawAim& a, RTCScene scene, const RawTile& tile, const TileHits& hits, const Vec3f& sun,
                    ShadowRays& shadows) {
     const int width = static_cast<int>(tile.cols().size()), height = static_cast<int>(tile.rows().size());
     for (int y0 = 0; y0 < height; y0 += 4)
@@ -136,16 +108,12 @@ void trace_shadows(const RawAim& a, RTCScene scene, const Region& tile, const Ti
     if (shadows.n > 0) shadows.trace(scene);
 }
 
-}  // namespace
-
-RawCost RawEmbree::trace(const Camera& camera, const Rigid3& T_world_camera, const Vec3& to_sun) const {
-    const RawAim a(camera, T_world_camera);
-    const RTCScene scene = impl_->raw.scene.get();
-    const Vec3f sun = vec_cast<float>(to_sun);
+RawCost trace(const RawScene& raw, const RawAim& a, const Camera& camera, const Vec3f& sun) {
+    const RTCScene scene = raw.scene.get();
     std::atomic<std::uint64_t> met{0}, traced{0}, shadowed{0};
     std::atomic<std::int64_t> primary_ns{0}, shadow_ns{0};
     const std::int64_t start_ns = monotonic_ns();
-    over_tiles(camera, [&](const Region& tile) {
+    over_raw_tiles(camera, [&](const RawTile& tile) {
         const std::int64_t tile_start_ns = monotonic_ns();
         TileHits hits;
         met += trace_primary(a, scene, tile, hits);
@@ -156,12 +124,23 @@ RawCost RawEmbree::trace(const Camera& camera, const Rigid3& T_world_camera, con
         primary_ns += primary_end_ns - tile_start_ns, shadow_ns += monotonic_ns() - primary_end_ns;
     });
     RawCost cost;
-    const double wall_s = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
+    const double wall_s = seconds_since(start_ns);
     cost.primary_s = wall_s * static_cast<double>(primary_ns) / static_cast<double>(primary_ns + shadow_ns);
     cost.shadow_s = wall_s - cost.primary_s;
     cost.primaries = static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
     cost.hits = met, cost.shadow_rays = traced, cost.shadowed = shadowed;
     return cost;
+}
+
+}  // namespace
+
+Result<RawFrame> raw_embree(const Scene& scene, const BodyPoses& at) {
+    auto raw = RawScene::build(scene, at);
+    if (!raw) return raw.error();
+    return RawFrame([raw = std::make_shared<RawScene>(*std::move(raw))](const Camera& camera, const Rigid3& T,
+                                                                        const Vec3& to_sun) {
+        return trace(*raw, RawAim(camera, T), camera, vec_cast<float>(to_sun));
+    });
 }
 
 }  // namespace narpa

@@ -5,7 +5,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <functional>
 
 #include "base/result.h"
 #include "renderer/geometry/tracer.h"
@@ -19,21 +19,11 @@ struct RawCost {
     [[nodiscard]] double seconds() const noexcept { return primary_s + shadow_s; }
 };
 
-class RawEmbree {
-public:
-    /// Bodies are meshes and stay at `at`.
-    static Result<RawEmbree> create(const Scene& scene, const BodyPoses& at);
-    RawEmbree(RawEmbree&&) noexcept;
-    ~RawEmbree();
+/// Traces the rays through all pixel centres, and from their hits to the Sun's centre in direction `to_sun` (unit,
+/// world). On the calling thread's TBB arena.
+using RawFrame = std::function<RawCost(const Camera& camera, const Rigid3& T_world_camera, const Vec3& to_sun)>;
 
-    /// Traces the rays through all pixel centres, and from their hits to the Sun's centre in direction `to_sun`
-    /// (unit, world). On the calling thread's TBB arena.
-    [[nodiscard]] RawCost trace(const Camera& camera, const Rigid3& T_world_camera, const Vec3& to_sun) const;
-
-private:
-    struct Impl;
-    explicit RawEmbree(std::unique_ptr<Impl>);
-    std::unique_ptr<Impl> impl_;
-};
+/// Of a scene whose bodies are meshes and stay at `at`; else an Error.
+[[nodiscard]] Result<RawFrame> raw_embree(const Scene& scene, const BodyPoses& at);
 
 }  // namespace narpa

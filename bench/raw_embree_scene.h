@@ -2,6 +2,9 @@
 /// world axes, single precision, no instances, default build. What the bench holds narpa's own tracer against.
 #pragma once
 
+#include <tbb/blocked_range2d.h>
+#include <tbb/parallel_for.h>
+
 #include <vector>
 
 #include "base/result.h"
@@ -30,5 +33,13 @@ struct RawAim {
 };
 
 inline constexpr int kRawTile = 32;  ///< pixels a side: what one task does
+using RawTile = tbb::blocked_range2d<int>;
+
+/// Calls `work(tile)` for tiles of the image. On the calling thread's TBB arena.
+template <class Work>
+void over_raw_tiles(const Camera& camera, const Work& work) {
+    tbb::parallel_for(RawTile(0, camera.height, kRawTile, 0, camera.width, kRawTile), work,
+                      tbb::simple_partitioner());
+}
 
 }  // namespace narpa

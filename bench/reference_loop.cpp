@@ -1,13 +1,11 @@
 #include "bench/reference_loop.h"
 
-#include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <vector>
 
@@ -95,49 +93,35 @@ struct LampFace {
     float chosen_below;                      ///< sum of the chances up to this one
 };
 
-}  // namespace
+class Loop {
+public:
+    Loop(const Scene& s, RawScene raw_scene) : scene(s), raw(std::move(raw_scene)) {
+        if (scene.sun) {
+            to_sun = vec_cast<float>(normalized(scene.sun->direction));
+            sun_radius = static_cast<float>(std::sin(0.5 * scene.sun->angular_diameter_rad));
+        }
+        find_lamps();
+    }
+    std::uint64_t render(const Camera& camera, const RawAim& aim, const FrameSettings& s, RadianceImage& out) const;
 
-struct ReferenceLoop::Impl {
-    const Scene& scene;
-    RawScene raw;
-    Vec3f to_sun{};
-    float sun_radius = 0;  ///< sine of the half angle
-    std::vector<LampFace> lamps{};
-
+private:
     void find_lamps();
     std::uint64_t trace(Paths& p, const FrameSettings& s) const;
     [[nodiscard]] Point point_of(const Paths& p, int i) const;
     [[nodiscard]] Incident from_sun(Counter& random) const;
     [[nodiscard]] Incident from_lamps(const Point& p, Counter& random) const;
     template <class Source>
-    std::uint64_t ask(Paths& p, const Source& source) const;
-    std::uint64_t ask_lights(Paths& p, bool direct) const;
+    std::uint64_t trace_shadows(Paths& p, const Source& source) const;
+    std::uint64_t light_directly(Paths& p, bool direct) const;
+
+    const Scene& scene;
+    const RawScene raw;
+    Vec3f to_sun{};
+    float sun_radius = 0;  ///< sine of the half angle
+    std::vector<LampFace> lamps{};
 };
 
-Result<ReferenceLoop> ReferenceLoop::create(const Scene& scene, const BodyPoses& at) {
-    for (const Material& m : scene.materials)
-        if (m.kind > Material::Kind::phong || m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 ||
-            m.height_texture >= 0)
-            return Error{"material \"" + m.name + "\", expected Lambert or Phong without textures", scene.file};
-    for (const Mesh& m : scene.meshes)
-        if (!m.normals.empty())
-            return Error{"mesh \"" + m.name + "\" has normals, expected flat faces", scene.file};
-    if (!scene.lights.empty()) return Error{"the scene has a [[light]], expected the Sun alone", scene.file};
-    auto raw = RawScene::build(scene, at);
-    if (!raw) return raw.error();
-    auto impl = std::make_unique<Impl>(Impl{scene, *std::move(raw)});
-    if (scene.sun) {
-        impl->to_sun = vec_cast<float>(normalized(scene.sun->direction));
-        impl->sun_radius = static_cast<float>(std::sin(0.5 * scene.sun->angular_diameter_rad));
-    }
-    impl->find_lamps();
-    return ReferenceLoop(std::move(impl));
-}
-ReferenceLoop::ReferenceLoop(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-ReferenceLoop::ReferenceLoop(ReferenceLoop&&) noexcept = default;
-ReferenceLoop::~ReferenceLoop() = default;
-
-Point ReferenceLoop::Impl::point_of(const Paths& p, int i) const {
+Point Loop::point_of(const Paths& p, int i) const {
     const std::size_t face = p.q.hit.primID[i];
     const Vec3f a = raw.vertices[raw.corners[3 * face]], b = raw.vertices[raw.corners[3 * face + 1]],
                 c = raw.vertices[raw.corners[3 * face + 2]];
@@ -149,7 +133,7 @@ Point ReferenceLoop::Impl::point_of(const Paths& p, int i) const {
 }
 
 /// Each triangle is chosen in proportion to its area times its radiance.
-void ReferenceLoop::Impl::find_lamps() {
+void Loop::find_lamps() {
     double sum = 0;
     for (std::size_t face = 0; face < raw.face_material.size(); ++face) {
         const Rgb& emission = scene.materials[raw.face_material[face]].emission;
@@ -165,13 +149,13 @@ void ReferenceLoop::Impl::find_lamps() {
     for (LampFace& lamp : lamps) lamp.radiance_area = total * lamp.radiance_area, lamp.chosen_below /= total;
 }
 
-Incident ReferenceLoop::Impl::from_sun(Counter& random) const {
+Incident Loop::from_sun(Counter& random) const {
     const auto irradiance = static_cast<float>(scene.sun->irradiance_w_m2);
     const auto [u, v] = random.two();
     return {about(to_sun, sun_radius * std::sqrt(u), v), kFarthest, {irradiance, irradiance, irradiance}};
 }
 
-Incident ReferenceLoop::Impl::from_lamps(const Point& p, Counter& random) const {
+Incident Loop::from_lamps(const Point& p, Counter& random) const {
     const float choice = random.two()[0];
     const auto chosen = std::upper_bound(lamps.begin(), lamps.end() - 1, choice,
                                          [](float c, const LampFace& lamp) { return c < lamp.chosen_below; });
@@ -184,9 +168,9 @@ Incident ReferenceLoop::Impl::from_lamps(const Point& p, Counter& random) const 
     return {l, range_m * (1 - 1e-4f), per_area * chosen->radiance_area};
 }
 
-/// The light of one source on the points of the packet.
+/// The light of one source on the points of all paths.
 template <class Source>
-std::uint64_t ReferenceLoop::Impl::ask(Paths& p, const Source& source) const {
+std::uint64_t Loop::trace_shadows(Paths& p, const Source& source) const {
     std::uint64_t rays = 0;
     for (std::size_t i = 0; i < 16; ++i) {
         p.shadow_valid[i] = 0;
@@ -210,16 +194,16 @@ std::uint64_t ReferenceLoop::Impl::ask(Paths& p, const Source& source) const {
 }
 
 /// By direct light what shines is seen and lights nothing.
-std::uint64_t ReferenceLoop::Impl::ask_lights(Paths& p, bool direct) const {
+std::uint64_t Loop::light_directly(Paths& p, bool direct) const {
     std::uint64_t rays = 0;
-    if (scene.sun) rays += ask(p, [&](const Point&, Counter& random) { return from_sun(random); });
+    if (scene.sun) rays += trace_shadows(p, [&](const Point&, Counter& random) { return from_sun(random); });
     if (!direct && !lamps.empty())
-        rays += ask(p, [&](const Point& point, Counter& random) { return from_lamps(point, random); });
+        rays += trace_shadows(p, [&](const Point& point, Counter& random) { return from_lamps(point, random); });
     return rays;
 }
 
 /// From the camera's rays to their light.
-std::uint64_t ReferenceLoop::Impl::trace(Paths& p, const FrameSettings& s) const {
+std::uint64_t Loop::trace(Paths& p, const FrameSettings& s) const {
     const bool direct = s.method == RenderSettings::Method::direct;
     std::uint64_t rays = 0;
     for (int depth = 0;; ++depth) {
@@ -242,7 +226,7 @@ std::uint64_t ReferenceLoop::Impl::trace(Paths& p, const FrameSettings& s) const
             any = true;
         }
         if (!any || (!direct && depth == s.max_depth)) return rays;
-        rays += ask_lights(p, direct);
+        rays += light_directly(p, direct);
         if (direct) return rays;
         for (int k = 0; k < 16; ++k) {
             const auto i = static_cast<std::size_t>(k);
@@ -255,52 +239,67 @@ std::uint64_t ReferenceLoop::Impl::trace(Paths& p, const FrameSettings& s) const
     }
 }
 
-std::uint64_t ReferenceLoop::render(const Camera& camera, const Rigid3& T_world_camera, const FrameSettings& s,
-                                    RadianceImage& out) const {
-    const RawAim aim(camera, T_world_camera);
+std::uint64_t Loop::render(const Camera& camera, const RawAim& aim, const FrameSettings& s,
+                           RadianceImage& out) const {
     const int strata = static_cast<int>(std::sqrt(static_cast<double>(s.spp)) + 1e-9);  // a side
     std::atomic<std::uint64_t> rays{0};
     std::fill(out.pixels.begin(), out.pixels.end(), Rgb{});
-    using Region = tbb::blocked_range2d<int>;
-    tbb::parallel_for(
-        Region(0, camera.height, kRawTile, 0, camera.width, kRawTile),
-        [&](const Region& tile) {
-            Paths p;
-            std::size_t n = 0;
-            std::uint64_t here = 0;
-            const auto flush = [&] {
-                for (std::size_t i = 0; i < 16; ++i) p.valid[i] = i < n ? -1 : 0;
-                here += impl_->trace(p, s);
-                for (std::size_t i = 0; i < n; ++i)
-                    out.pixels[p.pixel[i]] += (1 / static_cast<float>(s.spp)) * p.light[i];
-                n = 0;
-            };
-            const auto add = [&](int x, int y, int sample) {
-                const auto number = static_cast<std::uint32_t>(y * camera.width + x);
-                p.pixel[n] = number;
-                p.random[n] = Counter(s, number, static_cast<std::uint32_t>(sample));
-                auto [u, v] = p.random[n].two();
-                if (sample < strata * strata) {  // the samples beyond the last square lie anywhere
-                    u = (static_cast<float>(sample % strata) + u) / static_cast<float>(strata);
-                    v = (static_cast<float>(sample / strata) + v) / static_cast<float>(strata);
-                }
-                const Vec3f d = aim.ahead + (static_cast<float>(x) + u - 0.5f) * aim.across +
-                                (static_cast<float>(y) + v - 0.5f) * aim.down;
-                p.throughput[n] = {1, 1, 1};
-                p.light[n] = {};
-                p.start(static_cast<int>(n), aim.origin, d);
-                if (++n == 16) flush();
-            };
-            for (int y0 = tile.rows().begin(); y0 < tile.rows().end(); y0 += 4)
-                for (int x0 = tile.cols().begin(); x0 < tile.cols().end(); x0 += 4)
-                    for (int y = y0; y < std::min(y0 + 4, tile.rows().end()); ++y)
-                        for (int x = x0; x < std::min(x0 + 4, tile.cols().end()); ++x)
-                            for (int sample = 0; sample < s.spp; ++sample) add(x, y, sample);
-            if (n > 0) flush();
-            rays += here;
-        },
-        tbb::simple_partitioner());
+    over_raw_tiles(camera, [&](const RawTile& tile) {
+        Paths p;
+        std::size_t n = 0;
+        std::uint64_t here = 0;
+        const auto flush = [&] {
+            for (std::size_t i = 0; i < 16; ++i) p.valid[i] = i < n ? -1 : 0;
+            here += trace(p, s);
+            for (std::size_t i = 0; i < n; ++i)
+                out.pixels[p.pixel[i]] += (1 / static_cast<float>(s.spp)) * p.light[i];
+            n = 0;
+        };
+        const auto add = [&](int x, int y, int sample) {
+            const auto number = static_cast<std::uint32_t>(y * camera.width + x);
+            p.pixel[n] = number;
+            p.random[n] = Counter(s, number, static_cast<std::uint32_t>(sample));
+            auto [u, v] = p.random[n].two();
+            if (sample < strata * strata) {  // the samples beyond the last square lie anywhere
+                u = (static_cast<float>(sample % strata) + u) / static_cast<float>(strata);
+                v = (static_cast<float>(sample / strata) + v) / static_cast<float>(strata);
+            }
+            const Vec3f d = aim.ahead + (static_cast<float>(x) + u - 0.5f) * aim.across +
+                            (static_cast<float>(y) + v - 0.5f) * aim.down;
+            p.throughput[n] = {1, 1, 1};
+            p.light[n] = {};
+            p.start(static_cast<int>(n), aim.origin, d);
+            if (++n == 16) flush();
+        };
+        for (int y0 = tile.rows().begin(); y0 < tile.rows().end(); y0 += 4)
+            for (int x0 = tile.cols().begin(); x0 < tile.cols().end(); x0 += 4)
+                for (int y = y0; y < std::min(y0 + 4, tile.rows().end()); ++y)
+                    for (int x = x0; x < std::min(x0 + 4, tile.cols().end()); ++x)
+                        for (int sample = 0; sample < s.spp; ++sample) add(x, y, sample);
+        if (n > 0) flush();
+        rays += here;
+    });
     return rays;
+}
+
+}  // namespace
+
+Result<ReferenceLoop> reference_loop(const Scene& scene, const BodyPoses& at) {
+    for (const Material& m : scene.materials)
+        if (m.kind > Material::Kind::phong || m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 ||
+            m.height_texture >= 0)
+            return Error{"material \"" + m.name + "\", expected Lambert or Phong without textures", scene.file};
+    for (const Mesh& m : scene.meshes)
+        if (!m.normals.empty())
+            return Error{"mesh \"" + m.name + "\" has normals, expected flat faces", scene.file};
+    if (!scene.lights.empty()) return Error{"the scene has a [[light]], expected the Sun alone", scene.file};
+    auto raw = RawScene::build(scene, at);
+    if (!raw) return raw.error();
+    return ReferenceLoop(
+        [loop = std::make_shared<Loop>(scene, *std::move(raw))](const Camera& camera, const Rigid3& T,
+                                                                const FrameSettings& settings, RadianceImage& out) {
+            return loop->render(camera, RawAim(camera, T), settings, out);
+        });
 }
 
 }  // namespace narpa

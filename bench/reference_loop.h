@@ -7,30 +7,20 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <functional>
 
 #include "base/result.h"
 #include "renderer/film/camera_image.h"
 
 namespace narpa {
 
-class ReferenceLoop {
-public:
-    /// Meshes of flat faces, Lambert and Phong without textures, Sun, ambient and surfaces that shine; an Error for
-    /// anything else. Both outlive it; the bodies stay where `at` has them now.
-    static Result<ReferenceLoop> create(const Scene& scene, const BodyPoses& at);
-    ReferenceLoop(ReferenceLoop&&) noexcept;
-    ~ReferenceLoop();
+/// Of the settings: spp (each somewhere in the pixel, also where it is one), seed, frame, method, max_depth.
+/// Returns the number of rays. On the calling thread's TBB arena; same bytes on any number of threads.
+using ReferenceLoop = std::function<std::uint64_t(const Camera& camera, const Rigid3& T_world_camera,
+                                                  const FrameSettings& settings, RadianceImage& out)>;
 
-    /// Of the settings: spp (each somewhere in the pixel, also where it is one), seed, frame, method, max_depth.
-    /// Returns the number of rays. On the calling thread's TBB arena; same bytes on any number of threads.
-    std::uint64_t render(const Camera& camera, const Rigid3& T_world_camera, const FrameSettings& settings,
-                         RadianceImage& out) const;
-
-private:
-    struct Impl;
-    explicit ReferenceLoop(std::unique_ptr<Impl>);
-    std::unique_ptr<Impl> impl_;
-};
+/// Of meshes of flat faces, Lambert and Phong without textures, Sun, ambient and surfaces that shine; an Error for
+/// anything else. `scene` outlives it; the bodies stay where `at` has them now.
+[[nodiscard]] Result<ReferenceLoop> reference_loop(const Scene& scene, const BodyPoses& at);
 
 }  // namespace narpa

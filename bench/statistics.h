@@ -1,4 +1,4 @@
-/// bench/statistics.h - medians, quantiles and times, as the benches of the estimators need them.
+/// bench/statistics.h - means, medians, quantiles and times.
 #pragma once
 
 #include <algorithm>
@@ -17,17 +17,33 @@ namespace narpa {
     return *at;
 }
 
-[[nodiscard]] inline double rms(const std::vector<double>& values) {
-    double sum = 0;
-    for (const double v : values) sum += v * v;
-    return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+/// Of an even number of values the mean of the middle two; 0 for none.
+[[nodiscard]] inline double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    const std::size_t n = values.size();
+    return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
 
-/// CPU time of the calling thread: other load on the machine does not count.
-[[nodiscard]] inline double thread_microseconds() {
+/// Mean and root mean square of the values added; 0 for none.
+class Mean {
+public:
+    void add(double value) { ++n_, sum_ += value, squares_ += value * value; }
+    [[nodiscard]] int count() const noexcept { return n_; }
+    [[nodiscard]] double mean() const { return sum_ / std::max(1, n_); }
+    [[nodiscard]] double rms() const { return std::sqrt(squares_ / std::max(1, n_)); }
+
+private:
+    int n_ = 0;
+    double sum_ = 0, squares_ = 0;
+};
+
+/// CPU time of a clock: CLOCK_THREAD_CPUTIME_ID of the calling thread, CLOCK_PROCESS_CPUTIME_ID of all threads.
+/// Other load on the machine does not count.
+[[nodiscard]] inline double cpu_s(clockid_t clock) {
     std::timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
+    clock_gettime(clock, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 }  // namespace narpa

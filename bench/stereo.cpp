@@ -3,16 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <limits>
 #include <optional>
 
-#include "emulator/world.h"
-#include "estimator/pose/pose_estimate.h"
+#include "base/constants.h"
+#include "base/time.h"
+#include "bench/statistics.h"
+#include "emulator/camera_unit.h"
 #include "renderer/camera/camera_model.h"
-#include "renderer/camera/detector.h"
-#include "renderer/film/camera_image.h"
 
 namespace narpa {
 namespace {
@@ -20,44 +18,29 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-const Camera* find_camera(const Scene& scene, const std::string& name) {
-    const auto it = std::ranges::find(scene.cameras, name, &Camera::name);
-    return it == scene.cameras.end() ? nullptr : &*it;
-}
+/// Depths that are searched, in parts of the depth in the middle of the left frame: what an altimeter would give.
+constexpr double kNearestPart = 0.75, kFarthestPart = 1.5;
 
 Vector3d direction(const Camera& c, const Vector2d& px) {
     return to_eigen(CameraModelHandle(c)->on_plane({px.x(), px.y()}));
 }
 
-/// One of the two cameras, where it is, and what is around it.
+/// One of the two cameras, and its frame at time 0.
 struct Station {
-    const World& world;
-    const BodyPoses& at;
-    const Camera& camera;
-    Rigid3 T_world_camera;
-
-    [[nodiscard]] Result<MeasuredImage> frame(const StereoBenchSettings& s, std::uint32_t number) const {
-        const RenderSettings& r = world.scene().render;
-        FrameSettings f;
-        f.spp = s.spp > 0 ? s.spp : r.spp;
-        f.method = r.method, f.max_depth = r.max_depth;
-        f.seed = r.seed, f.frame = number;
-        RadianceImage radiance(camera.width, camera.height);
-        render_radiance(world.render_scene(), at, camera, T_world_camera, f, radiance);
-        std::vector<std::uint8_t> bytes(
-            frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
-        expose(camera, radiance, r.seed, number, bytes);
-        return measured_image(camera, bytes);
+    Station(const World& w, std::size_t index, std::uint32_t frame) : world(w), unit(w, index) {
+        unit.expose(frame, 0);
+        T_world_camera = world.sensor_pose(unit.camera().mount, unit.camera().T_mount_camera, unit.placement());
     }
+    const World& world;
+    CameraUnit unit;
+    Rigid3 T_world_camera{};
+
+    [[nodiscard]] Result<MeasuredImage> frame() const { return measured_image(unit.camera(), unit.bytes()); }
     /// In the camera's frame.
     [[nodiscard]] std::optional<Vector3d> surface(const Vector2d& px) const {
-        const Vec3 ray = normalized(to_vec3(direction(camera, px)));
-        const Hit hit = world.tracer().intersect(at, {T_world_camera.t, T_world_camera.q * ray},
-                                                 std::numeric_limits<double>::infinity());
+        const Vec3 ray = normalized(to_vec3(direction(unit.camera(), px)));
+        const Hit hit =
+            world.tracer().intersect(unit.placement(), {T_world_camera.t, T_world_camera.q * ray}, kInfinity);
         if (hit.body < 0) return {};
         return to_eigen(hit.range_m * ray);
     }
@@ -76,7 +59,6 @@ Result<StereoBenchPoint> beside_truth(const StereoPair& pair, const Station& lef
     out.whole_error_m = *depth * direction(pair.left, p.left_px) - *truth;
     out.fine_error_m = p.point.point_m - *truth;
     out.sigma_depth_m = std::sqrt(p.point.covariance_m2(2, 2));
-    out.normalised_squared = std::pow(out.fine_error_m.z() / out.sigma_depth_m, 2);
     out.epipolar_sigmas = p.point.epipolar_sigmas;
     return out;
 }
@@ -86,11 +68,9 @@ Result<StereoBenchPoint> beside_truth(const StereoPair& pair, const Station& lef
 Spread spread(std::vector<double> values) {
     Spread s;
     if (values.empty()) return s;
-    for (double& v : values) {
-        v = std::abs(v);
-        s.rms += v * v / static_cast<double>(values.size());
-    }
-    s.rms = std::sqrt(s.rms);
+    Mean all;
+    for (double& v : values) all.add(v = std::abs(v));
+    s.rms = all.rms();
     std::ranges::sort(values);
     const auto quantile = [&](double p) {
         const double at = p * static_cast<double>(values.size() - 1), part = at - std::floor(at);
@@ -100,10 +80,10 @@ Spread spread(std::vector<double> values) {
     s.lower_quartile = quantile(0.25), s.median = quantile(0.5), s.upper_quartile = quantile(0.75);
     s.largest = values.back();
     const double reach = 1.5 * (s.upper_quartile - s.lower_quartile);
-    s.low = *std::ranges::find_if(values, [&](double v) { return v >= s.lower_quartile - reach; });
-    for (const double v : values)
-        if (v <= s.upper_quartile + reach) s.high = v;
-    s.outliers = static_cast<int>(std::ranges::count_if(values, [&](double v) { return v < s.low || v > s.high; }));
+    const auto low = std::ranges::lower_bound(values, s.lower_quartile - reach);
+    const auto beyond = std::ranges::upper_bound(values, s.upper_quartile + reach);
+    s.whiskers = {*low, *(beyond - 1)};
+    s.outliers = static_cast<int>((low - values.begin()) + (values.end() - beyond));
     return s;
 }
 
@@ -118,63 +98,58 @@ double StereoBench::gain() const {
     return errors(false, 2, true).rms / errors(true, 2, true).rms;
 }
 double StereoBench::mean_normalised_squared() const {
-    double sum = 0;
-    for (const StereoBenchPoint& p : points) sum += p.normalised_squared;
-    return sum / static_cast<double>(points.size());
+    Mean sigmas;
+    for (const StereoBenchPoint& p : points) sigmas.add(p.fine_error_m.z() / p.sigma_depth_m);
+    return sigmas.rms() * sigmas.rms();
 }
 double StereoBench::mean_epipolar_squared() const {
-    double sum = 0;
-    for (const StereoBenchPoint& p : points) sum += p.epipolar_sigmas * p.epipolar_sigmas;
-    return sum / static_cast<double>(points.size());
+    Mean sigmas;
+    for (const StereoBenchPoint& p : points) sigmas.add(p.epipolar_sigmas);
+    return sigmas.rms() * sigmas.rms();
 }
 
-Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings& settings,
+Result<StereoBench> measure_stereo(const Scene& scene, int points,
                                    const std::function<void(const std::string&)>& progress) {
-    const Camera *left = find_camera(scene, "left"), *right = find_camera(scene, "right");
-    if (!left || !right)
-        return Error{"no stereo pair, expected two cameras with the names left and right", scene.file};
+    const auto left = sensor_named(scene.cameras, "left", "camera", scene.file);
+    if (!left) return left.error();
+    const auto right = sensor_named(scene.cameras, "right", "camera", scene.file);
+    if (!right) return right.error();
     progress("building");
     const auto world = World::create(scene);
     if (!world) return world.error();
-    BodyPoses at(scene.bodies.size());
-    (*world)->place(std::llround(settings.seconds * 1e9), -1, at);
-    const auto station = [&](const Camera& c) {
-        return Station{**world, at, c, (*world)->sensor_pose(c.mount, c.T_mount_camera, at)};
-    };
-    const Station l = station(*left), r = station(*right);
     StereoBench out;
     out.scene = scene.name;
-    out.pair = {*left, *right, inverse(r.T_world_camera) * l.T_world_camera};
+    progress("frames");
+    const std::int64_t render_start_ns = monotonic_ns();
+    const Station l(**world, *left, 0), r(**world, *right, 1);
+    out.render_s = seconds_since(render_start_ns);
+    const Camera& camera = l.unit.camera();
+    out.pair = {camera, r.unit.camera(), inverse(r.T_world_camera) * l.T_world_camera};
 
-    const auto middle = l.surface({left->cx, left->cy});
+    const auto middle = l.surface({camera.cx, camera.cy});
     if (!middle)
         return Error{"the middle of the left frame sees no surface, expected ground to measure from", scene.file};
-
-    const auto start = std::chrono::steady_clock::now();
-    progress("left frame");
-    auto left_frame = l.frame(settings, 2 * settings.frame);
+    auto left_frame = l.frame();
     if (!left_frame) return left_frame.error();
-    progress("right frame");
-    const auto right_frame = r.frame(settings, 2 * settings.frame + 1);
+    const auto right_frame = r.frame();
     if (!right_frame) return right_frame.error();
-    out.render_s = seconds_since(start);
 
     progress("matching");
     StereoSettings s;
-    s.points_max = settings.points;
-    s.nearest_m = settings.nearest_part * middle->z(), s.farthest_m = settings.farthest_part * middle->z();
-    const auto match_start = std::chrono::steady_clock::now();
+    s.points_max = points;
+    s.nearest_m = kNearestPart * middle->z(), s.farthest_m = kFarthestPart * middle->z();
+    const std::int64_t match_start_ns = monotonic_ns();
     const auto found = match_stereo(out.pair, *left_frame, *right_frame, s);
     if (!found) return found.error();
-    out.match_s = seconds_since(match_start);
+    out.match_s = seconds_since(match_start_ns);
     out.counts = found->counts;
     for (const StereoPoint& p : found->points) {
         const auto point = beside_truth(out.pair, l, p);
         if (!point) return point.error();
         out.points.push_back(*point);
     }
-    out.left = std::move(*left_frame);
-    out.left_top_dn = sensor_model(*left).top_dn;
+    out.left = *std::move(left_frame);
+    out.left_top_dn = sensor_model(camera).top_dn;
     return out;
 }
 

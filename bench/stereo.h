@@ -2,6 +2,7 @@
 /// matches, against the tracer's ranges.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -12,16 +13,6 @@
 
 namespace narpa {
 
-struct StereoBenchSettings {
-    int points = 100;
-    int spp = 0;              ///< 0: the scene's
-    std::uint32_t frame = 0;  ///< of the detectors' noise; two frames take two numbers
-    double seconds = 0;       ///< the time that the scene shows
-    /// Depths that are searched, in parts of the depth in the middle of the left frame: what an altimeter would
-    /// give.
-    double nearest_part = 0.75, farthest_part = 1.5;
-};
-
 /// One feature. Positions in the left camera's frame, m; the truth is where the ray through the left pixel meets
 /// the scene.
 struct StereoBenchPoint {
@@ -30,15 +21,14 @@ struct StereoBenchPoint {
     Eigen::Vector3d whole_error_m = Eigen::Vector3d::Zero();  ///< the printed formula, whole pixels
     Eigen::Vector3d fine_error_m = Eigen::Vector3d::Zero();   ///< maximum likelihood, between pixels
     double sigma_depth_m = 0;                                 ///< predicted for the latter
-    double normalised_squared =
-        0;  ///< of its depth error: chi-square with one degree of freedom where that is right
     double epipolar_sigmas = 0;
 };
 
 /// Of absolute values: quartiles; whiskers to the last value within 1.5 interquartile ranges of the box (Tukey
 /// 1977); the number beyond.
 struct Spread {
-    double low = 0, lower_quartile = 0, median = 0, upper_quartile = 0, high = 0;
+    std::array<double, 2> whiskers{};
+    double lower_quartile = 0, median = 0, upper_quartile = 0;
     double largest = 0, rms = 0;
     int outliers = 0;
 };
@@ -63,10 +53,10 @@ struct StereoBench {
     [[nodiscard]] double mean_epipolar_squared() const;
 };
 
-/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches them. `progress`
-/// is called with each step. Errors: no such cameras; no surface in the middle of the left frame; what match_stereo
-/// says; a match whose left pixel sees no surface.
-[[nodiscard]] Result<StereoBench> measure_stereo(const Scene& scene, const StereoBenchSettings& settings,
+/// Renders the scene's cameras `left` and `right`, exposes them with their detectors and matches so many points.
+/// `progress` is called with each step. Errors: no such cameras; no surface in the middle of the left frame; what
+/// match_stereo says; a match whose left pixel sees no surface.
+[[nodiscard]] Result<StereoBench> measure_stereo(const Scene& scene, int points,
                                                  const std::function<void(const std::string&)>& progress);
 
 /// What is wrong, one sentence each: fewer points than this, a gain below 5, errors that are not as predicted

@@ -48,7 +48,7 @@ endfunction()
 
 # narpa_link(TARGET NAME=LIBRARY...) - links libraries that only the target's sources include. LIBRARY, often an imported
 # target, is linked here and -lNAME in the installed package: its users need the library but not its CMake package, of
-# which those of Ceres and Imath print warnings and dozens of lines. "NAME" alone: both are the same.
+# which that of Imath prints dozens of lines. "NAME" alone: both are the same.
 function(narpa_link target)
   string(REGEX REPLACE "^narpa_([a-z]+).*" "\\1" component ${target})
   foreach(entry ${ARGN})

@@ -158,7 +158,7 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
         return;
     }
     out.matches = static_cast<int>(e->pixels);
-    out.renders += static_cast<int>(e->steps.size());
+    out.renders += e->renders;
     if (e->status != DenseStatus::converged) {
         out.why = std::string(name(e->status));
         return;

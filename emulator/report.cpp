@@ -16,20 +16,16 @@ namespace narpa {
 
 using nlohmann::json;
 
+template <class H>
+json percentiles(const H& h, double unit) {
+    json out = json::object();
+    for (const auto& [name, p] : kPercentiles) out[name] = h.percentile_ns(p) * unit;
+    return out;
+}
+template json percentiles(const Histogram&, double);
+template json percentiles(const SignedHistogram&, double);
+
 namespace {
-
-json percentiles_ms(const Histogram& h) {
-    return {
-        {"p50", h.percentile_ns(0.5) * 1e-6}, {"p99", h.percentile_ns(0.99) * 1e-6}, {"max", h.max_ns() * 1e-6}};
-}
-
-json percentiles(const auto& h, double unit) {
-    return {{"p50", h.percentile_ns(0.5) * unit},
-            {"p90", h.percentile_ns(0.9) * unit},
-            {"p99", h.percentile_ns(0.99) * unit},
-            {"p99.9", h.percentile_ns(0.999) * unit},
-            {"max", h.max_ns() * unit}};
-}
 
 json of_estimator(const OnlineEstimator& estimator) {
     return {{"camera", estimator.camera().name},
@@ -96,9 +92,9 @@ json CameraSensor::report() const {
             {"samples_per_pixel", percentiles(s.samples_1e3, 1e-3)},
             {"expected_error", s.error_1e9.count() > 0 ? percentiles(s.error_1e9, 1e-9) : json(nullptr)},
             {"hand_over_after_deadline_ms", lateness(s.late)},
-            {"wake_late_ms", percentiles_ms(s.wake_late)},
-            {"render_ms", percentiles_ms(s.render)},
-            {"mid_exposure_to_hand_over_ms", percentiles_ms(s.hand_over)},
+            {"wake_late_ms", percentiles(s.wake_late, 1e-6)},
+            {"render_ms", percentiles(s.render, 1e-6)},
+            {"mid_exposure_to_hand_over_ms", percentiles(s.hand_over, 1e-6)},
             {"sinks", sinks}};
 }
 
@@ -118,9 +114,9 @@ json LidarSensor::report() const {
             {"skipped", s.skipped},
             {"shots", s.shots},
             {"returns", s.returns},
-            {"wake_late_ms", percentiles_ms(s.wake_late)},
-            {"fire_ms", percentiles_ms(s.fire)},
-            {"due_to_sent_ms", percentiles_ms(s.hand_over)},
+            {"wake_late_ms", percentiles(s.wake_late, 1e-6)},
+            {"fire_ms", percentiles(s.fire, 1e-6)},
+            {"due_to_sent_ms", percentiles(s.hand_over, 1e-6)},
             {"sinks", sinks}};
 }
 

@@ -1,6 +1,7 @@
 /// emulator/report.h - how a run went: as one JSON document for programs, as a few lines for people.
 #pragma once
 
+#include <array>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -15,6 +16,13 @@ namespace narpa {
 [[nodiscard]] nlohmann::json report(const Emulator& emulator);
 /// The same as text.
 [[nodiscard]] std::string in_words(const Emulator& emulator);
+
+/// Named as in JSON.
+inline constexpr std::array<std::pair<const char*, double>, 5> kPercentiles{
+    {{"p50", 0.5}, {"p90", 0.9}, {"p99", 0.99}, {"p99.9", 0.999}, {"max", 1.0}}};
+/// By those names, of a Histogram or a SignedHistogram, in parts of `unit`.
+template <class H>
+[[nodiscard]] nlohmann::json percentiles(const H& histogram, double unit);
 
 /// How many frames were handed over how long after their deadline (negative: before).
 struct LatenessBin {

@@ -7,6 +7,9 @@
 namespace narpa {
 namespace {
 
+/// Beams that meet a surface at a flatter angle are not used.
+constexpr double kGrazingCosine = 0.05;
+
 /// Sixteen places of even density on a disc of radius 1, the first in its middle.
 const std::array<std::array<double, 2>, kLanes>& disc() {
     static const auto places = [] {
@@ -46,8 +49,8 @@ Ray BeamAssociation::in_target(const Rigid3& T, const Beam& beam) const noexcept
     return {q * (beam.origin_m - target_m), q * beam.direction};
 }
 
-void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double grazing_cosine, double search_m,
-                                std::size_t stride, std::vector<PointToPlane>& out) const {
+void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double search_m, std::size_t stride,
+                                std::vector<PointToPlane>& out) const {
     out.clear();
     if (search_m > 0)
         around_beams(T, search_m, stride, out);
@@ -62,7 +65,7 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
             p.sigma_m = std::hypot(noise.range_m, 0.25 * search_m);
             continue;
         }
-        if (!(cosine >= grazing_cosine)) {
+        if (!(cosine >= kGrazingCosine)) {
             p.fate = BeamFate::grazing;
             continue;
         }

@@ -38,8 +38,8 @@ public:
     /// > 0, for poses that are far off, sixteen rays within that distance of the beam are traced and the hit
     /// nearest to the point is used; a point whose beam misses is then attracted by the surface and its edges. Its
     /// sigma_m is a quarter of `search_m` combined with the noise, so that all points within reach weigh alike.
-    void associate(const Rigid3& T_lidar_target, const RangeNoise& noise, double grazing_cosine, double search_m,
-                   std::size_t stride, std::vector<PointToPlane>& out) const;
+    void associate(const Rigid3& T_lidar_target, const RangeNoise& noise, double search_m, std::size_t stride,
+                   std::vector<PointToPlane>& out) const;
 
     /// The derivative of distance_m with an error of the pose (pose_estimate.h), for point `i` of the sweep.
     [[nodiscard]] Vector6 derivative(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const;

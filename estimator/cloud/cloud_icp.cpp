@@ -4,13 +4,17 @@
 #include <cmath>
 #include <string>
 
+#include "estimator/pose/median.h"
+
 namespace narpa {
 namespace {
 
 constexpr std::size_t kFewestBeams = 6;
-constexpr double kTukey = 4.685;        ///< of the biweight: 95 % of the efficiency of least squares
-constexpr double kLastCircle = 0.02;    ///< of the search, in parts of the first
-constexpr double kMadToSigma = 1.4826;  ///< of a normal distribution
+constexpr std::size_t kSearchPoints = 100;  ///< of the sweep, about, that the search uses
+constexpr int kSearchIterations = 10;       ///< of the search, each with a smaller radius
+constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observability.h)
+constexpr double kTukey = 4.685;            ///< of the biweight: 95 % of the efficiency of least squares
+constexpr double kLastCircle = 0.02;        ///< of the search, in parts of the first
 
 /// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
 struct Biweight {
@@ -73,7 +77,7 @@ double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
 }
 
 CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
-    association_.associate(T, settings_.noise, settings_.grazing_cosine, search_m, stride, planes_);
+    association_.associate(T, settings_.noise, search_m, stride, planes_);
     Pass pass;
     magnitudes_.clear();
     for (const PointToPlane& p : planes_)
@@ -81,12 +85,9 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
     out.points = planes_.size();
     out.used = out.missed = out.grazing = out.rejected = out.explained = 0;
     if (magnitudes_.size() < kFewestBeams) return pass;
-    const auto middle = magnitudes_.begin() + static_cast<std::ptrdiff_t>(magnitudes_.size() / 2);
-    std::nth_element(magnitudes_.begin(), middle, magnitudes_.end());
-    out.scatter = kMadToSigma * *middle;
-    pass.scatter = std::max(1.0, out.scatter);
+    pass.scatter = std::max(1.0, kMadToSigma * upper_median(std::span(magnitudes_)));
 
-    double squares = 0, moment = 0;
+    double moment = 0;
     for (std::size_t k = 0; k < planes_.size(); ++k) {
         const PointToPlane& p = planes_[k];
         out.missed += p.fate == BeamFate::missed;
@@ -100,7 +101,6 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
             continue;
         }
         ++out.used;
-        squares += p.distance_m * p.distance_m;
         const Vector6 J = association_.derivative(T, k * stride, p) / p.sigma_m;
         const Matrix6 JJ = J * J.transpose();
         pass.hessian += robust.weight * JJ;
@@ -117,11 +117,10 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
     }
     pass.enough = out.used >= kFewestBeams;
     if (!pass.enough) return pass;
-    out.residual_m = std::sqrt(squares / static_cast<double>(out.used));
     pass.spread.centre_m = pass.spread.centre_m / pass.spread.weight;
     const Vec3& c = pass.spread.centre_m;
     pass.spread.radius_m = std::sqrt(std::max(1e-18, moment / pass.spread.weight - dot(c, c)));
-    out.observability = observability(pass.hessian, pass.spread, settings_.unobserved_below);
+    out.observability = observability(pass.hessian, pass.spread, kUnobservedBelow);
     return pass;
 }
 
@@ -176,10 +175,9 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
 
-    CloudEstimate out = attempt(start, search_m, settings_.search_points, settings_.search_iterations);
+    CloudEstimate out = attempt(start, search_m, kSearchPoints, kSearchIterations);
     if (search_m > 0 && !out.credible) {
-        CloudEstimate again =
-            attempt(start, search_m, 4 * settings_.search_points, 3 * settings_.search_iterations / 2);
+        CloudEstimate again = attempt(start, search_m, 4 * kSearchPoints, 3 * kSearchIterations / 2);
         again.iterations += out.iterations;
         if (again.explained > out.explained) out = again;
     }

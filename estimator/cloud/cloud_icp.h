@@ -18,12 +18,8 @@ namespace narpa {
 
 struct IcpSettings {
     RangeNoise noise{};
-    std::size_t search_points = 100;  ///< of the sweep, about, that the search uses
-    int search_iterations = 10;       ///< of the search, each with a smaller radius
-    int iterations = 50;              ///< at most, after the search
-    double grazing_cosine = 0.05;     ///< beams that meet a surface at a flatter angle are not used
-    double unobserved_below = 1e-3;   ///< normalised eigenvalue (observability.h)
-    double settled = 0.05;            ///< converged: a step of fewer standard deviations; 0: all iterations
+    int iterations = 50;    ///< at most, after the search
+    double settled = 0.05;  ///< converged: a step of fewer standard deviations; 0: all iterations
     /// Least part of the points on the model at a right pose: fewer mean a false minimum. The search is then
     /// repeated with four times the points.
     double explained_least = 0.9;
@@ -40,8 +36,6 @@ struct CloudEstimate {
     int iterations = 0;     ///< with those of the search
     bool settled = false;   ///< the last step was small
     bool credible = false;  ///< settled, and enough points are explained
-    double scatter = 0;     ///< of the residuals, in standard deviations of the noise: 1 where the settings hold
-    double residual_m = 0;  ///< RMS of the distances of the points used from their planes
     std::size_t points = 0, used = 0, missed = 0, grazing = 0, rejected = 0;  ///< sum: points = the rest
     /// Points within four standard deviations of the noise from the model.
     std::size_t explained = 0;

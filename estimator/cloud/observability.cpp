@@ -8,12 +8,9 @@ namespace {
 
 /// Takes (rotation * radius, translation of the centre) to (rotation, translation of the target's origin).
 Matrix6 from_normalised(const PointSpread& spread) {
-    const Vec3& c = spread.centre_m;
-    Eigen::Matrix3d cross_centre;
-    cross_centre << 0, -c.z, c.y, c.z, 0, -c.x, -c.y, c.x, 0;
     Matrix6 S = Matrix6::Identity();
     S.topLeftCorner<3, 3>() /= spread.radius_m;
-    S.bottomLeftCorner<3, 3>() = cross_centre / spread.radius_m;
+    S.bottomLeftCorner<3, 3>() = skew(to_eigen(spread.centre_m)) / spread.radius_m;
     return S;
 }
 

@@ -7,14 +7,14 @@
 /// stays below the sensor's.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
-#include <vector>
 
 #include "base/result.h"
-#include "estimator/dense/photometric_fit.h"
+#include "estimator/dense/level_view.h"
 
 namespace narpa {
 
@@ -22,9 +22,6 @@ namespace narpa {
 /// detector noise alone: 64 rays 3 to 5.5, 512 rays 1.5 to 1.6 (the scene has many details smaller than a pixel); a
 /// smooth body reaches the bound with 100. Frames of 16 samples a pixel whose variance is given reach it with 128.
 struct DenseOptions {
-    ExposurePrior exposure{};
-    double cauchy = 3;             ///< scale of the loss, standard deviations
-    double sigmas = 0.2;           ///< converged: the step is less than so many standard deviations of the pose
     int iterations = 16;           ///< at most, on each level
     int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
     double rays_per_pixel = 16;    ///< of the finest level's images, on average over pixels that show the target;
@@ -45,31 +42,21 @@ enum class DenseStatus : std::uint8_t {
 };
 [[nodiscard]] std::string_view name(DenseStatus status) noexcept;
 
-struct DenseStep {
-    int factor = 1;     ///< of the level: sensor pixels, each way, in one of its pixels
-    double cost = 0;    ///< robust, in units of this level's residual scale, a pixel
-    double sigmas = 0;  ///< length of the step that led here, in standard deviations of the pose
-    Rigid3 T_camera_body{};
-    bool better = false;  ///< the step was taken
-};
-
 struct DenseEstimate {
     DenseStatus status = DenseStatus::converged;
     Rigid3 T_camera_body{};
     Matrix6 covariance = Matrix6::Zero();  ///< PhotometricEquations::pose_covariance; zero unless converged
     Exposure exposure{};
-    double residual_scale = 1;  ///< median residual over that of the noise, at least 1
-    double chi2_per_pixel = 0;  ///< about 1 where the model holds
-    std::size_t pixels = 0;     ///< of the last level that show the target
-    std::vector<DenseStep> steps;
-    double render_ms = 0, derivative_ms = 0, solve_ms = 0;
+    std::size_t pixels = 0;  ///< of the last level that show the target
+    int renders = 0;         ///< images that were compared with the frame
 };
 
 class DenseAlignment {
 public:
     /// `render_scene` outlives it; `target`: index of the body whose pose is estimated.
     DenseAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target);
-    ~DenseAlignment();
+    DenseAlignment(const DenseAlignment&) = delete;
+    DenseAlignment& operator=(const DenseAlignment&) = delete;
 
     /// `at`: poses of all bodies at the time of the frame; the target's attitude determines its illumination, its
     /// position and the camera's are not used. `frame_variance`: DN^2 of the frame in addition to the sensor's
@@ -86,8 +73,16 @@ public:
                                         const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
+    [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
+                               const BodyPoses& at, const Rigid3& guess) const;
+    LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
+                     const MeasuredImage& frame, std::span<const float> frame_variance);
+
+    const RenderScene& render_scene_;
+    Camera camera_;
+    const std::size_t target_;
+    const SensorModel sensor_;
+    std::array<std::optional<LevelView>, 7> levels_{};  ///< by the logarithm of their factor
 };
 
 }  // namespace narpa

@@ -4,7 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "renderer/camera/camera_model.h"
@@ -12,6 +11,8 @@
 namespace narpa {
 namespace {
 
+/// The finest level converges when a step is less than so many standard deviations of the pose.
+constexpr double kConverged_sigmas = 0.2;
 /// Coarse levels converge when a step moves the target by less than this, px of the level.
 constexpr double kCoarseStep_px = 0.1;
 constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-7, kDampingStep = 10;
@@ -51,19 +52,6 @@ constexpr double kLeastGain = 0.05;
 /// The Jacobian is reused for poses within this motion, px.
 constexpr double kDerivativeServes_px = 0.2;
 
-class Stopwatch {
-public:
-    explicit Stopwatch(double& ms) : ms_(ms) {}
-    ~Stopwatch() {
-        const std::chrono::duration<double, std::milli> passed = std::chrono::steady_clock::now() - begun_;
-        ms_ += passed.count();
-    }
-
-private:
-    double& ms_;
-    std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-};
-
 /// Largest motion of a point of the target in the image, about.
 double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_camera_target, double extent_px) {
     const double z = std::max(T_camera_target.t.z, 1e-9);
@@ -80,15 +68,6 @@ bool is_observable(const Matrix6& information) {
            kLeastInformation;
 }
 
-FrameSettings settings_of(const DenseOptions& o) {
-    FrameSettings s;
-    s.seed = o.seed;
-    s.method = o.method;
-    s.max_depth = o.max_depth;
-    s.budget.kind = FrameBudget::Kind::rays;
-    return s;
-}
-
 }  // namespace
 
 bool is_pose(const Rigid3& T) {
@@ -96,12 +75,10 @@ bool is_pose(const Rigid3& T) {
     return finite && std::abs(norm(T.q) - 1) < 1e-3;
 }
 
-LevelSolver::LevelSolver(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene,
-                         std::size_t target, int factor, LevelView& view, const DenseOptions& options,
-                         DenseEstimate& estimate)
+LevelSolver::LevelSolver(const Camera& camera, const RenderScene& render_scene, std::size_t target, int factor,
+                         LevelView& view, const DenseOptions& options, DenseEstimate& estimate)
     : camera_(camera),
       pixels_per_radian_(CameraModelHandle(camera)->pixels_per_radian()),
-      sensor_(sensor),
       render_scene_(render_scene),
       target_(target),
       factor_(factor),
@@ -111,12 +88,14 @@ LevelSolver::LevelSolver(const Camera& camera, const SensorModel& sensor, const 
       coarse_(factor > options.finest),
       rays_(options.rays_per_pixel * (coarse_ ? kCoarseRays : 1)),
       fineness_(coarse_ ? std::max(1, options.fineness / kCoarseFineness) : options.fineness),
-      settings_(settings_of(options)) {}
+      settings_{.seed = options.seed, .method = options.method, .max_depth = options.max_depth} {
+    settings_.budget.kind = FrameBudget::Kind::rays;
+}
 
 DenseStatus LevelSolver::run(bool first) {
     render(e_.T_camera_body);
     if (first) shift();
-    robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images(pixels_averaged())) : 0;
+    robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images()) : 0;
     double damping = kFirstDamping, moved_px = std::numeric_limits<double>::infinity();
     double least = std::numeric_limits<double>::infinity();
     int stalled = 0;
@@ -126,7 +105,7 @@ DenseStatus LevelSolver::run(bool first) {
             moved_px = 0;
         }
         if (!linearise()) return DenseStatus::too_few_pixels;
-        if (k == 0) record(0, true);
+        if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
         Step step = next_step(damping);
         for (int refused = 0; !try_step(step); ++refused) {
@@ -158,24 +137,21 @@ void LevelSolver::polish() {
 }
 
 void LevelSolver::finish() {
-    const Stopwatch watch(e_.solve_ms);
-    const PhotometricImages images = view_.images(pixels_averaged());
-    e_.covariance = equations(images, sensor_, e_.exposure, o_.exposure, robust_).pose_covariance();
-    const PhotometricCost now = cost(images, sensor_, e_.exposure, o_.exposure, robust_);
+    const PhotometricImages images = view_.images();
+    e_.covariance = equations(images, e_.exposure, robust_).pose_covariance();
+    const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
-    e_.residual_scale = robust_.scale;
     const double off = std::abs(e_.exposure.gain - 1);
-    if (robust_.scale > kNoFit || off > kPriorHolds * o_.exposure.gain_sigma + kLeastOff)
+    if (robust_.scale > kNoFit || off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
         e_.status = DenseStatus::does_not_fit;
-    e_.chi2_per_pixel = now.chi2 / static_cast<double>(std::max<std::size_t>(now.pixels, 1));
 }
 
 Result<Matrix6> LevelSolver::bound() {
     render(e_.T_camera_body);
     differentiate();
-    PhotometricImages images = view_.images(pixels_averaged());
+    PhotometricImages images = view_.images();
     images.signal_variance = {};
-    const auto all = equations(images, sensor_, {}, o_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
+    const auto all = equations(images, {}, {1, std::numeric_limits<double>::infinity(), 0});
     const Matrix6 information = all.pose_information();
     if (!is_observable(information)) return Error{"too few pixels show the target to determine its pose"};
     return Matrix6(information.inverse());
@@ -183,7 +159,7 @@ Result<Matrix6> LevelSolver::bound() {
 
 void LevelSolver::shift() {
     const int most = std::min({kMostShift_px, view_.window().width / 4, view_.window().height / 4});
-    const auto [dx, dy] = best_shift(view_.images(pixels_averaged()), sensor_, most);
+    const auto [dx, dy] = best_shift(view_.images(), most);
     if (dx == 0 && dy == 0) return;
     Vector6 sideways = Vector6::Zero();
     const double z = std::abs(e_.T_camera_body.t.z);
@@ -193,27 +169,23 @@ void LevelSolver::shift() {
 }
 
 void LevelSolver::render(const Rigid3& T) {
-    const Stopwatch watch(e_.render_ms);
     const double window = static_cast<double>(view_.window().width) * view_.window().height;
     if (target_px_ == 0) target_px_ = kFirstPart * window;
     // A coarse pixel's noise is to be less, as the sensor's is. All pixels get one ray first.
     settings_.budget.rays = static_cast<std::uint64_t>(2 * window + rays_ * factor_ * factor_ * target_px_);
-    view_.render(T, sensor_, settings_);
+    view_.render(T, settings_);
 }
 
 void LevelSolver::differentiate() {
-    const Stopwatch watch(e_.derivative_ms);
-    view_.differentiate(e_.T_camera_body, sensor_, settings_, fineness_);
+    view_.differentiate(e_.T_camera_body, settings_, fineness_);
 }
 
 /// False where the pose is not observable.
 bool LevelSolver::linearise() {
-    const Stopwatch watch(e_.solve_ms);
-    const PhotometricImages images = view_.images(pixels_averaged());
-    robust_.scale = residual_scale(images, sensor_, e_.exposure, robust_.model_dn2);
-    robust_.cauchy = o_.cauchy;
-    cost_ = cost(images, sensor_, e_.exposure, o_.exposure, robust_);
-    equations_ = equations(images, sensor_, e_.exposure, o_.exposure, robust_);
+    const PhotometricImages images = view_.images();
+    robust_.scale = residual_scale(images, e_.exposure, robust_.model_dn2);
+    cost_ = cost(images, e_.exposure, robust_);
+    equations_ = equations(images, e_.exposure, robust_);
     target_px_ = static_cast<double>(cost_.pixels);
     return cost_.pixels >= kFewestPixels && is_observable(equations_.pose_information());
 }
@@ -224,9 +196,9 @@ LevelSolver::Step LevelSolver::next_step(double damping) const {
     damped.diagonal() *= 1 + damping;
     Step s;
     s.pose = stride_ * damped.ldlt().solve(equations_.pose_gradient());
-    s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
+    const double sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
     s.motion_px = motion_px(s.pose, pixels_per_radian_, e_.T_camera_body, extent_px(view_.window()));
-    s.size = coarse_ ? s.motion_px / kCoarseStep_px : s.sigmas / o_.sigmas;
+    s.size = coarse_ ? s.motion_px / kCoarseStep_px : sigmas / kConverged_sigmas;
     s.trusted = stride_ == 1 && s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
     return s;
 }
@@ -249,22 +221,15 @@ bool LevelSolver::try_step(const Step& step) {
     const Eigen::Vector2d e = equations_.exposure_step(step.pose);
     const Exposure exposure{std::max(e_.exposure.gain + e[0], kLeastGain), e_.exposure.offset_dn + e[1]};
     render(there);
-    const Stopwatch watch(e_.solve_ms);
-    const PhotometricCost now = cost(view_.images(pixels_averaged()), sensor_, exposure, o_.exposure, robust_);
+    ++e_.renders;
+    const PhotometricCost now = cost(view_.images(), exposure, robust_);
     const bool better = step.trusted || now.robust <= cost_.robust * (1 + kSlack);
     if (better) {
         e_.T_camera_body = there;
         e_.exposure = exposure;
         cost_ = now;
     }
-    record(step.sigmas, better);
     return better;
-}
-
-void LevelSolver::record(double sigmas, bool better) {
-    const double pixels = static_cast<double>(view_.window().width) * view_.window().height;
-    e_.steps.push_back(
-        {factor_, cost_.robust / (robust_.scale * robust_.scale * pixels), sigmas, e_.T_camera_body, better});
 }
 
 }  // namespace narpa

@@ -12,9 +12,8 @@ namespace narpa {
 class LevelSolver {
 public:
     /// All outlive it. `camera`: of the level, each of whose pixels is `factor` x `factor` of the sensor's.
-    LevelSolver(const Camera& camera, const SensorModel& sensor, const RenderScene& render_scene,
-                std::size_t target, int factor, LevelView& view, const DenseOptions& options,
-                DenseEstimate& estimate);
+    LevelSolver(const Camera& camera, const RenderScene& render_scene, std::size_t target, int factor,
+                LevelView& view, const DenseOptions& options, DenseEstimate& estimate);
 
     /// Iterates on this level; `first`: after a search over shifts by whole pixels, as a guess may be off by more
     /// than the Jacobian is valid for.
@@ -29,12 +28,11 @@ public:
 private:
     struct Step {
         Vector6 pose = Vector6::Zero();
-        double sigmas = 0, motion_px = 0;
+        double motion_px = 0;
         double size = 0;       ///< below 1: small enough to end with
         bool trusted = false;  ///< so small that noise decides whether the cost decreases
     };
 
-    [[nodiscard]] double pixels_averaged() const { return static_cast<double>(factor_) * factor_; }
     void shift();
     void render(const Rigid3& T);
     void differentiate();
@@ -42,11 +40,9 @@ private:
     [[nodiscard]] Step next_step(double damping) const;
     bool try_step(const Step& step);
     void adapt_stride(const Step& step);
-    void record(double sigmas, bool better);
 
     const Camera& camera_;
     const double pixels_per_radian_;
-    const SensorModel& sensor_;
     const RenderScene& render_scene_;
     const std::size_t target_;
     const int factor_;

@@ -78,9 +78,11 @@ double extent_px(const Window& window) {
     return std::max(window.width, window.height);
 }
 
-LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window,
-                     std::size_t target, const BodyPoses& at)
-    : window_(window),
+LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, const SensorModel& sensor,
+                     double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at)
+    : sensor_(sensor),
+      pixels_averaged_(pixels_averaged),
+      window_(window),
       view_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at),
       derivative_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at) {
     const std::size_t n = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
@@ -106,9 +108,9 @@ void LevelView::measure(const MeasuredImage& image, std::span<const float> varia
         }
 }
 
-void LevelView::render(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings) {
+void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& settings) {
     view_.render(T_camera_target, settings, true);
-    const auto& k = sensor.dn_per_radiance;
+    const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
         const Vec3 L = vec_cast<double>(view_.radiance().pixels[i]);
@@ -117,14 +119,20 @@ void LevelView::render(const Rigid3& T_camera_target, const SensorModel& sensor,
     }
 }
 
-void LevelView::differentiate(const Rigid3& T_camera_target, const SensorModel& sensor,
-                              const FrameSettings& settings, int fineness) {
-    columns_ = derivative_.at(T_camera_target, sensor, settings, fineness);
+void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
+    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness);
 }
 
-PhotometricImages LevelView::images(double pixels_averaged) const {
-    return {window_.width, window_.height,   measured_, measured_variance_,
-            signal_,       signal_variance_, columns_,  pixels_averaged};
+PhotometricImages LevelView::images() const {
+    return {.width = window_.width,
+            .height = window_.height,
+            .sensor = sensor_,
+            .measured = measured_,
+            .measured_variance = measured_variance_,
+            .signal = signal_,
+            .signal_variance = signal_variance_,
+            .derivative = columns_,
+            .pixels_averaged = pixels_averaged_};
 }
 
 }  // namespace narpa

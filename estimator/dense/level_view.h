@@ -26,21 +26,23 @@ struct Window {
 /// Signal and Jacobian in a window of the camera's image.
 class LevelView {
 public:
-    LevelView(const RenderScene& render_scene, const Camera& camera, const Window& window, std::size_t target,
-              const BodyPoses& at);
+    /// `render_scene` and `sensor` outlive it. `pixels_averaged`: of the sensor's, in each pixel of `camera`.
+    LevelView(const RenderScene& render_scene, const Camera& camera, const SensorModel& sensor,
+              double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
     /// As ModelView::place_bodies.
     void place_bodies(const BodyPoses& at);
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
-    void render(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings);
-    void differentiate(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
-                       int fineness);
+    void render(const Rigid3& T_camera_target, const FrameSettings& settings);
+    void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
     /// The latest of each.
-    [[nodiscard]] PhotometricImages images(double pixels_averaged) const;
+    [[nodiscard]] PhotometricImages images() const;
 
 private:
+    const SensorModel& sensor_;
+    double pixels_averaged_;
     Window window_;
     ModelView view_;
     ImageDerivative derivative_;

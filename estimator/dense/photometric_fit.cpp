@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "estimator/pose/median.h"
+
 namespace narpa {
 namespace {
 
@@ -25,20 +27,19 @@ struct Residual {
 
 class Residuals {
 public:
-    Residuals(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
-              double model_dn2)
-        : i_(images), sensor_(sensor), e_(exposure), model_dn2_(model_dn2) {}
+    Residuals(const PhotometricImages& images, const Exposure& exposure, double model_dn2)
+        : i_(images), e_(exposure), model_dn2_(model_dn2) {}
 
     [[nodiscard]] Residual at(int x, int y) const {
         const auto p =
             static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x);
         const auto at_p = [p](std::span<const float> v) { return v.empty() ? 0.0 : static_cast<double>(v[p]); };
         const double signal = at_p(i_.signal), measured = at_p(i_.measured);
-        const double expected = sensor_.black_dn + e_.gain * signal + e_.offset_dn;
+        const double expected = i_.sensor.black_dn + e_.gain * signal + e_.offset_dn;
         Residual out;
         // A clipped value carries no information.
-        if (expected >= sensor_.top_dn || measured >= sensor_.top_dn) return out;
-        const double variance = sensor_.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
+        if (expected >= i_.sensor.top_dn || measured >= i_.sensor.top_dn) return out;
+        const double variance = i_.sensor.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
                                 model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance);
         out.counts = variance > 0;
         if (!out.counts) return out;
@@ -58,7 +59,6 @@ public:
 
 private:
     const PhotometricImages& i_;
-    const SensorModel& sensor_;
     const Exposure& e_;
     const double model_dn2_;
 };
@@ -73,41 +73,29 @@ Sum sum_rows(const PhotometricImages& images, Add&& add) {
     return sum;
 }
 
-struct CostSum {
-    double robust = 0, chi2 = 0;
-    std::size_t pixels = 0;
-    CostSum& operator+=(const CostSum& b) {
-        robust += b.robust, chi2 += b.chi2, pixels += b.pixels;
-        return *this;
-    }
-};
-
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using Vector8 = Eigen::Matrix<double, 8, 1>;
-struct EquationSum {
-    Matrix8 information = Matrix8::Zero();
-    Matrix8 scatter = Matrix8::Zero();
-    Vector8 gradient = Vector8::Zero();
-    EquationSum& operator+=(const EquationSum& b) {
-        information += b.information, scatter += b.scatter, gradient += b.gradient;
-        return *this;
-    }
-};
 
 }  // namespace
 
-double residual_scale(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
-                      double model_dn2) {
-    const Residuals residuals(images, sensor, exposure, model_dn2);
+PhotometricCost& PhotometricCost::operator+=(const PhotometricCost& b) {
+    robust += b.robust, chi2 += b.chi2, pixels += b.pixels;
+    return *this;
+}
+
+PhotometricEquations& PhotometricEquations::operator+=(const PhotometricEquations& b) {
+    information += b.information, scatter += b.scatter, gradient += b.gradient;
+    return *this;
+}
+
+double residual_scale(const PhotometricImages& images, const Exposure& exposure, double model_dn2) {
+    const Residuals residuals(images, exposure, model_dn2);
     std::vector<float> size;
     for (int y = 1; y < images.height - 1; ++y)
         residuals.each(y, [&](const Residual& r, std::size_t) {
             if (r.shows_target) size.push_back(static_cast<float>(std::abs(r.r)));
         });
-    if (size.empty()) return 1;
-    const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-    std::nth_element(size.begin(), middle, size.end());
-    return std::max(1.0, 1.4826 * static_cast<double>(*middle));
+    return std::max(1.0, kMadToSigma * static_cast<double>(upper_median(std::span(size))));
 }
 
 double signal_power(const PhotometricImages& images) {
@@ -120,7 +108,7 @@ double signal_power(const PhotometricImages& images) {
     return sum / static_cast<double>(std::max<std::size_t>(lit, 1));
 }
 
-std::array<int, 2> best_shift(const PhotometricImages& images, const SensorModel& sensor, int most) {
+std::array<int, 2> best_shift(const PhotometricImages& images, int most) {
     const int side = 2 * most + 1;
     std::vector<double> sums(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
     tbb::parallel_for(0, side * side, [&](int shift) {
@@ -132,8 +120,9 @@ std::array<int, 2> best_shift(const PhotometricImages& images, const SensorModel
                 const int from_x = x - dx, from_y = y - dy;
                 const bool inside = from_x >= 0 && from_x < images.width && from_y >= 0 && from_y < images.height;
                 const auto from = static_cast<std::size_t>(inside ? from_y * images.width + from_x : 0);
-                const double expected = sensor.black_dn + (inside ? static_cast<double>(images.signal[from]) : 0);
-                const double r = static_cast<double>(images.measured[p]) - std::min(expected, sensor.top_dn);
+                const double expected =
+                    images.sensor.black_dn + (inside ? static_cast<double>(images.signal[from]) : 0);
+                const double r = static_cast<double>(images.measured[p]) - std::min(expected, images.sensor.top_dn);
                 sum += r * r;
             }
         sums[static_cast<std::size_t>(shift)] = sum;
@@ -142,11 +131,10 @@ std::array<int, 2> best_shift(const PhotometricImages& images, const SensorModel
     return {best % side - most, best / side - most};
 }
 
-PhotometricCost cost(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
-                     const ExposurePrior& prior, const Robustness& robust) {
-    const Residuals residuals(images, sensor, exposure, robust.model_dn2);
+PhotometricCost cost(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust) {
+    const Residuals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
-    const auto sum = sum_rows<CostSum>(images, [&](int y, CostSum& row) {
+    auto sum = sum_rows<PhotometricCost>(images, [&](int y, PhotometricCost& row) {
         residuals.each(y, [&](const Residual& r, std::size_t) {
             const double square = r.r * r.r;
             row.robust += std::isfinite(k) ? k * k * std::log1p(square / (k * k)) : square;
@@ -156,16 +144,17 @@ PhotometricCost cost(const PhotometricImages& images, const SensorModel& sensor,
         });
     });
     const double off = exposure.gain - 1;
-    const double known = off * off * precision(prior.gain_sigma) +
-                         exposure.offset_dn * exposure.offset_dn * precision(prior.offset_sigma_dn);
-    return {sum.robust + robust.scale * robust.scale * known, sum.chi2, sum.pixels};
+    sum.robust += robust.scale * robust.scale *
+                  (off * off * precision(images.prior.gain_sigma) +
+                   exposure.offset_dn * exposure.offset_dn * precision(images.prior.offset_sigma_dn));
+    return sum;
 }
 
-PhotometricEquations equations(const PhotometricImages& images, const SensorModel& sensor, const Exposure& exposure,
-                               const ExposurePrior& prior, const Robustness& robust) {
-    const Residuals residuals(images, sensor, exposure, robust.model_dn2);
+PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure,
+                               const Robustness& robust) {
+    const Residuals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
-    const auto sum = sum_rows<EquationSum>(images, [&](int y, EquationSum& row) {
+    auto out = sum_rows<PhotometricEquations>(images, [&](int y, PhotometricEquations& row) {
         residuals.each(y, [&](const Residual& r, std::size_t p) {
             const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
             Vector8 J;
@@ -176,19 +165,15 @@ PhotometricEquations equations(const PhotometricImages& images, const SensorMode
             row.gradient += weight * r.r * J;
         });
     });
-    PhotometricEquations out;
-    out.information = sum.information.selfadjointView<Eigen::Lower>();
-    out.scatter = sum.scatter.selfadjointView<Eigen::Lower>();
-    out.gradient = sum.gradient;
+    out.information = Matrix8(out.information.selfadjointView<Eigen::Lower>());
+    out.scatter = Matrix8(out.scatter.selfadjointView<Eigen::Lower>());
     // The prior in the units of residuals that are `scale` times their noise.
     const double unit = robust.scale * robust.scale;
-    const double gain = unit * precision(prior.gain_sigma), offset = unit * precision(prior.offset_sigma_dn);
-    out.information(6, 6) += gain;
-    out.information(7, 7) += offset;
-    out.scatter(6, 6) += gain;
-    out.scatter(7, 7) += offset;
-    out.gradient[6] -= gain * (exposure.gain - 1);
-    out.gradient[7] -= offset * exposure.offset_dn;
+    const Eigen::Vector2d prior =
+        unit * Eigen::Vector2d(precision(images.prior.gain_sigma), precision(images.prior.offset_sigma_dn));
+    out.information.diagonal().tail<2>() += prior;
+    out.scatter.diagonal().tail<2>() += prior;
+    out.gradient.tail<2>() -= prior.cwiseProduct(Eigen::Vector2d(exposure.gain - 1, exposure.offset_dn));
     return out;
 }
 

@@ -14,17 +14,6 @@
 
 namespace narpa {
 
-/// All of one camera, row-major, width x height.
-struct PhotometricImages {
-    int width = 0, height = 0;
-    std::span<const float> measured;           ///< DN
-    std::span<const float> measured_variance;  ///< DN^2 beside the sensor's noise; empty: none
-    std::span<const float> signal;             ///< predicted DN above black, not clipped
-    std::span<const float> signal_variance;    ///< of its own noise, DN^2; empty: none
-    std::span<const PixelDerivative> derivative;
-    double pixels_averaged = 1;  ///< each pixel is the mean of so many of the sensor's
-};
-
 struct Exposure {
     double gain = 1, offset_dn = 0;
 };
@@ -33,10 +22,25 @@ struct ExposurePrior {
     double gain_sigma = 0.05, offset_sigma_dn = 2;
 };
 
+/// All of one camera, row-major, width x height.
+struct PhotometricImages {
+    int width = 0, height = 0;
+    const SensorModel& sensor;
+    std::span<const float> measured;           ///< DN
+    std::span<const float> measured_variance;  ///< DN^2 beside the sensor's noise; empty: none
+    std::span<const float> signal;             ///< predicted DN above black, not clipped
+    std::span<const float> signal_variance;    ///< of its own noise, DN^2; empty: none
+    std::span<const PixelDerivative> derivative;
+    double pixels_averaged = 1;  ///< each pixel is the mean of so many of the sensor's
+    ExposurePrior prior{};
+};
+
 struct PhotometricCost {
     double robust = 0;  ///< sum of Cauchy's loss, (k s)^2 ln(1 + (r / k s)^2), of normalised residuals, + prior
     double chi2 = 0;    ///< of the same pixels, plain
     std::size_t pixels = 0;  ///< that show the target: signal or Jacobian not zero
+
+    PhotometricCost& operator+=(const PhotometricCost& b);
 };
 
 /// `scale`: size of the residuals in units of their noise (1: the model holds); `cauchy`: scale of the loss in
@@ -47,16 +51,15 @@ struct Robustness {
 
 /// Standard deviation of normalised residuals of the target's pixels by their median absolute deviation; at
 /// least 1.
-[[nodiscard]] double residual_scale(const PhotometricImages& images, const SensorModel& sensor,
-                                    const Exposure& exposure, double model_dn2);
-[[nodiscard]] PhotometricCost cost(const PhotometricImages& images, const SensorModel& sensor,
-                                   const Exposure& exposure, const ExposurePrior& prior, const Robustness& robust);
+[[nodiscard]] double residual_scale(const PhotometricImages& images, const Exposure& exposure, double model_dn2);
+[[nodiscard]] PhotometricCost cost(const PhotometricImages& images, const Exposure& exposure,
+                                   const Robustness& robust);
 
 /// Mean square of the signal where there is any, DN^2.
 [[nodiscard]] double signal_power(const PhotometricImages& images);
 /// The shift (right, down) of the predicted image that fits the measured one best: least squares over all shifts of
 /// up to `most` pixels each way.
-[[nodiscard]] std::array<int, 2> best_shift(const PhotometricImages& images, const SensorModel& sensor, int most);
+[[nodiscard]] std::array<int, 2> best_shift(const PhotometricImages& images, int most);
 
 /// Gauss-Newton's equations in pose (0..5), gain (6), offset (7): information * step = gradient.
 struct PhotometricEquations {
@@ -65,6 +68,7 @@ struct PhotometricEquations {
     /// Empirical covariance of the gradient, from the residuals, and the prior.
     Eigen::Matrix<double, 8, 8> scatter = Eigen::Matrix<double, 8, 8>::Zero();
 
+    PhotometricEquations& operator+=(const PhotometricEquations& b);
     /// Information of the pose with gain and offset marginalised.
     [[nodiscard]] Matrix6 pose_information() const;
     [[nodiscard]] Vector6 pose_gradient() const;
@@ -75,8 +79,7 @@ struct PhotometricEquations {
     /// Step of gain and offset for a step of the pose (back substitution).
     [[nodiscard]] Eigen::Vector2d exposure_step(const Vector6& pose_step) const;
 };
-[[nodiscard]] PhotometricEquations equations(const PhotometricImages& images, const SensorModel& sensor,
-                                             const Exposure& exposure, const ExposurePrior& prior,
+[[nodiscard]] PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure,
                                              const Robustness& robust);
 
 }  // namespace narpa

@@ -6,9 +6,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "base/time.h"
-#include "estimator/features/feature_matcher.h"
-#include "estimator/pose/pnp_points.h"
+#include "estimator/pose/median.h"
 
 namespace narpa {
 namespace {
@@ -50,16 +48,13 @@ double mahalanobis(double du, double dv, const PixelCovariance& c) {
 }
 
 double root_mean_square(const std::vector<double>& lengths) {
-    double squares = 0;
-    for (const double l : lengths) squares += l * l;
-    return lengths.empty() ? 0 : std::sqrt(squares / static_cast<double>(lengths.size()));
+    const Eigen::Map<const Eigen::VectorXd> all(lengths.data(), static_cast<Eigen::Index>(lengths.size()));
+    return lengths.empty() ? 0 : std::sqrt(all.squaredNorm() / static_cast<double>(lengths.size()));
 }
 
-double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+/// Standard deviation of residuals in u and in v, from the median of their lengths.
+double scale_of(std::vector<double> lengths) {
+    return upper_median(std::span(lengths)) / kRayleighMedian;
 }
 
 }  // namespace
@@ -91,12 +86,6 @@ struct FeatureAlignment::Points {
         for (std::size_t i = 0; i < size(); ++i)
             if (wanted[i] != 0) body_m[n] = body_m[i], pixels[n] = pixels[i], noise[n] = noise[i], ++n;
         body_m.resize(n), pixels.resize(n), noise.resize(n);
-    }
-    [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const {
-        std::vector<PixelCovariance> all;
-        all.reserve(size());
-        for (const PixelCovariance& c : noise) all.push_back(with_floor(c, floor_px));
-        return all;
     }
     /// Covariance due to excess errors that are correlated between matches as far as their windows overlap:
     /// C (sum over pairs of J_i' W_i S_ij W_j J_j) C.
@@ -182,7 +171,7 @@ void FeatureAlignment::find_target() {
 
 /// Features of the view as it was rendered last that lie on the target, and where the frame has them.
 void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones,
-                              Points& points, FeatureRound& round) {
+                              Points& points) {
     points = {};
     const auto target = static_cast<int>(view_.target());
     find_target();
@@ -210,7 +199,6 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
         points.pixels.push_back({m.frame_u, m.frame_v});
         points.noise.push_back({C(0, 0), C(0, 1), C(1, 1)});
     }
-    round.matches = static_cast<int>(points.size());
 }
 
 FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess) {
@@ -229,13 +217,8 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     Points points;
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();
-        std::int64_t start_ns = monotonic_ns();
         view_.render(estimate.T_camera_target, render_settings, false);
-        round.render_ms = seconds_since(start_ns) * 1e3;
-        start_ns = monotonic_ns();
-        gather(frame, toned_frame, tones, points, round);
-        round.match_ms = seconds_since(start_ns) * 1e3;
-        start_ns = monotonic_ns();
+        gather(frame, toned_frame, tones, points);
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;
             return estimate;
@@ -243,18 +226,19 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
 
         // First a robust pose; then least squares on its inliers.
         const auto solve = [&](Loss loss) {
-            const std::vector<PixelCovariance> covariances = points.covariances(floor_px);
+            std::vector<PixelCovariance> covariances;
+            for (const PixelCovariance& c : points.noise) covariances.push_back(with_floor(c, floor_px));
             RefineOptions options;
             options.loss.kind = loss;
             const PnpInput input{model, points.body_m, points.pixels, 1, covariances};
             return PnpFit(refiner.refine(input, estimate.T_camera_target, options));
         };
         const std::vector<double> before = points.residuals_px(camera, estimate.T_camera_target);
-        floor_px = std::max(floor_px, median(before) / kRayleighMedian);
+        floor_px = std::max(floor_px, scale_of(before));
         PnpFit fit = solve(Loss::cauchy);
         for (int tries = 0; tries < 2 && fit.ok(); ++tries) {
             const std::vector<double> residuals = points.residuals_px(camera, fit.T_camera_body);
-            const double scale = median(residuals) / kRayleighMedian;
+            const double scale = scale_of(residuals);
             std::vector<std::uint8_t> agrees;
             for (const double r : residuals) agrees.push_back(r < kOutlier * scale ? 1 : 0);
             points.keep(agrees);
@@ -265,7 +249,6 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
             floor_px = points.floor_px(camera, fit.T_camera_body);
             fit = solve(Loss::none);
         }
-        estimate.solver = fit.status;
         if (!fit.ok()) {
             estimate.status = FeatureStatus::no_pose;
             return estimate;
@@ -276,18 +259,16 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
                         b = project(camera, fit.T_camera_body * p);
             moved.push_back(std::hypot(a.u - b.u, a.v - b.v));
         }
-        round.agreeing = estimate.agreeing = static_cast<int>(points.size());
+        estimate.agreeing = static_cast<int>(points.size());
         round.before_px = root_mean_square(points.residuals_px(camera, estimate.T_camera_target));
         round.after_px = root_mean_square(points.residuals_px(camera, fit.T_camera_body));
-        round.moved_px = root_mean_square(moved);
-        round.solve_ms = seconds_since(start_ns) * 1e3;
         const Vector6 step = error_between(estimate.T_camera_target, fit.T_camera_body);
         estimate.T_camera_target = fit.T_camera_body;
-        estimate.floor_px = floor_px = points.floor_px(camera, fit.T_camera_body);
+        floor_px = points.floor_px(camera, fit.T_camera_body);
         estimate.covariance = fit.covariance + points.covariance_of_shared_errors(camera, fit.T_camera_body,
                                                                                   fit.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
-        if (round.moved_px < settings_.settled_px ||
+        if (root_mean_square(moved) < settings_.settled_px ||
             normalised_error_squared(step, estimate.covariance) < kSettledSquared) {
             estimate.status = FeatureStatus::settled;
             break;

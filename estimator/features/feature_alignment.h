@@ -27,30 +27,25 @@ enum class FeatureStatus : std::uint8_t {
     settled,
     unsettled,    ///< still moving after renders_max views
     few_matches,  ///< fewer than kFewestMatches inliers
-    no_pose,      ///< the solver failed: see `solver`
+    no_pose,      ///< the solver failed
 };
 inline constexpr int kFewestMatches = 8;
 [[nodiscard]] std::string_view name(FeatureStatus status) noexcept;
 
 /// One view rendered and compared.
 struct FeatureRound {
-    int matches = 0, agreeing = 0;
     double before_px = 0, after_px = 0;  ///< distance of agreeing matches, RMS, at the guess and at the solution
-    double moved_px = 0;                 ///< how far the solution moved the points, RMS
-    double render_ms = 0, match_ms = 0, solve_ms = 0;
 };
 
 struct FeatureEstimate {
     FeatureStatus status = FeatureStatus::few_matches;
-    PnpStatus solver = PnpStatus::converged;
     Rigid3 T_camera_target{};
-    /// From the sensor's noise and the excess scatter of the matches (`floor_px`), which is correlated between
+    /// From the sensor's noise and the excess scatter of the matches, which is correlated between
     /// matches whose windows overlap, in proportion to the overlap.
     Matrix6 covariance = Matrix6::Zero();
     /// Cramer-Rao for these points with the sensor's noise alone.
     Matrix6 bound = Matrix6::Zero();
     int agreeing = 0;
-    double floor_px = 0;  ///< error of a match beyond the sensor's noise, in u and in v
     std::vector<FeatureRound> rounds;
 
     [[nodiscard]] bool ok() const noexcept {
@@ -71,8 +66,7 @@ public:
 
 private:
     struct Points;
-    void gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones, Points& points,
-                FeatureRound& round);
+    void gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones, Points& points);
     void find_target();
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;
 

@@ -49,12 +49,11 @@ PnpSolver::PnpSolver(std::size_t points_max) : points_(points_max), all_(points_
     solution_.inlier.reserve(points_max);
 }
 
-const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& options) {
+const PnpSolution& PnpSolver::solve(const PnpInput& input, bool outliers) {
     solution_.status = check(input);
     solution_.has_second = solution_.imprecise = false;
     solution_.fit.chi2 = std::numeric_limits<double>::infinity();
     solution_.fit.status = PnpStatus::behind_camera;
-    solution_.hypotheses = 0;
     solution_.inliers = input.body_m.size();
     if (!solution_.ok()) return solution_;
     if (input.body_m.size() > points_.capacity()) {
@@ -73,29 +72,29 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, const PnpOptions& opt
         solution_.status = PnpStatus::degenerate;
         return solution_;
     }
-    options.outliers ? solve_with_outliers(input, options) : solve_all(input, spread, options);
+    outliers ? solve_with_outliers(input) : solve_all(input, spread);
     if (solution_.status != PnpStatus::converged) return solution_;
     solution_.status = solution_.fit.status;
     solution_.imprecise = solution_.fit.ok() && !(solution_.fit.relative_position_sigma() <= kImpreciseSigma);
     return solution_;
 }
 
-void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread, const PnpOptions& options) {
+void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread) {
     const double depth = depth_in_sigma(input, gathered_, spread);
     const bool few = points_.size() < kSurePoints;
     const InitialPoses starts = orthographic_poses(gathered_, spread, depth < kFlatSigma);
-    for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i], options);
-    if (few) consider_triples(options);
+    for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i]);
+    if (few) consider_triples();
     if (!fits_the_noise()) {
         starts_.clear();
         opencv_poses(gathered_, depth < kFlatSigma, starts_);
-        for (const CentredPose& start : starts_) consider(start, options);
+        for (const CentredPose& start : starts_) consider(start);
     }
-    if (few || depth < kReversibleSigma || !fits_the_noise()) consider_reversed(spread, options);
+    if (few || depth < kReversibleSigma || !fits_the_noise()) consider_reversed(spread);
 }
 
 // Four or five points fit several poses within the noise: the poses of triples are tried too.
-void PnpSolver::consider_triples(const PnpOptions& options) {
+void PnpSolver::consider_triples() {
     constexpr std::size_t kTriples = 4, kRefined = 3;
     std::array<std::pair<double, CentredPose>, 2 * kTriples> tried;
     std::size_t count = 0;
@@ -111,7 +110,7 @@ void PnpSolver::consider_triples(const PnpOptions& options) {
     const std::size_t refined = std::min(count, kRefined);
     std::partial_sort(tried.begin(), tried.begin() + refined, tried.begin() + count,
                       [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (std::size_t i = 0; i < refined; ++i) consider(tried[i].second, options);
+    for (std::size_t i = 0; i < refined; ++i) consider(tried[i].second);
 }
 
 void PnpSolver::gather() {
@@ -120,8 +119,8 @@ void PnpSolver::gather() {
         gathered_.push_back({points_.centred_body_m(i), points_.normalised(i)});
 }
 
-void PnpSolver::consider(const CentredPose& start, const PnpOptions& options) {
-    refine(points_, points_.uncentred(start), {options.lm, {}}, trial_);
+void PnpSolver::consider(const CentredPose& start) {
+    refine(points_, points_.uncentred(start), {}, trial_);
     if (trial_.status == PnpStatus::behind_camera || trial_.status == PnpStatus::not_finite) return;
     PnpFit& first = solution_.fit;
     PnpFit& second = solution_.second;
@@ -138,9 +137,9 @@ void PnpSolver::consider(const CentredPose& start, const PnpOptions& options) {
     }
 }
 
-void PnpSolver::consider_reversed(const PointExtent& spread, const PnpOptions& options) {
+void PnpSolver::consider_reversed(const PointExtent& spread) {
     if (!std::isfinite(solution_.fit.chi2)) return;
-    consider(depth_reversed(points_.centred(solution_.fit.T_camera_body), spread), options);
+    consider(depth_reversed(points_.centred(solution_.fit.T_camera_body), spread));
 }
 
 bool PnpSolver::fits_the_noise() const {

@@ -13,14 +13,6 @@
 
 namespace narpa {
 
-struct PnpOptions {
-    bool outliers = false;      ///< some pixels may belong to other points: RANSAC first (Fischler and Bolles 1981)
-    int hypotheses_max = 2000;  ///< that RANSAC may try, of either kind
-    double inliers_min = 0.25;  ///< least part of the points that are inliers, and five at least
-    std::uint64_t seed = 1;     ///< of RANSAC's samples
-    LmOptions lm;
-};
-
 inline constexpr double kAmbiguousChi2 = 9;             ///< three standard deviations
 inline constexpr double kImpreciseSigma = 0.01;         ///< of the range
 inline constexpr double kInlierSquaredResidual = 13.8;  ///< 99.9 % of chi-square with two degrees of freedom
@@ -35,7 +27,6 @@ struct PnpSolution {
         false;  ///< the position's sigma exceeds 1 % of the range: next to a danger cylinder, or too far
     std::vector<std::uint8_t> inlier;  ///< for each point 1 where the fit used it
     std::size_t inliers = 0;
-    int hypotheses = 0;  ///< that RANSAC tried
 
     [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
     /// The second pose may be the true one: its chi2 is less than 9 above the first's.
@@ -46,23 +37,21 @@ class PnpSolver {
 public:
     explicit PnpSolver(std::size_t points_max);
 
-    /// At least four points. The solution stays valid until the next call. Allocates only where OpenCV is used.
-    const PnpSolution& solve(const PnpInput& input, const PnpOptions& options = {});
+    /// At least four points. `outliers`: some pixels may belong to other points: RANSAC first (Fischler and Bolles
+    /// 1981). The solution stays valid until the next call. Allocates only where OpenCV is used.
+    const PnpSolution& solve(const PnpInput& input, bool outliers = false);
 
 private:
-    void solve_all(const PnpInput& input, const PointExtent& spread, const PnpOptions& options);
-    void solve_with_outliers(const PnpInput& input, const PnpOptions& options);
+    void solve_all(const PnpInput& input, const PointExtent& spread);
+    void solve_with_outliers(const PnpInput& input);
     void gather();
-    void consider(const CentredPose& start, const PnpOptions& options);
-    void consider_triples(const PnpOptions& options);
-    void consider_reversed(const PointExtent& spread, const PnpOptions& options);
+    void consider(const CentredPose& start);
+    void consider_triples();
+    void consider_reversed(const PointExtent& spread);
     [[nodiscard]] bool fits_the_noise() const;
     [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);
-    [[nodiscard]] bool find_consensus(const PnpOptions& options, bool orthographic);
-    [[nodiscard]] std::array<BodyPoint, 3> sample(const std::array<std::size_t, 3>& drawn) const;
-    void try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
-    void try_p3p(const std::array<std::size_t, 3>& drawn, const PnpOptions& options);
-    void try_hypothesis(const CentredPose& pose, const PnpOptions& options);
+    [[nodiscard]] bool find_consensus(bool orthographic);
+    void try_hypothesis(const CentredPose& pose);
 
     PnpPoints points_, all_;  // those in use, and with outliers
     std::vector<BodyPoint> gathered_;

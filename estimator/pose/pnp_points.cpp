@@ -60,27 +60,26 @@ void with_model(const CameraModel& model, const F& f) {
 
 PnpPoints::PnpPoints(std::size_t points_max) : groups_((points_max + kGroup - 1) / kGroup) {}
 
-void PnpPoints::assign(const PnpInput& input) {
-    size_ = input.body_m.size();
-    centroid_ = {};
-    for (const Vec3& p : input.body_m) centroid_ += p * (1.0 / static_cast<double>(size_));
+template <class Chosen>
+void PnpPoints::assign_if(const PnpInput& input, const Chosen& chosen) {
+    size_ = 0;
+    Vec3 sum{};
+    for (std::size_t i = 0; i < input.body_m.size(); ++i)
+        if (chosen(i)) sum += input.body_m[i], ++size_;
+    centroid_ = sum / static_cast<double>(size_);
     with_model(*input.camera, [&](const auto& model) {
-        for (std::size_t i = 0; i < size_; ++i) put(i, input, model, i);
+        for (std::size_t i = 0, to = 0; i < input.body_m.size(); ++i)
+            if (chosen(i)) put(to++, input, model, i);
     });
     pad();
 }
 
+void PnpPoints::assign(const PnpInput& input) {
+    assign_if(input, [](std::size_t) { return true; });
+}
+
 void PnpPoints::assign(const PnpInput& input, std::span<const std::uint8_t> chosen) {
-    size_ = 0;
-    Vec3 sum{};
-    for (std::size_t i = 0; i < chosen.size(); ++i)
-        if (chosen[i] != 0) sum += input.body_m[i], ++size_;
-    centroid_ = sum / static_cast<double>(size_);
-    with_model(*input.camera, [&](const auto& model) {
-        for (std::size_t i = 0, to = 0; i < chosen.size(); ++i)
-            if (chosen[i] != 0) put(to++, input, model, i);
-    });
-    pad();
+    assign_if(input, [&](std::size_t i) { return chosen[i] != 0; });
 }
 
 /// Residuals are taken on the plane z = 1 and weighed as those of the image, to first order about the measured
@@ -131,9 +130,8 @@ Rigid3 PnpPoints::uncentred(const CentredPose& pose) const {
 
 Matrix6 PnpPoints::uncentred(const CentredPose& pose, const Matrix6& covariance) const {
     // t = centroid - q c  =>  d_t = d_centroid + [q c] r
-    const Vec3 c = pose.q * centroid_;
     Matrix6 J = Matrix6::Identity();
-    J.bottomLeftCorner<3, 3>() << 0, -c.z, c.y, c.z, 0, -c.x, -c.y, c.x, 0;
+    J.bottomLeftCorner<3, 3>() = skew(to_eigen(pose.q * centroid_));
     return J * covariance * J.transpose();
 }
 
@@ -255,9 +253,7 @@ double PnpPoints::truncated_cost(const CentredPose& pose, double s_max) const {
     for (std::size_t i = 0; i < size_; i += kGroup) {
         std::array<double, kGroup> s;
         square_residuals({&groups_[i / kGroup], 1}, m.R, m.t, s.data());
-        for (std::size_t k = 0; k < std::min(kGroup, size_ - i); ++k) {
-            sum += s[k] < s_max ? s[k] : s_max;
-        }
+        for (std::size_t k = 0; k < std::min(kGroup, size_ - i); ++k) sum += std::min(s_max, s[k]);
     }
     return sum;
 }

@@ -127,6 +127,8 @@ public:
     };
 
 private:
+    template <class Chosen>
+    void assign_if(const PnpInput& input, const Chosen& chosen);
     template <class Model>
     void put(std::size_t i, const PnpInput& input, const Model& model, std::size_t point);
     void pad();

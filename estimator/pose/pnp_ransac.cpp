@@ -9,7 +9,8 @@ namespace {
 constexpr double kSampleSquaredResidual = 36;  // a pose of three noisy points misses the others by more than noise
 constexpr double kMissedConsensus = 1e-4;      // probability that no sample was clean
 constexpr std::size_t kInliersMin = 5;
-constexpr int kP3pHypothesesMax = 500;
+constexpr int kHypothesesMax = 2000, kP3pHypothesesMax = 500;
+constexpr double kInliersPart = 0.25;  // of all points, at least
 const RobustLoss kPolish{Loss::cauchy, 2};
 
 std::array<std::size_t, 3> draw_three(std::minstd_rand& random, std::size_t n) {
@@ -32,9 +33,9 @@ double samples_needed(std::size_t inliers, std::size_t n) {
 
 }  // namespace
 
-void PnpSolver::solve_with_outliers(const PnpInput& input, const PnpOptions& options) {
+void PnpSolver::solve_with_outliers(const PnpInput& input) {
     all_.assign(input);
-    if (!find_consensus(options, true) && !find_consensus(options, false)) {
+    if (!find_consensus(true) && !find_consensus(false)) {
         solution_.status = PnpStatus::no_consensus;
         return;
     }
@@ -49,12 +50,12 @@ void PnpSolver::solve_with_outliers(const PnpInput& input, const PnpOptions& opt
         solution_.inlier.assign(flags_.begin(), flags_.begin() + static_cast<std::ptrdiff_t>(before.size()));
         solution_.inliers = inliers;
         points_.assign(input, solution_.inlier);
-        refine(points_, T, {options.lm, {}}, solution_.fit);
+        refine(points_, T, {}, solution_.fit);
         T = solution_.fit.T_camera_body;
     }
     gather();
     const PointExtent spread = extent_of(gathered_);
-    if (solution_.fit.ok()) consider_reversed(spread, options);
+    if (solution_.fit.ok()) consider_reversed(spread);
 }
 
 std::size_t PnpSolver::mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags) {
@@ -67,47 +68,34 @@ std::size_t PnpSolver::mark_inliers(const PnpPoints& points, const Rigid3& T, st
     return inliers;
 }
 
-bool PnpSolver::find_consensus(const PnpOptions& options, bool orthographic) {
+bool PnpSolver::find_consensus(bool orthographic) {
     const std::size_t n = all_.size();
-    const int tries = orthographic ? options.hypotheses_max : std::min(options.hypotheses_max, kP3pHypothesesMax);
-    std::minstd_rand random(static_cast<std::minstd_rand::result_type>(options.seed));
+    const int tries = orthographic ? kHypothesesMax : kP3pHypothesesMax;
+    std::minstd_rand random(1);
     consensus_ = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), {}, 0};
     for (int tried = 0; tried < tries && tried < samples_needed(consensus_.inliers, n); ++tried) {
-        ++solution_.hypotheses;
+        std::array<BodyPoint, 3> sample;
         const auto drawn = draw_three(random, n);
+        for (std::size_t k = 0; k < 3; ++k) sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
         if (orthographic) {
-            try_orthographic(drawn, options);
+            const InitialPoses starts = three_point_poses(sample);
+            for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i]);
         } else {
-            try_p3p(drawn, options);
+            starts_.clear();
+            opencv_p3p(sample, starts_);
+            for (const CentredPose& start : starts_) try_hypothesis(start);
         }
     }
-    const auto enough = static_cast<std::size_t>(options.inliers_min * static_cast<double>(n));
+    const auto enough = static_cast<std::size_t>(kInliersPart * static_cast<double>(n));
     return consensus_.inliers >= std::max(kInliersMin, enough);
 }
 
-std::array<BodyPoint, 3> PnpSolver::sample(const std::array<std::size_t, 3>& drawn) const {
-    std::array<BodyPoint, 3> sample;
-    for (std::size_t k = 0; k < 3; ++k) sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
-    return sample;
-}
-
-void PnpSolver::try_orthographic(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
-    const InitialPoses starts = three_point_poses(sample(drawn));
-    for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i], options);
-}
-
-void PnpSolver::try_p3p(const std::array<std::size_t, 3>& drawn, const PnpOptions& options) {
-    starts_.clear();
-    opencv_p3p(sample(drawn), starts_);
-    for (const CentredPose& start : starts_) try_hypothesis(start, options);
-}
-
-void PnpSolver::try_hypothesis(const CentredPose& pose, const PnpOptions& options) {
+void PnpSolver::try_hypothesis(const CentredPose& pose) {
     const double cost_of_sample = all_.truncated_cost(pose, kSampleSquaredResidual);
     if (!(cost_of_sample < consensus_.cost_of_sample)) return;
     consensus_.cost_of_sample = cost_of_sample;
     // Local optimisation (Chum, Matas and Kittler 2003): the best samples are refined by all that agrees.
-    refine(all_, all_.uncentred(pose), {options.lm, kPolish}, trial_);
+    refine(all_, all_.uncentred(pose), {{}, kPolish}, trial_);
     if (trial_.status != PnpStatus::converged) return;
     const double cost = all_.truncated_cost(all_.centred(trial_.T_camera_body), kInlierSquaredResidual);
     if (!(cost < consensus_.cost)) return;

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
+#include <opencv2/calib3d.hpp>
 
 namespace narpa {
 namespace {
@@ -122,6 +123,53 @@ CentredPose depth_reversed(const CentredPose& pose, const PointExtent& spread) {
     const Vec3 sight = normalized(pose.centroid_m), normal = spread.axis[2];
     return {normalized(Quat{0, sight.x, sight.y, sight.z} * pose.q * Quat{0, normal.x, normal.y, normal.z}),
             pose.centroid_m};
+}
+
+namespace {
+
+/// Appends the poses that `solve(body_m, seen, rotations, translations)` finds by OpenCV; none where OpenCV throws,
+/// because the method cannot take the points.
+template <class Solve>
+void append_poses(std::span<const BodyPoint> points, const Solve& solve, std::vector<CentredPose>& out) {
+    std::vector<cv::Point3d> body_m;
+    std::vector<cv::Point2d> seen;
+    for (const BodyPoint& p : points) {
+        body_m.emplace_back(p.body_m.x, p.body_m.y, p.body_m.z);
+        seen.emplace_back(p.seen.u, p.seen.v);
+    }
+    std::vector<cv::Mat> rotations, translations;
+    try {
+        solve(body_m, seen, rotations, translations);
+    } catch (const cv::Exception&) {
+        return;
+    }
+    for (std::size_t i = 0; i < rotations.size(); ++i) {
+        const auto r = rotations[i].ptr<double>(), t = translations[i].ptr<double>();
+        const CentredPose pose{exp_rotation({r[0], r[1], r[2]}), {t[0], t[1], t[2]}};
+        if (std::isfinite(norm(pose.q)) && is_finite(pose.centroid_m)) out.push_back(pose);
+    }
+}
+
+/// Of the plane z = 1.
+const cv::Matx33d kUnitCamera = cv::Matx33d::eye();
+
+}  // namespace
+
+void opencv_poses(std::span<const BodyPoint> points, bool flat, std::vector<CentredPose>& out) {
+    for (const auto method : {cv::SOLVEPNP_SQPNP, cv::SOLVEPNP_IPPE}) {
+        if (method == cv::SOLVEPNP_IPPE && !flat) break;
+        const auto solve = [&](const auto& body_m, const auto& seen, auto& rotations, auto& translations) {
+            cv::solvePnPGeneric(body_m, seen, kUnitCamera, cv::noArray(), rotations, translations, false, method);
+        };
+        append_poses(points, solve, out);
+    }
+}
+
+void opencv_p3p(const std::array<BodyPoint, 3>& points, std::vector<CentredPose>& out) {
+    const auto solve = [](const auto& body_m, const auto& seen, auto& rotations, auto& translations) {
+        cv::solveP3P(body_m, seen, kUnitCamera, cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
+    };
+    append_poses(points, solve, out);
 }
 
 }  // namespace narpa

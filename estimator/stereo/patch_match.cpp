@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "estimator/pose/pose_estimate.h"
 
@@ -39,17 +40,6 @@ SplineImage::SplineImage(const MeasuredImage& image)
     : width_(image.width), height_(image.height), coefficients_(image.dn.begin(), image.dn.end()) {
     for (int y = 0; y < height_; ++y) filter(coefficients_.data() + std::ptrdiff_t{y} * width_, 1, width_);
     for (int x = 0; x < width_; ++x) filter(coefficients_.data() + x, width_, height_);
-}
-
-double SplineImage::dn(const Eigen::Vector2d& px) const {
-    const double x = std::floor(px.x()), y = std::floor(px.y());
-    const auto wx = weights(px.x() - x), wy = weights(px.y() - y);
-    const double* row = &coefficients_[(static_cast<std::size_t>(y) - 1) * static_cast<std::size_t>(width_) +
-                                       static_cast<std::size_t>(x) - 1];
-    double sum = 0;
-    for (std::size_t j = 0; j < 4; ++j, row += width_)
-        sum += wy[j] * (wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3]);
-    return sum;
 }
 
 SplineImage::Sample SplineImage::sample(const Eigen::Vector2d& px) const {
@@ -133,7 +123,7 @@ std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, 
         if (!warp.is_before(ray, inverse_depth)) return false;
         const Vector2d px = warp.px(ray, inverse_depth) + shift;
         if (!there.spline.holds(px)) return false;
-        c.add(dn, there.spline.dn(px));
+        c.add(dn, there.spline.sample(px).dn);
         return true;
     });
     if (!inside) return {};
@@ -215,21 +205,10 @@ private:
 };
 
 MeasuredImage softened(const MeasuredImage& image) {
-    MeasuredImage out = image, across = image;
-    const auto index = [&](int x, int y) {
-        return static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
-    };
-    const auto mix = [](float before, float here, float after) {
-        return static_cast<float>(kMiddle * here + kNeighbour * (before + after));
-    };
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x)
-            across.dn[index(x, y)] =
-                mix(image.at(std::max(x - 1, 0), y), image.at(x, y), image.at(std::min(x + 1, image.width - 1), y));
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x)
-            out.dn[index(x, y)] = mix(across.at(x, std::max(y - 1, 0)), across.at(x, y),
-                                      across.at(x, std::min(y + 1, image.height - 1)));
+    MeasuredImage out = image;
+    cv::Mat pixels(image.height, image.width, CV_32F, out.dn.data());
+    const cv::Matx13d kernel(kNeighbour, kMiddle, kNeighbour);
+    cv::sepFilter2D(pixels, pixels, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
     return out;
 }
 

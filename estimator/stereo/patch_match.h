@@ -21,7 +21,6 @@ public:
         Eigen::Vector2d gradient{0, 0};  ///< DN per px
     };
     /// At a point that `holds` with a margin of kMargin_px, else undefined.
-    [[nodiscard]] double dn(const Eigen::Vector2d& px) const;
     [[nodiscard]] Sample sample(const Eigen::Vector2d& px) const;
 
     static constexpr int kMargin_px = 2;

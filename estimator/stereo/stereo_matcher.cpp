@@ -13,30 +13,16 @@ using Eigen::Vector2d;
 /// Corners down to this part of the strongest one's eigenvalue, over blocks of so many pixels.
 constexpr double kLeastStrength = 1e-4;
 constexpr int kCornerBlock_px = 5, kCornersPerPoint = 10;
+constexpr int kCornersApart_px = 12;
 /// Of an exact pixel: small beside any match, large beside rounding.
 constexpr double kExact_px = 1e-4;
 /// Largest left-right-left error of the whole-pixel search.
 constexpr double kRoundTrip_px = 1.5;
 
-std::string size_text(int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-}
-
-Status check_frame(const char* which, const Camera& camera, const MeasuredImage& frame) {
-    const int height = camera.height - (camera.embedded_line ? 1 : 0);
-    if (frame.width != camera.width || frame.height != height ||
-        frame.dn.size() != static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(height))
-        return Error{std::string("the ") + which + " frame is " + size_text(frame.width, frame.height) +
-                     ", expected " + size_text(camera.width, height)};
-    if (!std::ranges::all_of(frame.dn, [](float dn) { return std::isfinite(dn); }))
-        return Error{std::string("the ") + which + " frame has a pixel that is no number, expected DN"};
-    return Ok{};
-}
-
 Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredImage& right,
              const StereoSettings& s) {
-    if (auto good = check_frame("left", pair.left, left); !good) return good;
-    if (auto good = check_frame("right", pair.right, right); !good) return good;
+    if (auto good = check_image(pair.left, left, "the left frame"); !good) return good;
+    if (auto good = check_image(pair.right, right, "the right frame"); !good) return good;
     const PixelMeasurement somewhere = exact_pixel({0, 0});
     if (triangulate(pair, somewhere, somewhere).status == TriangulationStatus::bad_input)
         return Error{
@@ -48,16 +34,16 @@ Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredIm
     if (!(s.nearest_m > 0 && s.farthest_m > s.nearest_m))
         return Error{"depths from " + std::to_string(s.nearest_m) + " to " + std::to_string(s.farthest_m) +
                      " m, expected 0 < nearest < farthest"};
-    if (s.patch_radius_px < 2 || s.patch_radius_px > 50 || s.points_max < 1 || s.apart_px < 1)
-        return Error{"expected a patch radius of 2 .. 50 px, at least one point, corners at least 1 px apart"};
+    if (s.patch_radius_px < 2 || s.patch_radius_px > 50 || s.points_max < 1)
+        return Error{"expected a patch radius of 2 .. 50 px and at least one point"};
     return Ok{};
 }
 
 std::vector<cv::Point2f> corners(const MeasuredImage& image, const StereoSettings& settings) {
     const cv::Mat pixels(image.height, image.width, CV_32F, const_cast<float*>(image.dn.data()));
     std::vector<cv::Point2f> found;
-    cv::goodFeaturesToTrack(pixels, found, kCornersPerPoint * settings.points_max, kLeastStrength,
-                            settings.apart_px, {}, kCornerBlock_px);
+    cv::goodFeaturesToTrack(pixels, found, kCornersPerPoint * settings.points_max, kLeastStrength, kCornersApart_px,
+                            {}, kCornerBlock_px);
     return found;
 }
 

@@ -21,7 +21,6 @@ struct StereoSettings {
     int points_max = 100;                  ///< the strongest corners that pass all checks
     double nearest_m = 0, farthest_m = 0;  ///< depths in the left frame between which points are searched
     int patch_radius_px = 9;               ///< 2 .. 50; the smaller, the less relief and the more noise
-    int apart_px = 12;                     ///< least distance of two corners
 };
 
 struct StereoPoint {

@@ -113,6 +113,18 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
     return image;
 }
 
+Status check_image(const Camera& camera, const MeasuredImage& image, const std::string& what) {
+    const int height = camera.height - (camera.embedded_line ? 1 : 0);
+    const auto size = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
+    if (image.width != camera.width || image.height != height ||
+        image.dn.size() != static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(height))
+        return Error{what + " is of " + size(image.width, image.height) + " pixels, expected the camera's " +
+                     size(camera.width, height)};
+    if (!std::all_of(image.dn.begin(), image.dn.end(), [](float dn) { return std::isfinite(dn); }))
+        return Error{what + " has pixels that are not finite, expected DN"};
+    return Ok{};
+}
+
 Camera coarser_camera(const Camera& camera, int factor) {
     return scaled(camera, 1.0 / factor, 1.0 / factor);
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/result.h"
@@ -42,6 +43,10 @@ struct SensorModel {
 /// A frame's bytes in the camera's format (renderer/camera/detector.h) as DN. Of a camera with an embedded line the
 /// image has one row fewer: the last holds no light. Errors: the number of bytes is not the format's.
 [[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);
+
+/// An Error where the image has not the camera's size, less the embedded line, or a pixel that is not finite.
+/// `what` it is, for the message.
+[[nodiscard]] Status check_image(const Camera& camera, const MeasuredImage& image, const std::string& what);
 
 /// A pyramid level: the same camera with 1 / factor of the pixels each way. Incomplete ones at the right and at the
 /// bottom are left out.

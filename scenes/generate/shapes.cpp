@@ -43,34 +43,32 @@ Rigid3 frame_along(const Vec3& origin, const Vec3& x_axis, const Vec3& up) {
 }
 
 void box(Mesh& mesh, const Rigid3& T, const Vec3& half, double bevel) {
-    const Vec3 centre = T.t;
-    // The corner `s` of the face that looks along `axis`.
-    const auto corner = [&](int axis, const std::array<int, 3>& s) {
-        Vec3 p;
-        for (int i = 0; i < 3; ++i) p[i] = s[static_cast<std::size_t>(i)] * (half[i] - (i == axis ? 0 : bevel));
+    // Corner `s`, of signs, of the face that looks along `axis`.
+    const auto corner = [&](int axis, const Vec3& s) {
+        Vec3 p = s * (half - Vec3{bevel, bevel, bevel});
+        p[axis] = s[axis] * half[axis];
         return T * p;
     };
     for (int a = 0; a < 3; ++a) {
         const int b = (a + 1) % 3, c = (a + 2) % 3;
         const auto sign = [&](int sa, int sb, int sc) {
-            std::array<int, 3> s{};
-            s[static_cast<std::size_t>(a)] = sa, s[static_cast<std::size_t>(b)] = sb,
-            s[static_cast<std::size_t>(c)] = sc;
+            Vec3 s;
+            s[a] = sa, s[b] = sb, s[c] = sc;
             return s;
         };
         for (const int s : {-1, 1}) {
             mesh.polygon({corner(a, sign(s, -1, -1)), corner(a, sign(s, 1, -1)), corner(a, sign(s, 1, 1)),
                           corner(a, sign(s, -1, 1))},
-                         centre);
+                         T.t);
             for (const int t : {-1, 1})
                 mesh.polygon({corner(a, sign(s, t, -1)), corner(a, sign(s, t, 1)), corner(b, sign(s, t, 1)),
                               corner(b, sign(s, t, -1))},
-                             centre);
+                             T.t);
         }
     }
     for (int i = 0; i < 8; ++i) {
-        const std::array<int, 3> s{i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1};
-        mesh.polygon({corner(0, s), corner(1, s), corner(2, s)}, centre);
+        const Vec3 s{i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0};
+        mesh.polygon({corner(0, s), corner(1, s), corner(2, s)}, T.t);
     }
 }
 

@@ -8,9 +8,8 @@
 
 namespace narpa::scenes {
 
-/// hull.png is an atlas of 8 x 8 different shield panels of kPanelTile metres each: rivets, seams, stains, marks.
+/// hull.png is an atlas of 8 x 8 different shield panels: rivets, seams, stains, marks.
 inline constexpr int kPanelsPerSide = 8;
-inline constexpr double kPanelTile = kMetresPerTile / kPanelsPerSide;
 /// blanket.png repeats every kBlanketTile metres: quilted multi-layer insulation.
 inline constexpr double kBlanketTile = 2.56;
 /// cells.png repeats every kCellTile metres: 8 x 8 solar cells with their bus bars.

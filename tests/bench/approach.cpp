@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/view/measured_image.h"
+#include "plot/plot.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -56,12 +57,12 @@ TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
 
     TemporaryFolder folder;
     const std::string plot = folder / "approach.png", frames = folder / "frames.png";
-    EXPECT_TRUE(plot_approach(plot, "approach", *runs));
+    EXPECT_TRUE(write_plot(plot, {{"plot", "approach"}, {"title", "approach"}, {"runs", to_json(*runs)}}));
     EXPECT_GT(std::filesystem::file_size(plot), 5000u);
     TracingThreads threads(0);
     EXPECT_TRUE(plot_approach_frames(frames, **world, 0, 0, options, threads));
     EXPECT_GT(std::filesystem::file_size(frames), 20000u);
-    EXPECT_EQ(to_json(features)["bands"].back()["found"], all.found);
+    EXPECT_EQ(to_json(*runs)[0]["bands"].back()["found"], all.found);
     EXPECT_NE(in_words(*runs).find("features"), std::string::npos);
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/gates.h"
+#include "bench/statistics.h"
 
 namespace narpa {
 namespace {
@@ -132,15 +133,15 @@ TEST(BenchLadder, SmallBudgetsCountOnlyWhereTheyAreJudged) {
 
 TEST(BenchLadder, RatiosOfTheCraftMustHold) {
     CraftRatios good{};
-    good.cost.frame_s = 1.5, good.cost.raw.primary_s = 0.6, good.cost.raw.shadow_s = 0.4;
-    good.space = {0.1, 0.039, 1};  // from afar it is only reported
-    good.still_and_moved = {0.1, 0.1009};
+    good.near.frame_s = 1.5, good.near.raw.primary_s = 0.6, good.near.raw.shadow_s = 0.4;
+    good.far_s = 0.1, good.edge_s = 0.039, good.filled_s = 1;  // from afar it is only reported
+    good.still_s = 0.1, good.moved_s = 0.1009;
     good.load_s = 0.29;
     EXPECT_TRUE(bench_faults(good).empty());
     const CraftRatios none{};  // 0 / 0 is no ratio that holds
     EXPECT_EQ(bench_faults(none).size(), 2u);
     CraftRatios bad = good;
-    bad.cost.frame_s = 1.7, bad.space.edge_s = 0.05, bad.still_and_moved.second_s = 0.2, bad.load_s = 1;
+    bad.near.frame_s = 1.7, bad.edge_s = 0.05, bad.moved_s = 0.2, bad.load_s = 1;
     EXPECT_EQ(bench_faults(bad).size(), 4u);
 }
 

@@ -46,10 +46,10 @@ TEST(BenchReference, TheCraftHasItsTrianglesAndItsCover) {
     const auto world = craft(1024, RenderSettings::Method::direct);
     EXPECT_NEAR(static_cast<double>(world->tracer().triangle_count()), 200'000, 2'000);
     const View v(*world);
-    auto raw = RawEmbree::create(world->scene(), v.at);
+    auto raw = raw_embree(world->scene(), v.at);
     ASSERT_TRUE(raw);
     const RawCost cost =
-        raw->trace(world->scene().cameras[0], v.T_world_camera, normalized(world->scene().sun->direction));
+        (*raw)(world->scene().cameras[0], v.T_world_camera, normalized(world->scene().sun->direction));
     EXPECT_EQ(cost.primaries, 1024u * 1024u);
     EXPECT_NEAR(static_cast<double>(cost.hits) / static_cast<double>(cost.primaries), 0.27, 0.02);
     EXPECT_GT(cost.shadow_rays, cost.hits / 2);       // most of what is seen faces the Sun
@@ -62,9 +62,9 @@ TEST(BenchReference, EmbreesCallsSeeTheSamePixelsAsTheTracer) {
     const auto world = craft(96, RenderSettings::Method::direct);
     const View v(*world);
     const Camera& c = world->scene().cameras[0];
-    auto raw = RawEmbree::create(world->scene(), v.at);
+    auto raw = raw_embree(world->scene(), v.at);
     ASSERT_TRUE(raw);
-    const RawCost cost = raw->trace(c, v.T_world_camera, normalized(world->scene().sun->direction));
+    const RawCost cost = (*raw)(c, v.T_world_camera, normalized(world->scene().sun->direction));
     RadianceImage image(96, 96);
     Aovs aovs;
     render_radiance(world->render_scene(), v.at, c, v.T_world_camera, {}, image, &aovs);
@@ -84,7 +84,7 @@ TEST(BenchReference, EmbreesCallsSeeTheSamePixelsAsTheTracer) {
 void expect_same_image(const World& world, int spp, double precision) {
     const View v(world);
     const Camera& c = world.scene().cameras[0];
-    auto loop = ReferenceLoop::create(world.scene(), v.at);
+    auto loop = reference_loop(world.scene(), v.at);
     ASSERT_TRUE(loop) << loop.error().text();
     FrameSettings settings;
     settings.method = world.scene().render.method;
@@ -98,7 +98,7 @@ void expect_same_image(const World& world, int spp, double precision) {
     }
     ErrorAgainst loops(narpas);
     for (settings.frame = 0; settings.frame < 16; ++settings.frame) {
-        EXPECT_GT(loop->render(c, v.T_world_camera, settings, image), image.pixels.size());
+        EXPECT_GT((*loop)(c, v.T_world_camera, settings, image), image.pixels.size());
         loops.add(image.pixels);
     }
     const ErrorRow row = loops.row(spp);
@@ -127,7 +127,7 @@ TEST(BenchReference, TheLoopRejectsScenesItCannotRender) {
     auto scene = read_scene(std::string(NARPA_BUILD_DIR) + "/scenes/docking/docking.toml");
     ASSERT_TRUE(scene);
     const BodyPoses at(scene->bodies.size());
-    const auto loop = ReferenceLoop::create(*scene, at);
+    const auto loop = reference_loop(*scene, at);
     ASSERT_FALSE(loop);
     EXPECT_NE(loop.error().what.find("without textures"), std::string::npos) << loop.error().text();
 }

@@ -45,8 +45,8 @@ struct LinearModel {
                                                   noise_times * std::sqrt(variance(p)) * normal(random)));
         }
     }
-    [[nodiscard]] PhotometricImages images() const {
-        return {kSize, kSize, measured, {}, signal, {}, derivative, 1};
+    [[nodiscard]] PhotometricImages images(const ExposurePrior& prior = {}) const {
+        return {kSize, kSize, sensor, measured, {}, signal, {}, derivative, 1, prior};
     }
 };
 
@@ -61,7 +61,7 @@ TEST(PhotometricFit, FindsThePoseWhateverTheExposure) {
     Exposure e;
     Vector6 step = Vector6::Zero();
     for (int k = 0; k < 4; ++k) {  // gain times derivative: not quite linear
-        const auto eq = equations(model.images(), model.sensor, e, free, {1, 1e9, 0});
+        const auto eq = equations(model.images(free), e, {1, 1e9, 0});
         step = eq.pose_information().ldlt().solve(eq.pose_gradient());
         const Eigen::Vector2d de = eq.exposure_step(step);
         e.gain += de[0];
@@ -76,11 +76,11 @@ TEST(PhotometricFit, EliminatesTheExposureAsTheWholeInverseDoes) {
     std::mt19937_64 random(4);
     LinearModel model(random);
     model.measure(Vector6::Zero(), {}, 1, random);
-    const auto eq = equations(model.images(), model.sensor, {}, {}, {});
+    const auto eq = equations(model.images(), {}, {});
     const Matrix6 whole = eq.information.inverse().topLeftCorner<6, 6>();
     EXPECT_LT((eq.pose_information() * whole - Matrix6::Identity()).norm(), 1e-9);
     // A known exposure gives more information on the pose.
-    const auto known = equations(model.images(), model.sensor, {}, {0, 0}, {});
+    const auto known = equations(model.images({0, 0}), {}, {});
     const Matrix6 gained = known.pose_information() - eq.pose_information();
     EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6>(gained).eigenvalues()[0], -1e-9 * gained.norm());
     EXPECT_GT(gained.norm(), 0);
@@ -95,7 +95,7 @@ TEST(PhotometricFit, ItsCovarianceIsThatOfItsErrors) {
         double sum = 0;
         for (int n = 0; n < kDraws; ++n) {
             model.measure(Vector6::Zero(), {}, times, random);
-            const auto eq = equations(model.images(), model.sensor, {}, {0, 0}, {1, 1e9, 0});
+            const auto eq = equations(model.images({0, 0}), {}, {1, 1e9, 0});
             const Vector6 step = eq.pose_information().ldlt().solve(eq.pose_gradient());
             sum += normalised_error_squared(step, eq.pose_covariance());
         }
@@ -113,7 +113,7 @@ TEST(PhotometricFit, FindsTheShift) {
             if (x >= 3 && y < kSize - 2)
                 model.measured[static_cast<std::size_t>(y * kSize + x)] +=
                     model.signal[static_cast<std::size_t>((y + 2) * kSize + x - 3)];
-    EXPECT_EQ(best_shift(model.images(), model.sensor, 5), (std::array<int, 2>{3, -2}));
+    EXPECT_EQ(best_shift(model.images(), 5), (std::array<int, 2>{3, -2}));
 }
 
 /// A shiny ellipsoid, 84 pixels long, through the detector's noise.

@@ -7,11 +7,11 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pose/pnp.h"
-#include "estimator/pose/pnp_ceres.h"
 #include "estimator/pose/pnp_refine.h"
 #include "estimator/stereo/stereo_matcher.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
+#include "tests/estimator/pnp_ceres.h"
 #include "tests/support/equidistant_camera.h"
 #include "tests/support/shapes.h"
 
@@ -82,9 +82,7 @@ TEST_F(EquidistantPoints, CeresAgreesAndOutliersAreFound) {
               1e-3);
 
     for (std::size_t i = 0; i < pixels.size(); i += 4) pixels[i] = {900, 100 + 10 * static_cast<double>(i)};
-    PnpOptions options;
-    options.outliers = true;
-    const PnpSolution& s = solver.solve(input(0.5), options);
+    const PnpSolution& s = solver.solve(input(0.5), true);
     ASSERT_TRUE(s.ok()) << in_words(s.status);
     EXPECT_NEAR(static_cast<double>(s.inliers), 30, 2);
     EXPECT_LT(error_between(s.fit.T_camera_body, truth).norm(), 0.02);

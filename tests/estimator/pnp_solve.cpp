@@ -154,9 +154,7 @@ TEST_F(SolvePnp, OutliersAreFoundAndLeftOut) {
             std::uniform_real_distribution<double> anywhere(0, 500);
             const auto outliers = static_cast<std::size_t>(part * n);
             for (std::size_t i = 0; i < outliers; ++i) seen.pixels[i] = {anywhere(random_), anywhere(random_)};
-            PnpOptions options;
-            options.outliers = true;
-            const PnpSolution& s = solver_.solve(seen.input(), options);
+            const PnpSolution& s = solver_.solve(seen.input(), true);
             ASSERT_TRUE(s.ok()) << in_words(s.status);
             const double e2 =
                 normalised_error_squared(error_between(s.fit.T_camera_body, seen.T_camera_body), s.fit.covariance);
@@ -173,20 +171,16 @@ TEST_F(SolvePnp, OutliersAreFoundAndLeftOut) {
 TEST_F(SolvePnp, SameSeedSameAnswer) {
     test::Seen seen = test::see(random_, test::random_points(random_, 40, 2), some_pose(20), 0.5);
     for (std::size_t i = 0; i < 15; ++i) seen.pixels[i].u += 100;
-    PnpOptions options;
-    options.outliers = true;
-    const Rigid3 first = solver_.solve(seen.input(), options).fit.T_camera_body;
+    const Rigid3 first = solver_.solve(seen.input(), true).fit.T_camera_body;
     PnpSolver another(64);
-    EXPECT_EQ(another.solve(seen.input(), options).fit.T_camera_body, first);
+    EXPECT_EQ(another.solve(seen.input(), true).fit.T_camera_body, first);
 }
 
 TEST_F(SolvePnp, NothingButOutliersIsNoConsensus) {
     test::Seen seen = test::see(random_, test::random_points(random_, 40, 2), some_pose(20), 0.5);
     std::uniform_real_distribution<double> anywhere(0, 500);
     for (Pixel& p : seen.pixels) p = {anywhere(random_), anywhere(random_)};
-    PnpOptions options;
-    options.outliers = true;
-    EXPECT_EQ(solver_.solve(seen.input(), options).status, PnpStatus::no_consensus);
+    EXPECT_EQ(solver_.solve(seen.input(), true).status, PnpStatus::no_consensus);
 }
 
 // Seen from the cylinder over three points, the camera may slide along it unnoticed.
@@ -225,11 +219,9 @@ TEST_F(SolvePnp, TouchesNoHeapWhereItsOwnStartsServe) {
     const test::Seen seen = test::see(random_, test::random_points(random_, 30, 2), some_pose(20), 0.5);
     test::Seen spoilt = seen;
     for (std::size_t i = 0; i < 6; ++i) spoilt.pixels[i].u += 100;
-    PnpOptions options;
-    options.outliers = true;
     const test::AllocationCounter counter;
     EXPECT_TRUE(solver_.solve(seen.input()).ok());
-    EXPECT_TRUE(solver_.solve(spoilt.input(), options).ok());
+    EXPECT_TRUE(solver_.solve(spoilt.input(), true).ok());
     EXPECT_EQ(counter.on_this_thread(), 0u);
 }
 
@@ -238,9 +230,7 @@ TEST_F(SolvePnp, RefusesWhatHasNoPose) {
     const auto status = [&](const std::vector<Vec3>& points, const auto& spoil, bool outliers) {
         test::Seen seen = test::see(random_, points, truth, 0.3);
         spoil(seen);
-        PnpOptions options;
-        options.outliers = outliers;
-        return solver_.solve(seen.input(), options).status;
+        return solver_.solve(seen.input(), outliers).status;
     };
     const auto as_seen = [](test::Seen&) {};
     std::vector<Vec3> line;

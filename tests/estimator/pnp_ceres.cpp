@@ -1,10 +1,9 @@
-#include "estimator/pose/pnp_ceres.h"
+#include "tests/estimator/pnp_ceres.h"
 
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/sized_cost_function.h>
 #include <ceres/solver.h>
-#include <ceres/tiny_solver.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -73,29 +72,6 @@ private:
     Residual residual_;
 };
 
-/// Of all points, for the tiny solver.
-struct AllResiduals {
-    using Scalar = double;
-    enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 6 };
-
-    std::vector<Residual> points;
-
-    [[nodiscard]] int NumResiduals() const { return 2 * static_cast<int>(points.size()); }
-
-    bool operator()(const double* x, double* residuals, double* jacobian) const {
-        Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>> all(jacobian, NumResiduals(), 6);
-        for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(points.size()); ++i) {
-            Eigen::Vector2d residual;
-            Matrix26 J;
-            if (!points[static_cast<std::size_t>(i)].evaluate(x, residual, jacobian != nullptr ? &J : nullptr))
-                return false;
-            std::copy_n(residual.data(), 2, residuals + 2 * i);
-            if (jacobian != nullptr) all.middleRows<2>(2 * i) = J;
-        }
-        return true;
-    }
-};
-
 std::unique_ptr<ceres::LossFunction> loss_function(const RobustLoss& loss) {
     return loss.kind == Loss::none ? nullptr : std::make_unique<ceres::CauchyLoss>(loss.scale);
 }
@@ -160,22 +136,6 @@ PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const Robus
     fit.summary.iterations = static_cast<int>(summary.iterations.size()) - 1;
     for (std::size_t i = 0; i < summary.iterations.size(); ++i)
         fit.summary.chi2_at[i] = 2 * summary.iterations[i].cost;
-    return fit;
-}
-
-PnpFit refine_with_tiny_solver(const PnpInput& input, const Rigid3& start) {
-    if (const PnpStatus status = check(input); status != PnpStatus::converged) return failure(status);
-    if (!is_usable(start)) return failure(PnpStatus::not_finite);
-    const Quat q0 = normalized(start.q);
-    AllResiduals residuals;
-    for (std::size_t i = 0; i < input.body_m.size(); ++i) residuals.points.push_back({input, q0, i});
-    ceres::TinySolver<AllResiduals> solver;
-    Vector6 x;
-    x << 0, 0, 0, to_eigen(start.t);
-    const auto summary = solver.Solve(residuals, &x);
-    PnpFit fit =
-        evaluated(input, pose_of(q0, x.data()), {}, summary.status != decltype(solver)::HIT_MAX_ITERATIONS);
-    fit.summary.iterations = summary.iterations;
     return fit;
 }
 

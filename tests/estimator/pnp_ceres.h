@@ -1,5 +1,4 @@
-/// estimator/pose/pnp_ceres.h - the refinement of pnp_refine.h once more, by Ceres: a reference for results and
-/// time.
+/// tests/estimator/pnp_ceres.h - the refinement of pnp_refine.h once more, by Ceres: a reference for its results.
 #pragma once
 
 #include "estimator/pose/pnp_refine.h"
@@ -9,9 +8,5 @@ namespace narpa {
 /// Ceres's Levenberg-Marquardt, dense Cholesky, one residual block and one loss for each point. The covariance is
 /// that of pnp_refine.h at this minimum.
 [[nodiscard]] PnpFit refine_with_ceres(const PnpInput& input, const Rigid3& start, const RobustLoss& loss = {});
-
-/// Ceres's TinySolver, which takes no losses and none of Ceres's set-up: over a rotation vector from the start and
-/// a translation.
-[[nodiscard]] PnpFit refine_with_tiny_solver(const PnpInput& input, const Rigid3& start);
 
 }  // namespace narpa

@@ -239,10 +239,11 @@ std::string texture_path(const std::string& mesh_path, std::string name) {
 Result<MeshFile> read_mesh(const std::string& path, double scale, const MeshReaderLimits& limits) {
     if (const Status plain = check_plain_file(path); !plain) return plain.error();
     const std::string extension = extension_of(path);
-    if (extension != ".obj" && !is_read_in_process(extension))
+    const bool is_obj = extension == ".obj" || extension == ".tab";
+    if (!is_obj && !is_read_in_process(extension))
         return Error{.what = fmt::format("not a mesh format that can be read, expected {}", kMeshExtensions),
                      .file = path};
-    Result<TriangleSoup> soup = extension == ".obj" ? read_obj(path) : read_soup_in_process(path, limits);
+    Result<TriangleSoup> soup = is_obj ? read_obj(path) : read_soup_in_process(path, limits);
     if (!soup) return soup.error();
     take_textures_off_bare_triangles(*soup, path);
     if (soup->triangles.empty())

@@ -36,6 +36,7 @@ std::string plot_program() {
 /// Runs a program at the usual priority, its standard output on our standard error. Returns its exit status.
 int run_program(std::vector<std::string> arguments) {
     std::vector<char*> argv;
+    argv.reserve(arguments.size() + 1);
     for (std::string& a : arguments) argv.push_back(a.data());
     argv.push_back(nullptr);
     posix_spawn_file_actions_t files;

@@ -82,14 +82,14 @@ std::pair<std::string, std::string> split_port(std::string_view text) {
 }
 
 /// 1 to 65535, or nothing.
-std::optional<int> port_number(std::string_view text) {
+std::optional<int> udp_port(std::string_view text) {
     std::uint16_t port = 0;
     return read_number(text, port) && port > 0 ? std::optional<int>(port) : std::nullopt;
 }
 
 Result<int> data_port(std::string_view text, const std::string& address, int position_port_offset) {
     const int least = std::max(1, 1 - position_port_offset), most = std::min(65535, 65535 - position_port_offset);
-    const std::optional<int> port = port_number(text);
+    const std::optional<int> port = udp_port(text);
     if (port && *port >= least && *port <= most) return *port;
     std::string what =
         "udp:" + address + ": expected a data port from " + std::to_string(least) + " to " + std::to_string(most);
@@ -165,7 +165,7 @@ Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) 
     const std::string_view rest = spec.starts_with(scheme) ? spec.substr(scheme.size()) : std::string_view{};
     const auto [host, port] = split_port(rest);
     const std::string address = rest.find(':') == rest.npos ? "0.0.0.0" : host;
-    if (address.empty() || !port_number(port))
+    if (address.empty() || !udp_port(port))
         return Error{name + ": expected udp:PORT or udp:ADDRESS:PORT with a port from 1 to 65535, as in udp:2368"};
 
     addrinfo hints{}, *found = nullptr;

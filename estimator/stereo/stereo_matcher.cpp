@@ -17,7 +17,7 @@ constexpr int kCornersApart_px = 12;
 /// Of an exact pixel: small beside any match, large beside rounding.
 constexpr double kExact_px = 1e-4;
 /// Largest left-right-left error of the whole-pixel search.
-constexpr double kRoundTrip_px = 1.5;
+constexpr double kStereoRoundTrip_px = 1.5;
 
 Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredImage& right,
              const StereoSettings& s) {
@@ -89,7 +89,7 @@ private:
                        settings_.patch_radius_px, right_patch_))
             return false;
         const auto home = search_line(right_patch_, back_, left_, {std::min(a, b), std::max(a, b)});
-        return home && (home->px - patch_.centre_px()).norm() < kRoundTrip_px;
+        return home && (home->px - patch_.centre_px()).norm() < kStereoRoundTrip_px;
     }
 
     const StereoPair& pair_;

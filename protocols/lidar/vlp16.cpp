@@ -79,7 +79,8 @@ constexpr std::int64_t shot_offset_ns(int shot) {
 
 /// Azimuth of the rotor in revolutions, [0, 1). Whole seconds are taken apart, so that a long run keeps its angle.
 double rotor_revolutions(std::int64_t t_ns, double rotation_hz) {
-    const double whole = std::fmod(static_cast<double>(t_ns / kSecond_ns) * rotation_hz, 1.0);
+    const std::int64_t seconds = t_ns / kSecond_ns;
+    const double whole = std::fmod(static_cast<double>(seconds) * rotation_hz, 1.0);
     const double turns = whole + static_cast<double>(t_ns % kSecond_ns) * rotation_hz * 1e-9;
     const double fraction = turns - std::floor(turns);
     return fraction < 1 ? fraction : 0.0;

@@ -24,7 +24,7 @@ constexpr std::int64_t kLeadNs = 5'000'000;
 constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
 
 /// A body's pose commands.
-struct Body {
+struct CommandedBody {
     std::string name;
     std::uint32_t base_id = 0;
     std::uint8_t counter = 0;
@@ -51,7 +51,7 @@ public:
           fd_(bus.carries_fd()),
           target_{scenario.target.body, scenario.target.can_id},
           chaser_{scenario.chaser.body, scenario.chaser.can_id} {
-        if (scenario.attractor) attractor_ = Body{scenario.attractor->first, scenario.attractor->second};
+        if (scenario.attractor) attractor_ = CommandedBody{scenario.attractor->first, scenario.attractor->second};
     }
 
     Status run() {
@@ -214,7 +214,7 @@ private:
         return Ok{};
     }
 
-    Status send_pose(Body& body, const Motion& motion) {
+    Status send_pose(CommandedBody& body, const Motion& motion) {
         const PoseCommand command{body.counter++, clock_time_ns(), motion};
         FrameSet frames;
         if (const EncodeStatus encoded = encode(command, body.base_id, fd_, frames); !encoded)
@@ -247,8 +247,8 @@ private:
     CanBus& bus_;
     const StopFlag& stop_;
     bool fd_;
-    Body target_, chaser_;
-    std::optional<Body> attractor_;
+    CommandedBody target_, chaser_;
+    std::optional<CommandedBody> attractor_;
 
     RemoteClock clock_;
     MessageDecoder<ActuatorCommand> decoder_;

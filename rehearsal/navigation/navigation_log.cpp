@@ -17,7 +17,7 @@ constexpr const char* kCycleHeader =
     "angular_z_n_m_s,frames,sweeps\n";
 constexpr const char* kMeasurementHeader = "t_ns,sensor,outcome,nis,points,ms,why\n";
 
-std::string numbers(const Vec3& v, const char* form = "{:.6g}") {
+std::string csv_numbers(const Vec3& v, const char* form = "{:.6g}") {
     return fmt::format(fmt::runtime(fmt::format("{0},{0},{0}", form)), v.x, v.y, v.z);
 }
 
@@ -71,12 +71,13 @@ void NavigationLog::cycle(const CycleRecord& r) {
     const auto phase = static_cast<std::size_t>(r.command.phase), abort = static_cast<std::size_t>(r.command.abort);
     cycles_ << fmt::format("{},{},{:.6f},{},{},{},{},{},{},{},{:.5f},{:.6g},{},{},{},{},{},{}\n", r.estimate.cycle,
                            r.estimate.t_ns, r.t_s, kGuidancePhases[phase], r.command.leg, kAbortReasons[abort],
-                           numbers(port.t, "{:.5f}"), numbers(r.port.velocity_m_s),
-                           numbers(r.reference.position_m, "{:.5f}"), numbers(port.t - r.reference.position_m),
+                           csv_numbers(port.t, "{:.5f}"), csv_numbers(r.port.velocity_m_s),
+                           csv_numbers(r.reference.position_m, "{:.5f}"),
+                           csv_numbers(port.t - r.reference.position_m),
                            angle_between(port.q, r.reference.q_port_chaser_port) / kDegree, r.position_sigma_m,
-                           numbers(r.estimate.sigma_position_m), numbers(r.estimate.sigma_rotation_rad / kDegree),
-                           numbers(r.command.impulse_n_s), numbers(r.command.angular_impulse_n_m_s),
-                           r.estimate.frames, r.estimate.sweeps);
+                           csv_numbers(r.estimate.sigma_position_m),
+                           csv_numbers(r.estimate.sigma_rotation_rad / kDegree), csv_numbers(r.command.impulse_n_s),
+                           csv_numbers(r.command.angular_impulse_n_m_s), r.estimate.frames, r.estimate.sweeps);
 
     const bool changed = r.command.phase != phase_ || r.command.abort != abort_;
     phase_ = r.command.phase, abort_ = r.command.abort;

@@ -7,7 +7,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kGuard_px = 1e-3;  ///< more than what rounding does to image coordinates
+constexpr double kConeGuard_px = 1e-3;  ///< more than what rounding does to image coordinates
 
 double angle_between_directions(const Vec3& a, const Vec3& b) {
     return std::atan2(norm(cross(a, b)), dot(a, b));
@@ -61,8 +61,9 @@ struct ConeCulling {
 
     [[nodiscard]] DirectionCone cone(const TileRect& rect) const {
         const auto edge = [](int tile) { return static_cast<double>(tile * kTileSize) - 0.5; };
-        DirectionCone rays = model.bounds({edge(rect.x_first) - kGuard_px, edge(rect.y_first) - kGuard_px,
-                                           edge(rect.x_last + 1) + kGuard_px, edge(rect.y_last + 1) + kGuard_px});
+        DirectionCone rays =
+            model.bounds({edge(rect.x_first) - kConeGuard_px, edge(rect.y_first) - kConeGuard_px,
+                          edge(rect.x_last + 1) + kConeGuard_px, edge(rect.y_last + 1) + kConeGuard_px});
         rays.half_angle_rad += turn_rad;
         return rays;
     }

@@ -12,7 +12,7 @@ namespace {
 constexpr double kGuard_px = 1e-3;  ///< more than what rounding does to image coordinates
 
 /// The image of a pinhole in units of tiles: tile (i, j) is what lies from i to i + 1 and from j to j + 1.
-struct Grid {
+struct TileGrid {
     TileRect all;
     double width, height;
     Pinhole image;
@@ -20,7 +20,7 @@ struct Grid {
     double lens_radius_m, inverse_focus_per_m;  ///< of a pinhole 0, 0
     double longest;  ///< of the rays, per metre along the camera's z axis, the longest, from anywhere on the lens
 
-    Grid(const Pinhole& pinhole, const Camera& c, const Lens* lens, const TileRect& whole)
+    TileGrid(const Pinhole& pinhole, const Camera& c, const Lens* lens, const TileRect& whole)
         : all(whole),
           width(static_cast<double>(c.width) / kTileSize),
           height(static_cast<double>(c.height) / kTileSize),
@@ -41,7 +41,7 @@ struct Extent {
         x_low = std::min(x_low, x - reach_x), x_high = std::max(x_high, x + reach_x);
         y_low = std::min(y_low, y - reach_y), y_high = std::max(y_high, y + reach_y);
     }
-    [[nodiscard]] bool within(const Grid& g) const {
+    [[nodiscard]] bool within(const TileGrid& g) const {
         return x_high >= -g.guard && x_low <= g.width + g.guard && y_high >= -g.guard &&
                y_low <= g.height + g.guard;
     }
@@ -51,7 +51,7 @@ int tile_at(double x, int last) {
     return static_cast<int>(std::min(std::max(0.0, x), static_cast<double>(last)));
 }
 
-TileRect tiles_of(const Extent& e, const Grid& g) {
+TileRect tiles_of(const Extent& e, const TileGrid& g) {
     return {tile_at(e.x_low - g.guard, g.all.x_last), tile_at(e.y_low - g.guard, g.all.y_last),
             tile_at(e.x_high + g.guard, g.all.x_last), tile_at(e.y_high + g.guard, g.all.y_last)};
 }
@@ -82,7 +82,7 @@ constexpr std::array<Edge, 12> kEdges = [] {
 /// A box as the camera sees it.
 class SeenBox {
 public:
-    SeenBox(const BoxNode& node, const Grid& grid, const BodyView& view, double slack_m)
+    SeenBox(const BoxNode& node, const TileGrid& grid, const BodyView& view, double slack_m)
         : grid_(grid), view_(view), centre_(view.centre_camera) {
         for (std::size_t k = 0; k < 3; ++k) {
             const double low = node.low[k], high = node.high[k];
@@ -220,7 +220,7 @@ private:
         return p;
     }
 
-    const Grid& grid_;
+    const TileGrid& grid_;
     const BodyView& view_;
     Vec3 centre_;                                   ///< camera's frame
     double half_z_ = 0;                             ///< of its extent along the camera's z axis
@@ -228,7 +228,7 @@ private:
 };
 
 /// Marks the boxes of a tree, no further down than it takes to tell tiles apart.
-NARPA_EACH_ISA void mark_boxes(std::span<const BoxNode> nodes, const Grid& grid, const BodyView& view,
+NARPA_EACH_ISA void mark_boxes(std::span<const BoxNode> nodes, const TileGrid& grid, const BodyView& view,
                                double slack_m, TileMask& mask) {
     std::array<std::uint32_t, kBoxLeaves + 1> open;  // one more with each step down
     std::size_t n = 0;
@@ -272,7 +272,7 @@ NARPA_EACH_ISA void mark_boxes(std::span<const BoxNode> nodes, const Grid& grid,
 /// a sphere, the rays that meet it make a circular cone, and so do, about them, those of a rectangle of the image.
 class SeenEllipsoid {
 public:
-    SeenEllipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view) {
+    SeenEllipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view) {
         const Vec3& semi_axes_m = bounds.semi_axes_m;
         // Rays from elsewhere on the lens meet what those from its centre meet when a ball of the lens's radius is
         // added to it: an ellipsoid that holds the sum (A. Kurzhanski, I. Valyi, "Ellipsoidal Calculus for
@@ -341,7 +341,7 @@ private:
 };
 
 /// Within the box about it, which is the tighter of the two for one that is very flat or long.
-void mark_ellipsoid(const BodyBounds& bounds, const Grid& grid, const BodyView& view, TileMask& mask) {
+void mark_ellipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, TileMask& mask) {
     const BoxNode node = box_about(bounds);
     const double rounding_m = 0x1p-23 * (norm(bounds.centre_m) + norm(bounds.semi_axes_m)) + view.rounding_m;
     const SeenBox box(node, grid, view, rounding_m);
@@ -365,7 +365,7 @@ BoxNode box_about(const BodyBounds& bounds) noexcept {
 
 void mark_by_projection(const Pinhole& pinhole, const Camera& camera, const Lens* lens, const CulledBody& body,
                         TileMask& mask) noexcept {
-    const Grid grid(pinhole, camera, lens, mask.all());
+    const TileGrid grid(pinhole, camera, lens, mask.all());
     if (body.boxes.empty())
         mark_ellipsoid(body.bounds, grid, body.view, mask);
     else

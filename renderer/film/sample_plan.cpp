@@ -28,8 +28,8 @@ constexpr float kUnseen = 0.02f;
 constexpr double kEdgePower = 0.8;
 
 constexpr int kRim = 2;
-constexpr int kSide = kTile + 2 * kRim;
-using Grid = std::array<std::array<float, kSide>, kSide>;
+constexpr int kPlanSide = kTile + 2 * kRim;
+using PlanGrid = std::array<std::array<float, kPlanSide>, kPlanSide>;
 constexpr std::size_t kGrain = 16;  ///< tiles of a task
 
 /// Folds 2 r + 1 neighbours.
@@ -44,15 +44,15 @@ constexpr auto kSum = [](float a, float b) { return a + b; };
 
 /// What a tile's pixels and their neighbours to two pixels' distance hold.
 struct Neighbourhood {
-    Grid edge{};            ///< variance
-    Grid noise{}, known{};  ///< variance, where it is known: 1
+    PlanGrid edge{};            ///< variance
+    PlanGrid noise{}, known{};  ///< variance, where it is known: 1
 };
 
 Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& contrasts, int tx, int ty,
                      float unseen) {
     Neighbourhood n;
-    for (int y = 0; y < kSide; ++y)
-        for (int x = 0; x < kSide; ++x) {
+    for (int y = 0; y < kPlanSide; ++y)
+        for (int x = 0; x < kPlanSide; ++x) {
             const int px = tx * kTile + x - kRim, py = ty * kTile + y - kRim;
             if (px < 0 || py < 0 || px >= g_buffer.width() || py >= g_buffer.height()) continue;
             const auto tile = static_cast<std::size_t>(py / kTile * g_buffer.tiles_x() + px / kTile);
@@ -68,21 +68,21 @@ Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& c
 
 /// Variance of one sample of each pixel, relative to a typical one; 0: all is the same around it.
 PerPixel<double> variances_of(const Neighbourhood& n, double typical, bool edge_classes) {
-    Grid near{}, far{}, noises{}, knowns{};  // along the rows, then along the columns
-    for (int y = 0; y < kSide; ++y)
-        for (int x = kRim; x < kSide - kRim; ++x) {
-            const auto row = [&](const Grid& g) { return [&g, x, y](int k) { return g[y][x + k]; }; };
+    PlanGrid near{}, far{}, noises{}, knowns{};  // along the rows, then along the columns
+    for (int y = 0; y < kPlanSide; ++y)
+        for (int x = kRim; x < kPlanSide - kRim; ++x) {
+            const auto row = [&](const PlanGrid& g) { return [&g, x, y](int k) { return g[y][x + k]; }; };
             near[y][x] = fold(1, row(n.edge), kGreatest);
             far[y][x] = fold(2, row(n.edge), kGreatest);
             noises[y][x] = fold(2, row(n.noise), kSum);
             knowns[y][x] = fold(2, row(n.known), kSum);
         }
     PerPixel<double> variances{};
-    for (int y = kRim; y < kSide - kRim; ++y)
-        for (int x = kRim; x < kSide - kRim; ++x) {
-            const auto column = [&](const Grid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
+    for (int y = kRim; y < kPlanSide - kRim; ++y)
+        for (int x = kRim; x < kPlanSide - kRim; ++x) {
+            const auto column = [&](const PlanGrid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
             // What has the pixel's own centre in it are its own noise and that of the four beside it.
-            const auto cross = [&](const Grid& g) {
+            const auto cross = [&](const PlanGrid& g) {
                 return g[y][x] + g[y][x - 1] + g[y][x + 1] + g[y - 1][x] + g[y + 1][x];
             };
             float edge = n.edge[y][x];

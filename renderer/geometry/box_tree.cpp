@@ -41,7 +41,7 @@ struct Box {
     [[nodiscard]] float extent() const { return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}); }
 };
 
-using Triangle = std::array<Vec3f, 3>;
+using TriangleCorners = std::array<Vec3f, 3>;
 
 /// Of `steps` from 0 on, also for what is not a number, as the difference of the largest numbers.
 std::size_t step_at(float x, std::size_t steps) {
@@ -67,16 +67,16 @@ public:
     [[nodiscard]] const Box& all() const { return all_; }
 
 private:
-    static Triangle corners(const Mesh& mesh, const std::array<std::uint32_t, 3>& f) {
+    static TriangleCorners corners(const Mesh& mesh, const std::array<std::uint32_t, 3>& f) {
         return {mesh.positions[f[0]], mesh.positions[f[1]], mesh.positions[f[2]]};
     }
-    static Box box_of(const Triangle& t) {
+    static Box box_of(const TriangleCorners& t) {
         Box box;
         for (const Vec3f& p : t) box.add(p);
         return box;
     }
 
-    void cut(const Triangle& t, int halvings) {
+    void cut(const TriangleCorners& t, int halvings) {
         const Box box = box_of(t);
         if (!(box.surface() > largest_) || halvings == 0) return add(box);
         std::size_t longest = 0;

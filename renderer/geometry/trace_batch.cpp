@@ -58,7 +58,8 @@ public:
         std::uint32_t lanes;
     };
     BodyGroups(const Lanes<int>& body, std::uint32_t lanes) noexcept {
-        for (std::uint32_t rest = lanes; rest != 0; rest &= ~groups_[n_++].lanes) {
+        for (std::uint32_t rest = lanes; rest != 0;
+             rest &= ~groups_[n_++].lanes) {  // NOLINT(bugprone-infinite-loop)
             const int first = body[static_cast<std::size_t>(std::countr_zero(rest))];
             groups_[n_] = {static_cast<std::size_t>(first), lanes_with(body, first) & rest};
         }

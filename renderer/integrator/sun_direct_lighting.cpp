@@ -109,7 +109,7 @@ void lobes_of(const SurfaceLanes& surfaces, const Lanes<double>& r_v, Lanes<floa
 
 NARPA_EACH_ISA void reflect_sun(const SurfaceLanes& surfaces, const Vec3Lanes& direction, const Vec3Lanes& to_sun,
                                 const Vec3& centre, float irradiance, Sunlight& out) noexcept {
-    constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
+    constexpr float inv_pi = static_cast<float>(std::numbers::inv_pi);
     const Vec3Lanes& n = surfaces.normal;
     Lanes<double> r_v;
     Lanes<float> arriving, lobe{};
@@ -129,9 +129,9 @@ NARPA_EACH_ISA void reflect_sun(const SurfaceLanes& surfaces, const Vec3Lanes& d
     RgbLanes reflected;
     Lanes<std::uint32_t> sent;
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const float r = surfaces.diffuse.r[i] * kInvPi + surfaces.specular.r[i] * lobe[i];
-        const float g = surfaces.diffuse.g[i] * kInvPi + surfaces.specular.g[i] * lobe[i];
-        const float b = surfaces.diffuse.b[i] * kInvPi + surfaces.specular.b[i] * lobe[i];
+        const float r = surfaces.diffuse.r[i] * inv_pi + surfaces.specular.r[i] * lobe[i];
+        const float g = surfaces.diffuse.g[i] * inv_pi + surfaces.specular.g[i] * lobe[i];
+        const float b = surfaces.diffuse.b[i] * inv_pi + surfaces.specular.b[i] * lobe[i];
         const bool dark = (r == 0) & (g == 0) & (b == 0);
         sent[i] = dark ? 0 : faces[i];
         reflected.r[i] = r * arriving[i];

@@ -137,7 +137,8 @@ private:
     static bool is_normal_map(const Texture& texture) {
         std::array<double, 3> sum{};
         for (std::size_t i = 0; i < texture.rgb.size(); ++i) sum[i % 3] += texture.rgb[i];
-        const double white = 65535.0 * static_cast<double>(texture.rgb.size() / 3);
+        const std::size_t texels = texture.rgb.size() / 3;
+        const double white = 65535.0 * static_cast<double>(texels);
         return sum[2] - std::max(sum[0], sum[1]) > 0.2 * white;
     }
 

@@ -23,7 +23,8 @@ share = prefix / "share/narpa"
 wrong = []
 
 for name in [
-    "bin/narpa", "bin/narpa-dynamics", "bin/narpa-navigation", "bin/narpa-plot", "bin/narpa-mesh-reader",
+    "bin/narpa", "bin/narpa-dynamics", "bin/narpa-navigation", "bin/narpa-mesh-reader",
+    "bin/narpa-plot", "bin/narpa-mesh-reader",
     "share/narpa/LICENSE", "share/narpa/README.md", "share/narpa/docs/scene.md", "share/narpa/docs/interfaces.md",
     "share/narpa/protocols/can/README.md", "share/narpa/protocols/can/narpa.dbc",
     "share/narpa/examples/dynamics.py", "share/narpa/python/narpa/can.py",

@@ -70,12 +70,16 @@ inline Vec3 rotation_vector(Quat q) {
 /// Shortest-arc spherical interpolation, u in [0, 1]; u outside extrapolates at the same rate.
 inline Quat slerp(const Quat& a, Quat b, double u) {
     if (dot(a, b) < 0) b = -b;
-    const double theta = 0.5 * angle_between(a, b);
-    double ka = 1.0 - u, kb = u;
-    if (theta > 1e-9) {
-        const double s = std::sin(theta);
-        ka = std::sin((1.0 - u) * theta) / s;
-        kb = std::sin(u * theta) / s;
+    const Quat chord{b.w - a.w, b.x - a.x, b.y - a.y, b.z - a.z};
+    const double chord2 = dot(chord, chord);
+    double ka = 1 - u, kb = u;
+    if (chord2 < 1e-6) {  // sin(k theta) / sin(theta) by its series, 1e-15 rad off
+        ka *= 1 + chord2 / 6 * (1 - ka * ka);
+        kb *= 1 + chord2 / 6 * (1 - kb * kb);
+    } else {
+        const double theta = 0.5 * angle_between(a, b), s = std::sin(theta);
+        ka = std::sin(ka * theta) / s;
+        kb = std::sin(kb * theta) / s;
     }
     return normalized(Quat{ka * a.w + kb * b.w, ka * a.x + kb * b.x, ka * a.y + kb * b.y, ka * a.z + kb * b.z});
 }

@@ -4,12 +4,26 @@
 
 namespace narpa {
 
+namespace {
+
+/// Shots that are traced together span no more than this: in between, bodies move along straight lines at constant
+/// rates, which is off by acceleration * span^2 / 8: 1e-9 m at 1 m/s^2. A VLP-16 fires 16 shots in 35 us.
+constexpr std::int64_t kBatchSpan_ns = 100'000;
+
+std::size_t batch_size(std::span<const LidarShot> shots) noexcept {
+    std::size_t n = 1;
+    while (n < std::min(kLanes, shots.size()) && shots[n].t_offset_ns - shots[0].t_offset_ns <= kBatchSpan_ns) ++n;
+    return n;
+}
+
+}  // namespace
+
 LidarUnit::LidarUnit(const World& world, std::size_t index)
     : world_(world),
       lidar_(world.scene().lidars[index]),
       model_(*lidar_.model),
       period_ns_(model_.packet_period_ns(lidar_.rate_hz)),
-      placement_(world.scene().bodies.size(), kLanes),
+      placement_(world.scene().bodies.size()),
       shots_(model_.spec().shots_per_packet),
       hits_(shots_.size()),
       ranges_m_(shots_.size()),
@@ -22,21 +36,21 @@ LidarUnit::LidarUnit(const World& world, std::size_t index)
 void LidarUnit::fire(std::int64_t packet) noexcept {
     model_.shots(packet, lidar_.rate_hz, shots_);
     returns_ = 0;
-    for (std::size_t first = 0; first < shots_.size(); first += kLanes) {
-        const auto shots = std::span(shots_).subspan(first, std::min(kLanes, shots_.size() - first));
-        Lanes<std::int64_t> times_ns;
-        for (std::size_t k = 0; k < shots.size(); ++k) times_ns[k] = packet_start_ns(packet) + shots[k].t_offset_ns;
-        world_.place_moving(std::span(times_ns).first(shots.size()), placement_);
+    const std::int64_t start_ns = packet_start_ns(packet);
+    for (std::size_t first = 0; first < shots_.size();) {
+        const auto rest = std::span(shots_).subspan(first), shots = rest.first(batch_size(rest));
+        const std::int64_t begin_ns = shots.front().t_offset_ns, end_ns = shots.back().t_offset_ns;
+        world_.place_moving(start_ns + begin_ns, start_ns + end_ns, placement_);
         RayBatch beams;
         for (const LidarShot& shot : shots) {
-            // The k-th shot meets the k-th pose of each path.
-            const double time =
-                static_cast<double>(beams.n) / static_cast<double>(std::max<std::size_t>(1, shots.size() - 1));
+            const double time = static_cast<double>(shot.t_offset_ns - begin_ns) /
+                                static_cast<double>(std::max<std::int64_t>(1, end_ns - begin_ns));
             const Rigid3 T_world_lidar = world_.sensor_pose(lidar_.mount, lidar_.T_mount_lidar, placement_, time);
             beams.put(beams.n++, {T_world_lidar * shot.origin_m, T_world_lidar.q * shot.direction, time});
         }
         shoot(world_.tracer(), placement_, beams, lidar_.range_max_m,
               std::span(hits_).subspan(first, shots.size()));
+        first += shots.size();
     }
     for (std::size_t i = 0; i < shots_.size(); ++i) {
         ranges_m_[i] = hits_[i].range_m;

@@ -101,12 +101,9 @@ PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,
     return source;
 }
 
-void World::place_moving(std::span<const std::int64_t> times_ns, BodyPoses& out) const noexcept {
-    Lanes<Rigid3> path;
-    for (const std::size_t i : moving_) {
-        for (std::size_t k = 0; k < times_ns.size(); ++k) path[k] = pose(i, times_ns[k]).motion.T_world_body;
-        out.set(i, std::span(path).first(times_ns.size()));
-    }
+void World::place_moving(std::int64_t start_ns, std::int64_t end_ns, BodyPoses& out) const noexcept {
+    for (const std::size_t i : moving_)
+        out.set(i, pose(i, start_ns).motion.T_world_body, pose(i, end_ns).motion.T_world_body);
 }
 
 std::optional<std::size_t> World::body_named(std::string_view name) const noexcept {

@@ -43,9 +43,9 @@ public:
     /// newer commands. Allocates nothing.
     PlacementSource place(std::int64_t t_ns, int rider, BodyPoses& out,
                           std::span<Motion> motions = {}) const noexcept;
-    /// Updates only the bodies that can move (all but those at rest without a can_id), after a first `place`.
-    /// Their paths have one pose for each of these times, up to kLanes.
-    void place_moving(std::span<const std::int64_t> times_ns, BodyPoses& out) const noexcept;
+    /// Moves the bodies that can move (all but those at rest without a can_id) from their pose at the start to the
+    /// one at the end, after a first `place`.
+    void place_moving(std::int64_t start_ns, std::int64_t end_ns, BodyPoses& out) const noexcept;
 
     [[nodiscard]] Rigid3 sensor_pose(int mount, const Rigid3& T_mount_sensor, const BodyPoses& at,
                                      double time = kMidExposure) const noexcept {

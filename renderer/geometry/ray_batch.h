@@ -4,12 +4,10 @@
 #include <cstdint>
 #include <utility>
 
+#include "renderer/geometry/body_poses.h"
 #include "renderer/geometry/lanes.h"
 
 namespace narpa {
-
-/// Moments within an exposure are fractions of it, 0 at its start and 1 at its end.
-inline constexpr double kMidExposure = 0.5;
 
 /// One lane of a RayBatch.
 struct Ray {

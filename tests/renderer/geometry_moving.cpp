@@ -24,12 +24,8 @@ Scene four_bodies() {
     return s;
 }
 
-std::array<Rigid3, 3> path_from(const Rigid3& T, std::mt19937_64& random) {
-    std::array<Rigid3, 3> path{T, T, T};
-    for (std::size_t k = 1; k < 3; ++k)
-        path[k] = {path[k - 1].q * exp_rotation(0.3 * random_direction(random)),
-                   path[k - 1].t + 0.5 * random_direction(random)};
-    return path;
+Rigid3 moved(const Rigid3& T, std::mt19937_64& random) {
+    return {T.q * exp_rotation(0.3 * random_direction(random)), T.t + 0.5 * random_direction(random)};
 }
 
 TEST(MovingBodies, EachRayMeetsThemAtItsOwnMoment) {
@@ -38,7 +34,7 @@ TEST(MovingBodies, EachRayMeetsThemAtItsOwnMoment) {
     ASSERT_TRUE(tracer) << tracer.error().text();
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> uniform(0, 1);
-    BodyPoses moving(4, 3);
+    BodyPoses moving(4);
     std::size_t seen = 0, dark = 0, again = 0;
     for (int round = 0; round < 100; ++round) {
         for (std::size_t b = 0; b < 4; ++b) {
@@ -46,7 +42,7 @@ TEST(MovingBodies, EachRayMeetsThemAtItsOwnMoment) {
             if (b == 3)
                 moving.set(b, T);
             else
-                moving.set(b, path_from(T, random));
+                moving.set(b, T, moved(T, random));
         }
         ASSERT_TRUE(moving.moving());
         RayBatch rays;
@@ -92,22 +88,24 @@ TEST(MovingBodies, EachRayMeetsThemAtItsOwnMoment) {
     EXPECT_GT(again, 20u);
 }
 
-TEST(MovingBodies, PathsPassThroughTheirPosesAndTurnEvenly) {
+TEST(MovingBodies, PathsBeginAndEndAtTheirPosesAndTurnEvenly) {
     std::mt19937_64 random(8);
-    const std::array<Rigid3, 3> path = path_from({random_attitude(random), {1e6, 2, 3}}, random);
-    BodyPoses at(1, 3);
-    at.set(0, path);
-    for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(at.T_world_body_at(0, 0.5 * static_cast<double>(k)), path[k]);
-    EXPECT_EQ(at.T_world_body[0], path[1]);
-    const Rigid3 T = at.T_world_body_at(0, 0.125);
-    EXPECT_NEAR(angle_between(path[0].q, T.q), 0.25 * angle_between(path[0].q, path[1].q), 1e-12);
-    EXPECT_NEAR(norm(T.t - (0.75 * path[0].t + 0.25 * path[1].t)), 0, 1e-9);
-    at.set(0, path[0]);
+    const Rigid3 start{random_attitude(random), {1e6, 2, 3}}, end = moved(start, random);
+    BodyPoses at(1);
+    at.set(0, start, end);
+    EXPECT_TRUE(at.moves(0));
+    EXPECT_EQ(at.T_world_body_at(0, 0), start);
+    EXPECT_EQ(at.T_world_body_at(0, 1), end);
+    EXPECT_EQ(at.T_world_body[0], at.T_world_body_at(0, 0.5));
+    const Rigid3 T = at.T_world_body_at(0, 0.25);
+    EXPECT_NEAR(angle_between(start.q, T.q), 0.25 * angle_between(start.q, end.q), 1e-12);
+    EXPECT_NEAR(norm(T.t - (0.75 * start.t + 0.25 * end.t)), 0, 1e-9);
+    at.set(0, start);
     EXPECT_FALSE(at.moving());
-    EXPECT_EQ(at.T_world_body_at(0, 0.7), path[0]);
-    at.set(0, std::array{path[2], path[2]});
+    EXPECT_EQ(at.T_world_body_at(0, 0.7), start);
+    at.set(0, end, end);
     EXPECT_FALSE(at.moving());
-    EXPECT_EQ(at.T_world_body[0], path[2]);
+    EXPECT_EQ(at.T_world_body[0], end);
 }
 
 }  // namespace

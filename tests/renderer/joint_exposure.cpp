@@ -100,7 +100,7 @@ TEST(MovingCamera, BlursAsMuchAsABodyThatMovesTheOtherWay) {
     const Rigid3 T = scene.bodies[0].initial.T_world_body;
     const Vec3 half{0.5 * kShift_px / kFocal_px, 0, 0};
     BodyPoses at(1);
-    at.set(0, std::array{Rigid3{T.q, T.t + half}, Rigid3{T.q, T.t - half}});
+    at.set(0, {T.q, T.t + half}, {T.q, T.t - half});
     FrameSettings settings;
     settings.spp = 64;
     expect_blurred_edge(rendered(scene, at, CameraPose({}, {}), settings), 64);
@@ -174,7 +174,7 @@ TEST(MovingCamera, SeesTheMeanOfManyMoments) {
     };
     BodyPoses moving(3);
     for (std::size_t b = 0; b < 3; ++b) moving.set(b, scene.bodies[b].initial.T_world_body);
-    for (std::size_t b = 0; b < 2; ++b) moving.set(b, std::array{moving.T_world_body[b], moved(b)});
+    for (std::size_t b = 0; b < 2; ++b) moving.set(b, moving.T_world_body[b], moved(b));
     const CameraPose pose({exp_rotation({0.02, -0.05, 0}), {-0.1, 0, 0}},
                           {exp_rotation({0, 0.05, 0.1}), {0.1, 0, 0.2}});
     FrameSettings settings;

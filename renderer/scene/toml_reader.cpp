@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "base/nearest_name.h"
 
 namespace narpa {
 
@@ -36,33 +37,6 @@ std::string shown(const toml::node& node) {
     if (const auto* i = node.as_integer()) return fmt::format("{}", i->get());
     if (const auto* f = node.as_floating_point()) return fmt::format("{}", f->get());
     return std::string(type_words(node));
-}
-
-/// Levenshtein's distance.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), std::size_t{0});
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i + 1;
-        for (std::size_t j = 0; j < b.size(); ++j) {
-            const std::size_t replace = diagonal + (a[i] != b[j]);
-            diagonal = row[j + 1];
-            row[j + 1] = std::min({replace, row[j] + 1, diagonal + 1});
-        }
-    }
-    return row.back();
-}
-
-std::string suggestion(std::string_view key, const std::vector<std::string>& known) {
-    constexpr std::size_t kFarthest = 2;
-    std::size_t best = std::min(kFarthest + 1, key.size());
-    const std::string* nearest = nullptr;
-    for (const std::string& k : known) {
-        const std::size_t d = edit_distance(key, k);
-        if (d < best) best = d, nearest = &k;
-    }
-    return nearest ? fmt::format("; did you mean \"{}\"?", *nearest) : std::string();
 }
 
 }  // namespace
@@ -317,7 +291,7 @@ void TableReader::finish() {
     for (const auto& [key, value] : *table_)
         if (std::find(asked_.begin(), asked_.end(), key.str()) == asked_.end())
             problems_->add(key.source(), fmt::format("unknown key \"{}\" in {}{}", key.str(), name_,
-                                                     suggestion(key.str(), asked_)));
+                                                     did_you_mean(key.str(), asked_)));
 }
 
 }  // namespace narpa

@@ -13,6 +13,7 @@ namespace narpa {
 
 CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep)
     : bus_(bus),
+      hub_(dynamic_cast<ClientHub*>(&bus)),
       log_(log),
       lockstep_(lockstep),
       pace_(!lockstep && bus.recorded()),
@@ -67,6 +68,7 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
             counters_.missed += static_cast<std::uint8_t>(command.counter - l.last_counter - 1);
         l.last_counter = command.counter;
         ++counters_.taken;
+        if (hub_) hub_->note_commander();
         moved = true;
         return status;
     }

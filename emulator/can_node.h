@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/can/can_bus.h"
+#include "drivers/can/client_hub.h"
 #include "emulator/log/row_log.h"
 #include "emulator/world.h"
 #include "protocols/can/messages.h"
@@ -44,6 +45,8 @@ public:
 
     [[nodiscard]] CanBus& bus() noexcept { return bus_; }
     [[nodiscard]] const CanBus& bus() const noexcept { return bus_; }
+    /// Null where the bus does not know its clients.
+    [[nodiscard]] const ClientHub* hub() const noexcept { return hub_; }
 
     /// Waits until `receive` may have something to read or the time is over; may wake early.
     void wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept;
@@ -80,6 +83,7 @@ private:
     void log_left_out(std::int64_t t_ns) noexcept;
 
     CanBus& bus_;
+    ClientHub* hub_;
     RowLog* log_;
     bool lockstep_, pace_;
     std::int64_t ahead_max_ns_;

@@ -18,6 +18,7 @@ namespace {
 constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
+constexpr int kWaitsAlone = 10;                          // so many, for a commander that comes back
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
 /// Calls f on the threads on which the sensor works.
@@ -144,10 +145,17 @@ void Emulator::run_lockstep(const StopFlag& stop) {
     LockstepClock clock;
     clock.end_at(end_ns_);
     bool started = false, moved = false, refused = false;
+    int waits_alone = 0;
     send_heartbeat(0, RunState::starting);
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
         if (!can_->receive(t_ns(), moved)) {
             if (can_->bus().ended()) break;
+            const bool left = can_->hub() && can_->hub()->commanders_left();
+            waits_alone = left ? waits_alone + 1 : 0;
+            if (waits_alone > kWaitsAlone) {
+                notices_.push_back("the last client that sent commands has left the bus: the run has ended");
+                break;
+            }
             can_->bus().wait(kLockstepWaitNs);
             continue;
         }

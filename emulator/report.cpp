@@ -48,6 +48,7 @@ json bus_document(const CanNode& node) {
             {"error_frames", b.error_frames},
             {"bus_off", b.bus_off},
             {"interface_down", b.interface_down},
+            {"clients_left", node.hub() ? json(node.hub()->clients_left()) : json(nullptr)},
             {"foreign_frames", c.foreign},
             {"frames_not_logged", c.not_logged},
             {"commands_taken", c.taken},
@@ -131,6 +132,8 @@ json report(const Emulator& emulator) {
         {"can", emulator.can() ? bus_document(*emulator.can()) : json(nullptr)},
         {"page_faults", {{"minor", emulator.page_faults().minor}, {"major", emulator.page_faults().major}}},
         {"notices", emulator.notices()},
+        {"advice", advice(emulator)},
+        {"passed", kept_up(emulator)},
         {"log", emulator.options().log_folder}};
     for (const auto& sensor : emulator.sensors())
         document[std::string(sensor->kind()) + "s"].push_back(sensor->report());
@@ -167,7 +170,10 @@ std::string bus_in_words(const CanNode& node) {
                                  {"malformed", b.malformed},
                                  {"error frames", b.error_frames},
                                  {"bus-off", b.bus_off},
-                                 {"connection or interface lost", b.interface_down}}));
+                                 {"connection or interface lost", b.interface_down}})) +
+           (node.hub() && node.hub()->clients_left() > 0
+                ? fmt::format("    {} clients have come and gone\n", node.hub()->clients_left())
+                : "");
 }
 
 }  // namespace
@@ -247,6 +253,50 @@ std::string LidarSensor::in_words() const {
     return out;
 }
 
+namespace {
+
+constexpr double kAdvisedShare = 0.01;
+
+double share(std::uint64_t part, std::uint64_t whole) {
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
+}
+
+/// What to change where a camera did not keep up; empty: it did.
+std::string advice(const CameraSensor& camera, const Camera& settings, std::int64_t budget_ns) {
+    const CameraStats& s = camera.stats();
+    const std::uint64_t due = s.frames + s.skipped;
+    const double period_ms = static_cast<double>(settings.period_ns) * 1e-6;
+    if (share(s.skipped + s.deadline_missed, due) <= kAdvisedShare) return {};
+    const double needs_ms = (s.render.percentile_ns(0.99) + s.sensor.percentile_ns(0.99)) * 1e-6;
+    std::string text = fmt::format("camera {}: {} of {} frames were skipped and {} late. ", settings.name,
+                                   s.skipped, due, s.deadline_missed);
+    if (budget_ns > 0 && static_cast<double>(budget_ns) * 1e-6 < 0.9 * period_ms && s.skipped == 0)
+        return text + "Give it more time (--budget-ms, at most the period), or less load beside it";
+    return text + fmt::format(
+                      "A frame takes {:.1f} ms (p99) and one is due every {:.1f} ms: expected --budget-ms {:.2g}, "
+                      "fewer --spp or --budget-rays, or rate_hz at most {:.2g}",
+                      needs_ms, period_ms, 0.6 * period_ms, std::max(0.1, 800 / std::max(needs_ms, 1e-3)));
+}
+
+}  // namespace
+
+bool kept_up(const Emulator& emulator) {
+    for (const CameraSensor* c : emulator.sensors_of<CameraSensor>())
+        if (share(c->stats().skipped, c->stats().frames + c->stats().skipped) > kSkippedShareMost) return false;
+    return true;
+}
+
+std::vector<std::string> advice(const Emulator& emulator) {
+    std::vector<std::string> all;
+    const Scene& scene = emulator.world().scene();
+    for (const CameraSensor* c : emulator.sensors_of<CameraSensor>())
+        for (const Camera& settings : scene.cameras)
+            if (settings.name == c->name())
+                if (std::string text = advice(*c, settings, scene.render.budget_ns); !text.empty())
+                    all.push_back(std::move(text));
+    return all;
+}
+
 std::string in_words(const Emulator& emulator) {
     const bool lockstep = emulator.options().lockstep;
     std::string out = fmt::format("{}: {:.3f} s in {}\n", emulator.world().scene().name,
@@ -260,6 +310,9 @@ std::string in_words(const Emulator& emulator) {
         out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,
                            emulator.page_faults().major);
     for (const std::string& notice : emulator.notices()) out += "  note: " + notice + "\n";
+    for (const std::string& text : advice(emulator)) out += "  advice: " + text + "\n";
+    if (!kept_up(emulator))
+        out += fmt::format("  failed: a camera skipped more than {:g} % of its frames\n", 100 * kSkippedShareMost);
     if (!emulator.options().log_folder.empty()) out += "  log: " + emulator.options().log_folder + "\n";
     return out;
 }

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <termios.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "drivers/can/buses.h"
+#include "drivers/can/client_hub.h"
 #include "drivers/can/slcan_stream.h"
 
 namespace narpa {
@@ -22,9 +24,18 @@ constexpr std::size_t kTcpClients = 8, kPty = kTcpClients, kClients = kTcpClient
 
 struct Client {
     SlcanStream stream{};
-    bool open = false;  ///< it has sent O: it is on the bus
+    bool open = false;             ///< it has sent O: it is on the bus
+    std::uint64_t connection = 0;  ///< counts all clients that have come
+    bool commands = false;         ///< a command came on this connection
     std::uint64_t overlong = 0;
     std::int64_t t_full_ns = 0;  ///< since when its send queue has been too full for others' frames; 0: it keeps up
+};
+
+/// A frame and the connection that it came on.
+struct QueuedFrame {
+    ReceivedFrame received{};
+    std::size_t client = 0;
+    std::uint64_t connection = 0;
 };
 
 /// Receive queue of fixed size.
@@ -32,11 +43,11 @@ class FrameQueue {
 public:
     [[nodiscard]] bool empty() const noexcept { return begin_ == end_; }
     [[nodiscard]] std::size_t free() const noexcept { return frames_.size() - (end_ - begin_); }
-    void push(const ReceivedFrame& f) noexcept { frames_[end_++ % frames_.size()] = f; }
-    [[nodiscard]] const ReceivedFrame& pop() noexcept { return frames_[begin_++ % frames_.size()]; }
+    void push(const QueuedFrame& f) noexcept { frames_[end_++ % frames_.size()] = f; }
+    [[nodiscard]] const QueuedFrame& pop() noexcept { return frames_[begin_++ % frames_.size()]; }
 
 private:
-    std::vector<ReceivedFrame> frames_{4096};
+    std::vector<QueuedFrame> frames_{4096};
     std::size_t begin_ = 0, end_ = 0;
 };
 
@@ -49,7 +60,7 @@ constexpr int kSocketBytes = 128 << 10;
 /// How long all clients wait for one that does not read. After that it misses frames.
 constexpr std::int64_t kPatience_ns = 1000'000'000;
 
-class SlcanHub final : public CanBus {
+class SlcanHub final : public CanBus, public ClientHub {
 public:
     SlcanHub(Descriptor listener, std::uint16_t port, Descriptor pty_near, Descriptor pty_far, std::string pty_path)
         : listener_(std::move(listener)),
@@ -62,10 +73,22 @@ public:
     [[nodiscard]] bool receive(ReceivedFrame& out) noexcept override {
         if (queue_.empty()) serve();
         if (queue_.empty()) return false;
-        out = queue_.pop();
+        newest_ = queue_.pop();
+        out = newest_.received;
         ++counters_.received;
         return true;
     }
+
+    void note_commander() noexcept override {
+        had_commander_ = true;
+        Client& from = clients_[newest_.client];
+        if (from.open && from.connection == newest_.connection) from.commands = true;  // else it has left already
+    }
+    [[nodiscard]] bool commanders_left() const noexcept override {
+        return had_commander_ && queue_.empty() &&
+               std::none_of(clients_.begin(), clients_.end(), [](const Client& c) { return c.open && c.commands; });
+    }
+    [[nodiscard]] std::uint64_t clients_left() const noexcept override { return clients_left_; }
 
     bool send(const CanFrame& frame) noexcept override {
         std::array<char, kSlcanMaxLine> line;
@@ -140,7 +163,8 @@ private:
             for (std::size_t i = 0; i < kTcpClients; ++i) {
                 if (clients_[i].stream) continue;
                 clients_[i].stream.attach(std::move(fd));
-                clients_[i].open = false;
+                clients_[i].open = clients_[i].commands = false;
+                clients_[i].connection = ++connections_;
                 clients_[i].overlong = 0;
                 break;
             }  // no slot left: fd closes, and the client sees it
@@ -155,7 +179,7 @@ private:
         if (there || &client == &clients_[kPty]) return;
         client.stream.close();
         client.open = false;
-        ++counters_.interface_down;
+        ++clients_left_;
     }
 
     void execute(Client& client, std::string_view line) noexcept {
@@ -165,6 +189,7 @@ private:
             case 'C':
                 if (!bare) return refuse(client);
                 client.open = line[0] == 'O';
+                if (!client.open) client.commands = false;
                 if (&client == &clients_[kPty] && !client.open) discard_unread(client);
                 return answer(client, "\r");
             case 'S':
@@ -180,7 +205,7 @@ private:
         ReceivedFrame received;
         if (!client.open || !decode_slcan(line, received.frame)) return refuse(client);
         received.t_received_ns = monotonic_ns();
-        queue_.push(received);
+        queue_.push({received, static_cast<std::size_t>(&client - clients_.data()), client.connection});
         answer(client, received.frame.extended ? "Z\r" : "z\r");
         std::array<char, kSlcanMaxLine> text;
         const std::size_t n = encode_slcan(received.frame, text);
@@ -215,6 +240,9 @@ private:
     std::string pty_path_;
     std::array<Client, kClients> clients_{};
     FrameQueue queue_{};
+    QueuedFrame newest_{};
+    std::uint64_t connections_ = 0, clients_left_ = 0;
+    bool had_commander_ = false;
 };
 
 Error failed(const std::string& what) {

@@ -9,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "drivers/can/client_hub.h"
 #include "drivers/can/descriptor.h"
 #include "tests/drivers/can_support.h"
 
@@ -63,6 +64,13 @@ public:
 private:
     Descriptor fd_;
 };
+
+const ClientHub& clients_of(const CanBus& bus) {
+    return dynamic_cast<const ClientHub&>(bus);
+}
+std::uint64_t clients_left(const CanBus& bus) {
+    return clients_of(bus).clients_left();
+}
 
 class SlcanHub : public testing::Test {
 protected:
@@ -150,11 +158,42 @@ TEST_F(SlcanHub, EightClientsAndNotNine) {
     EXPECT_TRUE(turn_until(*hub_, [&] {
         ReceivedFrame out;
         (void)hub_->receive(out);
-        return hub_->counters().interface_down == 1;
+        return clients_left(*hub_) == 1;
     }));
     Wire late(port_);
     late.say("V\r");
     EXPECT_EQ(late.hear(*hub_, "\r"), "V1013\r") << "a place was free again";
+}
+
+TEST_F(SlcanHub, KnowsWhenAllThatCommandedHaveLeft) {
+    auto& hub = dynamic_cast<ClientHub&>(*hub_);
+    std::optional<Wire> one(std::in_place, port_), two(std::in_place, port_);
+    Wire listener(port_);
+    for (Wire* w : {&*one, &*two, &listener}) w->say("O\r"), w->hear(*hub_, "\r");
+    ReceivedFrame out;
+    const auto command = [&](Wire& from) {
+        from.say("t1230\r");
+        ASSERT_TRUE(turn_until(*hub_, [&] { return hub_->receive(out); }));
+        hub.note_commander();
+    };
+    EXPECT_FALSE(hub.commanders_left()) << "nobody has commanded yet";
+    command(*one);
+    command(*two);
+    one.reset();
+    ASSERT_TRUE(turn_until(*hub_, [&] { return hub_->receive(out) || hub.clients_left() == 1; }));
+    EXPECT_FALSE(hub.commanders_left());
+    two->say("t1230\r");
+    two.reset();  // its last command is still to be read
+    ASSERT_TRUE(turn_until(*hub_, [&] { return hub_->receive(out); }));
+    hub.note_commander();
+    ASSERT_TRUE(turn_until(*hub_, [&] { return hub_->receive(out) || hub.clients_left() == 2; }));
+    EXPECT_TRUE(hub.commanders_left()) << "the listener does not count";
+    EXPECT_EQ(hub_->counters().interface_down, 0u) << "that clients end is no fault";
+    command(listener);
+    EXPECT_FALSE(hub.commanders_left()) << "it may be commanded again";
+    listener.say("C\r");
+    listener.hear(*hub_, "\r");
+    EXPECT_TRUE(hub.commanders_left()) << "closed is left";
 }
 
 TEST_F(SlcanHub, HalfLinesAndLongLinesAndJunk) {
@@ -199,7 +238,7 @@ TEST_F(SlcanHub, ClientThatStopsReadingIsLeftBehind) {
     EXPECT_EQ(heard, sent);
     // When it reads again it finds whole lines, and then takes part again.
     std::string text;
-    while (!hub_->counters().interface_down) {
+    while (clients_left(*hub_) == 0) {
         const std::string part = stuck.hear(*hub_, line);
         text += part;
         if (part.size() <= line.size()) break;

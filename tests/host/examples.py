@@ -57,7 +57,8 @@ def check_dynamics_and_navigation(seconds):
         expect(len(done.stdout.splitlines()) == seconds, f"it was commanded {seconds} times: {done.stdout[-300:]}")
         output = finished("navigation.py", *navigation)
         expect(f"{seconds - 1}: off by" in output, "it commanded every period")
-        run.stop()
+        summary = run.finish()  # by itself, once the dynamics have left
+        expect(summary["can"]["interface_down"] == 0, "and clients that end are no fault")
 
 
 def check_emulator(seconds):

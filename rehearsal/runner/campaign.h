@@ -38,6 +38,8 @@ struct RunResult {
 [[nodiscard]] std::vector<nlohmann::json> contacts_of(const std::vector<RunResult>& runs);
 /// Success rate with its interval, failures by gate and reason, contact conditions, navigation.
 [[nodiscard]] nlohmann::json summarise(const Scenario& scenario, const std::vector<RunResult>& runs);
+/// "98 of 100 runs succeeded: 98.0 %", or how many were flown where that is not all.
+[[nodiscard]] std::string campaign_headline(const nlohmann::json& summary);
 /// The charts of FOLDER/charts become part of it.
 [[nodiscard]] std::string campaign_page(const Scenario& scenario, const nlohmann::json& summary,
                                         const std::string& folder);

@@ -97,6 +97,7 @@ json summarise(const Scenario& scenario, const std::vector<RunResult>& runs) {
             {"scenario", scenario.name},
             {"runs", runs.size()},
             {"judged", known},
+            {"complete", known == runs.size()},
             {"succeeded", good},
             {"success_rate", known > 0 ? static_cast<double>(good) / static_cast<double>(known) : 0.0},
             {"success_interval_95", {low, high}},
@@ -133,16 +134,24 @@ std::string campaign_junit(const std::string& suite, const std::vector<RunResult
     return out + "  </testsuite>\n";
 }
 
+std::string campaign_headline(const json& s) {
+    const int runs = s["runs"], judged = s["judged"], good = s["succeeded"];
+    if (judged < runs)
+        return fmt::format(
+            "Incomplete: {} of {} runs were flown, {} of them succeeded. The same command goes on with "
+            "the rest",
+            judged, runs, good);
+    return fmt::format("{} of {} runs succeeded: {:.1f} %", good, runs, s["success_rate"].get<double>() * 100);
+}
+
 std::string campaign_page(const Scenario& scenario, const json& s, const std::string& folder) {
     const auto percent = [](const json& v) { return v.get<double>() * 100; };
     std::string body = fmt::format(
-        "<h1>{}</h1>\n<p class=\"lead\">{} {} of {} runs succeeded: {:.1f} %, with 95 % confidence between {:.1f} "
-        "and {:.1f} % (Clopper and Pearson)</p>\n",
-        escape(scenario.title), badge(s["passed"]), s["succeeded"].get<int>(), s["judged"].get<int>(),
-        percent(s["success_rate"]), percent(s["success_interval_95"][0]), percent(s["success_interval_95"][1]));
-    if (s["judged"] != s["runs"])
-        body += fmt::format("<p>{} of {} runs have no result yet.</p>\n",
-                            s["runs"].get<int>() - s["judged"].get<int>(), s["runs"].get<int>());
+        "<h1>{}</h1>\n<p class=\"lead\">{} {}</p>\n<p>With 95 % confidence between {:.1f} and {:.1f} % of all runs "
+        "succeed (Clopper and Pearson).</p>\n",
+        escape(scenario.title),
+        s["judged"] == s["runs"] ? badge(s["passed"]) : "<span class=\"badge none\">incomplete</span>",
+        escape(campaign_headline(s)), percent(s["success_interval_95"][0]), percent(s["success_interval_95"][1]));
     const auto value = [](const json& d, const char* key, int digits) {
         return fmt::format("{:.{}f}", d[key].get<double>(), digits);
     };

@@ -26,12 +26,20 @@ td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 figure{margin:0}figcaption{font-size:13px;color:var(--soft);max-width:360px}
 img{max-width:360px;width:100%;border:1px solid var(--rule);border-radius:3px;display:block}
 img.chart{max-width:100%;width:auto;border:0}
+figure.sheet{margin-top:14px}.sheet img,.sheet figcaption{max-width:900px}
 table.bars{max-width:1000px}table.bars td.bar{position:relative;width:45%}
 td.bar i{position:absolute;left:0}i.asked{top:6px;height:20px;background:#009E7329;border-right:2px solid var(--ink)}
 i.value{top:11px;height:10px;background:#0072B2}i.beyond{background:#D55E00}
 code,pre{font:12.5px/1.5 ui-monospace,"DejaVu Sans Mono",monospace}
 pre{background:#f6f8fa;padding:10px 12px;border-radius:4px;white-space:pre-wrap;overflow-wrap:anywhere;margin:6px 0}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:3px 16px;margin:8px 0;font-size:14px}dt{color:var(--soft)}dd{margin:0}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:3px 16px;margin:8px 0;font-size:14px}dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
+@media(max-width:640px){
+main{padding:16px 14px 40px}h1{font-size:21px}dl{grid-template-columns:1fr}dd{margin-bottom:6px}
+table,tbody,tr,td,td.n{display:block;width:auto;text-align:left;white-space:normal}
+tr:has(th){display:none}tr{border-bottom:1px solid var(--rule);padding:7px 0}td{border:0;padding:1px 0}
+td[data-of]:not(:empty)::before{content:attr(data-of) ": ";color:var(--soft)}
+table.bars td.bar{width:100%;height:30px}
+}
 )";
 
 }  // namespace
@@ -52,6 +60,7 @@ HtmlTable::HtmlTable(std::initializer_list<std::string_view> titles) {
     rows_ += "<tr>";
     for (std::string_view title : titles) {
         numbers_.push_back(title.starts_with('#'));
+        titles_.emplace_back(title.substr(numbers_.back() ? 1 : 0));
         rows_ += numbers_.back() ? fmt::format("<th class=\"n\">{}</th>", title.substr(1))
                                  : fmt::format("<th>{}</th>", title);
     }
@@ -60,8 +69,13 @@ HtmlTable::HtmlTable(std::initializer_list<std::string_view> titles) {
 
 void HtmlTable::row(std::initializer_list<std::string> cells) {
     rows_ += "<tr>";
-    auto is_number = numbers_.begin();
-    for (const std::string& cell : cells) rows_ += (*is_number++ ? "<td class=\"n\">" : "<td>") + cell + "</td>";
+    std::size_t i = 0;
+    for (const std::string& cell : cells) {
+        rows_ += numbers_[i] ? "<td class=\"n\"" : "<td";
+        if (!titles_[i].empty()) rows_ += " data-of=\"" + escape(titles_[i]) + "\"";
+        rows_ += ">" + cell + "</td>";
+        ++i;
+    }
     rows_ += "</tr>\n";
 }
 

@@ -46,6 +46,7 @@ public:
 
 private:
     std::vector<bool> numbers_;
+    std::vector<std::string> titles_;  ///< beside each cell where the page is narrow
     std::string rows_ = "<table>";
 };
 

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -52,13 +53,25 @@ std::string gates(const Run& run) {
 
 std::string approach(const Run& run) {
     return "<h2>Approach</h2>\n<p>The chaser's port in the target's port axes: x out of the docking interface. "
-           "Scales differ across and along.</p>\n" +
+           "Scales differ across and along. The line is the truth, as the dynamics sent it; the circles are the "
+           "navigation's estimates, a few of them.</p>\n" +
            charts_of(run.folder, {{"above", "From above"},
                                   {"side", "From the side"},
                                   {"front", "From the front"},
                                   {"contact", "The last three metres, from the front"}}) +
            "<h2>Range and rates</h2>\n<p>Shaded: phase of the guidance and number of the leg.</p>\n" +
            charts_of(run.folder, {{"range", "Range over time"}, {"rates", "Rates over time"}});
+}
+
+std::string thrusters(const Run& run) {
+    if (run.bus.commands.empty()) return "";
+    double delta_v = 0;
+    for (const ActuatorCommand& c : run.bus.commands) delta_v += norm(c.impulse_n_s) / run.scenario.chaser.mass_kg;
+    return fmt::format(
+               "<h2>Thrusters</h2>\n<p>Impulses that the navigation commanded, along the chaser's body axes; in "
+               "all a delta-v of {:.3f} m/s in {} commands.</p>\n",
+               delta_v, run.bus.commands.size()) +
+           charts_of(run.folder, {{"impulses", "Commanded impulses over time"}, {"delta_v", "Delta-v over time"}});
 }
 
 std::string errors(const Run& run) {
@@ -133,6 +146,35 @@ std::string ledger(const Run& run) {
     return out + table.html() + charts_of(run.folder, {{"latency", "Pose command to hand-over, for each frame"}});
 }
 
+/// "Holding: hold at 12 m (camera nav)" of hold_hold_at_12_m_nav.
+std::string caption(const Run& run, std::string name) {
+    std::string camera;
+    for (const std::string& c : run.scenario.navigation.cameras)
+        if (name.ends_with("_" + c)) camera = c;
+    if (!camera.empty()) name.resize(name.size() - camera.size() - 1);
+    std::replace(name.begin(), name.end(), '_', ' ');
+    if (name.starts_with("hold ")) name = "Holding: " + name.substr(5);
+    if (name == "contact" || name == "abort") name = "At the " + name;
+    return camera.empty() ? name : fmt::format("{} (camera {})", name, camera);
+}
+
+std::string picture(const fs::path& file, const std::string& text, std::string_view style = "") {
+    return fmt::format(
+        "<figure{0}><img alt=\"{1}\" src=\"data:image/png;base64,{2}\"/><figcaption>{1}</figcaption></figure>\n",
+        style, escape(text), base64(read_text(file.string())));
+}
+
+/// Frames over the run, from the emulator's log: whatever navigation flew.
+std::string contact_sheets(const Run& run) {
+    std::string out;
+    std::error_code none;
+    for (const std::string& camera : run.scenario.navigation.cameras)
+        if (const fs::path sheet = run.folder + "/emulator/" + camera + ".png"; fs::exists(sheet, none))
+            out += picture(sheet, fmt::format("Camera {}: frames over the whole run, row by row", camera),
+                           " class=\"sheet\"");
+    return out;
+}
+
 std::string pictures(const Run& run) {
     std::vector<fs::path> files;
     std::error_code none;
@@ -143,16 +185,42 @@ std::string pictures(const Run& run) {
         return std::pair(fs::last_write_time(a, none), a) < std::pair(fs::last_write_time(b, none), b);
     });
     if (files.size() > kPictures) files.resize(kPictures);
-    if (files.empty()) return "";
+    const std::string sheets = contact_sheets(run);
+    if (files.empty() && sheets.empty()) return "";
     std::string out = "<h2>What the navigation saw</h2>\n<div class=\"charts\">";
-    for (const fs::path& file : files) {
-        const std::string name = file.stem().string();
-        out += fmt::format(
-            "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"/><figcaption>{0}</figcaption>"
-            "</figure>\n",
-            escape(name), base64(read_text(file.string())));
+    for (const fs::path& file : files) out += picture(file, caption(run, file.stem().string()));
+    return out + "</div>\n" + sheets;
+}
+
+/// Links to what lies beside the page.
+std::string logs(const Run& run) {
+    constexpr std::array<std::pair<const char*, const char*>, 13> kFiles{
+        {{"result.json", "the verdict"},
+         {"junit.xml", "the same for CI"},
+         {"scenario.toml", "the scenario with all that it is based on"},
+         {"scene.toml", "the scene, likewise"},
+         {"charts.json", "the data of the charts"},
+         {"emulator/can.log", "the CAN bus, as candump writes it"},
+         {"emulator/run.json", "settings of the emulator"},
+         {"dynamics/truth.csv", "the truth"},
+         {"navigation/navigation.csv", "estimate, reference and command of each period"},
+         {"navigation/measurements.csv", "each measurement"},
+         {"emulator.log", "what the emulator printed"},
+         {"dynamics.log", "what the dynamics printed"},
+         {"navigation.log", "what the navigation printed"}}};
+    HtmlTable table{"file", "content"};
+    const auto add = [&](const std::string& file, const std::string& what) {
+        std::error_code none;
+        // result.json and junit.xml are written after the page.
+        if (fs::exists(run.folder + "/" + file, none) || file == "result.json" || file == "junit.xml")
+            table.row({fmt::format("<a href=\"{0}\">{0}</a>", escape(file)), escape(what)});
+    };
+    for (const auto& [file, what] : kFiles) add(file, what);
+    for (const std::string& camera : run.scenario.navigation.cameras) {
+        add(fmt::format("emulator/{}.ledger.csv", camera), fmt::format("time ledger of camera {}", camera));
+        add(fmt::format("emulator/{}.truth.csv", camera), "every body's pose in each of its frames");
     }
-    return out + "</div>\n";
+    return "<h2>Logs</h2>\n" + table.html();
 }
 
 std::string events(const Run& run) {
@@ -211,8 +279,9 @@ std::string how(const Run& run) {
 std::string rehearsal_page(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict,
                            const nlohmann::json& record, const std::string& folder) {
     const Run run{scenario, bus, verdict, record, folder};
-    return page_around(scenario.title, head(run) + gates(run) + approach(run) + errors(run) + contact(run) +
-                                           pictures(run) + ledger(run) + events(run) + how(run));
+    return page_around(scenario.title, head(run) + gates(run) + approach(run) + thrusters(run) + errors(run) +
+                                           contact(run) + pictures(run) + ledger(run) + events(run) + logs(run) +
+                                           how(run));
 }
 
 }  // namespace narpa::rehearsal

@@ -84,6 +84,19 @@ json of_gates(const Gates& g) {
     return out;
 }
 
+/// What the navigation commanded in each period, in the chaser's body axes, and the change of speed so far.
+json of_thrusters(const Scenario& scenario, const BusRecord& bus) {
+    using C = ActuatorCommand;
+    json out = columns<C>(bus.commands,
+                          {{"impulse_n_s", [](const C& c) { return of(c.impulse_n_s); }},
+                           {"angular_impulse_n_m_s", [](const C& c) { return of(c.angular_impulse_n_m_s); }}});
+    out["t_s"] = times(bus, bus.commands, kAll);
+    json& delta_v = out["delta_v_m_s"] = json::array();
+    double sum = 0;
+    for (const C& c : bus.commands) delta_v.push_back(sum += norm(c.impulse_n_s) / scenario.chaser.mass_kg);
+    return out;
+}
+
 /// From the pose command to the hand-over; none in lockstep, where the clock waits.
 json of_latency(const BusRecord& bus, bool lockstep) {
     json t = json::array(), ms = json::array();
@@ -116,6 +129,7 @@ json rehearsal_plot(const Scenario& scenario, const BusRecord& bus, const Verdic
             {"t_end_s", verdict.t_end_s},
             {"truth", truth},
             {"estimates", of_estimates(bus)},
+            {"thrusters", of_thrusters(scenario, bus)},
             {"holds_m", holds},
             {"phases", of_phases(bus)},
             {"gates", of_gates(scenario.gates)},

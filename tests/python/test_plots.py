@@ -133,6 +133,7 @@ def rehearsal(lockstep=False, flown=True):
         "phases": [{"from_s": 0, "to_s": 40, "phase": "moving", "leg": 1}, {"from_s": 40, "to_s": 100, "phase": "closing", "leg": 2}],
         "gates": {"corridor": {"half_angle_deg": 10, "radius_m": 0.5, "from_m": 20}, "keep_out_m": 5, "distance_m": None, "contact": limits},
         "contact": {"t_s": 99, "captured": True, "position_m": [0, 0.02, 0.01]} if flown else None,
+        "thrusters": {"t_s": t, "impulse_n_s": 100 * error, "angular_impulse_n_m_s": error, "delta_v_m_s": 0.01 * t},
         "latency": {"t_s": [] if lockstep else t, "ms": [] if lockstep else 20 + 0 * t},
     }  # fmt: skip
     return json.loads(json.dumps(document, default=lambda array: array.tolist()))
@@ -184,7 +185,7 @@ class Plots(unittest.TestCase):
     def test_a_rehearsal_has_the_charts_of_its_page(self):
         names = {file.stem for file in self.draw("rehearsal", rehearsal())}
         self.assertEqual(names, {"above", "side", "front", "contact", "range", "rates", "position_x", "position_y", "position_z",
-                                 "attitude_x", "attitude_y", "attitude_z", "latency"})  # fmt: skip
+                                 "attitude_x", "attitude_y", "attitude_z", "latency", "impulses", "delta_v"})  # fmt: skip
         lockstep = {file.stem for file in self.draw("rehearsal", rehearsal(lockstep=True), "lockstep")}
         self.assertEqual(names - lockstep, {"latency"})
 

@@ -33,7 +33,8 @@ std::string page_of(const Scenario& s, const Messages& m, const std::string& fol
 }
 
 TEST(Page, IsWellFormedAndNeedsNoNetwork) {
-    const Scenario s = full_scenario();
+    Scenario s = full_scenario();
+    s.navigation.cameras = {"nav"};
     const narpa::test::TemporaryFolder folder;
     std::filesystem::create_directory(folder / "navigation");
     std::ofstream(folder / "navigation/hold_far_nav.png") << "not looked at";
@@ -44,10 +45,26 @@ TEST(Page, IsWellFormedAndNeedsNoNetwork) {
     EXPECT_EQ(markup_error(page), "");
     for (const char* outside : {"http://", "https://", "<script", "<link", "url(//"})
         EXPECT_EQ(page.find(outside), std::string::npos) << outside;
-    for (const char* there : {"Docking &lt;&quot;small&quot;&gt; &amp; simple", "closing rate", "hold_far_nav",
-                              "data:image/png;base64,bm90IGxvb2tlZCBhdA==", "fault: thruster off +fx", "a &lt; b",
-                              "From the side", "gate failed: corridor"})
+    for (const char* there :
+         {"Docking &lt;&quot;small&quot;&gt; &amp; simple", "closing rate", "Holding: far (camera nav)",
+          "data:image/png;base64,bm90IGxvb2tlZCBhdA==", "fault: thruster off +fx", "a &lt; b", "From the side",
+          "gate failed: corridor", "<td data-of=\"gate\"><b>corridor</b>", "href=\"result.json\"", "a delta-v of"})
         EXPECT_NE(page.find(there), std::string::npos) << there;
+}
+
+TEST(Page, ShowsTheEmulatorsFramesWhateverNavigationFlew) {
+    Scenario s = full_scenario();
+    s.navigation.cameras = {"nav", "far"};
+    const narpa::test::TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "emulator");
+    std::ofstream(folder / "emulator/nav.png") << "not looked at";
+    std::ofstream(folder / "emulator/nav.ledger.csv") << "frame";
+    const std::string page = page_of(s, Messages(s), folder / "");
+    EXPECT_EQ(markup_error(page), "");
+    for (const char* there : {"data:image/png;base64,bm90IGxvb2tlZCBhdA==", "Camera nav: frames over the whole run",
+                              "href=\"emulator/nav.ledger.csv\""})
+        EXPECT_NE(page.find(there), std::string::npos) << there;
+    EXPECT_EQ(page.find("Camera far"), std::string::npos);
 }
 
 TEST(Page, OfARunThatNeverStartedIsWellFormed) {
@@ -83,6 +100,7 @@ TEST(Charts, HaveWhatWasOnTheBus) {
     EXPECT_EQ(d["gates"]["corridor"]["radius_m"], s.gates.corridor->radius_m);
     EXPECT_EQ(d["gates"]["keep_out_m"], 5);
     EXPECT_TRUE(d["contact"]["captured"]);
+    EXPECT_EQ(d["thrusters"]["delta_v_m_s"].size(), judge.bus().commands.size());
 }
 
 TEST(Charts, BecomePartOfThePage) {
@@ -119,6 +137,7 @@ TEST(Campaign, CountsAndExplains) {
     EXPECT_EQ(summary["succeeded"], 2);
     EXPECT_EQ(summary["judged"], 4);
     EXPECT_FALSE(summary["passed"]);
+    EXPECT_EQ(campaign_headline(summary), "2 of 4 runs succeeded: 50.0 %");
     EXPECT_EQ(summary["failures"]["contact"][0]["run"], 3);
     EXPECT_EQ(summary["failures"]["contact"][0]["folder"], "runs/0003");
     EXPECT_EQ(summary["failures"]["corridor"][0]["run"], 4);
@@ -133,7 +152,11 @@ TEST(Campaign, PageAndTestReportAreWellFormed) {
     runs.push_back({5, 15, "runs/0005", nullptr});
     const nlohmann::json summary = summarise(s, runs);
     EXPECT_EQ(summary["judged"], 4);
-    EXPECT_EQ(markup_error(campaign_page(s, summary, "/nowhere")), "");
+    EXPECT_EQ(campaign_headline(summary),
+              "Incomplete: 4 of 5 runs were flown, 2 of them succeeded. The same command goes on with the rest");
+    const std::string page = campaign_page(s, summary, "/nowhere");
+    EXPECT_EQ(markup_error(page), "");
+    EXPECT_NE(page.find(">incomplete<"), std::string::npos);
     EXPECT_EQ(campaign_plot(s, contacts_of(runs))["runs"].size(), 4u) << "the run without a result has no contact";
     const std::string xml = campaign_junit("a&b", runs);
     EXPECT_EQ(markup_error(xml), "");

@@ -8,6 +8,7 @@ from narpa.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMI
 PHASE_COLOURS = {"holding": GREEN, "transferring": SKY}  # others take turns
 OTHER_PHASES = (ORANGE, PURPLE, VERMILION, GREY)
 WIDE, HALF = 11.6, 5.7  # inches: one or two charts a row
+CIRCLES = 40  # of estimates in a view
 ROWS_OF_SAMPLES = 3000  # that an SVG holds; more are thinned out
 
 
@@ -49,9 +50,10 @@ def view(document, title, along, across):
         circle(axes, gates["distance_m"][0], VERMILION, "distance allowed")
         circle(axes, gates["distance_m"][1], VERMILION)
     axes.plot(truth[:, along], truth[:, across], color=BLUE, linewidth=1.8, label="true")
-    estimated = thin(document["estimates"]["port_position_m"]).reshape(-1, 3)
-    axes.plot(estimated[:, along], estimated[:, across], ".", color=ORANGE, markersize=2, label="estimated",
-              rasterized=len(estimated) > 300)  # fmt: skip
+    estimated = np.array(document["estimates"]["port_position_m"], float).reshape(-1, 3)
+    estimated = estimated[:: max(1, len(estimated) // CIRCLES)]  # open circles, so that the line is seen through them
+    axes.plot(estimated[:, along], estimated[:, across], "o", color=VERMILION, markersize=4, markerfacecolor="none",
+              markeredgewidth=0.9, label="estimated")  # fmt: skip
     holds = np.array(document["holds_m"], float).reshape(-1, 3)
     axes.plot(holds[:, along], holds[:, across], "o", color=INK, markersize=4.5, label="hold points")
     axes.set_xlim(left, right)
@@ -140,6 +142,25 @@ def error_chart(document, quantity, axis):
     return labelled(drawn, axes, name, "t [s]", f"[{unit}]")
 
 
+def thruster_charts(document):
+    """The impulses that the navigation commanded, and the delta-v so far."""
+    commands, charts = document["thrusters"], {}
+    t, impulses = np.array(commands["t_s"], float), np.array(commands["impulse_n_s"], float).reshape(-1, 3)
+    drawn = figure(WIDE, 2.7)
+    axes = drawn.subplots()
+    shade_phases(document, axes)
+    for axis, colour in enumerate((BLUE, VERMILION, GREEN)):
+        rows = thin(np.column_stack([t, impulses[:, axis]]))
+        axes.step(*rows.T, where="post", color=colour, linewidth=1.1, label="xyz"[axis])
+    charts["impulses"] = labelled(drawn, axes, "Commanded impulses, chaser's axes", "t [s]", "[N s]")
+    drawn = figure(WIDE, 2.4)
+    axes = drawn.subplots()
+    shade_phases(document, axes)
+    axes.step(*thin(np.column_stack([t, commands["delta_v_m_s"]])).T, where="post", color=BLUE)
+    charts["delta_v"] = labelled(drawn, axes, "Delta-v commanded so far", "t [s]", "[m/s]")
+    return charts
+
+
 def latency_chart(document):
     drawn = figure(WIDE, 2.4)
     axes = drawn.subplots()
@@ -164,6 +185,8 @@ def rehearsal(document):
         for quantity in ("position", "attitude"):
             for axis in range(3):
                 charts[f"{quantity}_{'xyz'[axis]}"] = error_chart(document, quantity, axis)
+    if document["thrusters"]["t_s"]:
+        charts.update(thruster_charts(document))
     if document["latency"]["t_s"]:
         charts["latency"] = latency_chart(document)
     return charts

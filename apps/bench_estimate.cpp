@@ -52,13 +52,14 @@ Status plot(const EstimateBenchOptions& o, const std::string& kind, const std::s
 }
 
 Outcome bench_pnp(const EstimateBenchOptions& o, Findings& findings) {
-    const Progress progress;
+    Progress progress("pose from points");
     PnpBenchOptions options = o.pnp;
     if (o.quick) options.trials = 20, options.points = {10}, options.ranges_m = {30}, options.hard_cases = false;
     const std::vector<PnpCell> cells = run_pnp_bench(
         options,
         [&](std::size_t done, std::size_t of) {
-            progress.show(fmt::format("points: cell {} of {}", done + 1, of));
+            progress.show(static_cast<double>(done) / static_cast<double>(of),
+                          fmt::format("cell {} of {}", done + 1, of));
         },
         stop_flag());
     const PnpVerdict verdict = judge(cells);
@@ -114,7 +115,7 @@ Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
         return Error{"--along and --up, expected directions that are not parallel"};
     if (o.quick) options.frames = 4, options.basin = {5}, options.basin_trials = 1;
     TracingThreads threads(o.threads);
-    const Progress progress;
+    Progress progress("pose from frames");
     const std::vector<ApproachRun> runs = run_approach(
         **world, *camera, target, options, threads, [&](const std::string& step) { progress.show(step); },
         stop_flag());
@@ -141,10 +142,9 @@ Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
 Outcome bench_stereo(const EstimateBenchOptions& o, Findings& findings) {
     auto scene = scene_or_shipped("", "descent/descent.toml");
     if (!scene) return scene.error();
-    const Progress progress;
+    Progress progress("stereo");
     const int points = o.quick ? 20 : 100;
-    const auto stereo =
-        measure_stereo(*scene, points, [&](const std::string& step) { progress.show("stereo: " + step); });
+    const auto stereo = measure_stereo(*scene, points, [&](const std::string& step) { progress.show(step); });
     if (!stereo) return stereo.error();
     say(in_words(*stereo));
     if (!o.quick)
@@ -164,12 +164,13 @@ Outcome bench_icp(const EstimateBenchOptions& o, Findings& findings) {
     if (!world) return world.error();
     const auto target = (*world)->body_named("station");
     if (!target) return Error{"no body \"station\" in the docking scene", (*world)->scene().file};
-    const Progress progress;
+    Progress progress("ICP");
     const int count = o.quick ? 10 : 1000;
     const std::vector<IcpStarts> starts{
         {5, 0.05, count}, {10, 0.1, count / 5}, {20, 0.2, count / 5}, {30, 0.3, count / 5}};
-    const auto runs = run_icp(**world, *target, starts,
-                              [&](int done, int of) { progress.show(fmt::format("ICP: start {}/{}", done, of)); });
+    const auto runs = run_icp(**world, *target, starts, [&](int done, int of) {
+        progress.show(static_cast<double>(done) / of, fmt::format("start {} of {}", done, of));
+    });
     say(in_words(runs));
     findings.add("ICP of a VLP-16 sweep", "LiDAR", 1e-3 * runs.front().microseconds_p50,
                  runs.front().translation_rms_m / (0.5 * (kIcpDistanceMin_m + kIcpDistanceMax_m)));
@@ -184,6 +185,7 @@ Outcome bench_icp(const EstimateBenchOptions& o, Findings& findings) {
 Outcome bench_filter(const EstimateBenchOptions& o, Findings& findings) {
     FilterBenchSettings settings;
     if (o.quick) settings.runs = 10, settings.seconds = 10;
+    const Progress progress("filter");
     const auto runs = run_filter(filter_cases(), settings);
     say(in_words(runs));
     constexpr double kRange_m = 30;  // of the cases

@@ -98,9 +98,9 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
         if (!made) return made.error();
         loop = *std::move(made);
     }
-    const Progress progress;
+    Progress progress(s.name);
     l.ladder = measure_ladder(**world, camera, settings, loop, threads,
-                              [&](const std::string& step) { progress.show(std::string(s.name) + ": " + step); });
+                              [&](const std::string& step) { progress.show(step); });
     return l;
 }
 
@@ -111,9 +111,9 @@ Result<CraftRatios> measure_craft(const LadderOptions& o, TracingThreads& thread
             for (Camera& c : scene->cameras) resize_longer_side(c, 128);
         return scene;
     };
-    const Progress progress;
+    Progress progress("craft");
     return measure_ratios(load, o.quick ? kQuick : kRatioFrames, o.quick ? 1 : kLoads, threads,
-                          [&](const std::string& step) { progress.show("craft: " + step); });
+                          [&](const std::string& step) { progress.show(step); });
 }
 
 // Tables and JSON

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 
 #include "apps/bench_scene.h"
 #include "apps/cli.h"
@@ -42,12 +43,15 @@ Result<std::vector<LoopRun>> measure(const LoopBenchOptions& o, const Scene& sce
     RunOptions options = o.run;
     for (const Camera& c : scene.cameras) options.video.emplace_back(c.name, "none");
     for (const Lidar& l : scene.lidars) options.lidar.emplace_back(l.name, "none");
-    const Progress progress;
     std::vector<LoopRun> runs;
     for (const bool loaded : {false, true}) {
         if ((loaded && o.load.empty()) || stop_flag()) continue;
         const std::string name = loaded ? "loaded" : "idle";
-        progress.show(fmt::format("{}: {:g} s", name, options.duration_s));
+        const auto began = std::chrono::steady_clock::now();
+        const Progress progress(fmt::format("real-time loop, {}", name), [&] {
+            const std::chrono::duration<double> so_far = std::chrono::steady_clock::now() - began;
+            return Step{so_far.count() / options.duration_s, {}};
+        });
         auto run = run_loop(name, scene, options, loaded ? o.load : std::vector<int>{}, stop_flag());
         if (!run) return run.error();
         runs.push_back(*std::move(run));

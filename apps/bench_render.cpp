@@ -109,7 +109,7 @@ Outcome bench_render(RenderBenchOptions o) {
     settings.frames = o.seeds;
     settings.reference_spp = o.reference_spp;
     settings.bands = true;
-    const Progress progress;
+    Progress progress("measuring");
     const Ladder ladder = measure_ladder(**world, *index, settings, {}, threads,
                                          [&](const std::string& step) { progress.show(step); });
 

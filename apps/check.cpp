@@ -11,19 +11,24 @@
 #include <fstream>
 #include <map>
 
+#include "apps/calibration.h"
 #include "apps/cli.h"
+#include "apps/shipped.h"
+#include "base/constants.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/world.h"
 #include "protocols/can/dbc.h"
 #include "protocols/lidar/lidar_model.h"
+#include "rehearsal/scenario/scenario.h"
+#include "renderer/camera/camera_model.h"
 #include "renderer/scene/kind_names.h"
 
 namespace narpa::cli {
 namespace {
 
 struct CheckOptions {
-    std::string scene, dbc;
+    std::string scene, dbc, calibration;
     std::vector<std::string> devices;
 };
 
@@ -186,6 +191,59 @@ Status save_dbc(const Scene& scene, const std::string& path) {
     return Ok{};
 }
 
+/// How much of a camera's frame shows the body that carries it.
+struct OwnHull {
+    double share = 0, nearest_m = 0;
+};
+OwnHull own_hull(const World& world, const Camera& c) {
+    constexpr int kColumns = 64, kRows = 48;
+    BodyPoses at(world.scene().bodies.size());
+    world.place(0, c.mount, at);
+    const Rigid3 T_world_camera = world.sensor_pose(c.mount, c.T_mount_camera, at);
+    const CameraModelHandle model(c);
+    OwnHull own{0, kInfinity};
+    int hits = 0;
+    for (int j = 0; j < kRows; ++j)
+        for (int i = 0; i < kColumns; ++i) {
+            const ImagePoint p{(i + 0.5) / kColumns * c.width - 0.5, (j + 0.5) / kRows * c.height - 0.5};
+            const Hit hit = world.tracer().intersect(
+                at, {T_world_camera.t, T_world_camera.q * normalized(model->direction(p))}, kInfinity);
+            if (hit.body < 0 || hit.body != c.mount) continue;
+            ++hits;
+            own.nearest_m = std::min(own.nearest_m, hit.range_m);
+        }
+    own.share = static_cast<double>(hits) / (kColumns * kRows);
+    return own;
+}
+
+/// A camera inside its hull is a usual mistake of a new scene; a bracket or a nozzle in the view is none.
+void check_own_hulls(const World& world, nlohmann::json& cameras) {
+    constexpr double kMuch = 0.25;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        const Camera& c = world.scene().cameras[i];
+        if (c.mount < 0) continue;
+        const OwnHull own = own_hull(world, c);
+        cameras[i]["own_hull_share"] = own.share;
+        if (own.share == 0) continue;
+        cameras[i]["own_hull_nearest_m"] = own.nearest_m;
+        const std::string what = fmt::format(
+            "camera {}: {:.0f} % of its frame show body {}, which carries it, from {:.3g} m on", c.name,
+            100 * own.share, world.scene().bodies[static_cast<std::size_t>(c.mount)].name, own.nearest_m);
+        say(own.share < kMuch ? "  " + what
+                              : "warning: " + what +
+                                    "; is the camera inside its hull? Move its position_m out of the "
+                                    "mesh, or check its axes (x right, y down, z forward)");
+    }
+}
+
+/// Whether it is written like a CAN bus: with a prefix, or the name of an interface.
+bool is_bus(const std::string& spec) {
+    std::error_code none;
+    for (const char* prefix : {"slcan:", "udp:", "log:", "can", "vcan"})
+        if (spec.starts_with(prefix)) return true;
+    return spec.find('/') == std::string::npos && std::filesystem::exists("/sys/class/net/" + spec, none);
+}
+
 /// Opens the device as a run would.
 Result<Finding> try_device(const std::string& spec) {
     if (spec.starts_with("/dev/video")) {
@@ -193,18 +251,56 @@ Result<Finding> try_device(const std::string& spec) {
         if (!sink) return Finding{spec, false, sink.error().what, sink.error().remedy};
         return Finding{spec, true, (*sink)->description(), ""};
     }
+    if (!is_bus(spec))
+        return Error{
+            "is neither a CAN bus nor a video device, expected vcan0, can0, slcan:PORT, udp:GROUP or "
+            "/dev/videoN",
+            spec};
     auto bus = open_can_bus(spec, CanRole::hub);
     if (bus) return Finding{spec, true, (*bus)->description(), ""};
     if (bus.error().kind == ErrorKind::bad_input) return bus.error();
     return Finding{spec, false, bus.error().what, bus.error().remedy};
 }
 
+/// The scenario in words; returns its part of the document.
+nlohmann::json describe(const rehearsal::Scenario& s) {
+    const auto names = [](const auto& list) {
+        std::vector<std::string> out;
+        for (const auto& one : list) out.push_back(one.name);
+        return out;
+    };
+    const auto& n = s.navigation;
+    say(fmt::format("scenario \"{}\": {}, at most {:g} s, of which its legs take about {:.0f} s", s.name, s.title,
+                    s.duration_s, s.nominal_duration_s()));
+    say(fmt::format("  scene: {}", s.scene));
+    std::vector<std::string> sensors = n.cameras;
+    sensors.insert(sensors.end(), n.lidars.begin(), n.lidars.end());
+    say(fmt::format("  {} flies to {}, by {}", s.chaser.body, s.target.body, fmt::join(sensors, ", ")));
+    say(fmt::format("  legs: {}", fmt::join(names(s.legs), ", ")));
+    return {{"file", s.file},     {"name", s.name},        {"scene", s.scene},          {"cameras", n.cameras},
+            {"lidars", n.lidars}, {"legs", names(s.legs)}, {"duration_s", s.duration_s}};
+}
+
 Outcome check(const CheckOptions& o) {
-    auto scene = load_scene(o.scene);
+    nlohmann::json document;
+    std::string scene_file = o.scene;
+    if (const auto named = find_file(FileKind::scene, o.scene); !named) {
+        const auto scenario_file = find_file(FileKind::scenario, o.scene);
+        if (!scenario_file) return named.error();
+        const auto scenario = rehearsal::read_scenario(*scenario_file);
+        if (!scenario) return scenario.error();
+        document["scenario"] = describe(*scenario);
+        scene_file = scenario->scene;
+    }
+    auto scene = load_scene(scene_file);
     if (!scene) return scene.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
     print_scene(**world);
+    nlohmann::json scene_document = describe(**world);
+    check_own_hulls(**world, scene_document["cameras"]);
+    if (!o.calibration.empty())
+        if (auto written = write_calibration((*world)->scene(), o.calibration); !written) return written.error();
     if (!o.dbc.empty())
         if (auto written = save_dbc((*world)->scene(), o.dbc); !written) return written.error();
 
@@ -226,21 +322,33 @@ Outcome check(const CheckOptions& o) {
                         f.remedy.empty() ? "" : "\n         try: " + f.remedy));
         machine.push_back({{"name", f.name}, {"there", f.there}, {"detail", f.detail}, {"remedy", f.remedy}});
     }
-    for (std::size_t i = general; i < findings.size(); ++i)  // devices named on the command line must exist
-        if (!findings[i].there)
-            return Error{findings[i].detail, findings[i].name, 0, 0, ErrorKind::missing, findings[i].remedy};
-    return nlohmann::json{{"scene", describe(**world)}, {"machine", machine}};
+    document.update({{"scene", scene_document}, {"machine", machine}});
+    for (std::size_t i = general; i < findings.size(); ++i) {  // devices named on the command line must exist
+        if (findings[i].there) continue;
+        const Error missing{findings[i].detail, findings[i].name, 0, 0, ErrorKind::missing, findings[i].remedy};
+        say("narpa: " + missing.text());
+        document.update(to_json(missing));
+        break;
+    }
+    return document;
 }
 
 }  // namespace
 
 Command add_check(Parser app) {
     auto o = std::make_shared<CheckOptions>();
-    const Parser c = app.subcommand("check", "Check the scene and this machine; names what is missing");
-    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    const Parser c = app.subcommand("check", "Check a scene or scenario and this machine; names what is missing");
+    c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows").required();
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, /dev/video10 ...");
+    c.option(
+        "--calibration", o->calibration,
+        "DIR: takes CAMERA.yaml (camera_info of ROS) and calibration.json: matrix, distortion and mount of each "
+        "sensor");
     c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
+    c.group("Start here");
+    c.examples({"narpa check docking", "narpa check my-scene.toml vcan0 /dev/video10",
+                "narpa check docking --dbc docking.dbc"});
     return [o] { return check(*o); };
 }
 

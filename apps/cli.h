@@ -7,20 +7,22 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 
 #include "apps/options.h"
+#include "apps/progress.h"
 #include "base/result.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa::cli {
 
-/// The result of a subcommand, for --json, or an Error. A gate's document has `passed`; false is exit status 1.
+/// The result of a subcommand, for --json, or an Error. A gate's document has `passed`; false is exit status 1. A
+/// document that ends with an error all the same has the `error` of to_json.
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 
 /// Each adds its subcommand and returns what runs when it is chosen.
+Command add_list(Parser app);
 Command add_check(Parser app);
 Command add_run(Parser app);
 Command add_fly(Parser app);
@@ -34,31 +36,10 @@ Command add_bench_render(Parser bench);
 Command add_bench_loop(Parser bench);
 Command add_bench_estimate(Parser bench);
 
-/// Prints a line on standard error.
-void say(std::string_view text);
-/// A line on a terminal that replaces itself; nothing elsewhere.
-class Progress {
-public:
-    Progress();
-    ~Progress();
-    Progress(const Progress&) = delete;
-    Progress& operator=(const Progress&) = delete;
-    void show(const std::string& text) const;
-
-private:
-    bool terminal_;
-};
-
-/// Shows what `text` returns on a terminal, once a second, from a thread of its own.
-class ProgressThread {
-public:
-    explicit ProgressThread(std::function<std::string()> text);
-
-private:
-    std::jthread thread_;
-};
-
-/// Reads a scene, with another method than its own if one is given, and prints its warnings.
+/// {"error": ...}, with the exit status.
+nlohmann::json to_json(const Error& e);
+/// Reads a scene from a file, or the shipped one of this name, with another method than its own if one is given,
+/// and prints its warnings.
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
 /// "NAME=VALUE" -> {NAME, VALUE}; an Error that names what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);

@@ -44,10 +44,11 @@ struct EstimateOptions {
 /// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
 Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, FrameTracker& tracker) {
     TracingThreads threads(o.threads);
-    const Progress progress;
+    Progress progress("estimating poses of " + o.input);
     std::vector<TrackedFrame> tracked;
     for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
-        progress.show(fmt::format("frame {}/{}", i, run.frames().size()));
+        progress.show(static_cast<double>(i) / static_cast<double>(run.frames().size()),
+                      fmt::format("frame {} of {}", i + 1, run.frames().size()));
         const FrameLedger& ledger = run.frames()[i].ledger;
         if (!run.has_image(i) || ledger.delivery != Delivery::frame) continue;
         std::vector<std::string> differs;
@@ -205,7 +206,10 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
     (*world)->place(t_ns, scene.cameras[*camera].mount, at);
     TracingThreads threads(o.threads);
     TrackedFrame tracked;
-    threads.arena.execute([&] { tracked = (*tracker)->take(0, t_ns, *bytes, at); });
+    {
+        const Progress progress("estimating the pose in " + o.frame);
+        threads.arena.execute([&] { tracked = (*tracker)->take(0, t_ns, *bytes, at); });
+    }
     if (!tracked.measured) return Error{"gives no pose: " + tracked.why, o.frame, 0, 0, ErrorKind::failed};
     nlohmann::json document =
         show(fmt::format("{} in camera {}", scene.bodies[(*tracker)->target()].name, scene.cameras[*camera].name),
@@ -247,7 +251,10 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     CloudIcp icp((*world)->tracer(), *target, settings);
     TracingThreads threads(o.threads);
     std::optional<Result<CloudEstimate>> found;
-    threads.arena.execute([&] { found.emplace(icp.align(*points, motion, guess, search_m)); });
+    {
+        const Progress progress("estimating the pose in " + o.sweep);
+        threads.arena.execute([&] { found.emplace(icp.align(*points, motion, guess, search_m)); });
+    }
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
     nlohmann::json document = show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name),
@@ -276,8 +283,6 @@ Outcome estimate(const EstimateOptions& o) {
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
     if (of_log) return estimate_log(o, *tracker);
-    if (!std::filesystem::exists(o.input, error))
-        return Error{"is not there, expected the folder of a logged run or a scene file", o.input};
     if (o.frame.empty() == o.sweep.empty())
         return Error{"with a scene, expected one of --frame FILE.raw and --sweep FILE.pcap", o.input};
     return o.frame.empty() ? estimate_sweep(o, *tracker) : estimate_frame(o, *tracker);
@@ -312,6 +317,8 @@ Command add_estimate(Parser app) {
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
     c.footer("Exit status 1 if no frame gave a pose, or a sweep's pose is not credible.");
+    c.group("Results");
+    c.examples({"narpa estimate out/docking/emulator -o errors.png", "narpa estimate docking --frame frame.raw"});
     return [o] { return estimate(*o); };
 }
 

@@ -68,9 +68,15 @@ public:
         : options_(o), bus_(bus), bodies_(bodies), fd_(bus.carries_fd() && !o.classic) {}
 
     Status play(const std::vector<TrajectoryRow>& rows) {
+        Progress progress("playing " + options_.trajectory);
+        progress.show("waiting for the emulator's clock");
         synchronise();
+        std::size_t k = 0;
         for (const TrajectoryRow& row : rows) {
             if (stop_flag()) break;
+            progress.show(static_cast<double>(k) / static_cast<double>(rows.size()),
+                          fmt::format("row {} of {}", k + 1, rows.size()));
+            ++k;
             const std::int64_t t = row.t_ns + start_ns_;
             if (!options_.lockstep) wait_for(t - std::llround(options_.lead_s * 1e9));
             if (auto sent = send(row, t); !sent) return sent;
@@ -203,6 +209,8 @@ Command add_fly(Parser app) {
     c.flag("--lockstep", o->lockstep,
            "Send the next command when the emulator's clock has reached the previous one");
     c.flag("--classic", o->classic, "Nine classic frames per command even if the bus carries CAN FD");
+    c.group("Sensors");
+    c.examples({"narpa fly approach.csv --can vcan0", "narpa fly approach.csv --can slcan:29537 --lockstep"});
     return [o] { return fly(*o); };
 }
 

@@ -1,46 +1,26 @@
 // narpa - hardware-in-the-loop camera and LiDAR emulator. This file: subcommands, --json, exit status.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
-#include <condition_variable>
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <mutex>
 
 #include "apps/cli.h"
+#include "apps/shipped.h"
+#include "generated/commit.h"
+#include "renderer/geometry/lanes.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa::cli {
 
-void say(std::string_view text) {
-    fmt::print(stderr, "{}\n", text);
-}
-
-Progress::Progress() : terminal_(::isatty(STDERR_FILENO) == 1) {}
-Progress::~Progress() {
-    if (terminal_) fmt::print(stderr, "\r{:<60}\r", "");
-}
-void Progress::show(const std::string& text) const {
-    if (terminal_) fmt::print(stderr, "\r{:<60}", text), std::fflush(stderr);
-}
-
-ProgressThread::ProgressThread(std::function<std::string()> text) {
-    if (::isatty(STDERR_FILENO) != 1) return;
-    thread_ = std::jthread([text = std::move(text)](const std::stop_token& stop) {
-        const Progress line;
-        std::mutex m;
-        std::unique_lock lock(m);
-        std::condition_variable_any woken;
-        while (!woken.wait_for(lock, stop, std::chrono::seconds(1), [&] { return stop.stop_requested(); }))
-            line.show(text());
-    });
-}
-
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method) {
-    auto scene = read_scene(path);
+    const auto file = find_file(FileKind::scene, path);
+    if (!file) return file.error();
+    auto scene = [&] {
+        const Progress progress("reading " + *file);
+        return read_scene(*file);
+    }();
     if (!scene) return scene;
     if (method)
         if (const Status good = use_method(*scene, *method); !good) return good.error();
@@ -55,8 +35,6 @@ Result<std::pair<std::string, std::string>> split_pair(const std::string& text, 
     return std::pair{text.substr(0, at), text.substr(at + 1)};
 }
 
-namespace {
-
 nlohmann::json to_json(const Error& e) {
     return {{"error",
              {{"what", e.what},
@@ -66,6 +44,8 @@ nlohmann::json to_json(const Error& e) {
               {"remedy", e.remedy},
               {"exit_status", exit_status(e.kind)}}}};
 }
+
+namespace {
 
 /// False: standard output did not take it.
 bool print_json(const nlohmann::json& document) {
@@ -82,13 +62,16 @@ int finish(const Outcome& outcome, bool json) {
         return exit_status(outcome.error().kind);
     }
     if (json && !print_json(*outcome)) return exit_status(ErrorKind::failed);
+    if (outcome->contains("error")) return (*outcome)["error"]["exit_status"];
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
 }
 
 Command add_bench(Parser app) {
     const Parser bench = app.subcommand("bench", "Measure speed against error");
+    bench.group("Measure");
     auto chosen = std::make_shared<Command>();
     bench.choice<Command>({add_bench_render, add_bench_loop, add_bench_estimate}, *chosen);
+    bench.examples({"narpa bench loop docking", "narpa bench render --spp 4,16,64 -o error.png"});
     return [chosen] { return (*chosen)(); };
 }
 
@@ -98,15 +81,35 @@ constexpr const char* kDescription =
 constexpr const char* kFooter =
     "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.";
 
+/// The widest of the instruction sets of base/each_isa.h that this processor has.
+const char* isa_in_use() {
+#if defined(__x86_64__) && defined(__gnu_linux__)
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("x86-64-v4")) return "AVX-512 (x86-64-v4)";
+    if (__builtin_cpu_supports("x86-64-v3")) return "AVX2 (x86-64-v3)";
+#endif
+    return "the compiler's base line";
+}
+
+/// "narpa 0.1.0, commit 2bbdc3b" and the instruction set, which decides the last bits of results.
+std::string version() {
+    const std::string commit = NARPA_COMMIT;
+    return fmt::format("narpa {}{}\nvector instructions: {}, {} rays at once", NARPA_VERSION,
+                       commit.empty() ? "" : ", commit " + commit, isa_in_use(), kLanes);
+}
+
 int run(int argc, char** argv) {
     bool json = false;
     Command chosen;
     const auto add_subcommands = [&](const Parser& app) {
-        app.choice<Command>(
-            {add_check, add_run, add_fly, add_render, add_scan, add_replay, add_estimate, add_rehearse, add_bench},
-            chosen);
+        app.choice<Command>({add_list, add_check, add_rehearse, add_run, add_fly, add_render, add_scan,
+                             add_estimate, add_replay, add_bench},
+                            chosen);
+        app.examples({"narpa rehearse docking                        a docking in a closed loop, with a report",
+                      "narpa render docking -o view.png              what the camera sees",
+                      "narpa run docking --can vcan0 --video nav=/dev/video10 --log out"});
     };
-    return parse_and_run(argc, argv, {kDescription, NARPA_VERSION, kFooter}, json, add_subcommands,
+    return parse_and_run(argc, argv, {kDescription, version(), kFooter}, json, add_subcommands,
                          [&] { return finish(chosen(), json); });
 }
 

@@ -1,10 +1,16 @@
 #include "apps/options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <span>
+#include <sstream>
 
+#include "base/nearest_name.h"
 #include "base/result.h"
 
 namespace narpa::cli {
@@ -53,6 +59,9 @@ Option Option::values(int least, int most) const {
 Option Option::type_name(const std::string& name) const {
     return Option(option_->type_name(name));
 }
+Option Option::group(const std::string& name) const {
+    return Option(option_->group(name));
+}
 bool Option::given() const {
     return option_->count() > 0;
 }
@@ -75,6 +84,14 @@ Option Parser::find(const std::string& name) const {
 }
 void Parser::footer(const std::string& text) const {
     app_->footer(text);
+}
+void Parser::group(const std::string& name) const {
+    app_->group(name);
+}
+void Parser::examples(const std::vector<std::string>& lines) const {
+    std::string text = "Examples:\n";
+    for (const std::string& line : lines) text += "  " + line + "\n";
+    app_->footer(text + "\n" + app_->get_footer());
 }
 void Parser::require_subcommand() const {
     app_->require_subcommand(1);
@@ -108,20 +125,195 @@ void add_json_flag(CLI::App& app, bool& json) {
         add_json_flag(*subcommand, json);
 }
 
+// --- Help -------------------------------------------------------------------------------------------------------
+
+constexpr std::size_t kIndent = 30, kColumns = 110;
+
+/// "narpa bench render".
+std::string full_name(const CLI::App& app) {
+    return (app.get_parent() ? full_name(*app.get_parent()) + " " : "") + app.get_name();
+}
+
+/// `left` in a column of its own, `text` wrapped beside it.
+std::string row(const std::string& left, const std::string& text) {
+    std::string out = "  " + left;
+    std::size_t column = out.size();
+    if (column + 2 > kIndent) out += '\n', column = 0;
+    out.append(kIndent - column, ' ');
+    column = kIndent;
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+        if (column > kIndent && column + 1 + word.size() > kColumns) {
+            out += '\n' + std::string(kIndent, ' ');
+            column = kIndent;
+        }
+        if (column > kIndent) out += ' ', ++column;
+        out += word;
+        column += word.size();
+    }
+    return out + '\n';
+}
+
+/// An option's placeholder and its text. A text "BUS: vcan0 | ..." begins with its placeholder.
+struct Described {
+    std::string placeholder, text;
+};
+Described describe(const CLI::Option& o) {
+    Described d{{}, o.get_description()};
+    if (!o.get_default_str().empty()) d.text += " (default: " + o.get_default_str() + ")";
+    for (const CLI::Option* needed : o.get_needs()) d.text += " (with " + needed->get_name() + ")";
+    if (o.get_items_expected_max() == 0) return d;
+    const std::string types = o.get_type_name(), type = types.substr(0, types.find(':'));
+    const std::size_t colon = d.text.find(": ");
+    if (colon != std::string::npos && d.text.find(' ') > colon && std::isupper(d.text[0]) != 0) {
+        d.placeholder = d.text.substr(0, colon);
+        d.text.erase(0, colon + 2);
+    } else if (const std::size_t set = types.find('{'); set != std::string::npos && types.size() < 40) {
+        d.placeholder = types.substr(set + 1, types.find('}') - set - 1);
+        std::replace(d.placeholder.begin(), d.placeholder.end(), ',', '|');
+    } else {
+        constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kByText{{{"Trajectory", "FILE"},
+                                                                                        {"FILE.", "FILE"},
+                                                                                        {"Name", "NAME"},
+                                                                                        {"Seconds", "SECONDS"},
+                                                                                        {"Folder", "DIR"},
+                                                                                        {"Command", "COMMAND"},
+                                                                                        {"Scene file", "SCENE"}}};
+        const auto known = std::find_if(kByText.begin(), kByText.end(),
+                                        [&](const auto& k) { return d.text.starts_with(k.first); });
+        d.placeholder = known != kByText.end()            ? known->second
+                        : type == "INT" || type == "UINT" ? "N"
+                        : type == "FLOAT"                 ? "X"
+                                                          : type;
+    }
+    return d;
+}
+
+/// Usage, arguments, options and commands by group; without the parser's own notation.
+class HelpFormatter final : public CLI::FormatterBase {
+public:
+    std::string make_help(const CLI::App* app, std::string, CLI::AppFormatMode) const override {
+        return app->get_description() + "\n\n" + usage(*app) + positionals(*app) + commands(*app) + options(*app) +
+               (app->get_footer().empty() ? "" : "\n" + app->get_footer() + "\n");
+    }
+
+private:
+    static std::string usage(const CLI::App& app) {
+        std::string out = "Usage: " + full_name(app);
+        const bool any_command = !app.get_subcommands([](const CLI::App*) { return true; }).empty();
+        if (any_command) out += " COMMAND ...";
+        for (const CLI::Option* o : app.get_options()) {
+            const Described d = describe(*o);
+            if (o->nonpositional() && o->get_required())
+                out += " " + (o->get_snames().empty() ? "--" + o->get_lnames()[0] : "-" + o->get_snames()[0]) +
+                       " " + d.placeholder;
+            if (o->get_positional() && !o->nonpositional()) {
+                const std::string name = o->get_name() + (o->get_items_expected_max() > 1 ? "..." : "");
+                out += o->get_required() ? " " + name : " [" + name + "]";
+            }
+        }
+        return out + (any_command ? "\n" : " [options]\n");
+    }
+
+    static std::string positionals(const CLI::App& app) {
+        std::string out;
+        for (const CLI::Option* o : app.get_options())
+            if (o->get_positional() && !o->nonpositional()) out += row(o->get_name(), o->get_description());
+        return out.empty() ? "" : "\n" + out;
+    }
+
+    static std::string options(const CLI::App& app) {
+        std::string out;
+        for (const std::string& group : app.get_groups()) {
+            std::string rows;
+            for (const CLI::Option* o : app.get_options()) {
+                if (!o->nonpositional() || o->get_group() != group) continue;
+                const Described d = describe(*o);
+                std::string names;
+                for (const std::string& s : o->get_snames()) names += (names.empty() ? "-" : ", -") + s;
+                for (const std::string& l : o->get_lnames()) names += (names.empty() ? "--" : ", --") + l;
+                rows += row(names + (d.placeholder.empty() ? "" : " " + d.placeholder), d.text);
+            }
+            if (!rows.empty()) out += "\n" + group + ":\n" + rows;
+        }
+        return out;
+    }
+
+    static std::string commands(const CLI::App& app) {
+        std::string out, group;
+        for (const CLI::App* c : app.get_subcommands([](const CLI::App*) { return true; })) {
+            if (c->get_group() != group) out += "\n" + (group = c->get_group()) + ":\n";
+            out += row(c->get_name(), c->get_description());
+        }
+        return out;
+    }
+};
+
+// --- Errors of the command line
+// -----------------------------------------------------------------------------------
+
+/// "narpa: there is no command "chek"; did you mean "check"?"; empty: all commands on the line exist.
+std::string unknown_command(const CLI::App& app, std::span<char* const> words) {
+    const CLI::App* at = &app;
+    for (const std::string word : words) {
+        const auto commands = at->get_subcommands([](const CLI::App*) { return true; });
+        if (commands.empty()) break;
+        if (word.starts_with("-")) continue;
+        std::vector<std::string> names;
+        for (const CLI::App* c : commands) names.push_back(c->get_name());
+        const auto found = std::find(names.begin(), names.end(), word);
+        if (found == names.end())
+            return full_name(*at) + ": there is no command \"" + word + "\"" + did_you_mean(word, names) + "\n" +
+                   full_name(*at) + " --help lists the commands";
+        at = commands[static_cast<std::size_t>(found - names.begin())];
+    }
+    return {};
+}
+
+/// The command that was chosen on the line.
+const CLI::App& chosen(const CLI::App& app) {
+    const auto commands = app.get_subcommands();
+    return commands.empty() ? app : chosen(*commands.front());
+}
+
+std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<char* const> words) {
+    const CLI::App& command = chosen(app);
+    const std::string name = full_name(command), help = "\n" + name + " --help has all options, and examples";
+    std::vector<std::string> known;
+    for (const CLI::Option* o : command.get_options()) {
+        for (const std::string& s : o->get_snames()) known.push_back("-" + s);
+        for (const std::string& l : o->get_lnames()) known.push_back("--" + l);
+    }
+    for (const std::string word : words) {
+        const std::string option = word.substr(0, word.find('='));
+        if (option.starts_with("--") && std::find(known.begin(), known.end(), option) == known.end())
+            return name + ": there is no option \"" + option + "\"" + did_you_mean(option, known) + help;
+    }
+    return name + ": " + e.what() + help;
+}
+
 }  // namespace
 
 int parse_and_run(int argc, char** argv, const ProgramTexts& texts, bool& json,
                   const std::function<void(Parser)>& add_subcommands, const std::function<int()>& run) {
-    CLI::App app{texts.description};
+    CLI::App app{texts.description, "narpa"};
     app.set_version_flag("--version", texts.version);
     app.fallthrough();
     app.footer(texts.footer);
+    app.formatter(std::make_shared<HelpFormatter>());
     add_subcommands(Parser(app));
     add_json_flag(app, json);
+    const std::span<char* const> words(argv + 1, static_cast<std::size_t>(std::max(argc - 1, 0)));
+    if (const std::string unknown = unknown_command(app, words); !unknown.empty()) {
+        std::cerr << unknown << "\n";
+        return exit_status(ErrorKind::bad_input);
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
-        return app.exit(e, std::cout, std::cerr) == 0 ? 0 : exit_status(ErrorKind::bad_input);
+        if (e.get_exit_code() == 0) return app.exit(e, std::cout, std::cerr);  // --help, --version
+        std::cerr << (words.empty() ? app.help() : line_error(app, e, words) + "\n");
+        return exit_status(ErrorKind::bad_input);
     }
     return run();
 }

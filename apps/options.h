@@ -42,6 +42,8 @@ public:
     /// So many values.
     Option values(int least, int most) const;
     Option type_name(const std::string& name) const;
+    /// Its heading in --help.
+    Option group(const std::string& name) const;
 
     [[nodiscard]] bool given() const;
     [[nodiscard]] std::string name() const;
@@ -63,6 +65,10 @@ public:
     /// An option that was added before.
     [[nodiscard]] Option find(const std::string& name) const;
     void footer(const std::string& text) const;
+    /// The heading of this command in its parent's --help.
+    void group(const std::string& name) const;
+    /// Command lines that --help shows above the footer. After `footer`.
+    void examples(const std::vector<std::string>& lines) const;
 
     /// Adds subcommands, each by a function that returns what runs when it is chosen; one of them must be. Sets
     /// `chosen` while the command line is parsed.

@@ -5,8 +5,8 @@
 
 #include <chrono>
 
-#include "apps/bench_scene.h"
 #include "apps/cli.h"
+#include "apps/shipped.h"
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/rehearsal.h"
 
@@ -30,15 +30,17 @@ bool line_on_stdin() {
     return ::read(STDIN_FILENO, &c, 1) == 1 ? c == '\n' : Clock::now() - first > std::chrono::seconds(10);
 }
 
-rehearsal::Console console() {
-    if (!::isatty(STDERR_FILENO))
-        return {[](std::string_view text) { say(text); }, [](std::string_view) {}, line_on_stdin};
-    return {[](std::string_view text) { fmt::print(stderr, "\r\033[K{}\n", text); },
-            [](std::string_view text) { fmt::print(stderr, "\r\033[K{}", text); }, line_on_stdin};
+rehearsal::Console console(Progress& progress) {
+    return {say, [&](double share, std::string_view text) { progress.show(share, std::string(text)); },
+            line_on_stdin};
 }
 
 Outcome one(const rehearsal::RehearsalOptions& options) {
-    const auto done = rehearsal::run_rehearsal(options, console(), stop_flag());
+    const auto done = [&] {
+        Progress progress("rehearsing");
+        progress.show("starting");
+        return rehearsal::run_rehearsal(options, console(progress), stop_flag());
+    }();
     if (!done) return done.error();
     for (const rehearsal::GateResult& g : done->verdict.gates)
         say(fmt::format("  {:<10} {:<12} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
@@ -49,12 +51,15 @@ Outcome one(const rehearsal::RehearsalOptions& options) {
 }
 
 Outcome many(const rehearsal::CampaignOptions& options) {
-    auto summary = rehearsal::run_campaign(options, console(), stop_flag());
+    auto summary = [&] {
+        Progress progress("rehearsing");
+        progress.show("starting");
+        return rehearsal::run_campaign(options, console(progress), stop_flag());
+    }();
     if (!summary) return summary;
     const nlohmann::json& s = *summary;
-    say(fmt::format("{} of {} runs succeeded: {:.1f} %, with 95 % confidence {:.1f} to {:.1f} %",
-                    s["succeeded"].get<std::size_t>(), s["judged"].get<std::size_t>(),
-                    s["success_rate"].get<double>() * 100, s["success_interval_95"][0].get<double>() * 100,
+    say(fmt::format("{}; with 95 % confidence {:.1f} to {:.1f} % of all do", rehearsal::campaign_headline(s),
+                    s["success_interval_95"][0].get<double>() * 100,
                     s["success_interval_95"][1].get<double>() * 100));
     for (const auto& c : s["contact"])
         say(fmt::format("  {:<22} {:>8.4f} +- {:.4f}, at most {:.4f} {}; asked {:g} to {:g}",
@@ -73,11 +78,10 @@ Outcome rehearse(const RehearseOptions& given) {
         if (!pair) return pair.error();
         o.video.insert(*std::move(pair));
     }
-    if (o.scenario.empty()) {
-        auto shipped = shipped_scene("rehearsal/docking.toml");
-        if (!shipped) return shipped.error();
-        o.scenario = *shipped;
-    }
+    if (o.scenario.empty()) o.scenario = "docking";
+    const auto file = find_file(FileKind::scenario, o.scenario);
+    if (!file) return file.error();
+    o.scenario = *file;
     auto scenario = rehearsal::read_scenario(o.scenario);
     if (!scenario) return scenario.error();
     if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name;
@@ -93,7 +97,7 @@ Command add_rehearse(Parser app) {
     r.version = NARPA_VERSION;
     const Parser c = app.subcommand(
         "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");
-    c.option("SCENARIO", r.scenario, "Scenario file (default: the docking that comes with narpa)");
+    c.option("SCENARIO", r.scenario, "Scenario file, or a name that `narpa list` shows (default: docking)");
     c.option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
     c.flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
     c.option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
@@ -118,6 +122,10 @@ Command add_rehearse(Parser app) {
         .range(1.0, 86400.0)
         .shows_default();
     c.footer("Exit status: 0 all gates passed; 1 one failed; 2 bad input; 3 a device is missing.");
+    c.group("Start here");
+    c.examples({"narpa rehearse docking -o out/docking", "narpa rehearse realtime --real-time",
+                "narpa rehearse dispersions --runs 100 --jobs 2",
+                "narpa rehearse docking-camera --navigation 'python3 my_navigation.py $BUS $VIDEO'"});
     return [o] { return rehearse(*o); };
 }
 

@@ -119,8 +119,9 @@ Outcome render(const RenderOptions& o) {
     {
         std::atomic<std::size_t> pixels_done{0};
         const auto pixels = static_cast<double>(unit.radiance().pixels.size());
-        const ProgressThread progress(
-            [&] { return fmt::format("{:5.1f} %", 100 * static_cast<double>(pixels_done) / pixels); });
+        const Progress progress("rendering " + o.out, [&] {
+            return Step{static_cast<double>(pixels_done) / pixels, {}};
+        });
         threads.arena.execute([&] {
             ledger = unit.expose(frame, t_ns, start_ns + budget_ns, aovs, &pixels_done);
             unit.embed(ledger);
@@ -161,7 +162,7 @@ Command add_render(Parser app) {
     auto o = std::make_shared<RenderOptions>();
     const Parser c = app.subcommand(
         "render", "Render one frame of a camera, byte for byte as `run` does (except with a time budget)");
-    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
     c.option("--camera", o->camera, "Name of the camera (default: the first)");
     c.option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)").range(-9e9, 9e9);
     c.option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
@@ -177,6 +178,10 @@ Command add_render(Parser app) {
     c.option("-o,--output", o->out,
              "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
         .required();
+    c.group("Sensors");
+    c.examples({"narpa render docking -o view.png",
+                "narpa render cornell --spp 256 -o cornell.exr --aov depth,normal",
+                "narpa render docking --pose chaser=20,0,0,0,0,0,1 -o near.png"});
     return [o] { return render(*o); };
 }
 

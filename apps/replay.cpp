@@ -18,6 +18,7 @@ constexpr int kFramesCompared = 10;  ///< by default
 
 struct ReplayOptions {
     std::string folder, camera, scene, picture;
+    std::string dynamics, navigation;  ///< commands in place of ours, for a rehearsal in lockstep
     int reference = 0, frames = 0, threads = 0;
 };
 
@@ -45,11 +46,12 @@ std::vector<std::size_t> frames_for(const ReplayOptions& o, std::size_t logged) 
 
 Replayed render_again(const ReplayOptions& o, Replay& run) {
     TracingThreads threads(o.threads);
-    const Progress progress;
+    Progress progress(fmt::format("rendering {} again", o.folder));
     const std::vector<std::size_t> chosen = frames_for(o, run.frames().size());
     Replayed done;
     for (std::size_t k = 0; k < chosen.size(); ++k) {
-        progress.show(fmt::format("{}/{}", k, chosen.size()));
+        progress.show(static_cast<double>(k) / static_cast<double>(chosen.size()),
+                      fmt::format("frame {} of {}", k + 1, chosen.size()));
         const std::size_t i = chosen[k];
         if (!run.has_image(i)) {
             ++done.not_whole;
@@ -143,19 +145,30 @@ Outcome replay(const ReplayOptions& o) {
 
 /// In lockstep all of it can be run again; what was run in real time has the emulator's frames to repeat.
 Outcome replay_any(const ReplayOptions& o) {
+    const bool commands = !o.dynamics.empty() || !o.navigation.empty();
+    const auto only_frames = [&](std::string_view why) {
+        return Error{fmt::format("{}: --dynamics and --navigation go with a rehearsal in lockstep as a whole", why),
+                     o.folder};
+    };
     std::error_code none;
-    if (!std::filesystem::exists(o.folder + "/rehearsal.json", none)) return replay(o);
+    if (!std::filesystem::exists(o.folder + "/rehearsal.json", none)) {
+        if (commands) return only_frames("is not the folder of a rehearsal");
+        return replay(o);
+    }
     const auto record = rehearsal::read_record(o.folder);
     if (!record) return record.error();
     const bool frames_alone = o.reference > 0 || o.frames > 0 || !o.camera.empty();
     if ((*record)["mode"] != "lockstep" || frames_alone) {
+        if (commands) return only_frames("only its frames are replayed");
         ReplayOptions emulator = o;
         emulator.folder += "/emulator";
         return replay(emulator);
     }
     stop_on_signals();
-    return rehearsal::rerun(o.folder, o.threads, NARPA_VERSION,
-                            {[](std::string_view text) { say(text); }, [](std::string_view) {}}, stop_flag());
+    Progress progress("running " + o.folder + " again");
+    return rehearsal::rerun(
+        {o.folder, o.dynamics, o.navigation, o.threads, NARPA_VERSION, {}},
+        {say, [&](double share, std::string_view text) { progress.show(share, std::string(text)); }}, stop_flag());
 }
 
 }  // namespace
@@ -173,10 +186,17 @@ Command add_replay(Parser app) {
     c.option("--frames", o->frames, "Number of frames, spread over the run (default: all; 10 with --reference)")
         .range(1, 1000000);
     c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);
+    for (const auto& [name, command] : {std::pair{"dynamics", &o->dynamics}, {"navigation", &o->navigation}})
+        c.option(fmt::format("--{}", name), *command,
+                 fmt::format("Command in place of narpa-{}, where the rehearsal had one, as for `rehearse`. A "
+                             "command in the log is never run",
+                             name));
     c.option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
     c.footer(
         "Exit status 1 if a frame does not repeat bit for bit, or none has an image. RMSE, bias and errors are of "
         "the mean of the bands, as fractions of the radiance at full scale.");
+    c.group("Results");
+    c.examples({"narpa replay out/docking", "narpa replay out/docking --reference 64 --frames 10 -o cost.png"});
     return [o] { return replay_any(*o); };
 }
 

@@ -7,6 +7,7 @@
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/report.h"
+#include "rehearsal/runner/run_folder.h"
 
 namespace narpa::cli {
 namespace {
@@ -40,6 +41,14 @@ std::string addresses(const std::string& bus, CanNode* can) {
                        a.pty.empty() ? "" : fmt::format("CAN_PTY={}\n", a.pty));
 }
 
+Step step_of(const Emulator& emulator) {
+    const RunOptions& o = emulator.options();
+    const double t_s = static_cast<double>(emulator.t_ns()) * 1e-9;
+    if (o.lockstep && t_s == 0) return {-1, "waiting for commands"};
+    if (o.duration_s == 0) return {-1, fmt::format("t = {:.1f} s", t_s)};
+    return {t_s / o.duration_s, fmt::format("t = {:.1f} s of {:g} s", t_s, o.duration_s)};
+}
+
 Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     RunOptions o = options.run;
@@ -58,6 +67,12 @@ Outcome run(const RunCommandOptions& options) {
         o.estimate = *estimator;
     }
     o.on_refusal = [](const std::string& what) { say("note: " + what); };
+    std::optional<Descriptor> lock;  // two runs into one folder would mix their logs
+    if (!o.log_folder.empty()) {
+        auto locked = rehearsal::lock_folder(o.log_folder);
+        if (!locked) return locked.error();
+        lock = *std::move(locked);
+    }
     if (!o.lockstep) keep_heap();
     auto scene = load_scene(options.scene);
     if (!scene) return scene.error();
@@ -75,8 +90,7 @@ Outcome run(const RunCommandOptions& options) {
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
     const Status status = [&] {
-        const ProgressThread progress(
-            [&] { return fmt::format("  t = {:.1f} s", static_cast<double>((*emulator)->t_ns()) * 1e-9); });
+        const Progress progress("running", [&] { return step_of(**emulator); });
         return (*emulator)->run(stop_flag());
     }();
     say(in_words(**emulator));
@@ -90,7 +104,7 @@ Command add_run(Parser app) {
     auto o = std::make_shared<RunCommandOptions>();
     const Parser c =
         app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
-    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
     c.option("--can", o->run.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE");
     c.option("--video", o->video, "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
         .repeatable();
@@ -115,6 +129,11 @@ Command add_run(Parser app) {
     c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
     c.option("--ready-fd", o->ready_fd,
              "Descriptor that gets the lines CAN=BUS and READY=1 once the emulator can be reached");
+    c.group("Sensors");
+    c.examples(
+        {"narpa run docking --can vcan0 --video nav=/dev/video10 --lidar top=udp:192.168.1.70:2368 --log out",
+         "narpa run docking --can slcan:29537 --video nav=frames.y4m --lockstep",
+         "narpa run docking --video nav=none --duration 10"});
     return [o, estimate] {
         o->estimates = estimate.given();
         return run(*o);

@@ -114,6 +114,7 @@ Outcome scan(const ScanOptions& o) {
     LidarUnit unit(**world, *index);
 
     std::size_t packets = 0, shots = 0, returns = 0;
+    Progress progress("scanning to " + o.out);
     const auto fire_all = [&](const Writer& write) {
         for (std::int64_t p = unit.first_packet_from(from_ns); unit.packet_start_ns(p) < to_ns; ++p) {
             unit.fire(p);
@@ -121,6 +122,9 @@ Outcome scan(const ScanOptions& o) {
             shots += unit.shots().size();
             returns += unit.returns();
             write(p, unit);
+            progress.show(
+                static_cast<double>(unit.packet_start_ns(p) - from_ns) / static_cast<double>(to_ns - from_ns),
+                fmt::format("{} packets", packets));
         }
     };
     const std::int64_t epoch_unix_ns = (*world)->scene().epoch_unix_ns;
@@ -140,7 +144,7 @@ Outcome scan(const ScanOptions& o) {
 Command add_scan(Parser app) {
     auto o = std::make_shared<ScanOptions>();
     const Parser c = app.subcommand("scan", "Scan with a LiDAR from a time on: points, shots or packets");
-    c.option("SCENE", o->scene, "Scene file (TOML)").required();
+    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
     c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");
     c.option("--time", o->time_s, "Simulation time in seconds of the first packet").range(0.0, 9e9).shows_default();
     c.option("--duration", o->duration_s, "Seconds (default: one turn)").range(0.0, 3600.0);
@@ -148,6 +152,8 @@ Command add_scan(Parser app) {
     c.option("-o,--output", o->out,
              "FILE.ply or .pcd (points), .csv (one row a shot, ranges unquantised), .pcap (packets)")
         .required();
+    c.group("Sensors");
+    c.examples({"narpa scan docking -o sweep.pcap", "narpa scan docking --time 30 -o cloud.ply"});
     return [o] { return scan(*o); };
 }
 

@@ -8,28 +8,38 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/nearest_name.h"
 #include "emulator/trajectory.h"
 
 namespace narpa::cli {
 namespace {
 
-Result<Rigid3> parse_pose(const std::string& text) {
+/// `given` is BODY=NUMBERS, for messages.
+Result<Rigid3> parse_pose(const std::string& numbers, const std::string& given) {
     std::array<double, 7> v{};
-    const char* at = text.data();
-    const char* end = at + text.size();
+    const char* at = numbers.data();
+    const char* end = at + numbers.size();
     for (std::size_t i = 0; i < v.size(); ++i) {
         const auto [next, error] = std::from_chars(at, end, v[i]);
         const bool last = i + 1 == v.size();
         if (error != std::errc{} || !std::isfinite(v[i]) || (last ? next != end : next == end || *next != ','))
             return Error{
-                fmt::format("--pose \"{}\", expected BODY=x,y,z,qw,qx,qy,qz (metres, unit quaternion)", text)};
+                fmt::format("--pose \"{}\", expected BODY=x,y,z,qw,qx,qy,qz (metres, unit quaternion)", given)};
         at = next + 1;
     }
     Rigid3 T{{v[3], v[4], v[5], v[6]}, {v[0], v[1], v[2]}};
     if (!accept_attitude(T.q))
-        return Error{fmt::format("--pose \"{}\": the quaternion's norm is {:.6g}, expected 1", text,
+        return Error{fmt::format("--pose \"{}\": the quaternion's norm is {:.6g}, expected 1", given,
                                  norm(Quat{v[3], v[4], v[5], v[6]}))};
     return T;
+}
+
+Error no_such_body(const std::string& name, const std::string& given, const Scene& scene) {
+    std::vector<std::string> names;
+    for (const Body& b : scene.bodies) names.push_back(b.name);
+    return {fmt::format("--pose \"{}\": no body named \"{}\" in the scene, expected one of {}{}", given, name,
+                        fmt::join(names, ", "), did_you_mean(name, names)),
+            scene.file};
 }
 
 }  // namespace
@@ -40,6 +50,7 @@ void BudgetOptions::add_to(Parser app) {
         app.option("--budget-ms", budget_ms, "Time budget per frame in milliseconds, instead").range(0.001, 1e6);
     const Option rays = app.option("--budget-rays", budget_rays, "Budget per frame in rays, instead")
                             .range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000});
+    for (const Option& option : {samples, time, rays}) (void)option.group("Budget of a frame");
     samples.excludes(time).excludes(rays);
     time.excludes(rays);
 }
@@ -63,12 +74,11 @@ Status PoseOptions::place(Scene& scene) const {
     for (const std::string& text : poses) {
         auto pair = split_pair(text, "BODY=x,y,z,qw,qx,qy,qz");
         if (!pair) return pair.error();
-        auto T = parse_pose(pair->second);
+        auto T = parse_pose(pair->second, text);
         if (!T) return T.error();
         const auto body = std::find_if(scene.bodies.begin(), scene.bodies.end(),
                                        [&](const Body& b) { return b.name == pair->first; });
-        if (body == scene.bodies.end())
-            return Error{fmt::format("--pose: no body named \"{}\" in the scene", pair->first), scene.file};
+        if (body == scene.bodies.end()) return no_such_body(pair->first, text, scene);
         body->initial = {*T, {}, {}};
     }
     return Ok{};

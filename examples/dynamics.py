@@ -67,7 +67,7 @@ def await_actuator_command(bus, t_ns):
 
 def main(bus_name, seconds=60.0):
     chaser, last_step = Chaser(), round(float(seconds) / STEP_S)
-    with Bus(bus_name) as bus:
+    with Bus(bus_name, patience_s=30) as bus:
         for step in range(last_step + 1):
             t_ns = round(step * STEP_S * 1e9)
             period_begins = step % POSES_PER_PERIOD == 0

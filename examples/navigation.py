@@ -89,7 +89,7 @@ def pd(error, error_rate, bandwidth, damping=0.9):
 
 def main(bus_name, video, target_rate=ORBIT_RATE_RAD_S):
     frames, tracker, keeper, target, report, cycle = frames_of(video), None, None, None, None, 0
-    with Bus(bus_name) as bus:
+    with Bus(bus_name, patience_s=30) as bus:
         print("ready", flush=True)
         for message in bus:
             if message.name == "Dynamics" and message["Phase"] == "finished":

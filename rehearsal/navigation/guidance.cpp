@@ -84,6 +84,17 @@ Quat looking_at_origin(const Vec3& position_m) {
 
 }  // namespace
 
+double Scenario::nominal_duration_s() const {
+    double t_s = 0;
+    Vec3 at = start.position_m;
+    for (const Leg& leg : legs) {
+        const LegPath path = LegPath::along(leg, at, kShareOfThrust * thrusters.force_n / chaser.mass_kg);
+        t_s += leg.contact ? norm(at) / leg.speed_m_s : path.duration_s() + leg.hold_s;
+        if (!leg.contact) at = path.end_m();
+    }
+    return std::min(t_s, duration_s);
+}
+
 Guidance::Guidance(const Scenario& scenario, double t_s)
     : legs_(scenario.legs),
       limits_(scenario.navigation),

@@ -63,8 +63,8 @@ struct Running {
 
 bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed) {
     const json result = read_json(folder + "/result.json");
-    return result.is_object() && result.value("scenario_hash", "") == scenario_hash &&
-           result.value("seed", std::uint64_t{0}) == seed && result.value("trouble", "") != "interrupted";
+    return result.is_object() && result.value("scenario_hash", json()) == scenario_hash &&
+           result.value("seed", json()) == seed && result.value("trouble", json("")) != "interrupted";
 }
 
 Result<json> run_campaign(const CampaignOptions& o, const Console& console, const StopFlag& stop) {
@@ -80,7 +80,8 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(scenario->file, scenario->scene);
     if (!texts) return texts.error();
-    if (Status good = claim_folder(o.run.folder, "runs"); !good) return good.error();
+    const auto lock = claim_folder(o.run.folder, "runs");
+    if (!lock) return lock.error();
     std::error_code failed;
     fs::create_directories(o.run.folder + "/runs", failed);
     const std::uint64_t first_seed = o.run.seed.value_or(scenario->seed);
@@ -113,12 +114,12 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
                     read_json(folder_of(runs[r.run - 1]) + "/result.json").value("headline", last_line(r.log))));
             return true;
         });
-        console.progress(fmt::format("{} of {} runs", done, runs.size()));
+        console.progress(static_cast<double>(done) / static_cast<double>(runs.size()),
+                         fmt::format("{} of {} runs", done, runs.size()));
         if (stop)
             for (Running& r : running) r.child.terminate();
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    console.progress("");
 
     for (RunResult& r : runs)
         if (is_done(folder_of(r), texts->hash, r.seed)) r.result = read_json(folder_of(r) + "/result.json");

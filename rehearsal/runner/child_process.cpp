@@ -68,14 +68,16 @@ std::vector<std::string> environment_with(const std::vector<std::pair<std::strin
 }  // namespace
 
 std::string ChildProcess::shell_line(const Command& command) {
+    const auto quoted = [](const std::string& text) {
+        std::string out = "'";
+        for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        return out + "'";
+    };
     std::string out;
-    for (const auto& [name, value] : command.environment) out += fmt::format("{}='{}' ", name, value);
+    for (const auto& [name, value] : command.environment) out += fmt::format("{}={} ", name, quoted(value));
     for (const std::string& part : command.line) {
-        const bool plain = !part.empty() && part.find_first_of(" \t\n'\"$&;|<>*?()#~`\\") == std::string::npos;
-        std::string quoted;
-        for (const char c : part) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-        out += plain ? part : "'" + quoted + "'";
-        out += ' ';
+        const bool plain = !part.empty() && part.find_first_of(" \t\n'\"$&;|<>*?()#~`\\!{}[]") == std::string::npos;
+        out += (plain ? part : quoted(part)) + ' ';
     }
     if (!out.empty()) out.pop_back();
     return out;
@@ -173,6 +175,16 @@ std::string last_line(const std::string& file) {
     return text.substr(start == std::string::npos ? 0 : start + 1, end - (start == std::string::npos ? -1 : start));
 }
 
+std::string error_in(const std::string& file) {
+    const std::string text = "\n" + read_text(file);
+    const std::size_t at = text.rfind("\nnarpa");
+    const std::size_t says = at == std::string::npos ? at : text.find(": ", at);
+    if (says == std::string::npos || text.substr(at, says - at).find_first_of(" \t") != std::string::npos)
+        return last_line(file);
+    const std::size_t end = text.find_last_not_of(" \t\r\n") + 1;
+    return text.substr(says + 2, end - says - 2);
+}
+
 Status Program::start(const std::string& name, const std::string& folder) {
     command.name = "the " + name;
     command.out = command.err = folder + "/" + name + ".log";
@@ -187,7 +199,7 @@ std::string Program::failure() {
     if (!status || *status == 0) return "";
     const std::string how =
         *status > 128 ? fmt::format("signal {}", *status - 128) : fmt::format("status {}", *status);
-    const std::string said = last_line(command.err);
+    const std::string said = error_in(command.err);
     return fmt::format("{} ended with {}{}", command.name, how, said.empty() ? "" : ": " + said);
 }
 

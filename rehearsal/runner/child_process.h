@@ -60,6 +60,8 @@ private:
 
 /// The last line of a text file that is not blank; empty where there is none.
 [[nodiscard]] std::string last_line(const std::string& file);
+/// The error of one of our programs in what it printed, "narpa: " left out, with its remedy; else the last line.
+[[nodiscard]] std::string error_in(const std::string& file);
 [[nodiscard]] std::string read_text(const std::string& file);
 
 struct Program {
@@ -69,7 +71,7 @@ struct Program {
     /// Output goes to FOLDER/NAME.log.
     Status start(const std::string& name, const std::string& folder);
     [[nodiscard]] bool ended() { return child && child->status(); }
-    /// "the navigation ended with status 7: its last line"; empty while it runs and after status 0.
+    /// "the navigation ended with status 7: its error"; empty while it runs and after status 0.
     [[nodiscard]] std::string failure();
     /// An Error of the kind that its exit status stands for.
     [[nodiscard]] Error start_error(const std::string& what);

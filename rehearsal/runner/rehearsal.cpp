@@ -72,7 +72,9 @@ private:
     // --- Folder and sensor links ---
 
     Status prepare_folder() {
-        if (Status good = claim_folder(options_.folder, "rehearsal.json"); !good) return good;
+        auto lock = claim_folder(options_.folder, "rehearsal.json");
+        if (!lock) return lock.error();
+        lock_ = *std::move(lock);
         std::error_code failed;
         for (const char* name : {"emulator", "dynamics", "navigation"}) {
             fs::remove_all(in_folder(name), failed);
@@ -269,7 +271,6 @@ private:
             if (seconds_since(shown) > 0.2) shown = Clock::now(), show_progress();
             if (!judge_.finished()) trouble_ = find_trouble(seconds_since(advanced));
         }
-        console_.progress("");
     }
 
     std::string find_trouble(double stalled_s) {
@@ -286,14 +287,15 @@ private:
 
     void show_progress() const {
         const BusRecord& bus = judge_.bus();
-        if (bus.truth.empty()) return console_.progress("waiting for the first poses");
+        if (bus.truth.empty()) return console_.progress(-1, "waiting for the first poses");
+        const double t_s = bus.seconds(bus.truth.back().t_ns);
         std::string text =
-            fmt::format("t = {:.1f} s, {:.2f} m", bus.seconds(bus.truth.back().t_ns), bus.truth.back().range_m());
+            fmt::format("t = {:.1f} s of about {:.0f} s, {:.2f} m", t_s, nominal_s_, bus.truth.back().range_m());
         if (!bus.commands.empty())
             text += fmt::format(", {}, {}", leg_text(scenario_, bus.commands.back().leg),
                                 kGuidancePhases[static_cast<std::size_t>(bus.commands.back().phase)]);
-        console_.progress(text + (judge_.failures() == 0 ? ", gates good"
-                                                         : fmt::format(", {} gate(s) FAILED", judge_.failures())));
+        text += judge_.failures() == 0 ? ", gates good" : fmt::format(", {} gate(s) FAILED", judge_.failures());
+        console_.progress(std::min(t_s / nominal_s_, 1.0), text);
     }
 
     /// Dynamics and navigation end by themselves after a good run; the emulator writes its logs at SIGTERM.
@@ -347,7 +349,9 @@ private:
     const Scenario scenario_;
     Judge judge_{scenario_,
                  [this](const GateResult& g) { console_.print(fmt::format("gate {}: {}", g.name, g.reason)); }};
+    const double nominal_s_ = scenario_.nominal_duration_s();
     const Clock::time_point began_ = Clock::now();
+    Descriptor lock_;  ///< on the folder
     std::string hash_, bus_name_, trouble_;
     std::vector<std::string> video_, lidar_sinks_, lidar_sources_;  ///< NAME=SINK, NAME=SOURCE
     std::vector<std::string> fifos_;

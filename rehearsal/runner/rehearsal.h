@@ -41,7 +41,8 @@ struct RehearsalResult {
 /// Where messages for people go.
 struct Console {
     std::function<void(std::string_view)> print;
-    std::function<void(std::string_view)> progress;  ///< a line that the next one replaces
+    /// How far it is: the share of the whole that is done, or a negative number, and a text.
+    std::function<void(double share, std::string_view)> progress;
     /// Polled where the user starts the navigation ("none"): whether it is ready. Empty: it is after ten seconds.
     std::function<bool()> navigation_ready{};
 };

@@ -103,10 +103,36 @@ Result<json> read_record(const std::string& folder) {
     return record;
 }
 
-Result<json> rerun(const std::string& folder, int threads, const std::string& version, const Console& console,
-                   const StopFlag& stop) {
+namespace {
+
+/// The command that replaces a program, or empty. A log may come from anywhere: its own command is only shown.
+Result<std::string> replacement(const json& record, const std::string& folder, const std::string& program,
+                                const std::string& given) {
+    if (!given.empty()) return given;
+    const json& logged = record[program];
+    if (logged == "") return std::string();
+    if (logged == "none")
+        return Error{
+            fmt::format("a program was started by hand in it: expected --{} COMMAND, or {}/emulator, whose "
+                        "frames can be replayed alone",
+                        program, folder),
+            folder};
+    return Error{fmt::format("the {0} was the command {1}, which is not run on the word of a log; expected --{0} "
+                             "COMMAND if you trust it, or {2}/emulator, whose frames can be replayed alone",
+                             program, logged.dump(-1, ' ', true, json::error_handler_t::replace), folder),
+                 folder + "/rehearsal.json"};
+}
+
+}  // namespace
+
+Result<json> rerun(const RerunOptions& options, const Console& console, const StopFlag& stop) {
+    const std::string& folder = options.folder;
     const auto record = read_record(folder);
     if (!record) return record.error();
+    const auto dynamics = replacement(*record, folder, "dynamics", options.dynamics);
+    if (!dynamics) return dynamics.error();
+    const auto navigation = replacement(*record, folder, "navigation", options.navigation);
+    if (!navigation) return navigation.error();
     const auto scenario = read_scenario((*record)["scenario"].get<std::string>());
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(scenario->file, scenario->scene);
@@ -122,16 +148,12 @@ Result<json> rerun(const std::string& folder, int threads, const std::string& ve
     o.scenario = scenario->file;
     o.folder = again.path();
     o.seed = (*record)["seed"].get<std::uint64_t>();
-    o.dynamics = record->value("dynamics", "");
-    o.navigation = record->value("navigation", "");
-    if (o.dynamics == "none" || o.navigation == "none")
-        return Error{fmt::format("a program was started by hand in it: expected {}/emulator, whose frames can be "
-                                 "replayed alone",
-                                 folder),
-                     folder};
-    o.threads = threads;
+    o.dynamics = *dynamics;
+    o.navigation = *navigation;
+    o.threads = options.threads;
     o.page = false;
-    o.version = version;
+    o.version = options.version;
+    o.programs = options.programs;
     const auto done = run_rehearsal(o, console, stop);
     if (!done) return done.error();
 

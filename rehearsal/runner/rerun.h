@@ -26,9 +26,16 @@ struct Difference {
 /// rehearsal.json. Errors: missing, or not the record of a rehearsal.
 Result<nlohmann::json> read_record(const std::string& folder);
 
+struct RerunOptions {
+    std::string folder;                ///< of the rehearsal
+    std::string dynamics, navigation;  ///< shell commands in place of ours; empty: ours
+    int threads = 0;
+    std::string version;
+    std::string programs;  ///< as in RehearsalOptions
+};
 /// Runs it with the same seed into a temporary folder and compares the bus, ledgers, truths and the logs of
-/// navigation and dynamics. For runs in lockstep.
-Result<nlohmann::json> rerun(const std::string& folder, int threads, const std::string& version,
-                             const Console& console, const StopFlag& stop);
+/// navigation and dynamics. For runs in lockstep. A command that the record names is never run: it is an Error
+/// unless the options name one in its place.
+Result<nlohmann::json> rerun(const RerunOptions& options, const Console& console, const StopFlag& stop);
 
 }  // namespace narpa::rehearsal

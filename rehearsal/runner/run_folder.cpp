@@ -1,8 +1,12 @@
 #include "rehearsal/runner/run_folder.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 
+#include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -55,17 +59,29 @@ Status write_junit(const std::string& file, const std::string& suites) {
                       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n" + suites + "</testsuites>\n");
 }
 
-Status claim_folder(const std::string& folder, const char* mark) {
+Result<Descriptor> lock_folder(const std::string& folder) {
     std::error_code failed;
     fs::create_directories(folder, failed);
     if (failed) return Error{"cannot be made: " + failed.message(), folder};
+    Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!lock) return Error{fmt::format("cannot be read: {}", std::strerror(errno)), folder};
+    // Some network file systems have no locks: there the folder is used without.
+    if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        return Error{"is in use by another run that has not ended, expected a folder of its own for each", folder};
+    return lock;
+}
+
+Result<Descriptor> claim_folder(const std::string& folder, const char* mark) {
+    auto lock = lock_folder(folder);
+    if (!lock) return lock;
+    std::error_code failed;
     const bool empty = fs::is_empty(folder, failed);
     if (failed) return Error{"cannot be read: " + failed.message(), folder};
     if (!empty && !fs::exists(folder + "/" + mark, failed))
         return Error{
             fmt::format("holds other files and no {}, expected a new or empty folder, or a rehearsal's", mark),
             folder};
-    return Ok{};
+    return lock;
 }
 
 }  // namespace narpa::rehearsal

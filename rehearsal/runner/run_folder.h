@@ -5,11 +5,14 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "drivers/can/descriptor.h"
 
 namespace narpa::rehearsal {
 
-/// Makes the folder, or takes one that has `mark` in it; an Error where it holds other files.
-Status claim_folder(const std::string& folder, const char* mark);
+/// Makes the folder and locks it until the descriptor closes; an Error where another program has locked it.
+Result<Descriptor> lock_folder(const std::string& folder);
+/// The same for a folder that is empty or has `mark` in it; an Error where it holds other files.
+Result<Descriptor> claim_folder(const std::string& folder, const char* mark);
 
 /// Scenario and scene with all that they are based on, as one TOML text each, and 16 hexadecimal digits of both.
 struct ScenarioTexts {

@@ -170,6 +170,8 @@ struct Scenario {
 
     [[nodiscard]] std::int64_t period_ns() const;  ///< of navigation and control
     [[nodiscard]] std::int64_t pose_period_ns() const;
+    /// The time that the legs and their holds take at their speeds, at most duration_s: for a progress display.
+    [[nodiscard]] double nominal_duration_s() const;
 };
 
 /// Errors name file, line, column, what is wrong and what was expected.

@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"PoseThatIsNoRotation", "render SCENE --pose chaser=0,0,0,1,1,0,0 -o FOLDERa.png", nullptr, 2,
                 "norm"},
         Mistake{"UnknownCloudKind", "scan SCENE -o FOLDERa.xyz", nullptr, 2, "expected .ply, .pcd, .csv or .pcap"},
-        Mistake{"NoSubcommand", "", nullptr, 2, "subcommand"},
+        Mistake{"NoSubcommand", "", nullptr, 2, "Usage: narpa COMMAND"},
         Mistake{"UnknownOption", "check SCENE --colour", nullptr, 2, "--colour"}),
     [](const auto& mistake) { return std::string(mistake.param.name); });
 

@@ -1,7 +1,9 @@
 #!/usr/bin/python3
 """The command line for scripts: --help, one JSON document on standard output, exit codes, errors with file and line."""
 import json
+import os
 import re
+from pathlib import Path
 
 import support
 from support import expect, narpa
@@ -13,6 +15,7 @@ SUBCOMMANDS = {
     "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
 }
+BUILD = Path(os.environ["NARPA_BUILD_DIR"])
 folder = support.work_folder()
 
 
@@ -67,6 +70,83 @@ def check_exit_codes():
     expect_refusal(3, "vcan99", "run", support.SCENE, "--can", "vcan99", "--video", f"{support.CAMERA}=none", "--duration", "0.1")
 
 
-check_help()
-check_json()
-check_exit_codes()
+def check_names():
+    """Scenes and scenarios by name, and files of the other kind."""
+    document = json.loads(narpa("list", "--json").stdout)
+    names = {kind: {entry["name"] for entry in document[kind]} for kind in ("scenarios", "scenes")}
+    expect({"docking", "rbar", "dispersions"} <= names["scenarios"], f"list names scenarios: {sorted(names['scenarios'])}")
+    expect({"docking", "cornell"} <= names["scenes"], f"list names scenes: {sorted(names['scenes'])}")
+    by_name = json.loads(narpa("check", "docking", "--json").stdout)["scene"]
+    by_file = json.loads(narpa("check", BUILD / "scenes/docking/docking.toml", "--json").stdout)["scene"]
+    expect(by_name == by_file, "check docking is check of docking.toml")
+    scenario = json.loads(narpa("check", "rbar", "--json").stdout)
+    expect(scenario["scenario"]["name"] == "rbar" and scenario["scene"]["cameras"], "check takes a scenario, and its scene")
+    expect_refusal(2, r"docking\.toml: is a scene, expected a scenario", "rehearse", BUILD / "scenes/docking/docking.toml")
+    expect_refusal(2, r"rbar\.toml: is a scenario, expected a scene", "render", BUILD / "scenes/rehearsal/rbar.toml", "-o", folder / "a.png")
+    expect_refusal(2, r'dokcing: no such file, .*did you mean "docking"\?', "rehearse", "dokcing")
+    expect_refusal(2, r"nowhere\.toml: no such file, expected a scene file", "run", folder / "nowhere.toml", "--video", "nav=none")
+
+
+def check_words():
+    """Help without the parser's notation, misspelt words, version."""
+    for name in ["", *SUBCOMMANDS, "rehearse", "estimate", "replay"]:
+        text = narpa(*([name] if name else []), "--help").stdout.decode()
+        for notation in ("TEXT:", "FLOAT:", "INT:", "UINT", "REQUIRED", "Excludes", "Positionals", "[OPTIONS]"):
+            expect(notation not in text, f"narpa {name} --help has no {notation}")
+        expect("Examples:\n" in text and f"Usage: narpa {name}".strip() in text, f"narpa {name} --help has usage and examples")
+    expect_refusal(2, 'no command "chek"; did you mean "check"', "chek", support.SCENE)
+    expect_refusal(2, 'no command "rendr"; did you mean "render"', "bench", "rendr")
+    expect_refusal(2, 'narpa render: there is no option "--sppp"; did you mean "--spp"', "render", support.SCENE, "--sppp", "3")
+    expect_refusal(2, "Usage: narpa COMMAND")
+    version = narpa("--version").stdout.decode()
+    expect(re.search(r"^narpa \d+\.\d+\.\d+(, commit [0-9a-f]{7,}.*)?\nvector instructions: .+\n", version), f"--version: {version!r}")
+
+
+def check_errors():
+    """They name what was given, and keep what was found."""
+    expect_refusal(2, r'--pose "chaser=1,2", expected BODY=', "render", support.SCENE, "--pose", "chaser=1,2", "-o", folder / "a.png")
+    expect_refusal(2, "nonsense: is neither a CAN bus nor a video device", "check", support.SCENE, "nonsense")
+    done = narpa("check", support.SCENE, "/dev/video99", "--json", status=3)
+    document = json.loads(done.stdout)
+    expect(document["error"]["file"] == "/dev/video99" and document["scene"] and document["machine"], "check --json reports beside the error")
+    done = narpa("rehearse", "docking", "--can", "can77", "-o", folder / "can77", status=3)
+    said = done.stderr.decode()
+    expect(re.search(r"ended with status 3: can77: .+\n +try: ", said), f"rehearse names its child's reason: {said[-300:]}")
+    plural = folder / "plural.toml"
+    plural.write_text('[scene]\nname = "x"\n[[bodies]]\nname = "a"\nsphere = {radius_m = 1.0}\n')
+    expect_refusal(2, r'plural\.toml:3:\d+: unknown key "bodies".*did you mean "body"', "check", plural)
+
+
+def check_sensors():
+    """A camera in its own hull, and the calibration of all."""
+    hull = folder / "hull.toml"
+    text = ('[scene]\nname = "hull"\n[sun]\ndirection = [1.0, 0.0, 0.0]\n[[body]]\nname = "craft"\nsphere = {radius_m = 1.0}\n[[camera]]\nname = "eye"\nmount = "craft"\n'
+            'position_m = [0.0, 0.0, %s]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 1.0\n')  # fmt: skip
+    for z, inside in (("0.5", True), ("1.5", False)):
+        hull.write_text(text % z)
+        said = narpa("check", hull).stderr.decode()
+        expect(("is the camera inside its hull?" in said) == inside, f"camera at {z} m on a ball of 1 m: {'warned' if inside else 'good'}")
+    narpa("check", "docking", "--calibration", folder / "calibration")
+    camera = json.loads((folder / "calibration/calibration.json").read_text())["cameras"][0]
+    expect(camera["mount"] == "chaser" and camera["camera_matrix"][0][0] > 100, "calibration.json has matrix and mount")
+    info = (folder / "calibration/nav.yaml").read_text()
+    expect("camera_matrix:" in info and f"image_width: {camera['width']}" in info, "and nav.yaml is a camera_info")
+
+
+def check_silence():
+    """What takes long says how far it is."""
+    said = narpa("run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "4").stderr.decode()
+    expect(re.search(r"running: t = .+ s of 4 s, \d+ %", said), f"run tells where it is: {said[:200]}")
+
+
+def check_folders():
+    """One run to a folder at a time."""
+    log = folder / "one-log"
+    with support.Run(support.SCENE, "--video", f"{support.CAMERA}=none", "--log", log) as run:
+        run.wait_for("camera ")
+        expect_refusal(2, "one-log: is in use by another run", "run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "1", "--log", log)
+        run.stop()
+
+
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_sensors, check_silence, check_folders):
+    check()

@@ -116,6 +116,19 @@ TEST(ChildProcess, GetsTheDescriptorAsAnOption) {
     EXPECT_EQ(read_text(folder / "out"), "--ready-fd 3\n");
 }
 
+TEST(ErrorIn, IsTheErrorWithItsRemedyAndNoMore) {
+    const TemporaryFolder folder;
+    const auto of = [&](const char* printed) {
+        std::ofstream(folder / "log") << printed;
+        return error_in(folder / "log");
+    };
+    EXPECT_EQ(of("reading\nnarpa: can7: no such interface\n  try: slcan:29537\n"),
+              "can7: no such interface\n  try: slcan:29537");
+    EXPECT_EQ(of("narpa-dynamics: it is lost\n"), "it is lost");
+    EXPECT_EQ(of("narpa is here\nTraceback: out of fuel\n"), "Traceback: out of fuel");
+    EXPECT_EQ(of(""), "");
+}
+
 TEST(ReadyFd, ThatIsNotOpenIsBadInput) {
     EXPECT_TRUE(check_ready_fd(-1));
     const Status closed = check_ready_fd(987);
@@ -171,7 +184,7 @@ TEST(Folder, WithOtherFilesIsNotClaimed) {
     EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
     EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
     std::ofstream(folder / "new/letter.txt") << "dear";
-    const Status other = claim_folder(folder / "new", "rehearsal.json");
+    const auto other = claim_folder(folder / "new", "rehearsal.json");
     ASSERT_FALSE(other);
     EXPECT_NE(other.error().what.find("holds other files"), std::string::npos);
     std::ofstream(folder / "new/rehearsal.json") << "{}";

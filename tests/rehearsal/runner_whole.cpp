@@ -11,6 +11,7 @@
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/rehearsal.h"
 #include "rehearsal/runner/rerun.h"
+#include "rehearsal/runner/run_folder.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/rehearsal/markup.h"
 #include "tests/support/temporary_folder.h"
@@ -40,7 +41,7 @@ RehearsalOptions options(const TemporaryFolder& folder) {
     return o;
 }
 
-const Console kSilent{[](std::string_view) {}, [](std::string_view) {}};
+const Console kSilent{[](std::string_view) {}, [](double, std::string_view) {}};
 
 TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
     const TemporaryFolder folder;
@@ -152,9 +153,67 @@ TEST(Whole, WaitsForANavigationStartedByTheUser) {
         << gate(done->verdict, "navigation").reason;
     EXPECT_EQ(gate(done->verdict, "duration").reason, "the goal was not reached when 1 s were over");
 
-    const auto again = rerun(o.folder, 1, "test", kSilent, stop);
+    const auto again = rerun({o.folder, "", "", 1, "test", ""}, kSilent, stop);
     ASSERT_FALSE(again);
     EXPECT_NE(again.error().what.find("a program was started by hand"), std::string::npos) << again.error().text();
+}
+
+/// The log of somebody else, whose record is valid but for the commands in it.
+TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    const auto scenario = read_scenario(short_scenario(folder));
+    ASSERT_TRUE(scenario);
+    const std::string proof = folder / "it-ran";
+    const nlohmann::json record{{"format", 1},
+                                {"scenario", scenario->file},
+                                {"scenario_hash", scenario_texts(scenario->file, scenario->scene)->hash},
+                                {"mode", "lockstep"},
+                                {"seed", 1u},
+                                {"dynamics", ""},
+                                {"navigation", ""}};
+    RerunOptions o{folder / "log", "", "", 1, "test", NARPA_BUILD_DIR "/bin"};
+    fs::create_directories(o.folder);
+    for (const char* program : {"dynamics", "navigation"})
+        for (const std::string command : {"touch " + proof, "\x1b[2Jnone; touch " + proof}) {
+            nlohmann::json hostile = record;
+            hostile[program] = command;
+            hostile["command_lines"] = {{program, "touch " + proof}};
+            ASSERT_TRUE(write_text(o.folder + "/rehearsal.json", hostile.dump()));
+            const auto done = rerun(o, kSilent, stop);
+            ASSERT_FALSE(done) << hostile;
+            EXPECT_EQ(done.error().kind, ErrorKind::bad_input);
+            EXPECT_NE(done.error().text().find("which is not run on the word of a log"), std::string::npos)
+                << done.error().text();
+            EXPECT_EQ(done.error().text().find('\x1b'), std::string::npos) << "it reaches no terminal either";
+            EXPECT_FALSE(fs::exists(proof)) << hostile;
+        }
+
+    // Named by the caller, it is run.
+    o.navigation = "touch " + proof + "; exit 9";
+    EXPECT_FALSE(rerun(o, kSilent, stop));
+    EXPECT_TRUE(fs::exists(proof));
+}
+
+TEST(Whole, ASecondRunIntoTheSameFolderIsRefused) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    o.dynamics = "sleep 100";
+    o.patience_s = 0.3;
+    std::optional<Result<RehearsalResult>> second;
+    Console first = kSilent;
+    first.print = [&](std::string_view text) {  // while the first is under way
+        if (text.starts_with("dynamics: ")) second = run_rehearsal(o, kSilent, stop);
+    };
+    ASSERT_TRUE(run_rehearsal(o, first, stop));
+    ASSERT_TRUE(second && !*second);
+    EXPECT_EQ(second->error().text(), o.folder +
+                                          ": is in use by another run that has not ended, expected a folder "
+                                          "of its own for each");
+    EXPECT_EQ(exit_status(second->error().kind), 2);
+    EXPECT_TRUE(fs::exists(o.folder + "/result.json")) << "the first is left alone";
+    EXPECT_TRUE(claim_folder(o.folder, "rehearsal.json")) << "and is unlocked at its end";
 }
 
 TEST(Whole, RejectsImpossibleCampaigns) {

@@ -1,0 +1,82 @@
+#include "apps/calibration.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "protocols/lidar/lidar_model.h"
+
+namespace narpa::cli {
+namespace {
+
+nlohmann::json mounting(const Scene& scene, int mount, const Rigid3& T) {
+    return {{"mount", mount < 0 ? "world" : scene.bodies[static_cast<std::size_t>(mount)].name},
+            {"position_m", {T.t.x, T.t.y, T.t.z}},
+            {"attitude_wxyz", {T.q.w, T.q.x, T.q.y, T.q.z}}};
+}
+
+nlohmann::json describe(const Scene& scene, const Camera& c) {
+    nlohmann::json camera{{"name", c.name},
+                          {"width", c.width},
+                          {"height", c.height},
+                          {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
+                          {"format", std::string(name(c.format))},
+                          {"camera_matrix", {{c.fx, 0, c.cx}, {0, c.fy, c.cy}, {0, 0, 1}}},
+                          {"distortion_model", "plumb_bob"},
+                          {"distortion_coefficients", {0, 0, 0, 0, 0}}};
+    camera.update(mounting(scene, c.mount, c.T_mount_camera));
+    return camera;
+}
+
+nlohmann::json describe(const Scene& scene, const Lidar& l) {
+    nlohmann::json lidar{{"name", l.name},
+                         {"model", std::string(l.model->spec().name)},
+                         {"rate_hz", l.rate_hz},
+                         {"range_max_m", l.range_max_m}};
+    lidar.update(mounting(scene, l.mount, l.T_mount_lidar));
+    return lidar;
+}
+
+std::string camera_info(const Camera& c) {
+    return fmt::format(
+        "image_width: {}\nimage_height: {}\ncamera_name: {}\n"
+        "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{fx}, 0.0, {cx}, 0.0, {fy}, {cy}, 0.0, 0.0, 1.0]\n"
+        "distortion_model: plumb_bob\n"
+        "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0.0, 0.0, 0.0, 0.0, 0.0]\n"
+        "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n"
+        "projection_matrix:\n  rows: 3\n  cols: 4\n"
+        "  data: [{fx}, 0.0, {cx}, 0.0, 0.0, {fy}, {cy}, 0.0, 0.0, 0.0, 1.0, 0.0]\n",
+        c.width, c.height, c.name, fmt::arg("fx", c.fx), fmt::arg("fy", c.fy), fmt::arg("cx", c.cx),
+        fmt::arg("cy", c.cy));
+}
+
+Status write(const std::string& file, const std::string& text) {
+    std::ofstream out(file, std::ios::binary);
+    out << text;
+    if (!out.flush()) return Error{"cannot be written", file, 0, 0, ErrorKind::failed};
+    return Ok{};
+}
+
+}  // namespace
+
+Status write_calibration(const Scene& scene, const std::string& folder) {
+    std::error_code failed;
+    std::filesystem::create_directories(folder, failed);
+    if (failed) return Error{"cannot be made: " + failed.message(), folder};
+    nlohmann::json document{
+        {"conventions",
+         "camera: x right, y down, z forward, centre of the top-left pixel (0, 0); LiDAR: x right, y forward, "
+         "z up; position and attitude take sensor coordinates to the mount's; quaternions w, x, y, z"},
+        {"cameras", nlohmann::json::array()},
+        {"lidars", nlohmann::json::array()}};
+    for (const Camera& c : scene.cameras) {
+        document["cameras"].push_back(describe(scene, c));
+        if (Status good = write(folder + "/" + c.name + ".yaml", camera_info(c)); !good) return good;
+    }
+    for (const Lidar& l : scene.lidars) document["lidars"].push_back(describe(scene, l));
+    return write(folder + "/calibration.json", document.dump(2) + "\n");
+}
+
+}  // namespace narpa::cli

@@ -1,0 +1,15 @@
+/// apps/calibration.h - what a navigation needs to know of the sensors, as files that other software reads.
+#pragma once
+
+#include <string>
+
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa::cli {
+
+/// Writes DIR/CAMERA.yaml for each camera (camera_info of ROS) and DIR/calibration.json with all cameras and
+/// LiDARs: matrix, distortion, and the mount as a body and a pose on it.
+Status write_calibration(const Scene& scene, const std::string& folder);
+
+}  // namespace narpa::cli

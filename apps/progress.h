@@ -1,0 +1,47 @@
+/// apps/progress.h - what a command that takes longer does, how far it is and how long it will take, on standard
+/// error.
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace narpa::cli {
+
+/// How far a command is.
+struct Step {
+    double share = -1;   ///< of the whole, 0 to 1; negative: unknown
+    std::string text{};  ///< "frame 3 of 10"; may be empty
+};
+
+/// "rendering: frame 3 of 10, 30 %, about 35 s left", or with the time so far where no share is known.
+[[nodiscard]] std::string progress_line(const std::string& what, const Step& step, double seconds);
+
+/// On a terminal one line that is rewritten, and removed at the end; elsewhere a line after two seconds and then
+/// every ten. A thread of its own prints, so that the lines come however long a step takes.
+class Progress {
+public:
+    /// `what`: "rendering camera nav". `poll`: asked for the step from that thread; empty: `show` sets it.
+    explicit Progress(std::string what, std::function<Step()> poll = {});
+    ~Progress();
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    void show(double share, std::string text = {});
+    void show(std::string text) { show(-1, std::move(text)); }
+
+private:
+    void print(const std::stop_token& stop);
+
+    const std::string what_;
+    std::mutex mutex_;
+    Step step_{};  ///< guarded by mutex_
+    std::function<Step()> poll_;
+    std::jthread thread_;
+};
+
+/// Prints a line on standard error, in place of a line of progress.
+void say(std::string_view text);
+
+}  // namespace narpa::cli

@@ -1,0 +1,135 @@
+// narpa list, and the files that it names.
+#include "apps/shipped.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "apps/cli.h"
+#include "base/nearest_name.h"
+#include "base/program_beside.h"
+
+namespace narpa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Empty: there is none.
+fs::path shipped_folder() {
+    std::error_code error;
+    const fs::path program = program_folder();
+    for (const char* folder : {"../scenes", "../share/narpa/scenes"})
+        if (const fs::path path = (program / folder).lexically_normal(); fs::is_directory(path, error)) return path;
+    return {};
+}
+
+/// The first sentence of the comment at its top, or its title.
+std::string about(const fs::path& file) {
+    std::ifstream in(file);
+    std::string text, line;
+    while (std::getline(in, line) && line.starts_with("# ")) text += (text.empty() ? "" : " ") + line.substr(2);
+    if (const std::size_t end = std::min(text.find(". "), text.find(": ")); end != std::string::npos)
+        text.resize(end);
+    if (text.ends_with('.')) text.pop_back();
+    if (!text.empty()) return text;
+    do {
+        if (line.starts_with("title = \"")) return line.substr(9, line.rfind('"') - 9);
+    } while (std::getline(in, line));
+    return {};
+}
+
+/// "docking" of docking/docking.toml and of the scenario rehearsal/docking.toml; else folder and file.
+std::string short_name(const fs::path& relative, FileKind kind) {
+    const std::string folder = relative.parent_path().string(), stem = relative.stem().string();
+    return folder == stem || (kind == FileKind::scenario && folder == "rehearsal") ? stem : folder + "/" + stem;
+}
+
+constexpr const char* kKindWords[] = {"scene", "scenario"};
+
+}  // namespace
+
+std::vector<ShippedFile> shipped_files(FileKind kind) {
+    std::vector<ShippedFile> all;
+    const fs::path folder = shipped_folder();
+    std::error_code error;
+    if (folder.empty()) return all;
+    for (const auto& entry : fs::recursive_directory_iterator(folder, error))
+        if (entry.path().extension() == ".toml" && kind_of(entry.path().string()) == kind)
+            all.push_back({short_name(entry.path().lexically_relative(folder), kind), entry.path().string(),
+                           about(entry.path())});
+    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    return all;
+}
+
+std::optional<FileKind> kind_of(const std::string& file) {
+    constexpr int kLines = 10000;
+    std::ifstream in(file);
+    std::string line;
+    for (int i = 0; i < kLines && std::getline(in, line); ++i) {
+        if (line.starts_with("[scenario]")) return FileKind::scenario;
+        if (line.starts_with("[scene]")) return FileKind::scene;
+    }
+    return std::nullopt;
+}
+
+Result<std::string> find_file(FileKind kind, const std::string& file_or_name) {
+    const std::string expected = kKindWords[static_cast<std::size_t>(kind)];
+    std::error_code error;
+    if (fs::exists(file_or_name, error) && !fs::is_directory(file_or_name, error)) {
+        const auto found = fs::is_regular_file(file_or_name, error) ? kind_of(file_or_name) : std::nullopt;
+        if (found && *found != kind)
+            return Error{kind == FileKind::scene
+                             ? "is a scenario, expected a scene: `narpa rehearse` and `narpa check` take scenarios"
+                             : "is a scene, expected a scenario, which names a scene and how it is flown "
+                               "(docs/rehearsal.md)",
+                         file_or_name};
+        return file_or_name;
+    }
+    const std::vector<ShippedFile> shipped = shipped_files(kind);
+    std::vector<std::string> names, with_this_stem;
+    for (const ShippedFile& s : shipped) {
+        if (s.name == file_or_name) return s.file;
+        if (fs::path(s.file).stem() == file_or_name) with_this_stem.push_back(s.file);
+        names.push_back(s.name);
+    }
+    if (with_this_stem.size() == 1) return with_this_stem.front();
+    return Error{fmt::format("no such file, expected a {0} file (TOML) or the name of a {0} that `narpa list` "
+                             "shows{1}",
+                             expected, did_you_mean(fs::path(file_or_name).stem().string(), names)),
+                 file_or_name};
+}
+
+namespace {
+
+Outcome list() {
+    nlohmann::json document;
+    for (const FileKind kind : {FileKind::scenario, FileKind::scene}) {
+        const std::string word = kKindWords[static_cast<std::size_t>(kind)];
+        say(kind == FileKind::scenario ? "scenarios, for `narpa rehearse NAME`:"
+                                       : "scenes, for `narpa check`, `run`, `render` and `scan`:");
+        nlohmann::json files = nlohmann::json::array();
+        for (const ShippedFile& s : shipped_files(kind)) {
+            say(fmt::format("  {:<26} {}", s.name, s.about));
+            files.push_back({{"name", s.name}, {"file", s.file}, {"about", s.about}});
+        }
+        document[word + "s"] = files;
+    }
+    const fs::path folder = shipped_folder();
+    if (folder.empty())
+        return Error{"no scenes lie beside the program, expected them in ../scenes or ../share/narpa/scenes"};
+    document["folder"] = folder.string();
+    say("files: " + folder.string());
+    return document;
+}
+
+}  // namespace
+
+Command add_list(Parser app) {
+    const Parser c = app.subcommand("list", "Name the scenarios and scenes that come with narpa");
+    c.group("Start here");
+    return [] { return list(); };
+}
+
+}  // namespace narpa::cli

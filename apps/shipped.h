@@ -1,0 +1,29 @@
+/// apps/shipped.h - scene and scenario files: by path, or by the name of one that comes with narpa.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace narpa::cli {
+
+enum class FileKind : std::uint8_t { scene, scenario };
+
+struct ShippedFile {
+    std::string name;   ///< "docking", "craft/craft-and-ball"
+    std::string file;   ///< its path
+    std::string about;  ///< a sentence
+};
+/// All of one kind that lie beside the program, in a build and when installed, by name.
+[[nodiscard]] std::vector<ShippedFile> shipped_files(FileKind kind);
+
+/// Whether a TOML file is a scene or a scenario, by its tables; empty where it is neither.
+[[nodiscard]] std::optional<FileKind> kind_of(const std::string& file);
+/// The path of a file, or of the shipped file with this name. Errors: no such file or name; a file of the other
+/// kind.
+[[nodiscard]] Result<std::string> find_file(FileKind kind, const std::string& file_or_name);
+
+}  // namespace narpa::cli

@@ -196,23 +196,23 @@ struct OwnHull {
     double share = 0, nearest_m = 0;
 };
 OwnHull own_hull(const World& world, const Camera& c) {
-    constexpr int kColumns = 64, kRows = 48;
+    constexpr int kAcross = 64, kDown = 48;
     BodyPoses at(world.scene().bodies.size());
     world.place(0, c.mount, at);
     const Rigid3 T_world_camera = world.sensor_pose(c.mount, c.T_mount_camera, at);
     const CameraModelHandle model(c);
     OwnHull own{0, kInfinity};
     int hits = 0;
-    for (int j = 0; j < kRows; ++j)
-        for (int i = 0; i < kColumns; ++i) {
-            const ImagePoint p{(i + 0.5) / kColumns * c.width - 0.5, (j + 0.5) / kRows * c.height - 0.5};
+    for (int j = 0; j < kDown; ++j)
+        for (int i = 0; i < kAcross; ++i) {
+            const ImagePoint p{(i + 0.5) / kAcross * c.width - 0.5, (j + 0.5) / kDown * c.height - 0.5};
             const Hit hit = world.tracer().intersect(
                 at, {T_world_camera.t, T_world_camera.q * normalized(model->direction(p))}, kInfinity);
             if (hit.body < 0 || hit.body != c.mount) continue;
             ++hits;
             own.nearest_m = std::min(own.nearest_m, hit.range_m);
         }
-    own.share = static_cast<double>(hits) / (kColumns * kRows);
+    own.share = static_cast<double>(hits) / (kAcross * kDown);
     return own;
 }
 

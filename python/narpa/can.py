@@ -207,8 +207,15 @@ class Bus:
         return None
 
     def __iter__(self):
+        """Messages until the bus is gone: `narpa run` has ended."""
+        import can
+
         while True:
-            yield self.receive()
+            try:
+                message = self.receive()
+            except can.CanOperationError:
+                return
+            yield message
 
     def close(self):
         self.bus.shutdown()

@@ -175,7 +175,7 @@ TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
     RerunOptions o{folder / "log", "", "", 1, "test", NARPA_BUILD_DIR "/bin"};
     fs::create_directories(o.folder);
     for (const char* program : {"dynamics", "navigation"})
-        for (const std::string command : {"touch " + proof, "\x1b[2Jnone; touch " + proof}) {
+        for (const std::string& command : {"touch " + proof, "\x1b[2Jnone; touch " + proof}) {
             nlohmann::json hostile = record;
             hostile[program] = command;
             hostile["command_lines"] = {{program, "touch " + proof}};

@@ -75,7 +75,8 @@ def narpa(*arguments, status=0):
 
 
 class Run:
-    """`narpa run` in the background. `stop` ends it as Ctrl-C does and returns its JSON summary."""
+    """`narpa run` in the background. `stop` ends it as Ctrl-C does, where it has not ended with its commanders in lockstep,
+    and returns its JSON summary."""
 
     def __init__(self, *arguments):
         self.log = work_folder() / "stderr"
@@ -121,8 +122,8 @@ class Run:
         return json.loads(out)
 
     def stop(self):
-        self.expect_alive()
-        self.process.send_signal(signal.SIGINT)
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
         return self.finish()
 
 

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "drivers/can/client_hub.h"
 #include "drivers/can/descriptor.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"

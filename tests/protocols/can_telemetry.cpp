@@ -8,7 +8,7 @@
 namespace narpa {
 namespace {
 
-FrameLedger random_ledger(std::mt19937_64& rng) {
+FrameLedger random_frame_ledger(std::mt19937_64& rng) {
     const auto up_to = [&](std::int64_t n) {
         return static_cast<std::int64_t>(rng() % static_cast<std::uint64_t>(n));
     };
@@ -38,7 +38,7 @@ FrameLedger random_ledger(std::mt19937_64& rng) {
 TEST(CanLedger, ClassicAndFdCarryTheSame) {
     std::mt19937_64 rng(5);
     for (int i = 0; i < 5000; ++i) {
-        const FrameLedger sent = random_ledger(rng);
+        const FrameLedger sent = random_frame_ledger(rng);
         FrameLedger from_classic, from_fd;
         LedgerDecoder classic(sent.camera), fd(sent.camera);
         DecodeStatus status = DecodeStatus::not_mine;

@@ -139,8 +139,9 @@ private:
             const std::int64_t off_ns = std::abs(frame.t_arrived_ns + offset_ns_ - notice.t_hand_over_ns);
             if (off_ns < least_ns) nearest = &notice, least_ns = off_ns;
         }
-        if (!nearest || nearest->delivery != Delivery::frame) return std::nullopt;
-        return nearest->t_mid_ns;
+        std::optional<std::int64_t> mid_ns;
+        if (nearest && nearest->delivery == Delivery::frame) mid_ns = nearest->t_mid_ns;
+        return mid_ns;
     }
 
     SensorInputs& inputs_;

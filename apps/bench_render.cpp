@@ -172,13 +172,13 @@ Command add_bench_render(Parser bench_command) {
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
     const Option scenes =
         c.option("--scenes", o->ladder.scenes,
-                 "Instead: time and error at a ladder of budgets, on the standing scenes: all, craft, "
+                 "Measure time and error at a ladder of budgets, on the standing scenes: all, craft, "
                  "craft-paths, docking, docking-contact, cornell, craft-and-ball")
             .comma_separated()
             .one_of(standing_scenes());
     const Option ablation =
         c.flag("--ablation", o->ladder.ablation,
-               "Instead: each adaptive mechanism switched off in turn, with time and error beside the "
+               "Measure each adaptive mechanism switched off in turn, with time and error beside the "
                "full renderer's, on the scenes of --scenes (default: all)");
     for (const Option& option : of_one_scene) {
         scenes.excludes(option);

@@ -27,15 +27,20 @@ namespace narpa {
     return row.back();
 }
 
-/// The nearest of `known`, at most two changes away; a plural in "ies" counts as its singular. Empty: none is near.
+/// The nearest of `known`, at most two changes away; else one that only lacks its end or has too much of it, as
+/// "fov_horizontal" without "_deg". A plural in "ies" counts as its singular. Empty: none is near.
 [[nodiscard]] inline std::optional<std::string> nearest_name(std::string_view name,
                                                              const std::vector<std::string>& known) {
     constexpr std::size_t kFarthest = 2;
     if (name.ends_with("ies"))
         for (const std::string& k : known)
             if (k == std::string(name.substr(0, name.size() - 3)) + "y") return k;
-    std::size_t best = std::min(kFarthest + 1, name.size());
+    constexpr std::size_t kBeginning = 4;  ///< fewer letters in common are chance
     std::optional<std::string> nearest;
+    if (name.size() >= kBeginning)
+        for (const std::string& k : known)
+            if (k.starts_with(name) || (k.size() >= kBeginning && name.starts_with(k))) nearest = k;
+    std::size_t best = std::min(kFarthest + 1, name.size());
     for (const std::string& k : known)
         if (const std::size_t d = edit_distance(name, k); d < best) best = d, nearest = k;
     return nearest;

@@ -30,7 +30,8 @@ CanBusResult open_can_bus(std::string_view spec, CanRole role) {
             return role == CanRole::hub ? open_candump_reader(std::string(rest))
                                         : open_candump_writer(std::string(rest));
         }
-    } else if (!spec.empty() && spec.size() < IFNAMSIZ && spec.find_first_of("/ \t") == std::string_view::npos) {
+    } else if (scheme != "slcan" && scheme != "udp" && scheme != "log" && !spec.empty() && spec.size() < IFNAMSIZ &&
+               spec.find_first_of("/ \t") == std::string_view::npos) {
         return open_socketcan(std::string(spec));
     }
     return Error{"unknown CAN bus \"" + std::string(spec) +

@@ -289,13 +289,14 @@ private:
         const BusRecord& bus = judge_.bus();
         if (bus.truth.empty()) return console_.progress(-1, "waiting for the first poses");
         const double t_s = bus.seconds(bus.truth.back().t_ns);
-        std::string text =
-            fmt::format("t = {:.1f} s of about {:.0f} s, {:.2f} m", t_s, nominal_s_, bus.truth.back().range_m());
+        const bool overdue = t_s > nominal_s_;
+        std::string text = fmt::format("t = {:.1f} s of {} {:.0f} s, {:.2f} m", t_s, overdue ? "at most" : "about",
+                                       overdue ? scenario_.duration_s : nominal_s_, bus.truth.back().range_m());
         if (!bus.commands.empty())
             text += fmt::format(", {}, {}", leg_text(scenario_, bus.commands.back().leg),
                                 kGuidancePhases[static_cast<std::size_t>(bus.commands.back().phase)]);
         text += judge_.failures() == 0 ? ", gates good" : fmt::format(", {} gate(s) FAILED", judge_.failures());
-        console_.progress(std::min(t_s / nominal_s_, 1.0), text);
+        console_.progress(overdue ? -1 : t_s / nominal_s_, text);
     }
 
     /// Dynamics and navigation end by themselves after a good run; the emulator writes its logs at SIGTERM.

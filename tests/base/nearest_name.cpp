@@ -20,6 +20,12 @@ TEST(NearestName, OfAPluralIsItsSingular) {
     EXPECT_EQ(nearest_name("bodies", kKnown), "body");
 }
 
+TEST(NearestName, MayLackItsEndOrHaveTooMuchOfIt) {
+    EXPECT_EQ(nearest_name("fov_horizontal", {"format", "fov_horizontal_deg"}), "fov_horizontal_deg");
+    EXPECT_EQ(nearest_name("radius_metres", {"mesh", "radius"}), "radius");
+    EXPECT_FALSE(nearest_name("up_is", {"up"}));
+}
+
 TEST(NearestName, DidYouMeanIsEmptyWithoutOne) {
     EXPECT_EQ(did_you_mean("bodies", kKnown), "; did you mean \"body\"?");
     EXPECT_EQ(did_you_mean("atmosphere", kKnown), "");

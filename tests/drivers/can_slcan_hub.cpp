@@ -465,5 +465,14 @@ TEST(SlcanClient, ErrorsNameTheFaultOfAHub) {
     EXPECT_NE(ninth.error().what.find("as many clients as it can have"), std::string::npos) << ninth.error().what;
 }
 
+TEST(CanBusName, ASchemeWithoutItsAddressIsNoInterface) {
+    for (const char* spec : {"slcan", "udp", "log"}) {
+        const auto bus = open_can_bus(spec, CanRole::hub);
+        ASSERT_FALSE(bus) << spec;
+        EXPECT_EQ(bus.error().kind, ErrorKind::bad_input);
+        EXPECT_NE(bus.error().what.find("slcan:PORT"), std::string::npos) << bus.error().what;
+    }
+}
+
 }  // namespace
 }  // namespace narpa

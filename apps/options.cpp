@@ -249,8 +249,7 @@ private:
     }
 };
 
-// --- Errors of the command line
-// -----------------------------------------------------------------------------------
+// --- Errors of the command line ---------------------------------------------------------------------------------
 
 /// "narpa: there is no command "chek"; did you mean "check"?"; empty: all commands on the line exist.
 std::string unknown_command(const CLI::App& app, std::span<char* const> words) {

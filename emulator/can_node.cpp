@@ -36,9 +36,10 @@ bool CanNode::receive(std::int64_t t_now_ns, bool& moved) noexcept {
     if (!next_frame(t_now_ns)) return false;
     const PoseStatus status = take(received_.frame, t_now_ns, moved);
     const bool commands = status == PoseStatus::partial || status == PoseStatus::complete;
-    commands || (!received_.frame.extended && is_closed_loop(received_.frame.id))
-        ? log_frame(received_.frame, t_now_ns)
-        : log_other(received_.frame, t_now_ns);
+    if (commands || (!received_.frame.extended && is_closed_loop(received_.frame.id)))
+        log_frame(received_.frame, t_now_ns);
+    else
+        log_other(received_.frame, t_now_ns);
     return true;
 }
 

@@ -57,9 +57,9 @@ public:
 
     /// Ends it; its wait status. One that had closed its pipe by ending keeps the status that it ended with.
     int end() {
-        if (pid_ > 0) {
-            ::kill(pid_, SIGKILL);
-            while (::waitpid(std::exchange(pid_, -1), &status_, 0) < 0 && errno == EINTR) {
+        if (const pid_t pid = std::exchange(pid_, -1); pid > 0) {
+            ::kill(pid, SIGKILL);
+            while (::waitpid(pid, &status_, 0) < 0 && errno == EINTR) {
             }
         }
         return status_;

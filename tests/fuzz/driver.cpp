@@ -91,7 +91,10 @@ int main(int argc, char** argv) {
     narpa::fuzz::Mutator mutator(seeds, seed);
     for (std::uint64_t n = 0; n < inputs; ++n) run(mutator.next());
     const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::printf("%s: %zu files, %llu mutated inputs, %.1f s\n", fs::path(argv[0]).filename().c_str(), seeds.size(),
-                static_cast<unsigned long long>(inputs), took_s);
-    return 0;
+    const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+    std::printf("%s: %zu files, %llu mutated inputs, %llu taken, %llu refused, %.1f s\n",
+                fs::path(argv[0]).filename().c_str(), seeds.size(), number(inputs), number(narpa::fuzz::taken),
+                number(narpa::fuzz::refused), took_s);
+    if (inputs == 0 || (narpa::fuzz::taken > 0 && narpa::fuzz::refused > 0)) return 0;
+    return std::fputs("fuzz: expected inputs that are taken and inputs that are refused\n", stderr), 1;
 }

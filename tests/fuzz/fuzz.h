@@ -24,6 +24,14 @@ inline void require(bool holds, const char* what) {
     std::abort();
 }
 
+/// What the target's reader has taken and refused: driver.cpp ends with an error where it never did one of them, as
+/// then the target tests nothing.
+inline std::uint64_t taken = 0, refused = 0;
+inline bool count(bool is_taken) {
+    ++(is_taken ? taken : refused);
+    return is_taken;
+}
+
 inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
     return {reinterpret_cast<const char*>(data), size};
 }

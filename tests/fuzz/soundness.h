@@ -40,7 +40,7 @@ inline void check(const Material& m, int textures) {
 }
 
 inline void check(const Result<MeshFile>& mesh) {
-    if (!mesh) return check(mesh.error());
+    if (!count(bool(mesh))) return check(mesh.error());
     check(mesh->mesh, mesh->materials.size());
     for (const MeshMaterial& m : mesh->materials) check(m.material, 0);
 }

@@ -40,8 +40,8 @@ def fly(scene, sinks, await_reader):
             for message in wire.command(pose, frame * support.PERIOD_NS, counter=frame):
                 bus.send(message)
             support.await_ledger(bus, wire, frame)
+        await_reader()  # narpa ends a second after the bus is closed, with or without it
         bus.shutdown()
-        await_reader()  # narpa waits only a second for it at the end
         return run.stop()
 
 

@@ -29,7 +29,12 @@ class Decoders {
 public:
     void accept(const CanFrame& f, std::int64_t t_ns) {
         PoseCommand pose;
-        if (poses_.accept(f, t_ns, pose) == DecodeStatus::complete) {
+        const PoseStatus status = poses_.accept(f, t_ns, pose);
+        ++frames_;
+        fuzz::require(status != PoseStatus::incomplete_set, "no frame is an incomplete set");
+        if (status == PoseStatus::bad_checksum) (void)fuzz::count(false);
+        if (status == PoseStatus::complete) {
+            (void)fuzz::count(true);
             const Motion& m = pose.motion;
             fuzz::require(std::abs(norm(m.T_world_body.q) - 1) < 1e-12, "an attitude is unit");
             fuzz::require(is_finite(m.T_world_body.t) && is_finite(m.velocity_m_s) && is_finite(m.rate_rad_s),
@@ -41,6 +46,14 @@ public:
         take(attitudes_, f, t_ns), take(dynamics_, f, t_ns);
     }
 
+    void check_counts() const {
+        std::uint64_t counted = 0;
+        for (std::size_t s = 0; s < kDecodeStatusCount; ++s)
+            if (static_cast<PoseStatus>(s) != PoseStatus::incomplete_set)
+                counted += poses_.count(static_cast<PoseStatus>(s));
+        fuzz::require(counted == frames_, "every frame is counted once");
+    }
+
 private:
     template <class Message>
     static void take(MessageDecoder<Message>& decoder, const CanFrame& f, std::int64_t t_ns) {
@@ -48,6 +61,7 @@ private:
         (void)decoder.accept(f, t_ns, message);
     }
     PoseDecoder poses_{0x100};
+    std::uint64_t frames_ = 0;
     MessageDecoder<FrameLedger> ledgers_;
     MessageDecoder<EstimateReport> estimates_;
     MessageDecoder<ActuatorCommand> actuators_;
@@ -73,6 +87,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
         decoders.accept(line.frame, line.t_ns);
         judge.accept(line.frame, line.t_ns);
     });
+    decoders.check_counts();
     (void)judge.finish();
     return 0;
 }

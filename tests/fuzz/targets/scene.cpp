@@ -8,7 +8,11 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static const bool copied = (folder.copy_scene_data(), true);
     (void)copied;
     const Result<Scene> scene = read_scene(folder.write("s.toml", fuzz::text_of(data, size)));
-    if (!scene) return fuzz::check(scene.error()), 0;
+    if (!fuzz::count(bool(scene))) {
+        fuzz::check(scene.error());
+        fuzz::require(scene.error().line >= 1, "an error names its line");
+        return 0;
+    }
     for (const Mesh& m : scene->meshes) fuzz::check(m, scene->materials.size());
     for (const Material& m : scene->materials) fuzz::check(m, static_cast<int>(scene->textures.size()));
     const auto bodies = static_cast<int>(scene->bodies.size());

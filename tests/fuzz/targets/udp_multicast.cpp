@@ -9,7 +9,7 @@
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace narpa;
     CanFrame frame;
-    if (!decode_udp_multicast({data, size}, frame)) return 0;
+    if (!fuzz::count(decode_udp_multicast({data, size}, frame))) return 0;
     fuzz::require(fuzz::is_valid(frame), "a frame is valid");
     std::array<std::uint8_t, kUdpMulticastMaxBytes> bytes{};
     CanFrame again;

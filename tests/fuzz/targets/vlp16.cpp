@@ -11,6 +11,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const LidarModel& model = vlp16();
     std::vector<LidarPoint> points(model.spec().shots_per_packet);
     const std::size_t count = model.points({data, size}, points);
+    (void)fuzz::count(count > 0);
     fuzz::require(count <= points.size(), "no more points than shots");
     for (std::size_t i = 0; i < count; ++i) {
         const LidarPoint& p = points[i];

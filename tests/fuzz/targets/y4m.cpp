@@ -14,7 +14,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     (void)decode_embedded_line({data, size});
     const auto source = open_video_source(folder.write("m.y4m", fuzz::text_of(data, size)), kFormat);
     std::vector<std::uint8_t> frame(frame_bytes(kFormat));
-    while (source && (*source)->receive(frame, 0)) {
+    while (fuzz::count(source && (*source)->receive(frame, 0))) {
     }
     return 0;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <thread>
 
@@ -17,6 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+constexpr std::chrono::seconds kShowPeriod{1};
 
 json read_json(const std::string& file) {
     json document = json::parse(read_text(file), nullptr, false);
@@ -61,6 +64,14 @@ struct Running {
 
 }  // namespace
 
+RunProgress progress_of(const std::string& log) {
+    const std::string line = last_line(log), begin = "rehearsing: ";
+    double t_s = 0, end_s = 0;
+    if (std::sscanf(line.c_str(), "rehearsing: t = %lf s of %*[a-z ] %lf", &t_s, &end_s) != 2 || end_s <= 0)
+        return {};
+    return {std::clamp(t_s / end_s, 0.0, 1.0), line.substr(begin.size(), line.find(',') - begin.size())};
+}
+
 bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed) {
     const json result = read_json(folder + "/result.json");
     return result.is_object() && result.value("scenario_hash", json()) == scenario_hash &&
@@ -91,6 +102,17 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     const auto folder_of = [&](const RunResult& r) { return o.run.folder + "/" + r.folder; };
     std::size_t next = 0, done = 0;
     std::vector<Running> running;
+    const auto show_progress = [&] {
+        auto finished = static_cast<double>(done);
+        std::string text = fmt::format("{} of {} runs", done, runs.size());
+        for (const Running& r : running) {
+            const RunProgress p = progress_of(r.log);
+            finished += p.share;
+            text += fmt::format(", run {}: {}", r.run, p.text.empty() ? "starting" : p.text);
+        }
+        console.progress(finished / static_cast<double>(runs.size()), text);
+    };
+    auto shown = std::chrono::steady_clock::now() - kShowPeriod;
     while ((next < runs.size() && !stop) || !running.empty()) {
         while (next < runs.size() && running.size() < static_cast<std::size_t>(o.jobs) && !stop) {
             const RunResult& r = runs[next++];
@@ -114,8 +136,10 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
                     read_json(folder_of(runs[r.run - 1]) + "/result.json").value("headline", last_line(r.log))));
             return true;
         });
-        console.progress(static_cast<double>(done) / static_cast<double>(runs.size()),
-                         fmt::format("{} of {} runs", done, runs.size()));
+        if (const auto now = std::chrono::steady_clock::now(); now - shown >= kShowPeriod) {
+            shown = now;
+            show_progress();
+        }
         if (stop)
             for (Running& r : running) r.child.terminate();
         std::this_thread::sleep_for(std::chrono::milliseconds(50));

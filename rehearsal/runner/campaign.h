@@ -24,6 +24,14 @@ struct CampaignOptions {
 /// summary.json, junit.xml, index.html in the folder. The document is that of summary.json.
 Result<nlohmann::json> run_campaign(const CampaignOptions& options, const Console& console, const StopFlag& stop);
 
+/// How far a run is.
+struct RunProgress {
+    double share = 0;
+    std::string text;  ///< "t = 12.0 s of about 93 s"; empty: not known yet
+};
+/// From the last progress line in its log.
+[[nodiscard]] RunProgress progress_of(const std::string& log);
+
 /// One run of a campaign.
 struct RunResult {
     std::size_t run = 0;

@@ -55,7 +55,9 @@ public:
         for (const auto step : {&Rehearsal::prepare_folder, &Rehearsal::prepare_sensors, &Rehearsal::start_emulator,
                                 &Rehearsal::join_bus, &Rehearsal::start_navigation, &Rehearsal::start_dynamics,
                                 &Rehearsal::write_record})
-            if (Status done = (this->*step)(); !done) return done.error();
+            if (Status done = (this->*step)(); !done) return failed_start(done.error());
+        std::error_code failed;
+        fs::remove_all(in_folder(kEarlier), failed);
         fly();
         stop_programs();
         return write_results();
@@ -71,18 +73,54 @@ private:
 
     // --- Folder and sensor links ---
 
+    /// What a run leaves in its folder.
+    static constexpr std::array kFiles{"emulator",       "dynamics",  "navigation",     "emulator.log",
+                                       "dynamics.log",   "charts",    "navigation.log", "charts.json",
+                                       "result.json",    "junit.xml", "index.html",     "scenario.toml",
+                                       "rehearsal.json", "scene.toml"};
+    /// Subfolders: of an earlier run's files until all programs have started, and of a start that failed.
+    static constexpr const char *kEarlier = "earlier", *kFailedStart = "failed-start";
+
+    /// Replaces the run in the folder `to` by that in `from`.
+    static void move_run(const std::string& from, const std::string& to) {
+        std::error_code failed;
+        fs::create_directories(to, failed);
+        for (const std::string name : kFiles) {
+            fs::remove_all(to + "/" + name, failed);
+            fs::rename(from + "/" + name, to + "/" + name, failed);
+        }
+    }
+
+    /// Back to the earlier run, where there is one.
+    void restore_earlier() {
+        std::error_code failed;
+        if (!fs::exists(in_folder(kEarlier), failed)) return;
+        move_run(in_folder(kEarlier), options_.folder);
+        fs::remove_all(in_folder(kEarlier), failed);
+    }
+
+    Error failed_start(Error error) {
+        for (Program* p : {&dynamics_, &navigation_, &emulator_}) p->child.reset();
+        std::error_code failed;
+        if (!lock_ || !fs::exists(in_folder(kEarlier), failed)) return error;
+        move_run(options_.folder, in_folder(kFailedStart));
+        restore_earlier();
+        if (error.file.starts_with(in_folder("")))
+            error.file = in_folder(kFailedStart) + error.file.substr(options_.folder.size());
+        return error;
+    }
+
     Status prepare_folder() {
         auto lock = claim_folder(options_.folder, "rehearsal.json");
         if (!lock) return lock.error();
         lock_ = *std::move(lock);
         std::error_code failed;
-        for (const char* name : {"emulator", "dynamics", "navigation"}) {
-            fs::remove_all(in_folder(name), failed);
+        fs::remove_all(in_folder(kFailedStart), failed);
+        restore_earlier();  // after a start that was killed
+        if (fs::exists(in_folder("result.json"), failed)) move_run(options_.folder, in_folder(kEarlier));
+        for (const char* name : kFiles) fs::remove_all(in_folder(name), failed);
+        for (const char* name : {"emulator", "dynamics", "navigation"})
             fs::create_directories(in_folder(name), failed);
-        }
-        for (const char* name :
-             {"emulator.log", "dynamics.log", "navigation.log", "result.json", "junit.xml", "index.html"})
-            fs::remove(in_folder(name), failed);
         // The mark of a rehearsal's folder, even if this one gets no further.
         if (Status good = write_text(in_folder("rehearsal.json"), "{}\n"); !good) return good;
         const auto texts = scenario_texts(scenario_.file, scenario_.scene);

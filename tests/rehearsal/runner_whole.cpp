@@ -119,6 +119,31 @@ TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
               std::string::npos);
 }
 
+TEST(Whole, AFailedStartKeepsTheEarlierRun) {
+    const TemporaryFolder folder;
+    const StopFlag stop{false};
+    RehearsalOptions o = options(folder);
+    ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
+    const auto kept = [&](const char* file) { return read_text(o.folder + "/" + file); };
+    const std::string result = kept("result.json"), record = kept("rehearsal.json"), log = kept("emulator/can.log");
+    ASSERT_FALSE(result.empty() || log.empty());
+    o.video["nav"] = "/dev/video99";
+    const auto failed = run_rehearsal(o, kSilent, stop);
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().kind, ErrorKind::missing);
+    EXPECT_EQ(failed.error().file, o.folder + "/failed-start/emulator.log");
+    EXPECT_NE(read_text(failed.error().file).find("/dev/video99"), std::string::npos);
+    EXPECT_EQ(kept("result.json"), result);
+    EXPECT_EQ(kept("rehearsal.json"), record);
+    EXPECT_EQ(kept("emulator/can.log"), log);
+    EXPECT_FALSE(fs::exists(o.folder + "/earlier"));
+
+    o.video.clear();
+    ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
+    EXPECT_FALSE(fs::exists(o.folder + "/failed-start"));
+    EXPECT_FALSE(fs::exists(o.folder + "/earlier"));
+}
+
 /// A navigation that the user starts some time after the request.
 TEST(Whole, WaitsForANavigationStartedByTheUser) {
     const TemporaryFolder folder;
@@ -214,6 +239,22 @@ TEST(Whole, ASecondRunIntoTheSameFolderIsRefused) {
     EXPECT_EQ(exit_status(second->error().kind), 2);
     EXPECT_TRUE(fs::exists(o.folder + "/result.json")) << "the first is left alone";
     EXPECT_TRUE(claim_folder(o.folder, "rehearsal.json")) << "and is unlocked at its end";
+}
+
+TEST(Whole, ACampaignShowsHowFarARunIs) {
+    const TemporaryFolder folder;
+    const std::string log = folder / "0001.log";
+    EXPECT_EQ(progress_of(log).text, "");
+    ASSERT_TRUE(write_text(log,
+                           "rehearsing: starting, 2 s so far\nrehearsing: t = 23.0 s of about 92 s, 7.78 m, leg 1 "
+                           "\"hold at 2 m\", moving, gates good, 25 %, about 37 s to go\n"));
+    EXPECT_EQ(progress_of(log).text, "t = 23.0 s of about 92 s");
+    EXPECT_DOUBLE_EQ(progress_of(log).share, 0.25);
+    ASSERT_TRUE(write_text(log, "rehearsing: t = 100.0 s of at most 400 s, 7.78 m, 60 s so far\n"));
+    EXPECT_EQ(progress_of(log).text, "t = 100.0 s of at most 400 s");
+    EXPECT_DOUBLE_EQ(progress_of(log).share, 0.25);
+    ASSERT_TRUE(write_text(log, "narpa: interrupted\n"));
+    EXPECT_EQ(progress_of(log).text, "");
 }
 
 TEST(Whole, RejectsImpossibleCampaigns) {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
-#include <span>
 
 #include "drivers/background_thread.h"
 #include "drivers/can/descriptor.h"
@@ -64,6 +63,7 @@ ReceiverWatch::ReceiverWatch(const sockaddr_storage& to, std::array<int, 2> port
                                    : mapped(reinterpret_cast<const sockaddr_in&>(to).sin_addr);
     end_fd_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (end_fd_ < 0) return;
+    sockets_.reserve(kSocketsMost);
     update();
     thread_ = start_without_signals([this] { run(); });
 }
@@ -119,13 +119,12 @@ void ReceiverWatch::read_row(const char* row) noexcept {
     if (!parse_address(hex.data(), std::strlen(hex.data()), bound)) return;
     if (!is_any(bound) && std::memcmp(&bound, &to_, sizeof to_) != 0) return;
     found.inode = inode;
-    const auto known = std::span(sockets_).first(known_);
-    const auto at = std::ranges::find(known, found.inode, &Socket::inode);
-    if (at != known.end()) {
+    const auto at = std::ranges::find(sockets_, found.inode, &Socket::inode);
+    if (at != sockets_.end()) {
         dropped_ += found.drops - at->drops;
         at->drops = found.drops;
-    } else if (known_ < sockets_.size()) {
-        sockets_[known_++] = found;
+    } else if (sockets_.size() < kSocketsMost) {
+        sockets_.push_back(found);
         if (!first_) dropped_ += found.drops;
     }
 }

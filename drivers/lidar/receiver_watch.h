@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 namespace narpa {
 
@@ -31,6 +32,9 @@ public:
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
 private:
+    /// Ports are shared by few sockets (SO_REUSEPORT, multicast); those beyond are not counted.
+    static constexpr std::size_t kSocketsMost = 4096;
+
     struct Socket {
         std::uint64_t inode = 0;
         std::uint32_t drops = 0;  ///< as the kernel counts them, modulo 2^32
@@ -41,9 +45,8 @@ private:
 
     in6_addr to_{};  ///< IPv4 addresses mapped into IPv6
     std::array<int, 2> ports_;
-    std::array<Socket, 32> sockets_{};
-    std::size_t known_ = 0;
-    bool first_ = true;  ///< what the kernel has counted so far are others' datagrams
+    std::vector<Socket> sockets_;  ///< those known; room for kSocketsMost is taken at the start
+    bool first_ = true;            ///< what the kernel has counted so far are others' datagrams
     std::mutex reading_;
     std::atomic<std::uint64_t> dropped_{0};
     int end_fd_ = -1;

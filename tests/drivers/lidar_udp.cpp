@@ -131,6 +131,21 @@ TEST(UdpSink, CountsWhatAReceiverThatCameLaterLoses) {
     EXPECT_GT(sink->counters().receiver_dropped, 0U);
 }
 
+/// Each restart of a receiver is a new socket.
+TEST(UdpSink, CountsWhatTheFiftiethReceiverLoses) {
+    const int port = free_port();
+    if (port == 0) GTEST_SKIP() << "no pair of free ports on loopback";
+    const auto sink = opened("udp:127.0.0.1:" + std::to_string(port));
+    for (int i = 0; i < 50; ++i) {
+        const Receiver receiver(port);
+        sink->flush();  // reads the counts
+        if (i < 49) continue;
+        for (int k = 0; k < 754; ++k) sink->send(PacketKind::data, counted_bytes(1206, k), k);
+        sink->flush();
+        EXPECT_GT(sink->counters().receiver_dropped, 0U);
+    }
+}
+
 TEST(UdpSink, SendingWithoutReceiverIsNoError) {
     for (const std::string host : {"127.0.0.1", "localhost", "[::1]"}) {
         auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().spec().network, 0, false);

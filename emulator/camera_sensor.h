@@ -61,7 +61,7 @@ public:
     [[nodiscard]] std::uint64_t drops() const noexcept override;
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
-    [[nodiscard]] std::string in_words() const override;
+    [[nodiscard]] std::string in_words(bool lockstep) const override;
 
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }

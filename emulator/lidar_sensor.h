@@ -37,7 +37,7 @@ public:
     [[nodiscard]] std::uint64_t drops() const noexcept override;
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
-    [[nodiscard]] std::string in_words() const override;
+    [[nodiscard]] std::string in_words(bool lockstep) const override;
 
     [[nodiscard]] const LidarUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }

@@ -159,12 +159,19 @@ std::string non_zero(const Counts& counts) {
     return text.empty() ? "none" : text;
 }
 
+/// "2 dropped (1 ring full, 1 no reader)", "0 dropped".
+std::string dropped(const Counts& causes) {
+    std::uint64_t all = 0;
+    for (const auto& [name, n] : causes) all += n;
+    return fmt::format("{} dropped{}", all, all > 0 ? " (" + non_zero(causes) + ")" : "");
+}
+
 std::string bus_in_words(const CanNode& node) {
     const CommandCounters c = node.counters();
     const CanCounters& b = node.bus().counters();
     return fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", node.bus().description(), c.taken,
                        c.missed, non_zero(c.rejected())) +
-           fmt::format("    {} frames received ({} foreign), {} sent, {} not sent; trouble: {}\n", b.received,
+           fmt::format("    {} frames received ({} foreign), {} sent, {} dropped; trouble: {}\n", b.received,
                        c.foreign, b.sent, b.send_drops,
                        non_zero({{"receive overflow", b.receive_overflow},
                                  {"malformed", b.malformed},
@@ -204,21 +211,25 @@ std::string lateness_in_words(const SignedHistogram& late) {
     return text.empty() ? "none" : text;
 }
 
-std::string CameraSensor::in_words() const {
+std::string CameraSensor::in_words(bool lockstep) const {
     const CameraStats& s = stats_;
     const auto late_ms = [&](double p) { return s.late.percentile_ns(p) * 1e-6; };
     Counts steps;
     for (std::size_t i = 0; i < kStepNames.size(); ++i) steps.emplace_back(kStepNames[i], s.steps[i]);
-    std::string out =
-        fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {} deadlines missed, {} stale\n", name(),
-                    s.frames, s.handed_over, s.skipped, s.deadline_missed, s.stale);
-    out += fmt::format("    p50 / p99 / max: render {}; mid-exposure to hand-over {}; wake-up latency {}\n",
-                       latency(s.render), latency(s.hand_over), latency(s.wake_late));
-    out += fmt::format(
-        "    hand-over after the deadline: p50 {:.2f}, p90 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
-        "repeated {}, blank {}\n    frames: {}\n",
-        late_ms(0.5), late_ms(0.9), late_ms(0.99), late_ms(0.999), s.late.max_ns() * 1e-6, s.repeated, s.blanked,
-        lateness_in_words(s.late));
+    std::string out = fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {}{} stale\n", name(),
+                                  s.frames, s.handed_over, s.skipped,
+                                  lockstep ? "" : fmt::format("{} deadlines missed, ", s.deadline_missed), s.stale);
+    out += fmt::format("    p50 / p99 / max: render {}", latency(s.render));
+    if (!lockstep) {  // where no time is the wall's there are no deadlines
+        out += fmt::format("; mid-exposure to hand-over {}; wake-up latency {}", latency(s.hand_over),
+                           latency(s.wake_late));
+        out += fmt::format(
+            "\n    hand-over after the deadline: p50 {:.2f}, p90 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
+            "repeated {}, blank {}\n    frames: {}",
+            late_ms(0.5), late_ms(0.9), late_ms(0.99), late_ms(0.999), s.late.max_ns() * 1e-6, s.repeated,
+            s.blanked, lateness_in_words(s.late));
+    }
+    out += "\n";
     out += fmt::format("    steps: {}; samples per pixel p50 {:.2f}, max {:.2f}", non_zero(steps),
                        s.samples_1e3.percentile_ns(0.5) * 1e-3, s.samples_1e3.max_ns() * 1e-3);
     if (s.error_1e9.count() > 0)
@@ -228,18 +239,19 @@ std::string CameraSensor::in_words() const {
     out += "\n";
     for (const auto& sink : sinks_) {
         const VideoCounters c = sink->counters();
-        out +=
-            fmt::format("    -> {}: {} written, dropped: {}\n", sink->description(), c.written,
-                        non_zero({{"ring full", c.ring_full}, {"no reader", c.no_reader}, {"failed", c.failed}}));
+        out += fmt::format("    -> {}: {} written, {}\n", sink->description(), c.written,
+                           dropped({{"ring full", c.ring_full}, {"no reader", c.no_reader}, {"failed", c.failed}}));
     }
     return out;
 }
 
-std::string LidarSensor::in_words() const {
+std::string LidarSensor::in_words(bool lockstep) const {
     const LidarStats& s = stats_;
     std::string out = fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
                                   name(), s.packets, sweeps(), s.skipped, s.returns, s.shots);
-    out += fmt::format("    p50 / p99 / max: fire {}; due to sent {}\n", latency(s.fire), latency(s.hand_over));
+    out += fmt::format("    p50 / p99 / max: fire {}", latency(s.fire));
+    if (!lockstep) out += fmt::format("; due to sent {}", latency(s.hand_over));
+    out += "\n";
     for (const auto& sink : sinks_) {
         const PacketCounters c = sink->counters();
         out += fmt::format("    -> {}: {} sent, {} dropped", sink->description(), c.sent, c.dropped);
@@ -301,7 +313,7 @@ std::string in_words(const Emulator& emulator) {
     const bool lockstep = emulator.options().lockstep;
     std::string out = fmt::format("{}: {:.3f} s in {}\n", emulator.world().scene().name,
                                   static_cast<double>(emulator.t_ns()) * 1e-9, lockstep ? "lockstep" : "real time");
-    for (const auto& sensor : emulator.sensors()) out += sensor->in_words();
+    for (const auto& sensor : emulator.sensors()) out += sensor->in_words(lockstep);
     if (const OnlineEstimator* e = emulator.estimator())
         out += fmt::format("  estimate of {} from camera {}: {} frames skipped; {}", e->target(), e->camera().name,
                            e->skipped(), in_words(summarise(e->frames())));

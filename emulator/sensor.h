@@ -60,9 +60,10 @@ public:
 
     /// After the run: flushes sinks and logs. Returns the first file that could not be written.
     virtual Status finish() = 0;
-    /// Statistics of the run, as a JSON object, and the same as lines of text.
+    /// Statistics of the run, as a JSON object, and the same as lines of text: in lockstep without those that
+    /// compare with wall time.
     [[nodiscard]] virtual nlohmann::json report() const = 0;
-    [[nodiscard]] virtual std::string in_words() const = 0;
+    [[nodiscard]] virtual std::string in_words(bool lockstep) const = 0;
 };
 
 /// Flushes the sinks. Returns the first file that could not be written.

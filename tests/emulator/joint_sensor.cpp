@@ -33,7 +33,7 @@ public:
         return Ok{};
     }
     nlohmann::json report() const override { return {{"name", name()}, {"ticks", times_.size()}}; }
-    std::string in_words() const override {
+    std::string in_words(bool) const override {
         return "  counter " + std::string(name()) + ": " + std::to_string(times_.size()) + " ticks\n";
     }
 

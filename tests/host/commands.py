@@ -32,6 +32,7 @@ def command_and_compare(bus_spec, bus_settings, fd):
             expect(ledger["PoseCounter"] == (250 + i) % 256, f"{name}: ledger of frame {frame} names its command")
         summary = run.stop()
         bus.shutdown()
+    expect(" frames received" in run.stderr() and "deadline" not in run.stderr(), f"{name}: the summary of lockstep has no deadlines")
     counts = summary["can"]
     print(f"{name}: {counts}")
     expect(counts["commands_taken"] == len(POSES) and counts["commands_missed"] == 0, f"{name}: all commands taken, none missed")

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -305,6 +306,19 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
     return document;
 }
 
+namespace {
+
+std::string ending_in_words(const std::string& ending) {
+    constexpr std::array<std::string_view, kEndings.size()> kWords{
+        "not over",           "docked",
+        "bounced off",        "the scenario's time is over",
+        "navigation is done", "the chaser has flown off"};
+    const auto at = std::find(kEndings.begin(), kEndings.end(), ending);
+    return at == kEndings.end() ? ending : std::string(kWords[static_cast<std::size_t>(at - kEndings.begin())]);
+}
+
+}  // namespace
+
 std::string in_words(const nlohmann::json& d) {
     const nlohmann::json &commands = d["actuator_commands"], &bus = d["bus"];
     return fmt::format(
@@ -312,9 +326,9 @@ std::string in_words(const nlohmann::json& d) {
         "CAN "
         "frames dropped",
         d["scenario"].get<std::string>(), d["seed"].dump(), d["end_s"].get<double>(),
-        d["stopped"].get<bool>() ? "stopped" : d["ending"].get<std::string>(), commands["applied"].dump(),
-        commands["lost"].dump(), commands["late"].dump(), commands["refused"].dump(), commands["bad_frames"].dump(),
-        bus["frames_dropped"].dump());
+        d["stopped"].get<bool>() ? "stopped" : ending_in_words(d["ending"].get<std::string>()),
+        commands["applied"].dump(), commands["lost"].dump(), commands["late"].dump(), commands["refused"].dump(),
+        commands["bad_frames"].dump(), bus["frames_dropped"].dump());
 }
 
 }  // namespace narpa::rehearsal

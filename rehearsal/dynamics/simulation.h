@@ -36,7 +36,7 @@ struct ContactEvent {
     bool captured = false;
 };
 
-/// Why a run is over.
+/// Why a run is over; left: the chaser has retreated far beyond its start.
 enum class Ending : std::uint8_t { not_yet, captured, bounced, duration, navigation_done, left };
 inline constexpr std::array<std::string_view, 6> kEndings{"not_yet",  "captured",        "bounced",
                                                           "duration", "navigation_done", "left"};

@@ -226,6 +226,7 @@ Outcome bench_estimates(const EstimateBenchOptions& o) {
                                     {{"plot", "estimators"}, {"estimators", findings.estimators}});
             !drawn)
             return drawn.error();
+    if (!o.plots.empty()) say("wrote plots to " + o.plots);
     if (stop_flag()) findings.faults.emplace_back("interrupted before the end");
     for (const std::string& fault : findings.faults) say("failed: " + fault);
     document["passed"] = findings.faults.empty();
@@ -243,7 +244,8 @@ Command add_bench_estimate(Parser bench_command) {
     for (const auto& [name, part] : kParts) names.emplace_back(name);
     c.option("--only", o->only, fmt::format("Only these parts, separated by commas: {}", fmt::join(names, ", ")))
         .comma_separated()
-        .one_of(names);
+        .one_of(names)
+        .type_name("LIST");
     c.option("--trials", o->pnp.trials, "pnp: draws of each cell").range(1, 1'000'000).shows_default();
     c.option("--points", o->pnp.points, "pnp: numbers of points").comma_separated().range(4, 1000);
     c.option("--noise-px", o->pnp.noise_px, "pnp: standard deviations of a pixel")
@@ -254,17 +256,21 @@ Command add_bench_estimate(Parser bench_command) {
     const Option nominal = c.flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c.flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases").excludes(nominal);
     c.option("--seed", o->pnp.seed, "pnp: of all draws").shows_default();
-    c.option("--scene", o->scene, "approach: scene file (default: the docking scene that is installed with narpa)");
-    c.option("--camera", o->camera, "approach: name of the camera (default: the first)");
-    c.option("--target", o->target, "approach: name of the body (default: the first that it can be)");
+    c.option("--scene", o->scene, "approach: scene file (default: the docking scene that is installed with narpa)")
+        .type_name("SCENE");
+    c.option("--camera", o->camera, "approach: name of the camera (default: the first)").type_name("NAME");
+    c.option("--target", o->target, "approach: name of the body (default: the first that it can be)")
+        .type_name("BODY");
     c.option("--size", o->size, "approach: pixels of the camera's longer side").range(32, 10'000).shows_default();
     c.option("--frames", o->approach.frames, "approach: frames").range(2, 100'000);
     c.option("--from", o->approach.from_m, "approach: m from the target's origin").range(0.01, 1e7).finite();
     c.option("--to", o->approach.to_m, "approach: m from the target's origin").range(0.01, 1e7).finite();
-    c.option("--along", o->along, "approach: X,Y,Z from the target towards the camera, target axes")
+    c.option("--along", o->along, "approach: from the target towards the camera, target axes")
+        .type_name("X,Y,Z")
         .comma_separated()
         .values(3, 3);
-    c.option("--up", o->up, "approach: X,Y,Z that is up in the picture, target axes")
+    c.option("--up", o->up, "approach: what is up in the picture, target axes")
+        .type_name("X,Y,Z")
         .comma_separated()
         .values(3, 3);
     c.option("--basin-trials", o->approach.basin_trials, "approach: starts of each distance; 0: none")
@@ -274,7 +280,7 @@ Command add_bench_estimate(Parser bench_command) {
         .finite();
     c.flag("--quick", o->quick, "Few draws of all, to see that it works");
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
-    c.option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error");
+    c.option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error").type_name("DIR");
     c.footer(
         "Exit status 1 where points or stereo are less exact than they must be, or the bench was interrupted.");
     return [o] { return bench_estimates(*o); };

@@ -326,6 +326,7 @@ Outcome bench_ladder(const LadderOptions& o) {
         plot["title"] = fmt::format("Error against time, {} threads; medians of {} frames", n_threads,
                                     o.quick ? kQuick : kLadderFrames);
         if (auto written = write_plot(o.plot, plot); !written) return written.error();
+        say("wrote " + o.plot);
     }
     return document;
 }

@@ -67,6 +67,7 @@ Outcome bench_loop(LoopBenchOptions o) {
         if (!cpus) return cpus.error();
         o.run.cpus = *std::move(cpus);
     }
+    if (auto made = make_folder_of(o.plot); !made) return made.error();
     keep_heap();
     auto scene = scene_or_shipped(o.scene, "docking/docking.toml");
     if (!scene) return scene.error();
@@ -83,8 +84,10 @@ Outcome bench_loop(LoopBenchOptions o) {
     say(title);
     say(in_words(*runs));
     for (const std::string& fault : faults) say("failed: " + fault);
-    if (!o.plot.empty())
+    if (!o.plot.empty()) {
         if (auto written = plot_loop(o.plot, title, *runs); !written) return written.error();
+        say("wrote " + o.plot);
+    }
 
     nlohmann::json of_runs = nlohmann::json::array();
     for (const LoopRun& run : *runs) of_runs.push_back(to_json(run));
@@ -107,21 +110,24 @@ Command add_bench_loop(Parser bench_command) {
         "loop", "The real-time loop, alone and under load from other processes: jitter, latency, deadlines");
     c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that is installed with narpa)");
     c.option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
+        .type_name("SECONDS")
         .range(0.1, 86400.0)
         .shows_default();
-    const Option load =
-        c.option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)").comma_separated();
+    const Option load = c.option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)")
+                            .type_name("LIST")
+                            .comma_separated();
     const Option busy = c.option("--busy", o->busy, "Number of processes that keep processors busy (default: 1)")
                             .range(1, kCpusMax)
                             .excludes(load);
     c.flag("--idle-only", o->idle_only, "Without the run under load").excludes(load).excludes(busy);
     o->budget.add_to(c);
-    c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one");
+    c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
+        .type_name("LIST");
     c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
     c.option("--late-max", o->late_max_percent, "Percentage of frames that may be late")
         .range(0.0, 100.0)
         .shows_default();
-    c.option("-o,--output", o->plot, "FILE.png: how many frames exceed which time");
+    c.option("-o,--output", o->plot, "How many frames exceed which time").type_name("FILE.png");
     c.footer(
         "Exit status 1 if a frame is incomplete, more frames are late than --late-max, none fell due, or the bench "
         "was interrupted.");

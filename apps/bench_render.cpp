@@ -78,6 +78,7 @@ void print_table(const Ladder& ladder, const Camera& c) {
 Outcome bench_render(RenderBenchOptions o) {
     if (o.ladder.ablation && o.ladder.scenes.empty()) o.ladder.scenes = {"all"};
     if (o.ladder.quick && o.ladder.scenes.empty()) return Error{"--quick needs --scenes or --ablation"};
+    if (auto made = make_folder_of(o.plot); !made) return made.error();
     if (!o.ladder.scenes.empty()) {
         o.ladder.threads = o.threads;
         o.ladder.plot = o.plot;
@@ -143,6 +144,7 @@ Outcome bench_render(RenderBenchOptions o) {
         nlohmann::json plot = document;
         plot.update({{"plot", "convergence"}, {"title", title}});
         if (auto written = write_plot(o.plot, plot); !written) return written.error();
+        say("wrote " + o.plot);
     }
     return document;
 }
@@ -155,7 +157,7 @@ Command add_bench_render(Parser bench_command) {
         "render", "Error of an image against samples and time, beside a reference of many samples");
     const std::array of_one_scene{
         c.option("SCENE", o->scene, "Scene file (TOML; default: the Cornell box that comes with narpa)"),
-        c.option("--camera", o->camera, "Name of the camera (default: the first)"),
+        c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME"),
         c.option("--spp", o->spp, "Samples per pixel to measure at").comma_separated().shows_default(),
         c.option("--reference-spp", o->reference_spp, "Samples per pixel of the reference, a multiple of 16")
             .range(32, 16 * 65535)
@@ -163,9 +165,10 @@ Command add_bench_render(Parser bench_command) {
                 return std::stoll(text) % kReferenceImages == 0 ? "" : "expected a multiple of 16";
             })
             .shows_default(),
-        c.option("--size", o->size,
-                 fmt::format("WxH: the camera's view with so many pixels (default: the longer side has {})",
-                             kDefaultSize)),
+        c.option(
+             "--size", o->size,
+             fmt::format("The camera's view with so many pixels (default: the longer side has {})", kDefaultSize))
+            .type_name("WxH"),
         c.option("--seeds", o->seeds, "Independent images at each number of samples")
             .range(2, 65535)
             .shows_default()};
@@ -175,7 +178,8 @@ Command add_bench_render(Parser bench_command) {
                  "Measure time and error at a ladder of budgets, on the standing scenes: all, craft, "
                  "craft-paths, docking, docking-contact, cornell, craft-and-ball")
             .comma_separated()
-            .one_of(standing_scenes());
+            .one_of(standing_scenes())
+            .type_name("LIST");
     const Option ablation =
         c.flag("--ablation", o->ladder.ablation,
                "Measure each adaptive mechanism switched off in turn, with time and error beside the "
@@ -189,7 +193,8 @@ Command add_bench_render(Parser bench_command) {
     c.flag("--gates", o->ladder.gates, "With --scenes: exit status 1 where a ratio is not what it should be")
         .needs(scenes);
     c.option("-o,--output", o->plot,
-             "FILE.png: error over samples and over time; with --scenes error over time, and where time goes");
+             "Error over samples and over time; with --scenes error over time, and where time goes")
+        .type_name("FILE.png");
     c.footer(
         "Without --scenes, exit status 1 where a bias is beyond three standard errors, or an error falls more "
         "slowly than spp^-0.47.");

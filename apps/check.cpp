@@ -191,49 +191,80 @@ Status save_dbc(const Scene& scene, const std::string& path) {
     return Ok{};
 }
 
-/// How much of a camera's frame shows the body that carries it.
+/// How many of a sensor's rays meet the body that carries it first.
 struct OwnHull {
-    double share = 0, nearest_m = 0;
+    double share = 0, nearest_m = kInfinity;
 };
-OwnHull own_hull(const World& world, const Camera& c) {
-    constexpr int kAcross = 64, kDown = 48;
+/// `rays` in the sensor's frame.
+OwnHull own_hull(const World& world, int mount, const Rigid3& T_mount_sensor, const std::vector<Ray>& rays) {
     BodyPoses at(world.scene().bodies.size());
-    world.place(0, c.mount, at);
-    const Rigid3 T_world_camera = world.sensor_pose(c.mount, c.T_mount_camera, at);
-    const CameraModelHandle model(c);
-    OwnHull own{0, kInfinity};
+    world.place(0, mount, at);
+    const Rigid3 T_world_sensor = world.sensor_pose(mount, T_mount_sensor, at);
+    OwnHull own;
     int hits = 0;
-    for (int j = 0; j < kDown; ++j)
-        for (int i = 0; i < kAcross; ++i) {
-            const ImagePoint p{(i + 0.5) / kAcross * c.width - 0.5, (j + 0.5) / kDown * c.height - 0.5};
-            const Hit hit = world.tracer().intersect(
-                at, {T_world_camera.t, T_world_camera.q * normalized(model->direction(p))}, kInfinity);
-            if (hit.body < 0 || hit.body != c.mount) continue;
-            ++hits;
-            own.nearest_m = std::min(own.nearest_m, hit.range_m);
-        }
-    own.share = static_cast<double>(hits) / (kAcross * kDown);
+    for (const Ray& ray : rays) {
+        const Hit hit = world.tracer().intersect(
+            at, {T_world_sensor * ray.origin, T_world_sensor.q * ray.direction}, kInfinity);
+        if (hit.body < 0 || hit.body != mount) continue;
+        ++hits;
+        own.nearest_m = std::min(own.nearest_m, hit.range_m);
+    }
+    own.share = static_cast<double>(hits) / static_cast<double>(rays.size());
     return own;
 }
 
-/// A camera inside its hull is a usual mistake of a new scene; a bracket or a nozzle in the view is none.
-void check_own_hulls(const World& world, nlohmann::json& cameras) {
-    constexpr double kMuch = 0.25;
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-        const Camera& c = world.scene().cameras[i];
-        if (c.mount < 0) continue;
-        const OwnHull own = own_hull(world, c);
-        cameras[i]["own_hull_share"] = own.share;
-        if (own.share == 0) continue;
-        cameras[i]["own_hull_nearest_m"] = own.nearest_m;
-        const std::string what = fmt::format(
-            "camera {}: {:.0f} % of its frame show body {}, which carries it, from {:.3g} m on", c.name,
-            100 * own.share, world.scene().bodies[static_cast<std::size_t>(c.mount)].name, own.nearest_m);
-        say(own.share < kMuch ? "  " + what
-                              : "warning: " + what +
-                                    "; is the camera inside its hull? Move its position_m out of the "
-                                    "mesh, or check its axes (x right, y down, z forward)");
+/// All over its frame.
+std::vector<Ray> rays_of(const Camera& c) {
+    constexpr int kAcross = 64, kDown = 48;
+    const CameraModelHandle model(c);
+    std::vector<Ray> rays;
+    for (int j = 0; j < kDown; ++j)
+        for (int i = 0; i < kAcross; ++i)
+            rays.push_back({{},
+                            normalized(model->direction(
+                                {(i + 0.5) / kAcross * c.width - 0.5, (j + 0.5) / kDown * c.height - 0.5}))});
+    return rays;
+}
+
+/// The shots of a turn.
+std::vector<Ray> rays_of(const Lidar& l) {
+    std::vector<LidarShot> shots(l.model->spec().shots_per_packet);
+    std::vector<Ray> rays;
+    for (std::int64_t p = 0; static_cast<double>(l.model->packet_start_ns(p, l.rate_hz)) < 1e9 / l.rate_hz; ++p) {
+        l.model->shots(p, l.rate_hz, shots);
+        for (const LidarShot& s : shots) rays.push_back({s.origin_m, s.direction});
     }
+    return rays;
+}
+
+/// A sensor inside its hull is a usual mistake of a new scene; a bracket or a nozzle in the view is none. From
+/// outside a convex hull a camera may see little of it, a LiDAR that turns may meet it with half of its shots.
+void check_own_hull(const World& world, const std::string& sensor, const char* rays_do, double much, int mount,
+                    const Rigid3& T_mount_sensor, const std::vector<Ray>& rays, nlohmann::json& document) {
+    if (mount < 0) return;
+    const OwnHull own = own_hull(world, mount, T_mount_sensor, rays);
+    document["own_hull_share"] = own.share;
+    std::string what = fmt::format("{}: {:.{}f} % of its {} body {}, which carries it", sensor, 100 * own.share,
+                                   own.share > 0 && own.share < 0.01 ? 2 : 0, rays_do,
+                                   world.scene().bodies[static_cast<std::size_t>(mount)].name);
+    if (own.share > 0) {
+        document["own_hull_nearest_m"] = own.nearest_m;
+        what += fmt::format(", from {:.3g} m on", own.nearest_m);
+    }
+    say(own.share < much ? "  " + what
+                         : "warning: " + what +
+                               "; is it inside its hull? Move its position_m out of the mesh, or check its axes "
+                               "(camera: x right, y down, z forward; LiDAR: x right, y forward, z up)");
+}
+
+void check_own_hulls(const World& world, nlohmann::json& document) {
+    const Scene& s = world.scene();
+    for (std::size_t i = 0; i < s.cameras.size(); ++i)
+        check_own_hull(world, "camera " + s.cameras[i].name, "pixels show", 0.25, s.cameras[i].mount,
+                       s.cameras[i].T_mount_camera, rays_of(s.cameras[i]), document["cameras"][i]);
+    for (std::size_t i = 0; i < s.lidars.size(); ++i)
+        check_own_hull(world, "lidar " + s.lidars[i].name, "shots meet", 0.5, s.lidars[i].mount,
+                       s.lidars[i].T_mount_lidar, rays_of(s.lidars[i]), document["lidars"][i]);
 }
 
 /// Whether it is written like a CAN bus: with a prefix, or the name of an interface.
@@ -244,11 +275,16 @@ bool is_bus(const std::string& spec) {
     return spec.find('/') == std::string::npos && std::filesystem::exists("/sys/class/net/" + spec, none);
 }
 
+/// The error names the device, or leaves that to the finding.
+Finding absent(const std::string& spec, const Error& e) {
+    return {spec, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
+}
+
 /// Opens the device as a run would.
 Result<Finding> try_device(const std::string& spec) {
     if (spec.starts_with("/dev/video")) {
         auto sink = open_video_sink(spec, {640, 480, PixelFormat::grey, 100'000'000}, WhenFull::drop);
-        if (!sink) return Finding{spec, false, sink.error().what, sink.error().remedy};
+        if (!sink) return absent(spec, sink.error());
         return Finding{spec, true, (*sink)->description(), ""};
     }
     if (!is_bus(spec))
@@ -259,7 +295,7 @@ Result<Finding> try_device(const std::string& spec) {
     auto bus = open_can_bus(spec, CanRole::hub);
     if (bus) return Finding{spec, true, (*bus)->description(), ""};
     if (bus.error().kind == ErrorKind::bad_input) return bus.error();
-    return Finding{spec, false, bus.error().what, bus.error().remedy};
+    return absent(spec, bus.error());
 }
 
 /// The scenario in words; returns its part of the document.
@@ -298,11 +334,16 @@ Outcome check(const CheckOptions& o) {
     if (!world) return world.error();
     print_scene(**world);
     nlohmann::json scene_document = describe(**world);
-    check_own_hulls(**world, scene_document["cameras"]);
-    if (!o.calibration.empty())
+    check_own_hulls(**world, scene_document);
+    if (!o.calibration.empty()) {
         if (auto written = write_calibration((*world)->scene(), o.calibration); !written) return written.error();
-    if (!o.dbc.empty())
+        say("wrote " + o.calibration + "/calibration.json and CAMERA.yaml of each camera");
+    }
+    if (!o.dbc.empty()) {
+        if (auto made = make_folder_of(o.dbc); !made) return made.error();
         if (auto written = save_dbc((*world)->scene(), o.dbc); !written) return written.error();
+        say("wrote " + o.dbc);
+    }
 
     std::vector<Finding> findings{
         socketcan(), video_devices(),
@@ -327,8 +368,7 @@ Outcome check(const CheckOptions& o) {
         if (findings[i].there) continue;
         const Error missing{findings[i].detail, findings[i].name, 0, 0, ErrorKind::missing, findings[i].remedy};
         say("narpa: " + missing.text());
-        document.update(to_json(missing));
-        break;
+        if (!document.contains("error")) document.update(to_json(missing));  // the first; `machine` has all
     }
     return document;
 }
@@ -341,14 +381,14 @@ Command add_check(Parser app) {
     c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows").required();
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, /dev/video10 ...");
-    c.option(
-        "--calibration", o->calibration,
-        "DIR: takes CAMERA.yaml (camera_info of ROS) and calibration.json: matrix, distortion and mount of each "
-        "sensor");
-    c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file");
+    c.option("--calibration", o->calibration,
+             "Takes CAMERA.yaml (camera_info of ROS) and calibration.json: matrix, distortion and mount of each "
+             "sensor")
+        .type_name("DIR");
+    c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file").type_name("FILE");
     c.group("Start here");
     c.examples({"narpa check docking", "narpa check my-scene.toml vcan0 /dev/video10",
-                "narpa check docking --dbc docking.dbc"});
+                "narpa check docking --dbc out/docking.dbc"});
     return [o] { return check(*o); };
 }
 

@@ -41,6 +41,8 @@ nlohmann::json to_json(const Error& e);
 /// Reads a scene from a file, or the shipped one of this name, with another method than its own if one is given,
 /// and prints its warnings.
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
+/// Makes the folder of a file that is to be written; nothing where `file` is empty.
+Status make_folder_of(const std::string& file);
 /// "NAME=VALUE" -> {NAME, VALUE}; an Error that names what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);
 

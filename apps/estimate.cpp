@@ -95,6 +95,8 @@ Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_opt
             fmt::format("{}: {} seen by {}, by {}", scene.name, target, (*run)->camera().name, method);
         if (auto written = plot_estimates(o.picture, title, *tracked); !written) return written.error();
     }
+    for (const std::string& file : {o.csv, o.picture})
+        if (!file.empty()) say("wrote " + file);
     return nlohmann::json{{"passed", summary.measured > 0},
                           {"log", o.input},
                           {"camera", (*run)->camera().name},
@@ -260,8 +262,9 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     nlohmann::json document = show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name),
                                    e.T_lidar_target, e.covariance, e.bound, truth);
     const int unobserved = e.observability.unobserved;
-    say(fmt::format("  {} points, {} used, {} as the model has them; {} motions that cannot be seen; {} iterations",
-                    e.points, e.used, e.explained, unobserved, e.iterations));
+    say(fmt::format(
+        "  {} returns, {} used, {} as the model has them; {} motions that cannot be seen; {} iterations", e.points,
+        e.used, e.explained, unobserved, e.iterations));
     if (!e.credible) say("  not credible: the pose does not explain its points, or did not settle");
     document["passed"] = document["credible"] = e.credible;
     document["points"] = e.points;
@@ -272,16 +275,19 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     return document;
 }
 
-Outcome estimate(const EstimateOptions& o) {
+Outcome estimate(EstimateOptions o) {
     auto tracker = o.tracker.options();
     if (!tracker) return tracker.error();
     std::error_code error;
+    if (std::filesystem::exists(o.input + "/rehearsal.json", error)) o.input += "/emulator";
     const bool of_log = std::filesystem::is_directory(o.input, error);
     for (const Option& option : of_log ? o.only_of_files : o.only_of_logs)
         if (option.given())
             return Error{fmt::format("{} goes with {}", option.name(),
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
+    for (const std::string& file : {o.csv, o.picture})
+        if (auto made = make_folder_of(file); !made) return made.error();
     if (of_log) return estimate_log(o, *tracker);
     if (o.frame.empty() == o.sweep.empty())
         return Error{"with a scene, expected one of --frame FILE.raw and --sweep FILE.pcap", o.input};
@@ -295,30 +301,38 @@ Command add_estimate(Parser app) {
     const Parser c = app.subcommand("estimate",
                                     "Estimate the target's pose from a logged run, a frame or a sweep, and compare "
                                     "with the truth and the bound");
-    c.option("INPUT", o->input, "Folder that `run --log` has written, or a scene file with --frame or --sweep")
+    c.option("INPUT", o->input,
+             "Folder that `run --log` or `rehearse` has written, or a scene with --frame or --sweep")
         .required();
-    c.option("--camera,--lidar", o->sensor, "Name of the camera or LiDAR (default: the first of the scene)");
-    c.option("--frame", o->frame, "FILE.raw: a frame's bytes as the device takes them, as `render` writes them");
-    c.option("--sweep", o->sweep, "FILE.pcap: the LiDAR's data packets, from the first on for one turn");
-    c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot, s")
+    c.option("--camera,--lidar", o->sensor, "Name of the camera or LiDAR (default: the first of the scene)")
+        .type_name("NAME");
+    c.option("--frame", o->frame, "A frame's bytes as the device takes them, as `render` writes them")
+        .type_name("FILE.raw");
+    c.option("--sweep", o->sweep, "The LiDAR's data packets, from the first on for one turn")
+        .type_name("FILE.pcap");
+    c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot")
+        .type_name("SECONDS")
         .range(-9e9, 9e9)
         .finite();
-    c.option("--range-noise", o->range_noise_m, "Standard deviation of the sweep's ranges, m")
+    c.option("--range-noise", o->range_noise_m, "Standard deviation of the sweep's ranges")
+        .type_name("METRES")
         .range(1e-6, 1e3)
         .shows_default();
     o->pose.add_to(c);
-    c.option("--scene", o->scene, "Scene file (default: the run's)");
+    c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
     o->tracker.add_to(c, "");
     c.option("--every", o->every, "Use every N-th frame").range(1, 1000000);
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
-    c.option("--csv", o->csv, "FILE.csv: a row for each frame");
-    c.option("-o,--output", o->picture, "FILE.png: errors over time, with three standard deviations and bound");
+    c.option("--csv", o->csv, "A row for each frame").type_name("FILE.csv");
+    c.option("-o,--output", o->picture, "Errors over time, with three standard deviations and bound")
+        .type_name("FILE.png");
     for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
     c.footer("Exit status 1 if no frame gave a pose, or a sweep's pose is not credible.");
     c.group("Results");
-    c.examples({"narpa estimate out/docking/emulator -o errors.png", "narpa estimate docking --frame frame.raw"});
+    c.examples(
+        {"narpa estimate out/first-flight -o out/errors.png", "narpa estimate docking --frame out/frame.raw"});
     return [o] { return estimate(*o); };
 }
 

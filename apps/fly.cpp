@@ -69,7 +69,7 @@ public:
 
     Status play(const std::vector<TrajectoryRow>& rows) {
         Progress progress("playing " + options_.trajectory);
-        progress.show("waiting for the emulator's clock");
+        progress.show(fmt::format("waiting at most {:g} s for the emulator's clock", options_.wait_s));
         synchronise();
         std::size_t k = 0;
         for (const TrajectoryRow& row : rows) {
@@ -170,7 +170,12 @@ Outcome fly(const FlyOptions& o) {
     std::stable_sort(rows->begin(), rows->end(), [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
 
     stop_on_signals();
-    auto bus = join_can_bus(o.bus, o.wait_s, stop_flag());
+    auto bus = [&] {
+        Progress progress("joining " + o.bus);
+        progress.show(
+            fmt::format("nobody is there yet; waiting at most {:g} s for `narpa run` (--wait)", o.wait_s));
+        return join_can_bus(o.bus, o.wait_s, stop_flag());
+    }();
     if (!bus) return bus.error();
     say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), bodies->size(),
                     (*bus)->description()));
@@ -195,15 +200,19 @@ Command add_fly(Parser app) {
     auto o = std::make_shared<FlyOptions>();
     const Parser c = app.subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
     c.option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)").required();
-    c.option("--can", o->bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").required();
-    c.option("--id", o->ids, "BODY=ID: base identifier of a body's commands, the scene's can_id (default: 0x100)")
+    c.option("--can", o->bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").type_name("BUS").required();
+    c.option("--id", o->ids, "Base identifier of a body's commands, the scene's can_id (default: 0x100)")
+        .type_name("BODY=ID")
         .repeatable();
     c.option("--start", o->start_s,
-             "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)");
+             "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)")
+        .type_name("SECONDS");
     c.option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")
+        .type_name("SECONDS")
         .range(0.0, 1.0)
         .shows_default();
     c.option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
+        .type_name("SECONDS")
         .range(0.0, 3600.0)
         .shows_default();
     c.flag("--lockstep", o->lockstep,

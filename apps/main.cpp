@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 
 #include "apps/cli.h"
 #include "apps/shipped.h"
@@ -26,6 +27,14 @@ Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::
         if (const Status good = use_method(*scene, *method); !good) return good.error();
     for (const std::string& w : scene->warnings) say("warning: " + w);
     return scene;
+}
+
+Status make_folder_of(const std::string& file) {
+    const auto folder = std::filesystem::path(file).parent_path();
+    std::error_code failed;
+    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
+    if (failed) return Error{"its folder cannot be made: " + failed.message(), file};
+    return Ok{};
 }
 
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected) {
@@ -71,15 +80,13 @@ Command add_bench(Parser app) {
     bench.group("Measure");
     auto chosen = std::make_shared<Command>();
     bench.choice<Command>({add_bench_render, add_bench_loop, add_bench_estimate}, *chosen);
-    bench.examples({"narpa bench loop docking", "narpa bench render --spp 4,16,64 -o error.png"});
+    bench.examples({"narpa bench loop docking", "narpa bench render --spp 4,16,64 -o out/error.png"});
     return [chosen] { return (*chosen)(); };
 }
 
 constexpr const char* kDescription =
     "narpa emulates a spacecraft's camera and LiDAR: poses in on CAN, camera frames out on V4L2, LiDAR packets "
     "out on UDP.";
-constexpr const char* kFooter =
-    "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.";
 
 /// The widest of the instruction sets of base/each_isa.h that this processor has.
 const char* isa_in_use() {
@@ -106,11 +113,12 @@ int run(int argc, char** argv) {
                              add_estimate, add_replay, add_bench},
                             chosen);
         app.examples({"narpa rehearse docking                        a docking in a closed loop, with a report",
-                      "narpa render docking -o view.png              what the camera sees",
-                      "narpa run docking --can vcan0 --video nav=/dev/video10 --log out"});
+                      "narpa render docking -o out/view.png          what the camera sees",
+                      "narpa run docking --can vcan0 --video nav=/dev/video10 --log out/run"});
     };
-    return parse_and_run(argc, argv, {kDescription, version(), kFooter}, json, add_subcommands,
-                         [&] { return finish(chosen(), json); });
+    return parse_and_run(
+        argc, argv, {"narpa", kDescription, version()}, add_subcommands, [&] { return finish(chosen(), json); },
+        &json);
 }
 
 }  // namespace

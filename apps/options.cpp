@@ -2,18 +2,34 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
 #include <span>
 #include <sstream>
+#include <type_traits>
 
 #include "base/nearest_name.h"
 #include "base/result.h"
 
 namespace narpa::cli {
+namespace {
+
+/// Of a value whose option has no type_name: a whole number, another number, text.
+template <class T>
+const char* placeholder(const T&) {
+    return std::is_integral_v<T> ? "N" : std::is_floating_point_v<T> ? "X" : "TEXT";
+}
+template <class T>
+const char* placeholder(const std::optional<T>&) {
+    return placeholder(T{});
+}
+template <class T>
+const char* placeholder(const std::vector<T>&) {
+    return placeholder(T{});
+}
+
+}  // namespace
 
 Option Option::required() const {
     return Option(option_->required());
@@ -33,7 +49,9 @@ Option Option::finite() const {
     });
 }
 Option Option::one_of(const std::vector<std::string>& values) const {
-    return Option(option_->check(CLI::IsMember(values)));
+    std::string names;
+    for (const std::string& value : values) names += (names.empty() ? "" : "|") + value;
+    return Option(option_->check(CLI::IsMember(values))->type_name(names));
 }
 Option Option::check(const std::function<std::string(const std::string&)>& complaint) const {
     return Option(option_->check(complaint));
@@ -74,7 +92,7 @@ Parser Parser::subcommand(const std::string& name, const std::string& help) cons
 }
 template <class T>
 Option Parser::option(const std::string& names, T& value, const std::string& help) const {
-    return Option(app_->add_option(names, value, help));
+    return Option(app_->add_option(names, value, help)->type_name(placeholder(value)));
 }
 Option Parser::flag(const std::string& names, bool& value, const std::string& help) const {
     return Option(app_->add_flag(names, value, help));
@@ -154,7 +172,7 @@ std::string row(const std::string& left, const std::string& text) {
     return out + '\n';
 }
 
-/// An option's placeholder and its text. A text "BUS: vcan0 | ..." begins with its placeholder.
+/// An option's placeholder and its text.
 struct Described {
     std::string placeholder, text;
 };
@@ -162,30 +180,9 @@ Described describe(const CLI::Option& o) {
     Described d{{}, o.get_description()};
     if (!o.get_default_str().empty()) d.text += " (default: " + o.get_default_str() + ")";
     for (const CLI::Option* needed : o.get_needs()) d.text += " (with " + needed->get_name() + ")";
-    if (o.get_items_expected_max() == 0) return d;
-    const std::string types = o.get_type_name(), type = types.substr(0, types.find(':'));
-    const std::size_t colon = d.text.find(": ");
-    if (colon != std::string::npos && d.text.find(' ') > colon && std::isupper(d.text[0]) != 0) {
-        d.placeholder = d.text.substr(0, colon);
-        d.text.erase(0, colon + 2);
-    } else if (const std::size_t set = types.find('{'); set != std::string::npos && types.size() < 40) {
-        d.placeholder = types.substr(set + 1, types.find('}') - set - 1);
-        std::replace(d.placeholder.begin(), d.placeholder.end(), ',', '|');
-    } else {
-        constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kByText{{{"Trajectory", "FILE"},
-                                                                                        {"FILE.", "FILE"},
-                                                                                        {"Name", "NAME"},
-                                                                                        {"Seconds", "SECONDS"},
-                                                                                        {"Folder", "DIR"},
-                                                                                        {"Command", "COMMAND"},
-                                                                                        {"Scene file", "SCENE"}}};
-        const auto known = std::find_if(kByText.begin(), kByText.end(),
-                                        [&](const auto& k) { return d.text.starts_with(k.first); });
-        d.placeholder = known != kByText.end()            ? known->second
-                        : type == "INT" || type == "UINT" ? "N"
-                        : type == "FLOAT"                 ? "X"
-                                                          : type;
-    }
+    // The parser appends its checks to the name of the type: "N:INT in [1 - 256]".
+    const std::string type = o.get_type_name();
+    if (o.get_items_expected_max() > 0) d.placeholder = type.substr(0, type.find(':'));
     return d;
 }
 
@@ -293,15 +290,15 @@ std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<
 
 }  // namespace
 
-int parse_and_run(int argc, char** argv, const ProgramTexts& texts, bool& json,
-                  const std::function<void(Parser)>& add_subcommands, const std::function<int()>& run) {
-    CLI::App app{texts.description, "narpa"};
+int parse_and_run(int argc, char** argv, const ProgramTexts& texts, const std::function<void(Parser)>& add_options,
+                  const std::function<int()>& run, bool* json) {
+    CLI::App app{texts.description, texts.name};
     app.set_version_flag("--version", texts.version);
     app.fallthrough();
     app.footer(texts.footer);
     app.formatter(std::make_shared<HelpFormatter>());
-    add_subcommands(Parser(app));
-    add_json_flag(app, json);
+    add_options(Parser(app));
+    if (json) add_json_flag(app, *json);
     const std::span<char* const> words(argv + 1, static_cast<std::size_t>(std::max(argc - 1, 0)));
     if (const std::string unknown = unknown_command(app, words); !unknown.empty()) {
         std::cerr << unknown << "\n";

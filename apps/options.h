@@ -1,5 +1,5 @@
-/// apps/options.h - options of a subcommand. CLI11 reads them, and is included by options.cpp alone: it costs 7 s
-/// of compiling for each file.
+/// apps/options.h - options of a program or subcommand. CLI11 reads them, and is included by options.cpp alone: it
+/// costs 7 s of compiling for each file.
 #pragma once
 
 #include <cstdint>
@@ -41,6 +41,7 @@ public:
     Option comma_separated() const;
     /// So many values.
     Option values(int least, int most) const;
+    /// What --help shows for its value; else N, X or TEXT, by its type.
     Option type_name(const std::string& name) const;
     /// Its heading in --help.
     Option group(const std::string& name) const;
@@ -89,11 +90,13 @@ private:
 };
 
 struct ProgramTexts {
-    std::string description, version, footer;
+    std::string name, description, version;
+    std::string footer =
+        "Exit status: 0 good; 1 ran, but something failed; 2 bad input; 3 a device or permission is missing.";
 };
 /// Parses a command line, then calls `run` while the options still exist. Prints help, version and errors itself.
-/// Returns the exit status. `json`: whether --json was given, anywhere on the line.
-int parse_and_run(int argc, char** argv, const ProgramTexts& texts, bool& json,
-                  const std::function<void(Parser)>& add_subcommands, const std::function<int()>& run);
+/// Returns the exit status. `json`: whether --json was given, anywhere on the line; null: there is no such option.
+int parse_and_run(int argc, char** argv, const ProgramTexts& texts, const std::function<void(Parser)>& add_options,
+                  const std::function<int()>& run, bool* json = nullptr);
 
 }  // namespace narpa::cli

@@ -40,7 +40,7 @@ std::string progress_line(const std::string& what, const Step& step, double seco
     line += fmt::format("{:.0f} %", 100 * share);
     // Of the first hundredth and the first second too little is known.
     if (share >= 0.01 && seconds >= 1)
-        line += fmt::format(", about {} left", duration(seconds * (1 - share) / share));
+        line += fmt::format(", about {} to go", duration(seconds * (1 - share) / share));
     return line;
 }
 

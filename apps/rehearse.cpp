@@ -46,7 +46,7 @@ Outcome one(const rehearsal::RehearsalOptions& options) {
         say(fmt::format("  {:<10} {:<12} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
                         g.reason));
     say(done->verdict.headline);
-    if (!done->page.empty()) say("page: " + done->page);
+    if (!done->page.empty()) say("wrote " + done->page);
     return done->result;
 }
 
@@ -67,7 +67,7 @@ Outcome many(const rehearsal::CampaignOptions& options) {
                         c["max"].get<double>(), c["unit"].get<std::string>(), c["asked_min"].get<double>(),
                         c["asked_max"].get<double>()));
     for (const auto& [gate, list] : s["failures"].items()) say(fmt::format("  {}: {} runs", gate, list.size()));
-    say("page: " + options.run.folder + "/index.html");
+    say("wrote " + options.run.folder + "/index.html");
     return summary;
 }
 
@@ -98,7 +98,10 @@ Command add_rehearse(Parser app) {
     const Parser c = app.subcommand(
         "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");
     c.option("SCENARIO", r.scenario, "Scenario file, or a name that `narpa list` shows (default: docking)");
-    c.option("-o,--output", r.folder, "DIR: takes page, verdict, logs (default: out/rehearsal/NAME)");
+    c.option("-o,--output", r.folder,
+             "Folder for page, verdict, logs (default: out/rehearsal/NAME, of the scenario's name): new, empty, or "
+             "an earlier run's, which is replaced once all programs have started")
+        .type_name("DIR");
     c.flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
     c.option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
     const Option runs = c.option("--runs", o->runs,
@@ -106,19 +109,25 @@ Command add_rehearse(Parser app) {
                                  "goes on where it was interrupted")
                             .range(1, 100000);
     c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
-    c.option("--can", r.bus, "BUS: slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2").shows_default();
-    c.option("--video", o->video, "CAMERA=DEVICE instead of a FIFO, like nav=/dev/video10; may be given many times")
+    c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
+        .type_name("BUS")
+        .shows_default();
+    c.option("--video", o->video, "A device instead of a FIFO, like nav=/dev/video10; may be given many times")
+        .type_name("CAMERA=DEVICE")
         .repeatable();
-    c.option(
-        "--dynamics", r.dynamics,
-        "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you start it, "
-        "last");
+    c.option("--dynamics", r.dynamics,
+             "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you "
+             "start it, "
+             "last")
+        .type_name("COMMAND");
     c.option("--navigation", r.navigation,
              "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
              "set; writes READY=1 to descriptor READY_FD or prints \"ready\" when it listens, or has 10 s; none: "
-             "you start it and press Enter");
+             "you start it and press Enter")
+        .type_name("COMMAND");
     c.option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)").range(0, 1024);
     c.option("--patience", r.patience_s, "Seconds without progress after which it is given up")
+        .type_name("SECONDS")
         .range(1.0, 86400.0)
         .shows_default();
     c.footer("Exit status: 0 all gates passed; 1 one failed; 2 bad input; 3 a device is missing.");

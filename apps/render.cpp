@@ -76,6 +76,10 @@ void keep_only(const std::set<std::string>& names, Aovs& a) {
     if (!names.contains("variance")) a.variance.clear();
 }
 
+bool is_black(const RadianceImage& image) {
+    return std::all_of(image.pixels.begin(), image.pixels.end(), [](const Rgb& p) { return p == Rgb{}; });
+}
+
 std::string_view name(Method m) {
     return m == Method::path ? "path" : "direct";
 }
@@ -100,6 +104,7 @@ Outcome render(const RenderOptions& o) {
     const auto frame =
         o.frame.value_or(static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period_ns / 2) / period_ns)));
 
+    if (auto made = make_folder_of(o.out); !made) return made.error();
     TracingThreads threads(o.threads);
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
@@ -133,9 +138,16 @@ Outcome render(const RenderOptions& o) {
     auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
     if (!written) return written.error();
     const RenderSettings& settings = (*world)->scene().render;
-    say(fmt::format("{}: {} x {}, {}, {:.6g} spp, {}, frame {} at {:.6f} s, {} triangles, {:.1f} ms", o.out,
-                    unit.camera().width, unit.camera().height, name(settings.method), ledger.samples_per_pixel,
-                    kStepNames[ledger.step], frame, static_cast<double>(t_ns) * 1e-9,
+    if (is_black(unit.radiance()))
+        say(
+            fmt::format("warning: every pixel is black: camera {} sees no lit surface from where it is; see its "
+                        "position_m, look_at or attitude_wxyz, its mount, --pose, --time and the light",
+                        unit.camera().name));
+    say(
+        fmt::format("wrote {}: {} x {}, {}, {:.6g} samples per pixel on average, {}, frame {} at {:.6f} s, {} "
+                    "triangles, {:.1f} ms",
+                    o.out, unit.camera().width, unit.camera().height, name(settings.method),
+                    ledger.samples_per_pixel, kStepNames[ledger.step], frame, static_cast<double>(t_ns) * 1e-9,
                     (*world)->tracer().triangle_count(), 1e3 * seconds));
     nlohmann::json document{{"file", o.out},
                             {"camera", unit.camera().name},
@@ -163,25 +175,27 @@ Command add_render(Parser app) {
     const Parser c = app.subcommand(
         "render", "Render one frame of a camera, byte for byte as `run` does (except with a time budget)");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
-    c.option("--camera", o->camera, "Name of the camera (default: the first)");
-    c.option("--time", o->time_s, "Simulation time in seconds (default: frame / rate)").range(-9e9, 9e9);
+    c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME");
+    c.option("--time", o->time_s, "Simulation time (default: frame / rate)").type_name("SECONDS").range(-9e9, 9e9);
     c.option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
     o->pose.add_to(c);
-    c.option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's");
+    c.option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's").type_name("FORMAT");
     o->budget.add_to(c);
     c.option("--method", o->method, "direct: light from its sources only; path: all light")
         .one_of({"direct", "path"});
     c.option("--max-depth", o->max_depth, "With path: surfaces that a path may hit").range(1, 40);
     c.option("--seed", o->seed, "Seed instead of the scene's");
     c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);
-    c.option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance");
+    c.option("--aov", o->aov, "With .exr: depth,range,normal,position,body,albedo,variance beside radiance")
+        .type_name("LIST");
     c.option("-o,--output", o->out,
              "FILE.png (digital numbers), .raw (the device's bytes), .exr or .pfm (linear radiance)")
+        .type_name("FILE")
         .required();
     c.group("Sensors");
-    c.examples({"narpa render docking -o view.png",
-                "narpa render cornell --spp 256 -o cornell.exr --aov depth,normal",
-                "narpa render docking --pose chaser=20,0,0,0,0,0,1 -o near.png"});
+    c.examples({"narpa render docking -o out/view.png",
+                "narpa render cornell --spp 256 -o out/cornell.exr --aov depth,normal",
+                "narpa render docking --pose chaser=20,0,0,0,0,0,1 -o out/near.png"});
     return [o] { return render(*o); };
 }
 

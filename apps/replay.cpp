@@ -100,6 +100,7 @@ Outcome replay(const ReplayOptions& o) {
     if (!o.picture.empty() && o.reference == 0)
         return Error{
             fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
+    if (auto made = make_folder_of(o.picture); !made) return made.error();
     auto run = Replay::open(o.folder, o.camera, o.scene);
     if (!run) return run.error();
     const std::string& camera = (*run)->camera().name;
@@ -139,6 +140,7 @@ Outcome replay(const ReplayOptions& o) {
         const auto written =
             plot_replay(o.picture, title, done.frames[done.worst], *done.worst_picture, *done.worst_reference);
         if (!written) return written.error();
+        say("wrote " + o.picture);
     }
     return document;
 }
@@ -178,8 +180,8 @@ Command add_replay(Parser app) {
     const Parser c = app.subcommand(
         "replay", "Render the frames of a logged run again, bit for bit, and report what their budget cost");
     c.option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written").required();
-    c.option("--camera", o->camera, "Name of the camera (default: the first of the scene)");
-    c.option("--scene", o->scene, "Scene file (default: the run's)");
+    c.option("--camera", o->camera, "Name of the camera (default: the first of the scene)").type_name("NAME");
+    c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
     c.option("--reference", o->reference,
              "Compare with this number of samples per pixel: error, similarity, shifts of bodies and edges")
         .range(2, 65535);
@@ -190,13 +192,15 @@ Command add_replay(Parser app) {
         c.option(fmt::format("--{}", name), *command,
                  fmt::format("Command in place of narpa-{}, where the rehearsal had one, as for `rehearse`. A "
                              "command in the log is never run",
-                             name));
-    c.option("-o,--output", o->picture, "FILE.png: the worst frame, its reference, their difference");
+                             name))
+            .type_name("COMMAND");
+    c.option("-o,--output", o->picture, "The worst frame, its reference, their difference").type_name("FILE.png");
     c.footer(
         "Exit status 1 if a frame does not repeat bit for bit, or none has an image. RMSE, bias and errors are of "
         "the mean of the bands, as fractions of the radiance at full scale.");
     c.group("Results");
-    c.examples({"narpa replay out/docking", "narpa replay out/docking --reference 64 --frames 10 -o cost.png"});
+    c.examples({"narpa replay out/first-flight",
+                "narpa replay out/first-flight --reference 64 --frames 10 -o out/cost.png"});
     return [o] { return replay_any(*o); };
 }
 

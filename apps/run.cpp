@@ -105,34 +105,41 @@ Command add_run(Parser app) {
     const Parser c =
         app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
-    c.option("--can", o->run.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE");
-    c.option("--video", o->video, "CAMERA=SINK: /dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
+    c.option("--can", o->run.bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").type_name("BUS");
+    c.option("--video", o->video, "/dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
+        .type_name("CAMERA=SINK")
         .repeatable();
-    c.option("--lidar", o->lidar, "LIDAR=SINK: udp:HOST:PORT | FILE.pcap | none; may be given many times")
+    c.option("--lidar", o->lidar, "udp:HOST:PORT | FILE.pcap | none; may be given many times")
+        .type_name("LIDAR=SINK")
         .repeatable();
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,
                                    "The clock advances only with commands; no wall time enters any result");
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
+        .type_name("SECONDS")
         .range(0.0, 9e9);
-    c.option("--log", o->run.log_folder, "Folder for run.json, truth, ledger, CAN log and contact sheet");
+    c.option("--log", o->run.log_folder,
+             "Folder for run.json, truth, ledger, CAN log and contact sheet; those of an earlier run are replaced")
+        .type_name("DIR");
     const Option estimate =
         c.option(
              "--estimate", o->run.estimate_camera,
              "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
-            .values(0, 1);
+            .values(0, 1)
+            .type_name("CAMERA");
     o->estimator.add_to(c, "estimate-");
     for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-seed"})
         c.find(name).needs(estimate);
     o->budget.add_to(c);
     c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
+        .type_name("LIST")
         .excludes(lockstep);
     c.option("--threads", o->run.threads, "Threads that trace rays (default: all cores)").range(0, 1024);
     c.option("--ready-fd", o->ready_fd,
              "Descriptor that gets the lines CAN=BUS and READY=1 once the emulator can be reached");
     c.group("Sensors");
     c.examples(
-        {"narpa run docking --can vcan0 --video nav=/dev/video10 --lidar top=udp:192.168.1.70:2368 --log out",
-         "narpa run docking --can slcan:29537 --video nav=frames.y4m --lockstep",
+        {"narpa run docking --can vcan0 --video nav=/dev/video10 --lidar top=udp:192.168.1.70:2368 --log out/run",
+         "narpa run docking --can slcan:29537 --video nav=out/frames.y4m --lockstep",
          "narpa run docking --video nav=none --duration 10"});
     return [o, estimate] {
         o->estimates = estimate.given();

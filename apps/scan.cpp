@@ -111,6 +111,7 @@ Outcome scan(const ScanOptions& o) {
     const double duration_s = o.duration_s > 0 ? o.duration_s : 1 / (*world)->scene().lidars[*index].rate_hz;
     const std::int64_t from_ns = std::llround(o.time_s * 1e9), to_ns = from_ns + std::llround(duration_s * 1e9);
     if (auto loaded = o.pose.load(**world, from_ns, to_ns); !loaded) return loaded.error();
+    if (auto made = make_folder_of(o.out); !made) return made.error();
     LidarUnit unit(**world, *index);
 
     std::size_t packets = 0, shots = 0, returns = 0;
@@ -131,7 +132,7 @@ Outcome scan(const ScanOptions& o) {
     const Status written = extension == ".pcap" ? write_capture(o.out, unit, epoch_unix_ns, fire_all)
                                                 : write_text(o.out, extension, fire_all);
     if (!written) return written.error();
-    say(fmt::format("{}: {} packets, {} shots, {} returns", o.out, packets, shots, returns));
+    say(fmt::format("wrote {}: {} packets, {} shots, {} returns", o.out, packets, shots, returns));
     return nlohmann::json{{"file", o.out},
                           {"lidar", unit.lidar().name},
                           {"packets", packets},
@@ -143,17 +144,25 @@ Outcome scan(const ScanOptions& o) {
 
 Command add_scan(Parser app) {
     auto o = std::make_shared<ScanOptions>();
-    const Parser c = app.subcommand("scan", "Scan with a LiDAR from a time on: points, shots or packets");
+    const Parser c = app.subcommand(
+        "scan", "Scan with a LiDAR from a time on: returns (echoes that came back), all shots, or packets");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
-    c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)");
-    c.option("--time", o->time_s, "Simulation time in seconds of the first packet").range(0.0, 9e9).shows_default();
-    c.option("--duration", o->duration_s, "Seconds (default: one turn)").range(0.0, 3600.0);
+    c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)").type_name("NAME");
+    c.option("--time", o->time_s, "Simulation time of the first packet")
+        .type_name("SECONDS")
+        .range(0.0, 9e9)
+        .shows_default();
+    c.option("--duration", o->duration_s, "How long (default: one turn)").type_name("SECONDS").range(0.0, 3600.0);
     o->pose.add_to(c);
     c.option("-o,--output", o->out,
-             "FILE.ply or .pcd (points), .csv (one row a shot, ranges unquantised), .pcap (packets)")
+             "FILE.ply or .pcd (the returns as points), .csv (a row for each shot, ranges unquantised), .pcap "
+             "(packets)")
+        .type_name("FILE")
         .required();
     c.group("Sensors");
-    c.examples({"narpa scan docking -o sweep.pcap", "narpa scan docking --time 30 -o cloud.ply"});
+    c.examples(
+        {"narpa scan docking -o out/sweep.pcap",
+         "narpa scan docking --trajectory build/release/scenes/docking/approach.csv --time 30 -o out/cloud.ply"});
     return [o] { return scan(*o); };
 }
 

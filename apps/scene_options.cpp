@@ -63,9 +63,10 @@ void BudgetOptions::override_scene(RenderSettings& render) const {
 }
 
 void PoseOptions::add_to(Parser app) {
-    app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) with the bodies' poses");
-    app.option("--pose", poses, "BODY=x,y,z,qw,qx,qy,qz: a body's pose (metres; body to world), at any time")
-        .type_name("POSE")
+    app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) with the bodies' poses")
+        .type_name("FILE");
+    app.option("--pose", poses, "A body's pose (metres; body to world), at any time")
+        .type_name("BODY=x,y,z,qw,qx,qy,qz")
         .values(1, 1)
         .repeatable();
 }
@@ -94,13 +95,14 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
 void TrackerFlags::add_to(Parser app, const std::string& prefix) {
     const std::string dashes = "--" + prefix;
     app.option(dashes + "target", tracker.target,
-               "Body whose pose is estimated (default: the first with a mesh that does not carry the camera)");
+               "Body whose pose is estimated (default: the first with a mesh that does not carry the camera)")
+        .type_name("BODY");
     app.option(dashes + "method", method,
                "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
         .one_of({"features", "dense"})
         .shows_default();
-    app.option(dashes + "start", start,
-               "DEG,PERCENT: error of the first guess, in attitude and as a part of the range")
+    app.option(dashes + "start", start, "Error of the first guess, in attitude and as a part of the range")
+        .type_name("DEG,PERCENT")
         .shows_default();
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
 }

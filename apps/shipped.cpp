@@ -67,24 +67,38 @@ std::optional<FileKind> kind_of(const std::string& file) {
     constexpr int kLines = 10000;
     std::ifstream in(file);
     std::string line;
+    std::optional<FileKind> kind;
     for (int i = 0; i < kLines && std::getline(in, line); ++i) {
         if (line.starts_with("[scenario]")) return FileKind::scenario;
-        if (line.starts_with("[scene]")) return FileKind::scene;
+        for (const char* table : {"[scene]", "[[body]]", "[[camera]]", "[[lidar]]"})
+            if (line.starts_with(table)) kind = FileKind::scene;
     }
-    return std::nullopt;
+    return kind;
 }
+
+namespace {
+
+/// `given`, file or name, is of the other kind than `expected`.
+Error other_kind(FileKind expected, const std::string& given) {
+    return {
+        fmt::format(fmt::runtime(expected == FileKind::scene
+                                     ? "is a scenario, expected a scene: `narpa rehearse {0}` flies it, and "
+                                       "`narpa check {0}` names its scene"
+                                     : "is a scene, expected a scenario, which names a scene and how it is flown "
+                                       "(docs/rehearsal.md; `narpa list` has some): `narpa render {0}` and "
+                                       "`narpa run {0}` take scenes"),
+                    given),
+        given};
+}
+
+}  // namespace
 
 Result<std::string> find_file(FileKind kind, const std::string& file_or_name) {
     const std::string expected = kKindWords[static_cast<std::size_t>(kind)];
     std::error_code error;
     if (fs::exists(file_or_name, error) && !fs::is_directory(file_or_name, error)) {
         const auto found = fs::is_regular_file(file_or_name, error) ? kind_of(file_or_name) : std::nullopt;
-        if (found && *found != kind)
-            return Error{kind == FileKind::scene
-                             ? "is a scenario, expected a scene: `narpa rehearse` and `narpa check` take scenarios"
-                             : "is a scene, expected a scenario, which names a scene and how it is flown "
-                               "(docs/rehearsal.md)",
-                         file_or_name};
+        if (found && *found != kind) return other_kind(kind, file_or_name);
         return file_or_name;
     }
     const std::vector<ShippedFile> shipped = shipped_files(kind);
@@ -95,6 +109,8 @@ Result<std::string> find_file(FileKind kind, const std::string& file_or_name) {
         names.push_back(s.name);
     }
     if (with_this_stem.size() == 1) return with_this_stem.front();
+    for (const ShippedFile& s : shipped_files(kind == FileKind::scene ? FileKind::scenario : FileKind::scene))
+        if (s.name == file_or_name) return other_kind(kind, file_or_name);
     return Error{fmt::format("no such file, expected a {0} file (TOML) or the name of a {0} that `narpa list` "
                              "shows{1}",
                              expected, did_you_mean(fs::path(file_or_name).stem().string(), names)),

@@ -12,7 +12,7 @@ namespace narpa {
     return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
 }
 
-/// A program beside the running one; where there is none, its bare name, which posix_spawnp looks for on PATH.
+/// A program beside the running one; where there is none, its bare name, which posix_spawnp searches on PATH.
 [[nodiscard]] inline std::string program_beside(const std::string& name) {
     std::error_code none;
     const std::filesystem::path beside = program_folder() / name;

@@ -43,7 +43,7 @@ Rigid3 frame_along(const Vec3& origin, const Vec3& x_axis, const Vec3& up) {
 }
 
 void box(Mesh& mesh, const Rigid3& T, const Vec3& half, double bevel) {
-    // Corner `s`, of signs, of the face that looks along `axis`.
+    // Corner `s`, of signs, of the face that points along `axis`.
     const auto corner = [&](int axis, const Vec3& s) {
         Vec3 p = s * (half - Vec3{bevel, bevel, bevel});
         p[axis] = s[axis] * half[axis];

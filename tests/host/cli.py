@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import subprocess
 from pathlib import Path
 
 import support
@@ -83,6 +84,11 @@ def check_names():
     expect(scenario["scenario"]["name"] == "rbar" and scenario["scene"]["cameras"], "check takes a scenario, and its scene")
     expect_refusal(2, r"docking\.toml: is a scene, expected a scenario", "rehearse", BUILD / "scenes/docking/docking.toml")
     expect_refusal(2, r"rbar\.toml: is a scenario, expected a scene", "render", BUILD / "scenes/rehearsal/rbar.toml", "-o", folder / "a.png")
+    expect_refusal(2, r"^narpa: rbar: is a scenario, expected a scene: `narpa rehearse rbar` flies it", "render", "rbar", "-o", folder / "a.png")
+    expect_refusal(2, r"^narpa: cornell: is a scene, expected a scenario, .*`narpa render cornell`", "rehearse", "cornell")
+    small = folder / "small.toml"
+    small.write_text('sun.direction = [1.0, 0.0, 0.0]\n[[body]]\nname = "ball"\nsphere = {radius_m = 1.0}\n')
+    expect_refusal(2, r"small\.toml: is a scene, expected a scenario", "rehearse", small)
     expect_refusal(2, r'dokcing: no such file, .*did you mean "docking"\?', "rehearse", "dokcing")
     expect_refusal(2, r"nowhere\.toml: no such file, expected a scene file", "run", folder / "nowhere.toml", "--video", "nav=none")
 
@@ -94,6 +100,12 @@ def check_words():
         for notation in ("TEXT:", "FLOAT:", "INT:", "UINT", "REQUIRED", "Excludes", "Positionals", "[OPTIONS]"):
             expect(notation not in text, f"narpa {name} --help has no {notation}")
         expect("Examples:\n" in text and f"Usage: narpa {name}".strip() in text, f"narpa {name} --help has usage and examples")
+    for program, options in (("narpa-dynamics", ["--can BUS", "--patience SECONDS"]), ("narpa-navigation", ["--can BUS", "--video CAMERA=SOURCE"])):
+        done = subprocess.run([BUILD / "bin" / program, "--help"], capture_output=True, text=True)
+        expect(done.returncode == 0 and f"Usage: {program} SCENARIO" in done.stdout and "Examples:\n" in done.stdout, f"{program} --help has usage and examples")
+        expect(all(option in done.stdout for option in options) and "REQUIRED" not in done.stdout, f"and {options}: {done.stdout}")
+        done = subprocess.run([BUILD / "bin" / program, "x.toml", "--cna", "y"], capture_output=True, text=True)
+        expect(done.returncode == 2 and 'no option "--cna"; did you mean "--can"' in done.stderr, f"{program} names the option meant: {done.stderr}")
     expect_refusal(2, 'no command "chek"; did you mean "check"', "chek", support.SCENE)
     expect_refusal(2, 'no command "rendr"; did you mean "render"', "bench", "rendr")
     expect_refusal(2, 'narpa render: there is no option "--sppp"; did you mean "--spp"', "render", support.SCENE, "--sppp", "3")
@@ -109,6 +121,9 @@ def check_errors():
     done = narpa("check", support.SCENE, "/dev/video99", "--json", status=3)
     document = json.loads(done.stdout)
     expect(document["error"]["file"] == "/dev/video99" and document["scene"] and document["machine"], "check --json reports beside the error")
+    done = narpa("check", support.SCENE, "can77", "/dev/video99", status=3)
+    named = [line.split(":")[1].strip() for line in done.stderr.decode().splitlines() if line.startswith("narpa: ")]
+    expect(named == ["can77", "/dev/video99"], f"check names every missing device: {named}")
     done = narpa("rehearse", "docking", "--can", "can77", "-o", folder / "can77", status=3)
     said = done.stderr.decode()
     expect(re.search(r"ended with status 3: can77: .+\n +try: ", said), f"rehearse names its child's reason: {said[-300:]}")
@@ -117,15 +132,35 @@ def check_errors():
     expect_refusal(2, r'plural\.toml:3:\d+: unknown key "bodies".*did you mean "body"', "check", plural)
 
 
+def check_output():
+    """What a command says of its files and its picture."""
+    aside = folder / "aside.toml"
+    aside.write_text('[scene]\nname = "aside"\n[sun]\ndirection = [0.0, -1.0, 0.0]\n[[body]]\nname = "ball"\nsphere = {radius_m = 1.0}\n[[camera]]\nname = "eye"\n'
+                     'position_m = [0.0, -9.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\n')  # fmt: skip
+    said = narpa("render", aside, "-o", folder / "new/a.png").stderr.decode()
+    expect(f"wrote {folder}/new/a.png: 64 x 48, direct, " in said and "samples per pixel on average" in said, f"render: {said}")
+    expect((folder / "new/a.png").exists() and "black" not in said, "it makes the folder; the ball is in view")
+    said = narpa("render", aside, "--pose", "ball=0,-99,0,1,0,0,0", "-o", folder / "b.png").stderr.decode()
+    expect("warning: every pixel is black: camera eye" in said, f"a camera that sees nothing is told: {said}")
+    for arguments, file in ((["check", support.SCENE, "--dbc", folder / "new/a.dbc"], "new/a.dbc"),
+                            (["scan", support.SCENE, "-o", folder / "new/a.ply"], "new/a.ply")):
+        said = narpa(*arguments).stderr.decode()
+        expect(f"wrote {folder}/{file}" in said and (folder / file).exists(), f"{arguments[0]}: wrote {file}")
+
+
 def check_sensors():
     """A camera in its own hull, and the calibration of all."""
     hull = folder / "hull.toml"
     text = ('[scene]\nname = "hull"\n[sun]\ndirection = [1.0, 0.0, 0.0]\n[[body]]\nname = "craft"\nsphere = {radius_m = 1.0}\n[[camera]]\nname = "eye"\nmount = "craft"\n'
-            'position_m = [0.0, 0.0, %s]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 1.0\n')  # fmt: skip
-    for z, inside in (("0.5", True), ("1.5", False)):
-        hull.write_text(text % z)
+            'position_m = [0.0, 0.0, %s]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 1.0\n'
+            '[[lidar]]\nname = "top"\nmount = "craft"\nmodel = "VLP-16"\nposition_m = [0.0, 0.0, %s]\n')  # fmt: skip
+    for z, inside in (("0.5", True), ("4.5", False)):
+        hull.write_text(text % (z, z))
         said = narpa("check", hull).stderr.decode()
-        expect(("is the camera inside its hull?" in said) == inside, f"camera at {z} m on a ball of 1 m: {'warned' if inside else 'good'}")
+        for sensor, part in (("camera eye", "pixels show"), ("lidar top", "shots meet")):
+            share = 100 if inside else 0
+            expect(f"{sensor}: {share} % of its {part} body craft, which carries it" in said, f"{sensor} at {z} m on a ball of 1 m: {share} %")
+            expect((f"warning: {sensor}" in said) == inside, "with a warning" if inside else "without a warning")
     narpa("check", "docking", "--calibration", folder / "calibration")
     camera = json.loads((folder / "calibration/calibration.json").read_text())["cameras"][0]
     expect(camera["mount"] == "chaser" and camera["camera_matrix"][0][0] > 100, "calibration.json has matrix and mount")
@@ -134,7 +169,11 @@ def check_sensors():
 
 
 def check_silence():
-    """What takes long says how far it is."""
+    """What takes long says how far it is, and what it waits for."""
+    flight = folder / "alone.csv"
+    flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n0,chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n")
+    said = narpa("fly", flight, "--can", f"slcan:{support.free_port()}", "--wait", "3", status=3).stderr.decode()
+    expect("waiting at most 3 s for `narpa run`" in said, f"fly tells what it waits for: {said}")
     said = narpa("run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "4").stderr.decode()
     expect(re.search(r"running: t = .+ s of 4 s, \d+ %", said), f"run tells where it is: {said[:200]}")
 
@@ -148,5 +187,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_sensors, check_silence, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_output, check_sensors, check_silence, check_folders):
     check()

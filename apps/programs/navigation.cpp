@@ -4,8 +4,8 @@
 
 #include <optional>
 
+#include "apps/programs/program.h"
 #include "rehearsal/navigation/node.h"
-#include "rehearsal/program_main.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -29,7 +29,6 @@ Result<SourceList> pairs(const std::vector<std::string>& texts, const char* flag
 }
 
 Status run(Arguments& a) {
-    if (auto good = check_ready_fd(a.ready_fd); !good) return good;
     auto video = pairs(a.video, "--video", "CAMERA=SOURCE, like nav=/dev/video10");
     if (!video) return video.error();
     auto lidar = pairs(a.lidar, "--lidar", "LIDAR=SOURCE, like top=udp:2368");
@@ -48,33 +47,42 @@ Status run(Arguments& a) {
     });
 }
 
+void add_options(Arguments& a, const cli::Parser& p) {
+    p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
+    p.option("--can", a.node.bus, "vcan0 | slcan:PORT | udp:239.74.163.2").type_name("BUS").required();
+    p.option("--video", a.video, "A FIFO, FILE.y4m or /dev/videoN, for each of the scenario's cameras")
+        .type_name("CAMERA=SOURCE")
+        .repeatable();
+    p.option("--lidar", a.lidar, "udp:PORT, for each of the scenario's LiDARs")
+        .type_name("LIDAR=SOURCE")
+        .repeatable();
+    p.flag("--lockstep", a.node.lockstep, "Wait for the emulator's clock; nothing depends on wall time");
+    p.option("--seed", a.node.seed, "Of the samples of its renders").shows_default();
+    p.option("--threads", a.threads, "Threads that render (default: all cores)").range(0, 1024);
+    p.option("--wait", a.node.wait_s, "How long to wait for the bus")
+        .type_name("SECONDS")
+        .range(0.0, 3600.0)
+        .finite()
+        .shows_default();
+    p.option("--log", a.node.log, "Folder for navigation.csv, measurements.csv, navigation.json and pictures")
+        .type_name("DIR");
+    p.examples(
+        {"narpa-navigation build/release/scenes/rehearsal/docking-camera.toml --can slcan:29537 --video "
+         "nav=out/nav --lockstep"});
+}
+
 }  // namespace
 }  // namespace narpa::rehearsal
 
 int main(int argc, char** argv) {
     using namespace narpa::rehearsal;
-    CLI::App app{
-        "narpa-navigation is the chaser's flight computer in a rehearsal: it estimates the target's pose from "
-        "frames "
-        "and sweeps and controls the chaser along the scenario's legs.",
-        "narpa-navigation"};
     Arguments a;
     a.node.version = NARPA_VERSION;
-    app.add_option("SCENARIO", a.scenario, "Scenario file (TOML)")->required();
-    app.add_option("--can", a.node.bus, "BUS: vcan0 | slcan:PORT | udp:239.74.163.2")->required();
-    app.add_option("--video", a.video, "CAMERA=SOURCE: a FIFO, FILE.y4m or /dev/videoN, for each of the scenario's")
-        ->allow_extra_args(false);
-    app.add_option("--lidar", a.lidar, "LIDAR=SOURCE: udp:PORT, for each of the scenario's")
-        ->allow_extra_args(false);
-    app.add_flag("--lockstep", a.node.lockstep, "Wait for the emulator's clock; nothing depends on wall time");
-    app.add_option("--seed", a.node.seed, "Of the samples of its renders")->capture_default_str();
-    app.add_option("--threads", a.threads, "Threads that render (default: as many as there are processors)")
-        ->check(CLI::Range(0, 1024));
-    app.add_option("--wait", a.node.wait_s, "Seconds to wait for the bus")
-        ->check(CLI::Range(0.0, 3600.0))
-        ->capture_default_str();
-    app.add_option("--log", a.node.log,
-                   "Folder for navigation.csv, measurements.csv, navigation.json and pictures");
-    add_ready_fd(app, a.ready_fd);
-    return run_program(app, argc, argv, [&] { return run(a); });
+    return narpa::cli::run_program(
+        argc, argv,
+        {"narpa-navigation",
+         "narpa-navigation is the chaser's flight computer in a rehearsal: it estimates the target's pose from "
+         "frames and sweeps and controls the chaser along the scenario's legs.",
+         NARPA_VERSION},
+        a.ready_fd, [&](const narpa::cli::Parser& p) { add_options(a, p); }, [&] { return run(a); });
 }

@@ -1,0 +1,71 @@
+// narpa-dynamics - simulates the two bodies of a scenario on a CAN bus.
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/programs/program.h"
+#include "base/stop.h"
+#include "drivers/can/remote_clock.h"
+#include "rehearsal/dynamics/node.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+struct Arguments {
+    std::string scenario, bus;
+    std::optional<std::uint64_t> seed;
+    DynamicsOptions options;
+    int ready_fd = -1;
+};
+
+Status simulate(Arguments& a) {
+    auto scenario = read_scenario(a.scenario);
+    if (!scenario) return scenario.error();
+    a.options.seed = a.seed.value_or(scenario->seed);
+    stop_on_signals();
+    auto bus = join_can_bus(a.bus, a.options.wait_s, stop_flag());
+    if (!bus) return bus.error();
+    notify_ready(a.ready_fd);
+    const auto flown = run_dynamics(*scenario, a.options, **bus, stop_flag());
+    if (!flown) return flown.error();
+    fmt::print(stderr, "{}\n", in_words(*flown));
+    return Ok{};
+}
+
+void add_options(Arguments& a, const cli::Parser& p) {
+    p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
+    p.option("--can", a.bus, "vcan0 | slcan:PORT | udp:239.74.163.2").type_name("BUS").required();
+    p.flag("--lockstep", a.options.lockstep,
+           "Each control period waits for its actuator command; the same seed gives the same bytes");
+    p.option("--seed", a.seed, "Of all random draws (default: the scenario's)").check([](const std::string& text) {
+        return text.starts_with("-") ? text + " is negative" : "";
+    });
+    p.option("--log", a.options.log_folder, "Folder for truth.csv and dynamics.json").type_name("DIR");
+    p.option("--wait", a.options.wait_s, "How long to wait for the bus and for the first heartbeat")
+        .type_name("SECONDS")
+        .range(0.0, 3600.0)
+        .finite()
+        .shows_default();
+    p.option("--patience", a.options.patience_s,
+             "In lockstep: how long to wait for an actuator command, and at the end for the emulator")
+        .type_name("SECONDS")
+        .range(0.1, 86400.0)
+        .finite()
+        .shows_default();
+    p.examples({"narpa-dynamics build/release/scenes/rehearsal/docking-camera.toml --can slcan:29537 --lockstep"});
+}
+
+}  // namespace
+}  // namespace narpa::rehearsal
+
+int main(int argc, char** argv) {
+    using namespace narpa::rehearsal;
+    Arguments a;
+    a.options.version = NARPA_VERSION;
+    return narpa::cli::run_program(
+        argc, argv,
+        {"narpa-dynamics",
+         "narpa-dynamics simulates the two bodies of a rehearsal: poses and attitude reports out on CAN, thruster "
+         "commands in.",
+         NARPA_VERSION},
+        a.ready_fd, [&](const narpa::cli::Parser& p) { add_options(a, p); }, [&] { return simulate(a); });
+}

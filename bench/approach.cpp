@@ -131,7 +131,7 @@ Rigid3 ApproachFrames::pose(double range_m, std::uint32_t number) const {
         return Vec3{x, y, z};
     };
     const Vec3 position = range_m * (normalized(options_.along) + some(kOffset));
-    const Vec3 z = normalized(-position);  // the camera looks along its z, its y is down
+    const Vec3 z = normalized(-position);  // the camera points along its z, its y is down
     const Vec3 x = normalized(cross(z, options_.up));
     const Quat aimed = quat_from_columns(x, cross(z, x), z);
     return inverse({aimed * exp_rotation(some(kOffset)), position});

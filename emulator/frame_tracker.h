@@ -69,7 +69,7 @@ struct TrackedFrame {
 
 class FrameTracker {
 public:
-    /// `world` outlives it. Errors: no such target, no body to look for, options.
+    /// `world` outlives it. Errors: no such target, no body to estimate, options.
     static Result<std::unique_ptr<FrameTracker>> create(const World& world, std::size_t camera,
                                                         const TrackerOptions& options);
     ~FrameTracker();

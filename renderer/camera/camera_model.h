@@ -97,7 +97,7 @@ public:
     /// Image point of the direction (u, v, 1): the inverse.
     [[nodiscard]] ImagePoint of_plane(double u, double v) const noexcept { return {cx + fx * u, cy + fy * v}; }
 
-    /// Rays as an affine function of the image point: (x, y) looks along origin + x * per_x + y * per_y, of z = 1
+    /// Rays as an affine function of the image point: (x, y) points along origin + x * per_x + y * per_y, of z = 1
     /// before `q` turns it.
     struct AffineRays {
         Vec3 origin, per_x, per_y;

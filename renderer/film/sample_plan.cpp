@@ -18,7 +18,7 @@ constexpr float kBeside = 0.05f, kNextButOne = 0.01f;
 /// as in empty space, a pixel has an eighth of that (kEventful).
 constexpr double kLeast = 1.0 / 128;
 /// A pixel whose centre met nothing gets so many doublings of kLeast: thin parts of a body may pass between the
-/// centres, as its bounds are there, and to look for them costs one ray and no shading.
+/// centres, as its bounds are there, and to search for them costs one ray and no shading.
 constexpr int kEmptyDoublings = 2;
 /// Along an edge of little contrast there may be a glint that no centre met: so much of a typical variance is
 /// assumed.

@@ -16,7 +16,7 @@ namespace narpa {
 
 namespace {
 
-/// Assimp 5.2 looks for the end of a PLY header for ever where there is none, and for elements that a header
+/// Assimp 5.2 searches for the end of a PLY header for ever where there is none, and for elements that a header
 /// promises and no file of this size can hold.
 Status check_ply_header(const std::string& path) {
     if (extension_of(path) != ".ply") return Ok{};

@@ -154,7 +154,7 @@ inline BodyPoses placed(const Scene& s, const Vec3& offset = {}) {
     return at;
 }
 
-/// A pose at `eye` that looks along z at `target`, with image down away from `up`.
+/// A pose at `eye` that points along z at `target`, with image down away from `up`.
 inline Rigid3 looking(const Vec3& eye, const Vec3& target, const Vec3& up = {0, 0, 1}) {
     const Vec3 z = normalized(target - eye), x = normalized(cross(z, up));
     return {quat_from_columns(x, cross(z, x), z), eye};

@@ -262,9 +262,10 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     nlohmann::json document = show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name),
                                    e.T_lidar_target, e.covariance, e.bound, truth);
     const int unobserved = e.observability.unobserved;
-    say(fmt::format(
-        "  {} returns, {} used, {} as the model has them; {} motions that cannot be seen; {} iterations", e.points,
-        e.used, e.explained, unobserved, e.iterations));
+    say(
+        fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
+                    "cannot be seen; {} iterations",
+                    e.points, e.used, e.explained, unobserved, e.iterations));
     if (!e.credible) say("  not credible: the pose does not explain its points, or did not settle");
     document["passed"] = document["credible"] = e.credible;
     document["points"] = e.points;

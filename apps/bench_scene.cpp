@@ -5,7 +5,7 @@
 
 #include "apps/cli.h"
 #include "base/program_beside.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa::cli {
 

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/camera/scene_camera.h"
+#include "renderer/scene/calibration_file.h"
 
 namespace narpa::cli {
 namespace {
@@ -18,14 +20,16 @@ nlohmann::json mounting(const Scene& scene, int mount, const Rigid3& T) {
 }
 
 nlohmann::json describe(const Scene& scene, const Camera& c) {
-    nlohmann::json camera{{"name", c.name},
-                          {"width", c.width},
-                          {"height", c.height},
-                          {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
-                          {"format", std::string(name(c.format))},
-                          {"camera_matrix", {{c.fx, 0, c.cx}, {0, c.fy, c.cy}, {0, 0, 1}}},
-                          {"distortion_model", "plumb_bob"},
-                          {"distortion_coefficients", {0, 0, 0, 0, 0}}};
+    const bool is_fisheye = c.distortion && c.distortion->model == Distortion::Model::fisheye;
+    nlohmann::json camera{
+        {"name", c.name},
+        {"width", c.width},
+        {"height", c.height},
+        {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
+        {"format", std::string(name(c.format))},
+        {"camera_matrix", {{c.fx, 0, c.cx}, {0, c.fy, c.cy}, {0, 0, 1}}},
+        {"distortion_model", is_fisheye ? "fisheye" : "opencv"},
+        {"distortion_coefficients", c.distortion ? c.distortion->coefficients : std::vector<double>(5)}};
     camera.update(mounting(scene, c.mount, c.T_mount_camera));
     return camera;
 }
@@ -39,17 +43,8 @@ nlohmann::json describe(const Scene& scene, const Lidar& l) {
     return lidar;
 }
 
-std::string camera_info(const Camera& c) {
-    return fmt::format(
-        "image_width: {}\nimage_height: {}\ncamera_name: {}\n"
-        "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{fx}, 0.0, {cx}, 0.0, {fy}, {cy}, 0.0, 0.0, 1.0]\n"
-        "distortion_model: plumb_bob\n"
-        "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0.0, 0.0, 0.0, 0.0, 0.0]\n"
-        "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n"
-        "projection_matrix:\n  rows: 3\n  cols: 4\n"
-        "  data: [{fx}, 0.0, {cx}, 0.0, 0.0, {fy}, {cy}, 0.0, 0.0, 0.0, 1.0, 0.0]\n",
-        c.width, c.height, c.name, fmt::arg("fx", c.fx), fmt::arg("fy", c.fy), fmt::arg("cx", c.cx),
-        fmt::arg("cy", c.cy));
+Calibration calibration_of(const Camera& c) {
+    return {c.width, c.height, pinhole_of(c), c.distortion};
 }
 
 Status write(const std::string& file, const std::string& text) {
@@ -73,7 +68,9 @@ Status write_calibration(const Scene& scene, const std::string& folder) {
         {"lidars", nlohmann::json::array()}};
     for (const Camera& c : scene.cameras) {
         document["cameras"].push_back(describe(scene, c));
-        if (Status good = write(folder + "/" + c.name + ".yaml", camera_info(c)); !good) return good;
+        if (Status good = write(folder + "/" + c.name + ".yaml", calibration_text(c.name, calibration_of(c)));
+            !good)
+            return good;
     }
     for (const Lidar& l : scene.lidars) document["lidars"].push_back(describe(scene, l));
     return write(folder + "/calibration.json", document.dump(2) + "\n");

@@ -21,7 +21,7 @@
 #include "protocols/can/dbc.h"
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/scene/kind_names.h"
 
 namespace narpa::cli {

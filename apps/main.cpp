@@ -9,8 +9,9 @@
 
 #include "apps/cli.h"
 #include "apps/shipped.h"
+#include "base/each_isa.h"
+#include "base/lanes.h"
 #include "generated/commit.h"
-#include "renderer/geometry/lanes.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa::cli {
@@ -90,7 +91,7 @@ constexpr const char* kDescription =
 
 /// The widest of the instruction sets of base/each_isa.h that this processor has.
 const char* isa_in_use() {
-#if defined(__x86_64__) && defined(__gnu_linux__)
+#ifdef NARPA_HAS_EACH_ISA
     __builtin_cpu_init();
     if (__builtin_cpu_supports("x86-64-v4")) return "AVX-512 (x86-64-v4)";
     if (__builtin_cpu_supports("x86-64-v3")) return "AVX2 (x86-64-v3)";

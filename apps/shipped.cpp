@@ -21,7 +21,7 @@ fs::path shipped_folder() {
     std::error_code error;
     const fs::path program = program_folder();
     for (const char* folder : {"../scenes", "../share/narpa/scenes"})
-        if (const fs::path path = (program / folder).lexically_normal(); fs::is_directory(path, error)) return path;
+        if (fs::path path = (program / folder).lexically_normal(); fs::is_directory(path, error)) return path;
     return {};
 }
 

@@ -6,6 +6,7 @@
 /// Clang's function multiversioning). The same bytes come out of each: nothing is contracted or reordered. The
 /// choice is made before the sanitizers are set up, so their builds have the base line alone.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define NARPA_HAS_EACH_ISA
 #define NARPA_EACH_ISA [[gnu::flatten, gnu::target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")]]
 #else
 #define NARPA_EACH_ISA

@@ -1,6 +1,6 @@
 #include "bench/raw_embree_scene.h"
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 
@@ -45,7 +45,7 @@ Result<RawScene> RawScene::build(const Scene& scene, const BodyPoses& at) {
 }
 
 RawAim::RawAim(const Camera& c, const Rigid3& T) : origin(vec_cast<float>(T.t)) {
-    const auto [at_zero, per_x, per_y] = Pinhole(c).rays(T.q);
+    const auto [at_zero, per_x, per_y] = pinhole_of(c).rays(T.q);
     across = vec_cast<float>(per_x), down = vec_cast<float>(per_y), ahead = vec_cast<float>(at_zero);
 }
 

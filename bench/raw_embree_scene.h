@@ -7,9 +7,9 @@
 
 #include <vector>
 
+#include "base/lanes.h"
 #include "base/result.h"
 #include "renderer/geometry/embree.h"
-#include "renderer/geometry/lanes.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene/scene.h"
 

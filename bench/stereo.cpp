@@ -10,7 +10,7 @@
 #include "base/time.h"
 #include "bench/statistics.h"
 #include "emulator/camera_unit.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 namespace {

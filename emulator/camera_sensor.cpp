@@ -161,11 +161,11 @@ void CameraSensor::log(const FrameLedger& l) noexcept {
 }
 
 Status CameraSensor::finish() {
-    const Status video = finish_all(sinks_);
+    Status video = finish_all(sinks_);
     if (!sheet_) return video;
     const Status truth = truth_log_->close(), ledger = ledger_log_->close();
     const Status sheet = sheet_->write(folder_ + "/" + unit_.camera().name + ".png");
-    for (const Status* s : {&video, &truth, &ledger, &sheet})
+    for (const Status* s : std::initializer_list<const Status*>{&video, &truth, &ledger, &sheet})
         if (!*s) return s->error();
     return Ok{};
 }

@@ -9,7 +9,7 @@
 #include "base/constants.h"
 #include "estimator/view/measured_image.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_batch.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "base/constants.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "estimator/pose/levenberg_marquardt.h"
 #include "estimator/pose/pose_estimate.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 

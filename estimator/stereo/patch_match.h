@@ -8,7 +8,7 @@
 #include "base/pose.h"
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/view/measured_image.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 

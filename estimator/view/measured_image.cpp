@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "renderer/camera/camera_model.h"
 #include "renderer/camera/detector.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <span>
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 
 namespace narpa {

@@ -56,7 +56,7 @@ public:
     }
 
     Status run() {
-        const Status flown = options_.lockstep ? run_in_lockstep() : run_in_real_time();
+        Status flown = options_.lockstep ? run_in_lockstep() : run_in_real_time();
         if (!flown) return flown;
         return log_ ? log_->close() : Status{Ok{}};
     }

@@ -181,7 +181,7 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
 template <class Sensor>
 std::vector<std::string> read_sensors(TableReader& table, const char* key, const std::vector<Sensor>& sensors,
                                       const Scene& scene, const std::string& chaser) {
-    const std::vector<std::string> names = table.texts(key).value_or(std::vector<std::string>{});
+    std::vector<std::string> names = table.texts(key).value_or(std::vector<std::string>{});
     for (const std::string& name : names) {
         const auto found = std::ranges::find(sensors, name, &Sensor::name);
         if (found == sensors.end())

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "renderer/geometry/lanes.h"
+#include "base/lanes.h"
 
 namespace narpa {
 

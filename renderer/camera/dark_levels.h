@@ -11,7 +11,7 @@
 #include <array>
 #include <cstdint>
 
-#include "renderer/geometry/lanes.h"
+#include "base/lanes.h"
 
 namespace narpa {
 

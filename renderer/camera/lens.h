@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/light/concentric_disc.h"
 
 namespace narpa {

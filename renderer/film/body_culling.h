@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa {
 

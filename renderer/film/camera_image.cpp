@@ -73,15 +73,16 @@ void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
     });
 }
 
-/// Pixels beyond the image circle of a camera that has one.
-void blacken_unseen(const Camera& camera, RadianceImage& out) {
+/// Pixels beyond the image circle of a camera that has one, row by row.
+std::vector<std::uint32_t> unseen_pixels(const Camera& camera) {
+    std::vector<std::uint32_t> unseen;
     const CameraModelHandle model(camera);
-    if (model->pinhole() != nullptr) return;
-    for (int y = 0; y < out.height; ++y)
-        for (int x = 0; x < out.width; ++x)
+    if (model->pinhole() != nullptr) return unseen;
+    for (int y = 0; y < camera.height; ++y)
+        for (int x = 0; x < camera.width; ++x)
             if (!model->sees({static_cast<double>(x), static_cast<double>(y)}))
-                out.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width) +
-                           static_cast<std::size_t>(x)] = {};
+                unseen.push_back(static_cast<std::uint32_t>(y * camera.width + x));
+    return unseen;
 }
 
 FrameAccount render_uniform(FramePasses& passes, const Frame& f, RadianceImage& out, std::vector<float>* variance) {
@@ -102,6 +103,7 @@ struct CameraRenderer::Impl {
     const Camera& camera;
     FramePasses passes{render_scene.tracer(), camera};
     PassCosts costs{};
+    std::vector<std::uint32_t> unseen = unseen_pixels(camera);
 };
 
 CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera)
@@ -126,7 +128,7 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose,
     if (!uniform)
         account = render_within_budget(impl_->passes, impl_->costs, render_scene, camera, at, pose, settings, out,
                                        variance);
-    blacken_unseen(camera, out);
+    for (const std::uint32_t pixel : impl_->unseen) out.pixels[pixel] = {};
     return account;
 }
 

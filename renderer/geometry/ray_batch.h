@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "base/lanes.h"
 #include "renderer/geometry/body_poses.h"
-#include "renderer/geometry/lanes.h"
 
 namespace narpa {
 

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "renderer/geometry/lanes.h"
+#include "base/lanes.h"
 
 namespace narpa {
 

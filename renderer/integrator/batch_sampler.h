@@ -2,7 +2,7 @@
 /// bit.
 #pragma once
 
-#include "renderer/geometry/lanes.h"
+#include "base/lanes.h"
 #include "renderer/integrator/sampler.h"
 
 namespace narpa {

@@ -9,8 +9,8 @@
 #include <optional>
 #include <span>
 
-#include "renderer/camera/camera_model.h"
 #include "renderer/camera/camera_pose.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/integrator/frame_settings.h"
 #include "renderer/integrator/path.h"
 #include "renderer/integrator/subpixel_bodies.h"

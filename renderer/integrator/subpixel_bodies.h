@@ -8,7 +8,7 @@
 
 #include <optional>
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/tracer.h"
 
 namespace narpa {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "renderer/material/fast_math.h"
+#include "base/fast_math.h"
 
 namespace narpa {
 

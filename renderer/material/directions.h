@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/fast_math.h"
 #include "base/vec3.h"
-#include "renderer/material/fast_math.h"
 
 namespace narpa {
 

@@ -12,43 +12,6 @@ namespace narpa {
 
 namespace {
 
-void read_resolution(TableReader& table, Camera& camera) {
-    constexpr int kMostPixels = 16384;
-    table.require("resolution", "[width, height] in pixels");
-    if (const auto size = table.size("resolution", kMostPixels))
-        camera.width = (*size)[0], camera.height = (*size)[1];
-}
-
-void read_intrinsics(TableReader& table, Camera& camera) {
-    for (const char* key : {"fx", "fy"}) table.require(key, "a focal length in pixels");
-    camera.fx = table.number("fx", kPositive).value_or(1);
-    camera.fy = table.number("fy", kPositive).value_or(1);
-    camera.cx = table.number("cx").value_or(camera.cx);
-    camera.cy = table.number("cy").value_or(camera.cy);
-    table.finish();
-}
-
-/// Field of view edge to edge of the picture: the diagonal is hypot(width, height) pixels long.
-void read_projection(TableReader& table, Camera& camera) {
-    const Range angle{.low = 0, .high = 180, .low_open = true, .high_open = true};
-    camera.cx = 0.5 * (camera.width - 1), camera.cy = 0.5 * (camera.height - 1);
-    auto intrinsics = table.table("intrinsics");
-    const auto diagonal = table.number("fov_diagonal_deg", angle),
-               horizontal = table.number("fov_horizontal_deg", angle);
-    const char* const keys[] = {"intrinsics", "fov_diagonal_deg", "fov_horizontal_deg"};
-    const auto given = std::count_if(std::begin(keys), std::end(keys), [&](const char* k) { return table.has(k); });
-    if (given == 0) table.require("fov_diagonal_deg", "one of intrinsics, fov_diagonal_deg, fov_horizontal_deg");
-    if (given > 1)
-        for (const char* key : keys)
-            if (table.has(key))
-                table.fail(key, "expected exactly one of intrinsics, fov_diagonal_deg, fov_horizontal_deg");
-    if (intrinsics) read_intrinsics(*intrinsics, camera);
-    if (diagonal)
-        camera.fx = camera.fy = 0.5 * std::hypot(camera.width, camera.height) / std::tan(*diagonal * kPi / 360.0);
-    if (horizontal) camera.fx = camera.fy = 0.5 * camera.width / std::tan(*horizontal * kPi / 360.0);
-    table.not_in_this_version("distortion", "the projection is a pinhole so far");
-}
-
 std::int64_t read_period_ns(TableReader& table, std::int64_t otherwise) {
     const auto rate_hz = table.number("rate_hz", {.low = 1e-3, .high = 10000});
     return rate_hz ? std::llround(1e9 / *rate_hz) : otherwise;
@@ -133,14 +96,14 @@ double white_radiance(const Scene& scene) {
     return std::max({scene.ambient.x, scene.ambient.y, scene.ambient.z});
 }
 
-Camera read_camera(TableReader& table, std::vector<std::string>& names, const Scene& scene) {
+Camera read_camera(TableReader& table, std::vector<std::string>& names, const Scene& scene,
+                   const std::filesystem::path& folder) {
     Camera camera;
     camera.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, camera_attitude);
     camera.mount = mounting.mount;
     camera.T_mount_camera = mounting.T_mount_thing;
-    read_resolution(table, camera);
-    read_projection(table, camera);
+    read_projection(table, camera, folder);
     camera.period_ns = read_period_ns(table, camera.period_ns);
     if (scene.render.budget_ns > camera.period_ns)
         table.fail("rate_hz", fmt::format("a period of {} ms, expected at least the budget_ms of [render], {}",
@@ -184,7 +147,8 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
 void read_sensors(TableReader& root, SceneReading& reading) {
     Scene& scene = reading.scene;
     std::vector<std::string> cameras, lidars;
-    for (TableReader& table : root.tables("camera")) scene.cameras.push_back(read_camera(table, cameras, scene));
+    for (TableReader& table : root.tables("camera"))
+        scene.cameras.push_back(read_camera(table, cameras, scene, reading.folder));
     for (TableReader& table : root.tables("lidar")) scene.lidars.push_back(read_lidar(table, lidars, scene));
     if (!root.has("camera") && !root.has("lidar")) root.require("camera", "at least one [[camera]] or [[lidar]]");
 }

@@ -15,6 +15,7 @@
 #include "base/pose.h"
 #include "base/vec3.h"
 #include "renderer/material/material.h"
+#include "renderer/projection/distortion.h"
 
 namespace narpa {
 
@@ -93,15 +94,14 @@ struct Lens {
 
 enum class LatePolicy : std::uint8_t { drop, repeat, late, blank };
 
-class CameraModel;
-
 struct Camera {
     std::string name;
     int mount = -1;  ///< body it rides on; -1 is the world
     Rigid3 T_mount_camera{};
     int width = 640, height = 480;
-    double fx = 0, fy = 0, cx = 0, cy = 0;       ///< px; the centre of the top-left pixel is (0, 0)
-    std::shared_ptr<const CameraModel> model{};  ///< renderer/camera/camera_model.h; null: the pinhole of the above
+    double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px; the centre of the top-left pixel is (0, 0)
+    std::optional<Distortion> distortion{};
+    std::shared_ptr<const CameraModel> model{};  ///< null: the pinhole of the above
     std::int64_t period_ns = 100'000'000;        ///< 1 / rate_hz
     PixelFormat format = PixelFormat::grey;
     bool embedded_line = false;  ///< the last row carries the frame's identity and ledger

@@ -48,6 +48,8 @@ void read_bodies(TableReader& root, SceneReading& reading);
 void read_lights(TableReader& root, SceneReading& reading);
 /// [[camera]] and [[lidar]]; bodies and surroundings come first.
 void read_sensors(TableReader& root, SceneReading& reading);
+/// Resolution and projection of a camera; paths in it start at `folder`.
+void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);
 

@@ -148,14 +148,15 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
     return value(key, take, "an array of texts in quotes");
 }
 
-std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::size_t count,
+std::optional<std::vector<double>> TableReader::numbers(std::string_view key,
+                                                        std::initializer_list<std::size_t> counts,
                                                         const Range& range) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     const toml::array* array = node->as_array();
-    if (!array || array->size() != count) {
+    if (!array || std::ranges::find(counts, array->size()) == counts.end()) {
         const std::string got = array ? fmt::format("an array of {}", array->size()) : shown(*node);
-        fail(key, fmt::format("got {}, expected an array of {} numbers", got, count));
+        fail(key, fmt::format("got {}, expected an array of {} numbers", got, fmt::join(counts, ", ")));
         return std::nullopt;
     }
     std::vector<double> out;
@@ -172,7 +173,7 @@ std::optional<std::vector<double>> TableReader::numbers(std::string_view key, st
 }
 
 std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) {
-    const auto v = numbers(key, 3, range);
+    const auto v = numbers(key, {3}, range);
     if (!v) return std::nullopt;
     return Vec3{(*v)[0], (*v)[1], (*v)[2]};
 }
@@ -192,7 +193,7 @@ std::optional<Vec3> TableReader::direction(std::string_view key) {
 }
 
 std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, const Range& range) {
-    const auto v = numbers(key, 2, range);
+    const auto v = numbers(key, {2}, range);
     if (!v) return std::nullopt;
     return std::array{(*v)[0], (*v)[1]};
 }
@@ -211,7 +212,7 @@ std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
 }
 
 std::optional<Quat> TableReader::attitude(std::string_view key) {
-    const auto v = numbers(key, 4, kAnyNumber);
+    const auto v = numbers(key, {4});
     if (!v) return std::nullopt;
     const Quat q{(*v)[0], (*v)[1], (*v)[2], (*v)[3]};
     if (const double n = norm(q); !(std::abs(n - 1.0) < 1e-3)) {

@@ -90,6 +90,9 @@ public:
     std::optional<std::string> text(std::string_view key);
     /// An array of texts.
     std::optional<std::vector<std::string>> texts(std::string_view key);
+    /// An array of one of these counts.
+    std::optional<std::vector<double>> numbers(std::string_view key, std::initializer_list<std::size_t> counts,
+                                               const Range& range = kAnyNumber);
     std::optional<Vec3> vec3(std::string_view key, const Range& range = kAnyNumber);
     /// A unit vector from one of any length but 0.
     std::optional<Vec3> direction(std::string_view key);
@@ -136,7 +139,6 @@ private:
     template <class Take>
     auto value(std::string_view key, const Take& take, const std::string& expected)
         -> decltype(take(std::declval<const toml::node&>()));
-    std::optional<std::vector<double>> numbers(std::string_view key, std::size_t count, const Range& range);
 
     const toml::table* table_;
     std::string name_;

@@ -9,7 +9,7 @@
 #include "bench/raw_embree.h"
 #include "bench/reference_loop.h"
 #include "emulator/world.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa {

@@ -8,7 +8,7 @@
 
 #include "emulator/log/estimate_report.h"
 #include "emulator/trajectory.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"

@@ -279,7 +279,7 @@ TEST(SplineImage, PassesThroughThePixelsWithItsSlope) {
 TEST(EpipolarWarp, FollowsThePointAlongTheLine) {
     Camera from = camera(), to = camera();
     to.fx = 500, to.fy = 550, to.cx = 100;
-    const EpipolarWarp warp(Pinhole(from), Pinhole(to), kTurned);
+    const EpipolarWarp warp(pinhole_of(from), pinhole_of(to), kTurned);
     const Vector2d left(30, 190);
     const Vector3d ray = warp.ray(left);
     for (const double depth : {20.0, 100.0, 1e4}) {

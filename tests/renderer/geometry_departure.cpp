@@ -30,16 +30,12 @@ void trace(const Tracer& tracer, const BodyPoses& at, const Lanes<Hit>& from, co
 }
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kFewer = 20;  // the sanitizers are that much slower
+constexpr int kFewerDepartures = 20;  // the sanitizers are that much slower
 #else
-constexpr int kFewer = 1;
+constexpr int kFewerDepartures = 1;
 #endif
 
 constexpr std::uint32_t kAll = (1u << kLanes) - 1;
-
-bool is_set(std::uint32_t bits, std::size_t i) {
-    return (bits >> i & 1u) != 0;
-}
 
 void add_ellipsoid(Scene& s, const Vec3& semi_axes_m, const Rigid3& T_world_body) {
     Body b;
@@ -86,7 +82,7 @@ TEST_P(LeavingAConvexBody, OutwardsMissesItAndInwardsMeetsItFromInside) {
             const auto tracer = Tracer::create(s, 1);
             ASSERT_TRUE(tracer) << tracer.error().text();
             const BodyPoses at = placed(s, offset);
-            for (int k = 0; k < 7500 / kFewer; ++k) {
+            for (int k = 0; k < 7500 / kFewerDepartures; ++k) {
                 Lanes<Hit> from, met;
                 Lanes<Vec3> out, in;
                 std::uint32_t seen = 0;
@@ -114,7 +110,7 @@ TEST_P(LeavingAConvexBody, OutwardsMissesItAndInwardsMeetsItFromInside) {
                 bright += std::popcount(seen & ~tracer->occluded(at, batch_of(from), lanes_of(in), seen));
             }
         }
-    EXPECT_GE(outward, 500'000 / kFewer);
+    EXPECT_GE(outward, 500'000 / kFewerDepartures);
     EXPECT_EQ(met_again, 0) << "of " << outward;
     EXPECT_EQ(dark, 0) << "of " << outward;
     EXPECT_EQ(missed, 0) << "of " << inward;
@@ -197,7 +193,7 @@ TEST(BouncingInside, NothingEscapes) {
         {"1 mm", body(icosphere(3, 5e-4))},     {"Earth", body(icosphere(3, 6378137))},
         {"sphere", alone("sphere", 1, random)}, {"ellipsoid", alone("ellipsoid", 1, random)}};
     for (const auto& [name, scene] : bodies) {
-        const Bounces b = bounce_inside(scene, {3.844e8, -7e6, 5}, 1'000'000 / kFewer);
+        const Bounces b = bounce_inside(scene, {3.844e8, -7e6, 5}, 1'000'000 / kFewerDepartures);
         EXPECT_EQ(b.escapes, 0) << name << " of " << b.bounces;
     }
 }

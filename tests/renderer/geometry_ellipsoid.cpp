@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/ellipsoid.h"
 #include "tests/support/shapes.h"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <numbers>
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 #include "tests/renderer/path_support.h"
 

@@ -17,6 +17,9 @@ using namespace test;
 
 const Pinhole kPinhole{400, 440, 130, 95};
 const EquidistantCamera kEquidistant{150, 140, 130, 95};
+const auto kBarrel = distorted(kPinhole, {Distortion::Model::opencv, {-0.1, 0.02, 1e-3, -2e-3, 0.001}});
+const auto kFisheye = distorted({150, 140, 130, 95}, {Distortion::Model::fisheye, {-0.02, 0.004, -0.001, 1e-4}});
+const std::array<const CameraModel*, 4> kModels{&kPinhole, &kEquidistant, kBarrel.get(), kFisheye.get()};
 
 void expect_consistent(const CameraModel& model, double reach_px, double tolerance) {
     std::mt19937_64 random(1);
@@ -51,13 +54,11 @@ void expect_consistent(const CameraModel& model, double reach_px, double toleran
 }
 
 TEST(CameraModel, ProjectionUndoesDirectionAndMatchesItsDerivatives) {
-    expect_consistent(kPinhole, 300, 1e-4);
-    expect_consistent(kEquidistant, 300, 1e-4);
+    for (const CameraModel* model : kModels) expect_consistent(*model, 300, 1e-4);
 }
 
 TEST(CameraModel, BatchHasTheSameDirections) {
-    for (const CameraModel* model :
-         {static_cast<const CameraModel*>(&kPinhole), static_cast<const CameraModel*>(&kEquidistant)}) {
+    for (const CameraModel* model : kModels) {
         const Quat q = normalized(Quat{0.3, -0.5, 0.7, 0.2});
         Lanes<double> x, y;
         for (std::size_t i = 0; i < kLanes; ++i)
@@ -71,8 +72,7 @@ TEST(CameraModel, BatchHasTheSameDirections) {
 TEST(CameraModel, ConeOfARectangleHoldsItsRays) {
     std::mt19937_64 random(2);
     std::uniform_real_distribution<double> place(-200, 400), size(0.1, 150), part(0, 1);
-    for (const CameraModel* model :
-         {static_cast<const CameraModel*>(&kPinhole), static_cast<const CameraModel*>(&kEquidistant)})
+    for (const CameraModel* model : kModels)
         for (int i = 0; i < 200; ++i) {
             ImageRect r{place(random), place(random), 0, 0};
             r.x_high = r.x_low + size(random), r.y_high = r.y_low + size(random);

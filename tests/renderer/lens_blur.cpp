@@ -66,7 +66,7 @@ TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
                 EXPECT_LE(norm(p - q), 1e-13 * (focus + 10));
             }
             const Vec3 chief = chief_direction(*c.lens, conjugate(T.q) * ray.direction, from);
-            const auto [back_x, back_y] = *Pinhole(c).project(chief);
+            const auto [back_x, back_y] = *pinhole_of(c).project(chief);
             EXPECT_NEAR(back_x, x, 1e-9);
             EXPECT_NEAR(back_y, y, 1e-9);
         }

@@ -69,7 +69,7 @@ TEST_P(BadObjFile, SaysWhereAndWhat) {
 INSTANTIATE_TEST_SUITE_P(Mesh, BadObjFile, testing::ValuesIn(kBadMeshes),
                          [](const auto& one) { return std::string(one.param.name); });
 
-MeshFile read_good(const std::string& path, double scale = 1) {
+MeshFile good_mesh(const std::string& path, double scale = 1) {
     Result<MeshFile> mesh = read_mesh(path, scale);
     if (!mesh) {
         ADD_FAILURE() << mesh.error().text();
@@ -80,7 +80,7 @@ MeshFile read_good(const std::string& path, double scale = 1) {
 
 MeshFile read_obj_text(const std::string& text, double scale = 1) {
     const TemporaryFolder folder;
-    return read_good(folder.write("m.obj", text), scale);
+    return good_mesh(folder.write("m.obj", text), scale);
 }
 
 Vec3 area_vector(const Mesh& m) {
@@ -103,7 +103,7 @@ double signed_volume(const Mesh& m) {
 }
 
 TEST(MeshFile, CubeIsClosedAndFacesOutward) {
-    const MeshFile cube = read_good(data_file("cube.obj"), 2);
+    const MeshFile cube = good_mesh(data_file("cube.obj"), 2);
     EXPECT_EQ(cube.mesh.faces.size(), 12u);
     EXPECT_NEAR(signed_volume(cube.mesh), 8, 1e-12);
     EXPECT_LT(norm(area_vector(cube.mesh)), 1e-12);
@@ -113,7 +113,7 @@ TEST(MeshFile, CubeIsClosedAndFacesOutward) {
 }
 
 TEST(MeshFile, MtlBecomesLambertAndPhong) {
-    const MeshFile cube = read_good(data_file("cube.obj"));
+    const MeshFile cube = good_mesh(data_file("cube.obj"));
     ASSERT_EQ(cube.materials.size(), 2u) << "only those that are used";
     const MeshMaterial& painted = cube.materials[0];
     EXPECT_EQ(painted.material.name, "painted panel");
@@ -197,7 +197,7 @@ TEST(MeshFile, TextureNamesWithSpacesOptionsAndForeignFolders) {
     const TemporaryFolder folder;
     folder.write("my skin.ppm", "P3 1 1 255\n255 255 255\n");
     folder.write("m.mtl", "newmtl a\nmap_Kd -o 0.5 0 -clamp on C:\\models\\my skin.ppm  \n");
-    const MeshFile m = read_good(
+    const MeshFile m = good_mesh(
         folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
     EXPECT_EQ(m.materials.at(0).colour.file, folder / "my skin.ppm");
     EXPECT_EQ(m.materials.at(0).material.diffuse, (Rgb{1, 1, 1})) << "no Kd under a map is 1";
@@ -220,7 +220,7 @@ TEST(MeshFile, MissingTextureIsHalfTheColourAndTold) {
 TEST(MeshFile, TextureStaysOffTrianglesWithoutCoordinates) {
     const TemporaryFolder folder;
     folder.write("m.mtl", "newmtl a\nmap_Kd t.ppm\n");
-    const MeshFile m = read_good(
+    const MeshFile m = good_mesh(
         folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "v 0 0 1\nvt 0 0\nf 1/1 2/1 3/1\nf 1 2 4\n"));
     EXPECT_TRUE(m.materials.at(m.mesh.face_material[0]).has_textures());
     EXPECT_FALSE(m.materials.at(m.mesh.face_material[1]).has_textures());
@@ -230,14 +230,14 @@ TEST(MeshFile, TextureStaysOffTrianglesWithoutCoordinates) {
 TEST(MeshFile, AssimpFormatsAreRead) {
     const TemporaryFolder folder;
     const MeshFile stl =
-        read_good(folder.write("m.stl",
+        good_mesh(folder.write("m.stl",
                                "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
                                "vertex 0 1 0\nendloop\nendfacet\nendsolid s\n"),
                   1000);
     ASSERT_EQ(stl.mesh.faces.size(), 1u);
     EXPECT_NEAR(area_vector(stl.mesh).z, 0.5e6, 1e-6);
     const MeshFile ply =
-        read_good(folder.write("m.ply",
+        good_mesh(folder.write("m.ply",
                                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
                                "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
                                "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"));
@@ -257,7 +257,7 @@ constexpr const char* kGltf = R"({"asset": {"version": "2.0"}, "scene": 0, "scen
 
 TEST(MeshFile, GltfNodesAndMaterialsAreApplied) {
     const TemporaryFolder folder;
-    const MeshFile m = read_good(folder.write("m.gltf", kGltf));
+    const MeshFile m = good_mesh(folder.write("m.gltf", kGltf));
     ASSERT_EQ(m.mesh.faces.size(), 1u);
     EXPECT_NEAR(area_vector(m.mesh).z, 0.5, 1e-12) << "a mirrored triangle still faces the same side";
     const auto [low, high] = std::minmax_element(m.mesh.positions.begin(), m.mesh.positions.end(),

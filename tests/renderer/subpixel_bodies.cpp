@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/constants.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/subpixel_bodies.h"
 #include "tests/renderer/camera_support.h"

@@ -6,11 +6,11 @@
 #include <numbers>
 #include <random>
 
+#include "base/fast_math.h"
 #include "renderer/film/camera_batch.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/bsdf.h"
-#include "renderer/material/fast_math.h"
 #include "tests/support/lens_ray.h"
 #include "tests/support/shapes.h"
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "base/constants.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/texture_lookup.h"
 #include "tests/renderer/texture_support.h"

@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/mesh_shape.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/lens_ray.h"

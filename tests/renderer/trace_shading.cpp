@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "renderer/camera/camera_model.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/sampler.h"
 #include "renderer/integrator/shading.h"

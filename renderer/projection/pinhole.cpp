@@ -1,7 +1,6 @@
-#include "renderer/camera/camera_model.h"
+#include "renderer/projection/pinhole.h"
 
 #include <algorithm>
-#include <array>
 
 #include "base/each_isa.h"
 
@@ -20,21 +19,6 @@ NARPA_EACH_ISA void pinhole_directions(const Pinhole& pinhole, const Quat& q, co
 }
 
 }  // namespace
-
-double largest_stretch(const ProjectionJacobian& J) noexcept {
-    const double xx = dot(J.x, J.x), yy = dot(J.y, J.y), xy = dot(J.x, J.y);
-    return std::sqrt(0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy));
-}
-
-void CameraModel::directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
-                             Vec3Lanes& out) const noexcept {
-    for (std::size_t i = 0; i < kLanes; ++i) out.put(i, q * direction({x[i], y[i]}));
-}
-
-double CameraModel::pixels_per_sr(const Vec3& d) const noexcept {
-    const auto [x, y] = jacobian(d);
-    return norm(cross(x, y));
-}
 
 void Pinhole::directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
                          Vec3Lanes& out) const noexcept {
@@ -59,32 +43,6 @@ std::shared_ptr<const CameraModel> Pinhole::scaled(double x, double y) const {
 }
 std::shared_ptr<const CameraModel> Pinhole::windowed(double x, double y) const {
     return std::make_shared<Pinhole>(with_origin(x, y));
-}
-
-namespace {
-
-void set_intrinsics(Camera& camera, const Pinhole& p) {
-    camera.fx = p.fx, camera.fy = p.fy, camera.cx = p.cx, camera.cy = p.cy;
-}
-
-}  // namespace
-
-Camera scaled(const Camera& camera, double factor_x, double factor_y) {
-    constexpr double kRounding = 1e-9;
-    Camera c = camera;
-    c.width = static_cast<int>(camera.width * factor_x * (1 + kRounding));
-    c.height = static_cast<int>(camera.height * factor_y * (1 + kRounding));
-    set_intrinsics(c, Pinhole(camera).with_scale(factor_x, factor_y));
-    if (camera.model) c.model = camera.model->scaled(factor_x, factor_y);
-    return c;
-}
-
-Camera windowed(const Camera& camera, int x, int y, int width, int height) {
-    Camera c = camera;
-    c.width = width, c.height = height;
-    set_intrinsics(c, Pinhole(camera).with_origin(x, y));
-    if (camera.model) c.model = camera.model->windowed(x, y);
-    return c;
 }
 
 }  // namespace narpa

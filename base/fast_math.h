@@ -1,4 +1,4 @@
-/// renderer/material/fast_math.h - sine, cosine and powers without branches or tables, so that the compiler works
+/// base/fast_math.h - sine, cosine and powers without branches or tables, so that the compiler works
 /// on several lanes at a time. The same numbers in a lane as alone.
 #pragma once
 

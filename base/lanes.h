@@ -1,5 +1,5 @@
-/// renderer/geometry/lanes.h - sixteen rays side by side, laid out so that the compiler works on several of them
-/// with each instruction.
+/// base/lanes.h - sixteen rays or pixels side by side, laid out so that the compiler works on several of them with
+/// each instruction.
 #pragma once
 
 #include <array>

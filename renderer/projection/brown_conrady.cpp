@@ -1,0 +1,167 @@
+#include "renderer/projection/brown_conrady.h"
+
+#include <cmath>
+
+#include "base/each_isa.h"
+#include "base/lanes.h"
+
+namespace narpa {
+BrownConrady::Distorted BrownConrady::distort(double u, double v) const noexcept {
+    const double s = u * u + v * v, uv = u * v;
+    const double above = 1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3)),
+                 below = 1 + s * (c_.k4 + s * (c_.k5 + s * c_.k6));
+    const double L = above / below;
+    const double L_by_s =
+        (c_.k1 + s * (2 * c_.k2 + s * 3 * c_.k3) - L * (c_.k4 + s * (2 * c_.k5 + s * 3 * c_.k6))) / below;
+    const double prism_u = 2 * (c_.s1 + 2 * c_.s2 * s), prism_v = 2 * (c_.s3 + 2 * c_.s4 * s);  // by s, doubled
+    const double cross = 2 * (uv * L_by_s + c_.p1 * u + c_.p2 * v);
+    return {u * L + 2 * c_.p1 * uv + c_.p2 * (s + 2 * u * u) + s * (c_.s1 + s * c_.s2),
+            v * L + c_.p1 * (s + 2 * v * v) + 2 * c_.p2 * uv + s * (c_.s3 + s * c_.s4),
+            L + 2 * u * u * L_by_s + 2 * c_.p1 * v + 6 * c_.p2 * u + prism_u * u,
+            cross + prism_u * v,
+            cross + prism_v * u,
+            L + 2 * v * v * L_by_s + 6 * c_.p1 * v + 2 * c_.p2 * u + prism_v * v};
+}
+
+namespace {
+
+using Model = BrownConrady;
+
+/// Of tan(angle from the axis): 89 degrees.
+constexpr double kMostPlane = 57.3;
+/// From the table's start, 1e-3 off at most with strong tangential terms, each step squares the error.
+constexpr int kNewtonSteps = 5;
+/// Of a solution, in units of the plane z = 1.
+constexpr double kResidual = 1e-10;
+
+struct PlanePoint {
+    double u, v;
+};
+
+inline PlanePoint newton_step(const Model& m, const PlanePoint& wanted, const PlanePoint& p) noexcept {
+    const Model::Distorted d = m.distort(p.u, p.v);
+    const double du = d.u - wanted.u, dv = d.v - wanted.v, det = d.u_by_u * d.v_by_v - d.u_by_v * d.v_by_u;
+    return {p.u - (du * d.v_by_v - dv * d.u_by_v) / det, p.v - (dv * d.u_by_u - du * d.v_by_u) / det};
+}
+
+inline bool is_solution(const Model& m, const RadialInverse& inverse, const PlanePoint& wanted,
+                        const PlanePoint& p) noexcept {
+    const Model::Distorted d = m.distort(p.u, p.v);
+    const double most = inverse.most() * (1 + 1e-12);
+    return std::abs(d.u - wanted.u) + std::abs(d.v - wanted.v) < kResidual && p.u * p.u + p.v * p.v <= most * most;
+}
+
+inline PlanePoint start(const RadialInverse& inverse, const PlanePoint& wanted) noexcept {
+    const double ratio = inverse.ratio(std::sqrt(wanted.u * wanted.u + wanted.v * wanted.v));
+    return {ratio * wanted.u, ratio * wanted.v};
+}
+
+/// The point of the plane z = 1 that is seen at `wanted` of the distorted one; the start of the search, on or near
+/// the rim, where there is none.
+inline PlanePoint undistort(const Model& m, const RadialInverse& inverse, const PlanePoint& wanted) noexcept {
+    const PlanePoint begin = start(inverse, wanted);
+    PlanePoint p = begin;
+    for (int i = 0; i < kNewtonSteps; ++i) p = newton_step(m, wanted, p);
+    return is_solution(m, inverse, wanted, p) ? p : begin;
+}
+
+NARPA_EACH_ISA void directions_of(const Model& m, const Pinhole& pinhole, const RadialInverse& inverse,
+                                  const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                                  Vec3Lanes& out) noexcept {
+    Lanes<double> wanted_u, wanted_v, begin_u, begin_v, u, v;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 wanted = pinhole.on_plane({x[i], y[i]});
+        wanted_u[i] = wanted.x, wanted_v[i] = wanted.y;
+        const PlanePoint p = start(inverse, {wanted_u[i], wanted_v[i]});
+        u[i] = begin_u[i] = p.u, v[i] = begin_v[i] = p.v;
+    }
+    for (int k = 0; k < kNewtonSteps; ++k)
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            const PlanePoint p = newton_step(m, {wanted_u[i], wanted_v[i]}, {u[i], v[i]});
+            u[i] = p.u, v[i] = p.v;
+        }
+    Vec3Lanes direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const bool found = is_solution(m, inverse, {wanted_u[i], wanted_v[i]}, {u[i], v[i]});
+        const Vec3 d = q * normalized(Vec3{found ? u[i] : begin_u[i], found ? v[i] : begin_v[i], 1});
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    out = direction;
+}
+
+}  // namespace
+
+BrownConrady::BrownConrady(const Pinhole& pinhole, const Coefficients& coefficients)
+    : pinhole_(pinhole),
+      c_(coefficients),
+      inverse_(
+          kMostPlane, [&](double r) { return radius(r); }, [&](double r) { return slope(r); }) {}
+
+double BrownConrady::radius(double r) const noexcept {
+    const double s = r * r;
+    return r * (1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3))) / (1 + s * (c_.k4 + s * (c_.k5 + s * c_.k6)));
+}
+
+/// 0 from the first pole on.
+double BrownConrady::slope(double r) const noexcept {
+    const double s = r * r;
+    const double above = 1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3)),
+                 below = 1 + s * (c_.k4 + s * (c_.k5 + s * c_.k6));
+    if (!(below > 0)) return 0;
+    const double above_by_s = c_.k1 + s * (2 * c_.k2 + s * 3 * c_.k3),
+                 below_by_s = c_.k4 + s * (2 * c_.k5 + s * 3 * c_.k6);
+    return above / below + 2 * s * (above_by_s * below - above * below_by_s) / (below * below);
+}
+
+Vec3 BrownConrady::on_plane(const ImagePoint& p) const noexcept {
+    const Vec3 wanted = pinhole_.on_plane(p);
+    const auto [u, v] = undistort(*this, inverse_, {wanted.x, wanted.y});
+    return {u, v, 1};
+}
+
+void BrownConrady::directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                              Vec3Lanes& out) const noexcept {
+    directions_of(*this, pinhole_, inverse_, q, x, y, out);
+}
+
+std::optional<ImagePoint> BrownConrady::project(const Vec3& p) const noexcept {
+    if (!(p.z > 0)) return std::nullopt;
+    const double u = p.x / p.z, v = p.y / p.z;
+    if (!(std::hypot(u, v) <= inverse_.most())) return std::nullopt;
+    const Distorted d = distort(u, v);
+    if (!(std::hypot(d.u, d.v) <= inverse_.most_distorted())) return std::nullopt;
+    return pinhole_.of_plane(d.u, d.v);
+}
+
+ProjectionJacobian BrownConrady::jacobian(const Vec3& p) const noexcept {
+    const double u = p.x / p.z, v = p.y / p.z;
+    const Distorted d = distort(u, v);
+    const auto gradient = [&](double by_u, double by_v) { return Vec3{by_u, by_v, -u * by_u - v * by_v} / p.z; };
+    return {pinhole_.fx * gradient(d.u_by_u, d.u_by_v), pinhole_.fy * gradient(d.v_by_u, d.v_by_v)};
+}
+
+bool BrownConrady::sees(const ImagePoint& p) const noexcept {
+    const Vec3 wanted = pinhole_.on_plane(p);
+    if (!(std::hypot(wanted.x, wanted.y) <= inverse_.most_distorted())) return false;
+    const auto [u, v] = undistort(*this, inverse_, {wanted.x, wanted.y});
+    return is_solution(*this, inverse_, {wanted.x, wanted.y}, {u, v});
+}
+
+DirectionCone BrownConrady::bounds(const ImageRect& rect) const noexcept {
+    return cone_about_border(*this, rect);
+}
+
+std::shared_ptr<const CameraModel> BrownConrady::scaled(double x, double y) const {
+    return std::make_shared<BrownConrady>(pinhole_.with_scale(x, y), c_);
+}
+std::shared_ptr<const CameraModel> BrownConrady::windowed(double x, double y) const {
+    return std::make_shared<BrownConrady>(pinhole_.with_origin(x, y), c_);
+}
+
+bool BrownConrady::is_valid() const noexcept {
+    for (const double c : {c_.k1, c_.k2, c_.k3, c_.k4, c_.k5, c_.k6, c_.p1, c_.p2, c_.s1, c_.s2, c_.s3, c_.s4})
+        if (!std::isfinite(c)) return false;
+    return pinhole_.is_valid() && inverse_.most() > 0;
+}
+
+}  // namespace narpa

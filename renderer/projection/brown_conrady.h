@@ -1,0 +1,57 @@
+/// renderer/projection/brown_conrady.h - the pinhole behind a lens that distorts, as OpenCV's calib3d defines it.
+///
+/// Of a point (X, Y, Z), Z > 0, in camera axes: u = X / Z, v = Y / Z, r^2 = u^2 + v^2,
+///
+///     L  = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
+///     u' = u L + 2 p1 u v + p2 (r^2 + 2 u^2) + s1 r^2 + s2 r^4
+///     v' = v L + p1 (r^2 + 2 v^2) + 2 p2 u v + s3 r^2 + s4 r^4
+///     x  = cx + fx u',  y = cy + fy v'.
+///
+/// Sources: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971), radial and
+/// tangential terms; J. Weng et al., "Camera calibration with distortion models and accuracy evaluation", IEEE PAMI
+/// 14 (1992), thin prism; OpenCV's documentation for the order and the rational form.
+#pragma once
+
+#include "renderer/projection/pinhole.h"
+#include "renderer/projection/radial_inverse.h"
+
+namespace narpa {
+
+/// Where r L no longer grows with r the image would fold over: nothing is seen beyond.
+class BrownConrady final : public CameraModel {
+public:
+    struct Coefficients {
+        double k1 = 0, k2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0, p1 = 0, p2 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0;
+    };
+    BrownConrady(const Pinhole& pinhole, const Coefficients& coefficients);
+
+    /// By Newton's method: exact to rounding where `sees` is true, the direction of the rim beyond.
+    [[nodiscard]] Vec3 direction(const ImagePoint& p) const noexcept override { return normalized(on_plane(p)); }
+    [[nodiscard]] Vec3 on_plane(const ImagePoint& p) const noexcept override;
+    void directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                    Vec3Lanes& out) const noexcept override;
+    [[nodiscard]] std::optional<ImagePoint> project(const Vec3& point) const noexcept override;
+    [[nodiscard]] ProjectionJacobian jacobian(const Vec3& point) const noexcept override;
+    [[nodiscard]] bool sees(const ImagePoint& p) const noexcept override;
+    [[nodiscard]] double pixels_per_radian() const noexcept override { return pinhole_.fx; }
+    [[nodiscard]] DirectionCone bounds(const ImageRect& rect) const noexcept override;
+    [[nodiscard]] std::shared_ptr<const CameraModel> scaled(double x, double y) const override;
+    [[nodiscard]] std::shared_ptr<const CameraModel> windowed(double x, double y) const override;
+    [[nodiscard]] bool is_valid() const noexcept override;
+
+    /// A point of the plane z = 1 and its image there, with the derivatives of the one by the other.
+    struct Distorted {
+        double u, v, u_by_u, u_by_v, v_by_u, v_by_v;
+    };
+    [[nodiscard]] Distorted distort(double u, double v) const noexcept;
+
+private:
+    [[nodiscard]] double radius(double r) const noexcept;
+    [[nodiscard]] double slope(double r) const noexcept;
+
+    Pinhole pinhole_;
+    Coefficients c_;
+    RadialInverse inverse_;
+};
+
+}  // namespace narpa

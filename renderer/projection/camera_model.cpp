@@ -1,0 +1,50 @@
+#include "renderer/projection/camera_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace narpa {
+
+double largest_stretch(const ProjectionJacobian& J) noexcept {
+    const double xx = dot(J.x, J.x), yy = dot(J.y, J.y), xy = dot(J.x, J.y);
+    return std::sqrt(0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy));
+}
+
+void CameraModel::directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                             Vec3Lanes& out) const noexcept {
+    for (std::size_t i = 0; i < kLanes; ++i) out.put(i, q * direction({x[i], y[i]}));
+}
+
+double CameraModel::pixels_per_sr(const Vec3& d) const noexcept {
+    const auto [x, y] = jacobian(d);
+    return norm(cross(x, y));
+}
+
+/// Sixteen points of the border. Between two of them it strays from the nearer one by half their distance, and a
+/// little more where it is curved. The interior lies within: where the camera sees, directions do not fold.
+DirectionCone cone_about_border(const CameraModel& model, const ImageRect& r) noexcept {
+    constexpr double kStray = 0.6;
+    constexpr std::size_t kPerEdge = kLanes / 4;
+    Lanes<double> x, y;
+    for (std::size_t i = 0; i < kPerEdge; ++i) {
+        const double part = static_cast<double>(i) / kPerEdge;
+        const double along_x = part * (r.x_high - r.x_low), along_y = part * (r.y_high - r.y_low);
+        x[i] = r.x_low + along_x, y[i] = r.y_low;
+        x[kPerEdge + i] = r.x_high, y[kPerEdge + i] = r.y_low + along_y;
+        x[2 * kPerEdge + i] = r.x_high - along_x, y[2 * kPerEdge + i] = r.y_high;
+        x[3 * kPerEdge + i] = r.x_low, y[3 * kPerEdge + i] = r.y_high - along_y;
+    }
+    Vec3Lanes border;
+    model.directions({}, x, y, border);
+    const auto angle = [](const Vec3& a, const Vec3& b) { return std::atan2(norm(cross(a, b)), dot(a, b)); };
+    DirectionCone cone{model.direction({0.5 * (r.x_low + r.x_high), 0.5 * (r.y_low + r.y_high)}), 0};
+    double widest = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        cone.half_angle_rad = std::max(cone.half_angle_rad, angle(cone.axis, border[i]));
+        widest = std::max(widest, angle(border[i], border[(i + 1) % kLanes]));
+    }
+    cone.half_angle_rad += kStray * widest;
+    return cone;
+}
+
+}  // namespace narpa

@@ -1,0 +1,89 @@
+/// renderer/projection/camera_model.h - which ray passes a point of the image, and where a point of the scene
+/// appears.
+///
+/// Camera axes: x right, y down, z forward, origin at the centre of projection, metres. Image points are in pixels;
+/// the centre of the top-left pixel is (0, 0), as in OpenCV, so that pixel (i, j) extends half a pixel to each
+/// side.
+///
+/// A new kind of camera is a class of its own, set as Camera::model: renderer, tile culling and estimator use this
+/// interface alone. Algorithms that need straight lines to stay straight ask for `pinhole()`.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "base/lanes.h"
+#include "base/pose.h"
+
+namespace narpa {
+
+struct ImagePoint {
+    double x = 0, y = 0;
+};
+
+/// A rectangle of the image, px. Pixels i .. j reach from i - 1/2 to j + 1/2.
+struct ImageRect {
+    double x_low = 0, y_low = 0, x_high = 0, y_high = 0;
+};
+
+/// All directions within an angle of its axis, camera axes.
+struct DirectionCone {
+    Vec3 axis{0, 0, 1};  ///< unit
+    double half_angle_rad = 0;
+};
+
+/// How the image point moves with the point of the scene: gradients of x and of y, px per metre, camera axes.
+struct ProjectionJacobian {
+    Vec3 x{}, y{};
+};
+/// The largest singular value: px that a point moves by at most, per metre.
+[[nodiscard]] double largest_stretch(const ProjectionJacobian& J) noexcept;
+
+class Pinhole;
+
+/// A central projection: all rays pass the origin of the camera's axes. Immutable.
+class CameraModel {
+public:
+    virtual ~CameraModel() = default;
+
+    /// Unit direction of the ray through an image point. Continues smoothly where the camera does not see.
+    [[nodiscard]] virtual Vec3 direction(const ImagePoint& p) const noexcept = 0;
+    /// The same of length z = 1, for rays with z > 0.
+    [[nodiscard]] virtual Vec3 on_plane(const ImagePoint& p) const noexcept {
+        const Vec3 d = direction(p);
+        return d / d.z;
+    }
+    /// Unit directions for a batch, in the axes that `q` turns camera axes into.
+    virtual void directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                            Vec3Lanes& out) const noexcept;
+    /// Where a point (camera axes; any length, so a direction as well) appears, on or off the detector. Nothing
+    /// where no ray comes from: of a pinhole z <= 0.
+    [[nodiscard]] virtual std::optional<ImagePoint> project(const Vec3& point) const noexcept = 0;
+    /// Of `project`, at a point that has an image.
+    [[nodiscard]] virtual ProjectionJacobian jacobian(const Vec3& point) const noexcept = 0;
+    /// Does light reach the detector there? False beyond the image circle of a lens: such pixels stay black.
+    [[nodiscard]] virtual bool sees(const ImagePoint&) const noexcept { return true; }
+
+    /// Image area per solid angle about a unit direction that has an image, px^2 sr^-1; 1 over it is the solid
+    /// angle of a pixel.
+    [[nodiscard]] virtual double pixels_per_sr(const Vec3& direction) const noexcept;
+    /// Along x at the centre of projection: 1 over it is the angular width of a pixel.
+    [[nodiscard]] virtual double pixels_per_radian() const noexcept = 0;
+    /// Holds the directions of all rays through a rectangle of the image.
+    [[nodiscard]] virtual DirectionCone bounds(const ImageRect& rect) const noexcept = 0;
+
+    /// Of an image with so many times the pixels along x and y over the same field of view.
+    [[nodiscard]] virtual std::shared_ptr<const CameraModel> scaled(double factor_x, double factor_y) const = 0;
+    /// Of the part of the image whose top-left pixel is (x, y).
+    [[nodiscard]] virtual std::shared_ptr<const CameraModel> windowed(double x, double y) const = 0;
+
+    /// Finite parameters that define a projection.
+    [[nodiscard]] virtual bool is_valid() const noexcept { return true; }
+    /// Itself if it is a pinhole, else null.
+    [[nodiscard]] virtual const Pinhole* pinhole() const noexcept { return nullptr; }
+};
+
+/// `bounds` of a model without a closed form: from directions along the border.
+[[nodiscard]] DirectionCone cone_about_border(const CameraModel& model, const ImageRect& rect) noexcept;
+
+}  // namespace narpa

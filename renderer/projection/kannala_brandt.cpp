@@ -1,0 +1,105 @@
+#include "renderer/projection/kannala_brandt.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "base/each_isa.h"
+#include "base/fast_math.h"
+#include "base/lanes.h"
+
+namespace narpa {
+double KannalaBrandt::radius(double theta) const noexcept {
+    const double s = theta * theta;
+    return theta * (1 + s * (c_.k1 + s * (c_.k2 + s * (c_.k3 + s * c_.k4))));
+}
+double KannalaBrandt::slope(double theta) const noexcept {
+    const double s = theta * theta;
+    return 1 + s * (3 * c_.k1 + s * (5 * c_.k2 + s * (7 * c_.k3 + s * 9 * c_.k4)));
+}
+
+namespace {
+
+/// At 180 degrees all points of a circle would be one direction.
+constexpr double kMostAngle_rad = 3.14;
+/// The table's start is 1e-5 off at most but for the last entries before a rim where the slope ends.
+constexpr int kNewtonSteps = 4;
+
+inline Vec3 direction_of(const KannalaBrandt& m, const RadialInverse& inverse, const Vec3& wanted) noexcept {
+    const double distorted = std::sqrt(wanted.x * wanted.x + wanted.y * wanted.y);
+    const double begin = distorted * inverse.ratio(distorted);
+    double theta = begin;
+    for (int i = 0; i < kNewtonSteps; ++i) theta = theta - (m.radius(theta) - distorted) / m.slope(theta);
+    const bool found = std::abs(m.radius(theta) - distorted) < 1e-10 && theta <= inverse.most() * (1 + 1e-12);
+    const SinCos at = sincos_of_turns((found ? theta : begin) * (0.5 / std::numbers::pi));
+    const double side = distorted > 0 ? at.sin / distorted : 0;
+    return {side * wanted.x, side * wanted.y, at.cos};
+}
+
+NARPA_EACH_ISA void directions_of(const KannalaBrandt& m, const Pinhole& pinhole, const RadialInverse& inverse,
+                                  const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                                  Vec3Lanes& out) noexcept {
+    Vec3Lanes direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 d = q * direction_of(m, inverse, pinhole.on_plane({x[i], y[i]}));
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    out = direction;
+}
+
+}  // namespace
+
+KannalaBrandt::KannalaBrandt(const Pinhole& pinhole, const Coefficients& coefficients)
+    : pinhole_(pinhole),
+      c_(coefficients),
+      inverse_(
+          kMostAngle_rad, [&](double t) { return radius(t); }, [&](double t) { return slope(t); }) {}
+
+Vec3 KannalaBrandt::direction(const ImagePoint& p) const noexcept {
+    return direction_of(*this, inverse_, pinhole_.on_plane(p));
+}
+
+void KannalaBrandt::directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
+                               Vec3Lanes& out) const noexcept {
+    directions_of(*this, pinhole_, inverse_, q, x, y, out);
+}
+
+std::optional<ImagePoint> KannalaBrandt::project(const Vec3& p) const noexcept {
+    const double side = std::hypot(p.x, p.y), theta = std::atan2(side, p.z);
+    if (!(theta <= inverse_.most()) || !(side > 0 || p.z > 0)) return std::nullopt;
+    const double k = side > 0 ? radius(theta) / side : 1 / p.z;
+    return pinhole_.of_plane(k * p.x, k * p.y);
+}
+
+ProjectionJacobian KannalaBrandt::jacobian(const Vec3& p) const noexcept {
+    const double fx = pinhole_.fx, fy = pinhole_.fy, side = std::hypot(p.x, p.y), square = dot(p, p);
+    if (side < 1e-9 * p.z) return {{fx / p.z, 0, 0}, {0, fy / p.z, 0}};
+    // theta' (X, Y) / side, with d theta = (Z X, Z Y, -side^2) / (side square).
+    const double theta = std::atan2(side, p.z), g = slope(theta), k = radius(theta) / side;
+    const double c = p.x / side, s = p.y / side, along = g * p.z / square;
+    return {fx * Vec3{along * c * c + k * s * s, (along - k) * c * s, -g * side * c / square},
+            fy * Vec3{(along - k) * c * s, along * s * s + k * c * c, -g * side * s / square}};
+}
+
+bool KannalaBrandt::sees(const ImagePoint& p) const noexcept {
+    const Vec3 wanted = pinhole_.on_plane(p);
+    return std::hypot(wanted.x, wanted.y) <= inverse_.most_distorted();
+}
+
+DirectionCone KannalaBrandt::bounds(const ImageRect& rect) const noexcept {
+    return cone_about_border(*this, rect);
+}
+
+std::shared_ptr<const CameraModel> KannalaBrandt::scaled(double x, double y) const {
+    return std::make_shared<KannalaBrandt>(pinhole_.with_scale(x, y), c_);
+}
+std::shared_ptr<const CameraModel> KannalaBrandt::windowed(double x, double y) const {
+    return std::make_shared<KannalaBrandt>(pinhole_.with_origin(x, y), c_);
+}
+
+bool KannalaBrandt::is_valid() const noexcept {
+    for (const double c : {c_.k1, c_.k2, c_.k3, c_.k4})
+        if (!std::isfinite(c)) return false;
+    return pinhole_.is_valid() && inverse_.most() > 0;
+}
+
+}  // namespace narpa

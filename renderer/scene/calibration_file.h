@@ -1,0 +1,26 @@
+/// renderer/scene/calibration_file.h - a camera's calibration as OpenCV and ROS keep it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/result.h"
+#include "renderer/projection/distortion.h"
+
+namespace narpa {
+
+struct Calibration {
+    int width = 0, height = 0;
+    Pinhole pinhole;
+    std::optional<Distortion> distortion;  ///< none where all coefficients are 0
+};
+
+/// YAML: `camera_info` of ROS (`distortion_model` is plumb_bob, rational_polynomial, equidistant or fisheye) and
+/// what OpenCV's calibration samples write (`fisheye_model`). Read are image_width, image_height, camera_matrix and
+/// distortion_coefficients; rectification and projection are not. Errors name the file and the line.
+[[nodiscard]] Result<Calibration> read_calibration(const std::string& file);
+
+/// The same, as a file that both read.
+[[nodiscard]] std::string calibration_text(const std::string& camera_name, const Calibration& calibration);
+
+}  // namespace narpa

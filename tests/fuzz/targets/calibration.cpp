@@ -1,0 +1,19 @@
+// A camera's calibration in YAML.
+#include "renderer/scene/calibration_file.h"
+#include "tests/fuzz/fuzz.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    using namespace narpa;
+    static const fuzz::InputFolder folder;
+    const auto calibration = read_calibration(folder.write("c.yaml", fuzz::text_of(data, size)));
+    if (!fuzz::count(bool(calibration)))
+        return fuzz::require(!calibration.error().what.empty(), "an error has words"), 0;
+    fuzz::require(calibration->width > 0 && calibration->height > 0 && calibration->pinhole.is_valid(),
+                  "it is valid");
+    if (!calibration->distortion) return 0;
+    const auto model = distorted(calibration->pinhole, *calibration->distortion);
+    fuzz::require(model != nullptr, "a distortion has a model");
+    const Vec3 d = model->direction({0.5 * calibration->width, 0.25 * calibration->height});
+    fuzz::require(std::abs(norm(d) - 1) < 1e-9 || !model->is_valid(), "directions are unit");
+    return 0;
+}

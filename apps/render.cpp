@@ -39,10 +39,11 @@ Status override_scene(const RenderOptions& o, Scene& scene, Camera& camera) {
     if (o.max_depth) scene.render.max_depth = *o.max_depth;
     if (!o.format.empty()) {
         const auto format = pixel_format_from(o.format);
-        if (!format) return Error{fmt::format("--format {}, expected GREY, Y16, YUYV or RGB24", o.format)};
-        if (*format == PixelFormat::yuyv && camera.width % 2 != 0)
+        if (!format)
             return Error{
-                fmt::format("--format YUYV needs an even width, camera \"{}\" has {}", camera.name, camera.width)};
+                fmt::format("--format {}, expected one of {}", o.format, fmt::join(kPixelFormatNames, ", "))};
+        if (const std::string what = unfit_size(*format, camera.width, camera.height); !what.empty())
+            return Error{fmt::format("camera \"{}\": --format {}", camera.name, what)};
         camera.format = *format;
     }
     return o.pose.place(scene);
@@ -179,7 +180,8 @@ Command add_render(Parser app) {
     c.option("--time", o->time_s, "Simulation time (default: frame / rate)").type_name("SECONDS").range(-9e9, 9e9);
     c.option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
     o->pose.add_to(c);
-    c.option("--format", o->format, "GREY, Y16, YUYV or RGB24 instead of the scene's").type_name("FORMAT");
+    c.option("--format", o->format, "GREY, Y16, YUYV, RGB24, RGGB8, RGGB16 ... instead of the scene's")
+        .type_name("FORMAT");
     o->budget.add_to(c);
     c.option("--method", o->method, "direct: light from its sources only; path: all light")
         .one_of({"direct", "path"});

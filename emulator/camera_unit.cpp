@@ -16,9 +16,8 @@ double full_scale_radiance(const Camera& camera) noexcept {
     const Detector& d = *camera.detector;
     double electrons = 0;
     for (int band = 0; band < 3; ++band) electrons += electrons_per_radiance(d, band);
-    const bool mono = camera.format == PixelFormat::grey || camera.format == PixelFormat::y16;
     const double top_e = gain_e_per_dn(d) * (std::exp2(d.bits) - 1 - d.black_level_dn);
-    return std::min(d.full_well_e, top_e) / (mono ? electrons : electrons / 3);
+    return std::min(d.full_well_e, top_e) / (is_mono(camera.format) ? electrons : electrons / 3);
 }
 
 CameraUnit::CameraUnit(const World& world, std::size_t index)
@@ -29,6 +28,7 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
       placement_(world.scene().bodies.size()),
       motions_(world.scene().bodies.size()),
       renderer_(world.render_scene(), camera_),
+      sensor_array_(SensorArray::create(camera_, world.scene().render.seed)),
       radiance_(camera_.width, camera_.height),
       bytes_(frame_bytes(format())) {}
 
@@ -89,7 +89,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     // The allowance includes the time by which the renderer stopped late.
     if (settings.budget.kind == FrameBudget::Kind::time)
         t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
-    narpa::expose(camera_, radiance_, render.seed, frame, bytes_);
+    narpa::expose(camera_, radiance_, render.seed, frame, bytes_, sensor_array_.get());
     durations_.sensor_ns = monotonic_ns() - lit_ns;
 
     FrameLedger ledger;

@@ -10,6 +10,7 @@
 
 #include "emulator/world.h"
 #include "protocols/ledger.h"
+#include "renderer/camera/sensor_array.h"
 #include "renderer/film/camera_image.h"
 
 namespace narpa {
@@ -82,6 +83,7 @@ private:
     BodyPoses placement_;
     std::vector<Motion> motions_;
     CameraRenderer renderer_;
+    std::unique_ptr<SensorArray> sensor_array_;  ///< null where the scene names none
     RadianceImage radiance_;
     Allowance allowance_;
     FrameDurations durations_;

@@ -102,8 +102,8 @@ Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const 
                                                    WhenFull full) {
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"video: width, height and frame period must be positive"};
-    if (format.pixel == PixelFormat::yuyv && format.width % 2 != 0)
-        return Error{"video: YUYV needs an even width, not " + std::to_string(format.width)};
+    if (const std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())
+        return Error{"video: " + what};
     try {
         return open_by_kind(std::string(spec), format, full);
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left

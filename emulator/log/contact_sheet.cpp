@@ -16,14 +16,22 @@ constexpr int kThumbnailWidth = 320;
 
 /// Blue, green, red of one pixel, 0..255, as the format carries them.
 std::array<int, 3> pixel(const VideoFormat& f, std::span<const std::uint8_t> bytes, int x, int y) {
-    const std::size_t i =
-        (static_cast<std::size_t>(y) * static_cast<std::size_t>(f.width) + static_cast<std::size_t>(x)) *
-        bytes_per_pixel(f.pixel);
-    switch (f.pixel) {
-        case PixelFormat::grey: return {bytes[i], bytes[i], bytes[i]};
-        case PixelFormat::y16: return {bytes[i + 1], bytes[i + 1], bytes[i + 1]};
-        case PixelFormat::rgb24: return {bytes[i + 2], bytes[i + 1], bytes[i]};
-        case PixelFormat::yuyv: break;
+    const std::size_t size = bytes_per_pixel(f.pixel);
+    const auto at = [&](int column, int row) {
+        return (static_cast<std::size_t>(row) * static_cast<std::size_t>(f.width) +
+                static_cast<std::size_t>(column)) *
+               size;
+    };
+    const std::size_t i = at(x, y), high = is_16_bit(f.pixel) ? 1 : 0;
+    if (is_mono(f.pixel)) return {bytes[i + high], bytes[i + high], bytes[i + high]};
+    if (f.pixel == PixelFormat::rgb24) return {bytes[i + 2], bytes[i + 1], bytes[i]};
+    if (is_bayer(f.pixel)) {  // the colour of its 2 x 2 pixels
+        std::array<int, 3> sum{};
+        for (int k = 0; k < 4; ++k) {
+            const int column = (x & ~1) + k % 2, row = (y & ~1) + k / 2;
+            sum[2 - bayer_band(f.pixel, column, row)] += bytes[at(column, row) + high];
+        }
+        return {sum[0], sum[1] / 2, sum[2]};
     }
     const std::size_t pair = i & ~std::size_t{3};  // Y0 U Y1 V; BT.601 limited range
     const double luma = 1.164 * (bytes[i] - 16), u = bytes[pair + 1] - 128.0, v = bytes[pair + 3] - 128.0;

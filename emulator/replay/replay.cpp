@@ -59,6 +59,7 @@ Replay::Replay(std::unique_ptr<World> world, std::size_t camera_index)
       index_(static_cast<std::uint8_t>(camera_index)),
       full_scale_(full_scale_radiance(camera_)),
       renderer_(world_->render_scene(), camera_),
+      sensor_array_(SensorArray::create(camera_, world_->scene().render.seed)),
       picture_(camera_.width, camera_.height),
       reference_(camera_.width, camera_.height),
       bytes_(frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns})) {}
@@ -121,7 +122,7 @@ std::vector<std::string> Replay::make(std::size_t i) {
     if (l.expected_error >= 0)
         expect_same("expected_error", static_cast<float>(account.standard_error / full_scale_), l.expected_error,
                     differs);
-    expose(camera_, picture_, settings.seed, l.frame, bytes_);
+    expose(camera_, picture_, settings.seed, l.frame, bytes_, sensor_array_.get());
     if (has_image(i) && !bytes_repeat(logged))
         differs.push_back(
             fmt::format("image_crc32: {:08x}, logged {:08x}", image_crc32(bytes_), logged.image_crc32));

@@ -12,6 +12,7 @@
 #include "emulator/log/ledger_log.h"
 #include "emulator/replay/image_compare.h"
 #include "emulator/world.h"
+#include "renderer/camera/sensor_array.h"
 
 namespace narpa {
 
@@ -69,6 +70,7 @@ private:
     std::vector<LoggedFrame> frames_;
     std::vector<BodyPoses> placements_;
     CameraRenderer renderer_;
+    std::unique_ptr<SensorArray> sensor_array_;
     RadianceImage picture_, reference_;
     std::vector<std::uint8_t> bytes_;
     std::size_t made_ = 0;  ///< the frame that `picture_` shows

@@ -12,34 +12,43 @@ namespace {
 
 /// Weights by which the bands' digital numbers are averaged; monochrome formats add the bands before conversion.
 std::array<double, 3> band_weights(PixelFormat format) {
-    switch (format) {
-        case PixelFormat::grey:
-        case PixelFormat::y16: return {1, 1, 1};
-        case PixelFormat::rgb24: return {1.0 / 3, 1.0 / 3, 1.0 / 3};
-        case PixelFormat::yuyv: return {0.299, 0.587, 0.114};  // BT.601
-    }
+    if (format == PixelFormat::rgb24) return {1.0 / 3, 1.0 / 3, 1.0 / 3};
+    if (format == PixelFormat::yuyv) return {0.299, 0.587, 0.114};  // BT.601
+    if (is_bayer(format)) return {0.25, 0.5, 0.25};                 // without_mosaic
     return {1, 1, 1};
-}
-
-bool one_pixel_for_all_bands(PixelFormat format) {
-    return format == PixelFormat::grey || format == PixelFormat::y16;
 }
 
 int converter_bits(const Camera& camera) {
     if (camera.detector) return camera.detector->bits;
-    return camera.format == PixelFormat::y16 ? 16 : 8;
+    return is_16_bit(camera.format) ? 16 : 8;
 }
 
 /// DN between neighbouring values of the format.
 double step_dn(const Camera& camera) {
     const double eight_bits = std::exp2(converter_bits(camera) - 8);
-    switch (camera.format) {
-        case PixelFormat::y16: return 1;
-        case PixelFormat::yuyv: return eight_bits * 255.0 / 219.0;  // luma 16 .. 235
-        case PixelFormat::grey:
-        case PixelFormat::rgb24: return eight_bits;
-    }
-    return 1;
+    if (camera.format == PixelFormat::yuyv) return eight_bits * 255.0 / 219.0;  // luma 16 .. 235
+    return is_16_bit(camera.format) ? 1 : eight_bits;
+}
+
+/// Each pixel becomes the mean of its neighbourhood with the weights [1 2 1] x [1 2 1] / 16, which has a quarter of
+/// red, half of green and a quarter of blue wherever it stands. The image is mirrored at its edges, which keeps the
+/// bands' places.
+void without_mosaic(MeasuredImage& image) {
+    const std::vector<float> mosaic = image.dn;
+    const auto inside = [](int i, int size) {
+        return std::clamp(i < 0 ? -i : i >= size ? 2 * size - 2 - i : i, 0, size - 1);
+    };
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            float sum = 0;
+            for (int dy = -1; dy <= 1; ++dy)
+                for (int dx = -1; dx <= 1; ++dx) {
+                    const int weight = (2 - std::abs(dx)) * (2 - std::abs(dy));
+                    const int from = inside(y + dy, image.height) * image.width + inside(x + dx, image.width);
+                    sum += static_cast<float>(weight) * mosaic[static_cast<std::size_t>(from)];
+                }
+            image.dn[static_cast<std::size_t>(y * image.width + x)] = sum / 16;
+        }
 }
 
 }  // namespace
@@ -50,7 +59,8 @@ double SensorModel::dn(const Rgb& L) const {
 }
 
 double SensorModel::variance_dn2(double expected_dn) const {
-    return read_dn2 + shot_dn * std::max(0.0, expected_dn - black_dn) + rounding_dn2;
+    const double signal = std::max(0.0, expected_dn - black_dn);
+    return read_dn2 + shot_dn * signal + prnu2 * signal * signal + rounding_dn2;
 }
 
 SensorModel sensor_model(const Camera& camera) {
@@ -60,7 +70,7 @@ SensorModel sensor_model(const Camera& camera) {
     const double step = step_dn(camera);
     s.rounding_dn2 = step * step / 12;
     if (!camera.detector) {
-        const double share = one_pixel_for_all_bands(camera.format) ? 1.0 / 3 : 1.0;
+        const double share = is_mono(camera.format) ? 1.0 / 3 : 1.0;
         for (std::size_t b = 0; b < 3; ++b)
             s.dn_per_radiance[b] = weights[b] * share * converter_top / camera.white_radiance;
         s.top_dn = converter_top;
@@ -69,20 +79,23 @@ SensorModel sensor_model(const Camera& camera) {
     const Detector& d = *camera.detector;
     const double dn_per_e = 1 / gain_e_per_dn(d);
     double squares = 1;  // of the weights of numbers whose noise is independent
-    if (!one_pixel_for_all_bands(camera.format))
+    if (camera.format == PixelFormat::rgb24 || camera.format == PixelFormat::yuyv)
         squares = weights[0] * weights[0] + weights[1] * weights[1] + weights[2] * weights[2];
     for (int b = 0; b < 3; ++b) {
         const auto i = static_cast<std::size_t>(b);
         s.dn_per_radiance[i] = weights[i] * electrons_per_radiance(d, b) * dn_per_e;
     }
-    s.black_dn = d.black_level_dn;
+    const double dark_e = dark_electrons(d);
+    s.black_dn = d.black_level_dn + dark_e * dn_per_e;
     s.rounding_dn2 *= camera.format == PixelFormat::rgb24 ? squares : 1;
     s.top_dn = std::min(converter_top, std::floor(d.black_level_dn + d.full_well_e * dn_per_e + 0.5));
-    if (camera.format != PixelFormat::y16) {  // what its truncated bytes stand for
+    if (!is_16_bit(camera.format)) {  // what its truncated bytes stand for
         const double byte = std::exp2(converter_bits(camera) - 8);
         s.top_dn = std::floor(s.top_dn / byte) * byte + 0.5 * (byte - 1);
     }
-    s.read_dn2 = squares * d.read_noise_e * d.read_noise_e * dn_per_e * dn_per_e;
+    const double dark_e2 = d.read_noise_e * d.read_noise_e + d.dsnu_e * d.dsnu_e + (d.shot_noise ? dark_e : 0);
+    s.read_dn2 = squares * dark_e2 * dn_per_e * dn_per_e;
+    s.prnu2 = squares * d.prnu * d.prnu;
     s.shot_dn = d.shot_noise ? squares * dn_per_e : 0;
     return s;
 }
@@ -100,16 +113,17 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
     const double step = std::exp2(bits - 8), middle = (step - 1) / 2;
     for (std::size_t i = 0; i < image.dn.size(); ++i) {
         double dn = 0;
-        switch (camera.format) {
-            case PixelFormat::y16: dn = (bytes[2 * i] | bytes[2 * i + 1] << 8) >> (16 - bits); break;
-            case PixelFormat::grey: dn = bytes[i] * step + middle; break;
-            case PixelFormat::rgb24:
-                dn = (bytes[3 * i] + bytes[3 * i + 1] + bytes[3 * i + 2]) / 3.0 * step + middle;
-                break;
-            case PixelFormat::yuyv: dn = (bytes[2 * i] - 16) * (255.0 / 219.0) * step + middle; break;
-        }
+        if (camera.format == PixelFormat::rgb24)
+            dn = (bytes[3 * i] + bytes[3 * i + 1] + bytes[3 * i + 2]) / 3.0 * step + middle;
+        else if (camera.format == PixelFormat::yuyv)
+            dn = (bytes[2 * i] - 16) * (255.0 / 219.0) * step + middle;
+        else if (is_16_bit(camera.format))
+            dn = (bytes[2 * i] | bytes[2 * i + 1] << 8) >> (16 - bits);
+        else
+            dn = bytes[i] * step + middle;
         image.dn[i] = static_cast<float>(dn);
     }
+    if (is_bayer(camera.format)) without_mosaic(image);
     return image;
 }
 

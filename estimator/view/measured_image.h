@@ -27,17 +27,21 @@ struct MeasuredImage {
 /// of an ideal sensor without one. In DN of the converter, whatever bits of it the format keeps.
 struct SensorModel {
     std::array<double, 3> dn_per_radiance{};  ///< DN per W m^-2 sr^-1 in the red, green, blue band
-    double black_dn = 0;
-    double top_dn = 255;      ///< what a pixel cannot exceed: full well or the end of the converter
-    double read_dn2 = 0;      ///< variance of the read noise
-    double shot_dn = 0;       ///< variance per DN above black; 0: no shot noise
-    double rounding_dn2 = 0;  ///< variance of rounding to the format's step: step^2 / 12
+    double black_dn = 0;                      ///< without light: the black level and the mean dark current
+    double top_dn = 255;                      ///< what a pixel cannot exceed: full well or the end of the converter
+    double read_dn2 = 0;                      ///< variance without light: read noise, dark current, DSNU
+    double shot_dn = 0;                       ///< variance per DN above black; 0: no shot noise
+    double prnu2 = 0;                         ///< variance per square of the DN above black
+    double rounding_dn2 = 0;                  ///< variance of rounding to the format's step: step^2 / 12
 
     [[nodiscard]] double dn(const Rgb& radiance) const;  ///< expected, at most top_dn
     [[nodiscard]] double variance_dn2(double expected_dn) const;
 };
 
-/// RGB24 is read as the mean of its bands, YUYV as its luma.
+/// RGB24 is read as the mean of its bands, YUYV as its luma. Of a Bayer mosaic each pixel is the weighted mean of
+/// 3 x 3, a quarter of red and blue and half of green; their noise is correlated, and the variance is that of white
+/// noise with the same mean over many pixels. Hot, dead and blinking pixels, cosmic rays and blooming are not in
+/// it.
 [[nodiscard]] SensorModel sensor_model(const Camera& camera);
 
 /// A frame's bytes in the camera's format (renderer/camera/detector.h) as DN. Of a camera with an embedded line the

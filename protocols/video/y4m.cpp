@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
+#include <utility>
 
 #include "base/time.h"
 
@@ -14,9 +15,8 @@ std::string_view colour_space(PixelFormat pixel) {
         case PixelFormat::grey: return "mono";
         case PixelFormat::y16: return "mono16";
         case PixelFormat::yuyv: return "422";
-        case PixelFormat::rgb24: break;
+        default: return {};
     }
-    return {};
 }
 
 /// The value of a header's tag, such as the 640 of W640; empty without one.
@@ -51,8 +51,8 @@ Result<std::string> y4m_stream_header(const VideoFormat& format) {
         return Error{"Y4M cannot hold " + std::string(name(format.pixel)) + " frames; it holds GREY, Y16 and YUYV"};
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"Y4M needs a positive width, height and frame period"};
-    if (format.pixel == PixelFormat::yuyv && format.width % 2 != 0)
-        return Error{"YUYV needs an even width, not " + std::to_string(format.width)};
+    if (std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())
+        return Error{std::move(what)};
     const std::int64_t common = std::gcd(kSecond_ns, format.period_ns);
     return "YUV4MPEG2 W" + std::to_string(format.width) + " H" + std::to_string(format.height) + " F" +
            std::to_string(kSecond_ns / common) + ":" + std::to_string(format.period_ns / common) + " Ip A1:1 C" +

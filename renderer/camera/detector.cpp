@@ -1,8 +1,5 @@
 #include "renderer/camera/detector.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,16 +7,20 @@
 
 #include "base/each_isa.h"
 #include "renderer/camera/digitise.h"
+#include "renderer/camera/pixel_tasks.h"
+#include "renderer/camera/sensor_array.h"
 #include "renderer/camera/solar_bands.h"
 
 namespace narpa {
 namespace {
 
-constexpr std::size_t kPixelsPerTask = 1024 * kLanes;
-
 NARPA_EACH_ISA void write(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
                           std::size_t first_pixel, std::uint8_t* out) noexcept {
     write_pixels(sensor, format, radiance, first_pixel, out);
+}
+NARPA_EACH_ISA void write_mosaic(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
+                                 std::size_t first_pixel, std::uint8_t* out) noexcept {
+    write_mosaic_pixels(sensor, format, radiance, first_pixel, out);
 }
 
 void set_detector(const Detector& d, DetectorConstants& s) {
@@ -35,10 +36,17 @@ void set_detector(const Detector& d, DetectorConstants& s) {
 
 /// No noise, as many bits as the format has, white_radiance at full scale.
 void set_ideal(const Camera& c, DetectorConstants& s) {
-    s.bits = c.format == PixelFormat::y16 ? 16 : 8;
+    s.bits = is_16_bit(c.format) ? 16 : 8;
     s.electrons_per_radiance.fill((is_mono(c.format) ? 1.0 / 3 : 1.0) / c.white_radiance);
     s.full_well_e = std::numeric_limits<double>::infinity();
     s.dn_per_e = (1 << s.bits) - 1;
+}
+
+void set_mosaic(const Camera& c, DetectorConstants& s) {
+    s.rows_per_pixel = 1.0 / c.width;
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < static_cast<int>(kLanes); ++x)
+            s.mosaic[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = bayer_band(c.format, x, y);
 }
 
 }  // namespace
@@ -60,6 +68,7 @@ DetectorConstants detector_constants(const Camera& c, std::uint64_t seed, std::u
     s.dark = DarkLevels(s.black_dn, s.read_noise_e * s.dn_per_e, s.top_dn);
     s.frame = frame;
     s.random = PhiloxSchedule(seed);
+    if (is_bayer(c.format)) set_mosaic(c, s);
     return s;
 }
 
@@ -74,20 +83,28 @@ double gain_e_per_dn(const Detector& d) noexcept {
     return d.gain_e_per_dn > 0 ? d.gain_e_per_dn : d.full_well_e / (std::exp2(d.bits) - 1 - d.black_level_dn);
 }
 
+double dark_seconds(const Detector& d) noexcept {
+    return d.exposure_s * std::exp2((d.temperature_c - d.dark_reference_c) / d.dark_doubling_c);
+}
+
+double dark_electrons(const Detector& d) noexcept {
+    return d.dark_current_e_s * dark_seconds(d);
+}
+
 void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
-            std::span<std::uint8_t> out) noexcept {
+            std::span<std::uint8_t> out, SensorArray* array) noexcept {
+    if (array != nullptr) return array->expose(camera, radiance, seed, frame, out);
     const DetectorConstants sensor = detector_constants(camera, seed, frame);
-    const std::span<const Rgb> pixels = radiance.pixels;
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, (pixels.size() + kPixelsPerTask - 1) / kPixelsPerTask),
-        [&](const tbb::blocked_range<std::size_t>& tasks) {
-            for (std::size_t task = tasks.begin(); task != tasks.end(); ++task) {
-                const std::size_t first = task * kPixelsPerTask;
-                write(sensor, camera.format, pixels.subspan(first, std::min(kPixelsPerTask, pixels.size() - first)),
-                      first, out.data() + first * bytes_per_pixel(camera.format));
-            }
-        },
-        tbb::simple_partitioner());
+    for_each_task(radiance.pixels, [&](std::size_t first, std::span<const Rgb> part) {
+        std::uint8_t* const bytes = out.data() + first * bytes_per_pixel(camera.format);
+        is_bayer(camera.format) ? write_mosaic(sensor, camera.format, part, first, bytes)
+                                : write(sensor, camera.format, part, first, bytes);
+    });
+}
+
+void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
+            std::span<std::uint8_t> out) {
+    expose(camera, radiance, seed, frame, out, SensorArray::create(camera, seed).get());
 }
 
 }  // namespace narpa

@@ -28,15 +28,13 @@ struct DetectorConstants {
     int bits = 8;
     bool shot_noise = false;
     std::uint32_t frame = 0;
+    double rows_per_pixel = 0;                     ///< 1 / the image's width
+    std::array<Lanes<std::uint32_t>, 2> mosaic{};  ///< Bayer: bands of kLanes pixels of an even and of an odd row
     PhiloxSchedule random{0};
     DarkLevels dark;
 };
 [[nodiscard]] DetectorConstants detector_constants(const Camera& camera, std::uint64_t seed,
                                                    std::uint32_t frame) noexcept;
-
-inline bool is_mono(PixelFormat f) noexcept {
-    return f == PixelFormat::grey || f == PixelFormat::y16;
-}
 
 using DnLanes = Lanes<std::uint32_t>;
 
@@ -143,7 +141,38 @@ inline bool is_black(const Rgb* radiance) noexcept {
     return any == 0;
 }
 
-/// DN of each band; monochrome pixels use the first.
+/// How many photosites a pixel has: one, or one for each band.
+inline std::uint32_t sites_per_pixel(PixelFormat f) noexcept {
+    return f == PixelFormat::rgb24 || f == PixelFormat::yuyv ? 3 : 1;
+}
+
+/// Mean of the electrons that light releases in kLanes pixels: of each band, or of all bands in the first.
+inline void mean_electrons(const DetectorConstants& sensor, bool mono, const Rgb* radiance,
+                           std::array<Lanes<double>, 3>& mean_e) noexcept {
+    const RgbLanes l = load_radiance(sensor, radiance);
+    const auto [red, green, blue] = sensor.electrons_per_radiance;
+    for (std::size_t i = 0; i < kLanes; ++i) mean_e[0][i] = red * static_cast<double>(l.r[i]);
+    for (std::size_t i = 0; i < kLanes; ++i) mean_e[1][i] = green * static_cast<double>(l.g[i]);
+    for (std::size_t i = 0; i < kLanes; ++i) mean_e[2][i] = blue * static_cast<double>(l.b[i]);
+    if (mono)
+        for (std::size_t i = 0; i < kLanes; ++i) mean_e[0][i] = mean_e[0][i] + mean_e[1][i] + mean_e[2][i];
+}
+
+/// Of pixels of a Bayer mosaic: the bands that their places have, in the first. The image's width is even, so a
+/// pixel's column is even where its lane is.
+inline void mosaic_electrons(const DetectorConstants& sensor, const Rgb* radiance, std::uint32_t first_pixel,
+                             std::array<Lanes<double>, 3>& mean_e) noexcept {
+    mean_electrons(sensor, false, radiance, mean_e);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        // The product is at least half a pixel's share of a row from the next whole number.
+        const double pixel = static_cast<double>(static_cast<std::int32_t>(first_pixel + i)) + 0.5;
+        const bool odd = (static_cast<std::int32_t>(pixel * sensor.rows_per_pixel) & 1) != 0;
+        const std::uint32_t band = odd ? sensor.mosaic[1][i] : sensor.mosaic[0][i];
+        mean_e[0][i] = band == 0 ? mean_e[0][i] : band == 1 ? mean_e[1][i] : mean_e[2][i];
+    }
+}
+
+/// DN of each photosite of kLanes pixels; those of one photosite use the first.
 struct alignas(64) DnBands {
     std::array<DnLanes, 3> dn;
 };
@@ -156,16 +185,20 @@ inline DnBands digitise(const DetectorConstants& sensor, bool mono, const Rgb* r
             out.dn[band] = digitise_dark(sensor, dark_words.of(sensor, first_pixel, band));
         return out;
     }
-    const RgbLanes l = load_radiance(sensor, radiance);
     std::array<Lanes<double>, 3> mean_e;
-    const auto [red, green, blue] = sensor.electrons_per_radiance;
-    for (std::size_t i = 0; i < kLanes; ++i) mean_e[0][i] = red * static_cast<double>(l.r[i]);
-    for (std::size_t i = 0; i < kLanes; ++i) mean_e[1][i] = green * static_cast<double>(l.g[i]);
-    for (std::size_t i = 0; i < kLanes; ++i) mean_e[2][i] = blue * static_cast<double>(l.b[i]);
-    if (mono)
-        for (std::size_t i = 0; i < kLanes; ++i) mean_e[0][i] = mean_e[0][i] + mean_e[1][i] + mean_e[2][i];
+    mean_electrons(sensor, mono, radiance, mean_e);
     for (std::uint32_t band = 0; band < bands; ++band)
         out.dn[band] = digitise(sensor, mean_e[band], first_pixel, band, dark_words);
+    return out;
+}
+
+/// The same of a Bayer mosaic, in the first.
+inline DnBands digitise_mosaic(const DetectorConstants& sensor, const Rgb* radiance, std::uint32_t first_pixel,
+                               DarkWords& dark_words) noexcept {
+    DnBands out;
+    std::array<Lanes<double>, 3> mean_e;
+    mosaic_electrons(sensor, radiance, first_pixel, mean_e);
+    out.dn[0] = digitise(sensor, mean_e[0], first_pixel, 0, dark_words);
     return out;
 }
 
@@ -216,34 +249,57 @@ inline std::array<std::uint32_t, kLanes / 2> to_yuyv(int bits, const DnBands& c)
     return out;
 }
 
-/// kLanes pixels into kLanes * bytes_per_pixel(format) bytes.
-inline void write_lanes(const DetectorConstants& sensor, PixelFormat format, const Rgb* radiance,
-                        std::uint32_t first_pixel, DarkWords& dark_words, std::uint8_t* out) noexcept {
-    const DnBands c = digitise(sensor, is_mono(format), radiance, first_pixel, dark_words);
+/// That of a mosaic's samples: GREY or Y16.
+inline PixelFormat sample_format(PixelFormat f) noexcept {
+    return !is_bayer(f) ? f : is_16_bit(f) ? PixelFormat::y16 : PixelFormat::grey;
+}
+
+/// kLanes pixels as bytes of a format without a mosaic.
+inline void put_lanes(int bits, PixelFormat format, const DnBands& c, std::uint8_t* out) noexcept {
     const auto put = [out](const auto& bytes) { std::memcpy(out, bytes.data(), sizeof bytes); };
     switch (format) {
-        case PixelFormat::grey: return put(to_grey(sensor.bits, c.dn[0]));
-        case PixelFormat::y16: return put(to_y16(sensor.bits, c.dn[0]));
-        case PixelFormat::rgb24: return put(to_rgb24(sensor.bits, c));
-        case PixelFormat::yuyv: return put(to_yuyv(sensor.bits, c));
+        case PixelFormat::grey: return put(to_grey(bits, c.dn[0]));
+        case PixelFormat::y16: return put(to_y16(bits, c.dn[0]));
+        case PixelFormat::rgb24: return put(to_rgb24(bits, c));
+        case PixelFormat::yuyv: return put(to_yuyv(bits, c));
+        default: return;
     }
 }
 
 /// Consecutive pixels from `first_pixel` of the image on, a multiple of kLanes, whose bytes start at `out`.
-inline void write_pixels(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
-                         std::size_t first_pixel, std::uint8_t* out) noexcept {
+/// `write(radiance, first_pixel, out)` writes kLanes pixels.
+template <class Write>
+void write_batches(PixelFormat format, std::span<const Rgb> radiance, std::size_t first_pixel, std::uint8_t* out,
+                   const Write& write) noexcept {
     const std::size_t bytes = bytes_per_pixel(format);
     Lanes<Rgb> rest{};
     std::array<std::uint8_t, 3 * kLanes> rest_out;
-    DarkWords dark_words;
     for (std::size_t i = 0; i < radiance.size(); i += kLanes) {
         const std::size_t count = std::min(kLanes, radiance.size() - i);
         const bool whole = count == kLanes;
         if (!whole) std::copy_n(&radiance[i], count, rest.begin());
-        write_lanes(sensor, format, whole ? &radiance[i] : rest.data(), static_cast<std::uint32_t>(first_pixel + i),
-                    dark_words, whole ? out + i * bytes : rest_out.data());
+        write(whole ? &radiance[i] : rest.data(), static_cast<std::uint32_t>(first_pixel + i),
+              whole ? out + i * bytes : rest_out.data());
         if (!whole) std::copy_n(rest_out.begin(), count * bytes, out + i * bytes);
     }
+}
+
+/// Of a detector whose photosites are all alike, in a format without a mosaic.
+inline void write_pixels(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
+                         std::size_t first_pixel, std::uint8_t* out) noexcept {
+    DarkWords dark_words;
+    write_batches(format, radiance, first_pixel, out, [&](const Rgb* batch, std::uint32_t pixel, std::uint8_t* to) {
+        put_lanes(sensor.bits, format, digitise(sensor, is_mono(format), batch, pixel, dark_words), to);
+    });
+}
+
+/// The same of a Bayer mosaic. A function of its own: in one with the above, GCC compiles both worse.
+inline void write_mosaic_pixels(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
+                                std::size_t first_pixel, std::uint8_t* out) noexcept {
+    DarkWords dark_words;
+    write_batches(format, radiance, first_pixel, out, [&](const Rgb* batch, std::uint32_t pixel, std::uint8_t* to) {
+        put_lanes(sensor.bits, sample_format(format), digitise_mosaic(sensor, batch, pixel, dark_words), to);
+    });
 }
 
 }  // namespace narpa

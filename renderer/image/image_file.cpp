@@ -132,10 +132,9 @@ Status write_png(const std::string& path, const RenderedFrame& frame) {
         };
         cv::Mat image;
         switch (frame.camera.format) {
-            case PixelFormat::grey: image = view(CV_8UC1); break;
-            case PixelFormat::y16: image = view(CV_16UC1); break;
             case PixelFormat::rgb24: cv::cvtColor(view(CV_8UC3), image, cv::COLOR_RGB2BGR); break;
             case PixelFormat::yuyv: cv::cvtColor(view(CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV); break;
+            default: image = view(is_16_bit(frame.camera.format) ? CV_16UC1 : CV_8UC1); break;
         }
         std::vector<std::uint8_t> encoded;
         if (!cv::imencode(".png", image, encoded)) return Error{"OpenCV could not encode the PNG", path};

@@ -26,7 +26,8 @@ struct RenderedFrame {
 ///         have a second channel with the rounding error of the first (depth.Z.rest, range.rest, position.X.rest
 ///         ...): their sum is accurate to 2^-48, 1e-7 m at the distance of the Moon.
 ///   .pfm  linear radiance, little-endian, rows from the bottom
-///   .png  the camera's own output: GREY 8-bit, Y16 16-bit grey, RGB24 and YUYV 8-bit colour
+///   .png  the camera's own output: GREY 8-bit, Y16 16-bit grey, RGB24 and YUYV 8-bit colour, Bayer mosaics
+///         as they are, 8-bit or 16-bit grey
 ///   .raw  the camera's own output, byte for byte as written to a video device
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);

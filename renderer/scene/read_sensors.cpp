@@ -17,14 +17,13 @@ std::int64_t read_period_ns(TableReader& table, std::int64_t otherwise) {
     return rate_hz ? std::llround(1e9 / *rate_hz) : otherwise;
 }
 
-PixelFormat read_format(TableReader& table, int width) {
-    using enum PixelFormat;
-    static constexpr std::array<std::pair<std::string_view, PixelFormat>, 4> kFormats{
-        {{name(grey), grey}, {name(y16), y16}, {name(yuyv), yuyv}, {name(rgb24), rgb24}}};
-    const PixelFormat format = table.choice<PixelFormat>("format", kFormats).value_or(grey);
-    if (format == yuyv && width % 2 != 0)
-        table.fail("format",
-                   fmt::format("YUYV holds pixels in pairs and the width is {}, expected an even one", width));
+PixelFormat read_format(TableReader& table, const Camera& camera) {
+    std::array<std::pair<std::string_view, PixelFormat>, kPixelFormatNames.size()> formats;
+    for (std::size_t i = 0; i < formats.size(); ++i)
+        formats[i] = {kPixelFormatNames[i], static_cast<PixelFormat>(i)};
+    const PixelFormat format = table.choice<PixelFormat>("format", formats).value_or(PixelFormat::grey);
+    if (const std::string what = unfit_size(format, camera.width, camera.height); !what.empty())
+        table.fail("format", what);
     return format;
 }
 
@@ -33,6 +32,32 @@ LatePolicy read_late_policy(TableReader& table) {
     static constexpr std::array<std::pair<std::string_view, LatePolicy>, 4> kPolicies{
         {{"drop", drop}, {"repeat", repeat}, {"late", late}, {"blank", blank}}};
     return table.choice<LatePolicy>("late_policy", kPolicies).value_or(late);
+}
+
+/// A share of the pixels and the current of each, which belong together.
+void read_defects(TableReader& table, const char* share_key, const char* current_key, double& share,
+                  double& current_e_s) {
+    share = table.number(share_key, {.low = 0, .high = 0.1}).value_or(0);
+    if (share > 0) table.require(current_key, "a number > 0, as there is such a share of pixels");
+    if (!table.has(share_key)) table.refuse(current_key, fmt::format("there is no {}", share_key));
+    current_e_s = table.number(current_key, kPositive).value_or(0);
+}
+
+/// Dark current, and what makes pixels differ from each other.
+void read_sensor_array(TableReader& table, Detector& d) {
+    const Range celsius{.low = -273.15, .high = 200};
+    d.dark_current_e_s = table.number("dark_current_e_s", kNotNegative).value_or(0);
+    d.dark_reference_c = table.number("dark_reference_c", celsius).value_or(d.dark_reference_c);
+    d.temperature_c = table.number("temperature_c", celsius).value_or(d.dark_reference_c);
+    d.dark_doubling_c = table.number("dark_doubling_c", {.low = 1, .high = 100}).value_or(d.dark_doubling_c);
+    d.prnu = table.number("prnu", {.low = 0, .high = 0.5}).value_or(0);
+    d.dsnu_e = table.number("dsnu_e", kNotNegative).value_or(0);
+    d.dead_pixel_share = table.number("dead_pixel_share", {.low = 0, .high = 0.1}).value_or(0);
+    read_defects(table, "hot_pixel_share", "hot_pixel_e_s", d.hot_pixel_share, d.hot_pixel_e_s);
+    read_defects(table, "blinking_pixel_share", "blinking_e_s", d.blinking_pixel_share, d.blinking_e_s);
+    d.blooming = table.boolean("blooming").value_or(false);
+    d.cosmic_rays_per_cm2_s = table.number("cosmic_rays_per_cm2_s", {.low = 0, .high = 1e6}).value_or(0);
+    d.sensitive_depth_m = table.number("sensitive_depth_m", kPositive).value_or(d.sensitive_depth_m);
 }
 
 std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_ns) {
@@ -48,8 +73,10 @@ std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_n
     d.gain_e_per_dn = table->number("gain_e_per_dn", kNotNegative).value_or(d.gain_e_per_dn);
     d.read_noise_e = table->number("read_noise_e", kNotNegative).value_or(d.read_noise_e);
     d.shot_noise = table->boolean("shot_noise").value_or(d.shot_noise);
-    d.bits = static_cast<int>(table->integer("bits", 8, 12).value_or(d.bits));
+    d.bits = static_cast<int>(table->integer("bits", 8, 16).value_or(d.bits));
     d.black_level_dn = static_cast<int>(table->integer("black_level_dn", 0, (1 << d.bits) - 2).value_or(0));
+    read_sensor_array(*table, d);
+    d.exposure_s *= std::exp2(table->number("exposure_stops", {.low = -20, .high = 20}).value_or(0));
     const double period_s = 1e-9 * static_cast<double>(period_ns);
     if (d.exposure_s > period_s) {
         const std::string what = fmt::format("{} s is longer than a frame, expected at most 1 / rate_hz = {:g} s",
@@ -109,7 +136,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
         table.fail("rate_hz", fmt::format("a period of {} ms, expected at least the budget_ms of [render], {}",
                                           static_cast<double>(camera.period_ns) * 1e-6,
                                           static_cast<double>(scene.render.budget_ns) * 1e-6));
-    camera.format = read_format(table, camera.width);
+    camera.format = read_format(table, camera);
     camera.embedded_line = table.boolean("embedded_line").value_or(camera.embedded_line);
     if (camera.embedded_line && camera.height < 2)
         table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");

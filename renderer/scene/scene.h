@@ -72,18 +72,31 @@ struct Light {
     double radius_m = 0.5;             ///< disc
 };
 
-/// Photons to digital numbers. Absent: an ideal sensor without noise (see Camera::white_radiance).
+/// Photons to digital numbers. Absent: an ideal sensor without noise (see Camera::white_radiance). Amounts of 0 and
+/// switches that are false are exactly off.
 struct Detector {
-    double exposure_s = 0.01;
+    double exposure_s = 0.01;  ///< its stops included
     double pixel_pitch_m = 5e-6;
     double f_number = 4;
     double quantum_efficiency = 0.5;  ///< electrons per photon
     double full_well_e = 20000;
     double gain_e_per_dn = 0;  ///< 0: full_well_e / (2^bits - 1 - black_level_dn)
-    double read_noise_e = 0;   ///< RMS; 0 is exactly off
-    bool shot_noise = false;   ///< Poisson; false is exactly off
+    double read_noise_e = 0;   ///< RMS
+    bool shot_noise = false;   ///< Poisson
     int black_level_dn = 0;
-    int bits = 12;  ///< ADC, 8..12
+    int bits = 12;  ///< ADC, 8..16
+
+    double dark_current_e_s = 0;  ///< mean of a pixel, at dark_reference_c
+    double temperature_c = 20, dark_reference_c = 20;
+    double dark_doubling_c = 7;  ///< K by which dark current doubles
+    double prnu = 0;             ///< standard deviation of the pixels' gains, of their mean: EMVA's PRNU_1288
+    double dsnu_e = 0;           ///< standard deviation of the pixels' offsets: EMVA's DSNU_1288
+    double dead_pixel_share = 0;
+    double hot_pixel_share = 0, hot_pixel_e_s = 0;      ///< dark current added, at dark_reference_c
+    double blinking_pixel_share = 0, blinking_e_s = 0;  ///< the same, in half of the frames
+    bool blooming = false;
+    double cosmic_rays_per_cm2_s = 0;
+    double sensitive_depth_m = 1e-5;  ///< of the silicon that collects a cosmic ray's charge
 };
 
 /// Thin lens: what is not at the focus distance is blurred to a circle of aperture * fx * |1/focus - 1/z| pixels.

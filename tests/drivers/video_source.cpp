@@ -280,8 +280,9 @@ TEST_P(V4l2Source, AnotherFormatIsNamed) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, V4l2Source,
-                         testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv,
-                                         PixelFormat::rgb24),
+                         testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv, PixelFormat::rgb24,
+                                         PixelFormat::rggb8, PixelFormat::bggr8, PixelFormat::gbrg16,
+                                         PixelFormat::bggr16),
                          [](const auto& instance) { return std::string(name(instance.param)); });
 
 }  // namespace

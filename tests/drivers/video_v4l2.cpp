@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdlib>
 
+#include "drivers/video/v4l2_device.h"
 #include "drivers/video/video_sink.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/temporary_folder.h"
@@ -12,6 +13,20 @@ namespace narpa {
 namespace {
 
 using test::Bytes, test::noise_frame;
+
+TEST(V4l2Format, CodesAreThoseOfTheKernel) {
+    // linux/videodev2.h; Documentation/userspace-api/media/v4l/pixfmt-bayer.rst
+    const std::pair<PixelFormat, std::string> cases[] = {
+        {PixelFormat::grey, "GREY"},   {PixelFormat::y16, "Y16 "},    {PixelFormat::yuyv, "YUYV"},
+        {PixelFormat::rgb24, "RGB3"},  {PixelFormat::rggb8, "RGGB"},  {PixelFormat::grbg8, "GRBG"},
+        {PixelFormat::gbrg8, "GBRG"},  {PixelFormat::bggr8, "BA81"},  {PixelFormat::rggb16, "RG16"},
+        {PixelFormat::grbg16, "GR16"}, {PixelFormat::gbrg16, "GB16"}, {PixelFormat::bggr16, "BYR2"}};
+    for (const auto& [pixel, code] : cases) {
+        const int line = 64 * static_cast<int>(bytes_per_pixel(pixel));
+        EXPECT_EQ(format_text(v4l2_wanted_format({64, 48, pixel})),
+                  "64x48 " + code + ", " + std::to_string(line) + " bytes a line");
+    }
+}
 
 constexpr int kReaderFrames = 6;
 
@@ -89,8 +104,9 @@ TEST_P(V4l2Sink, SecondWriterIsRefused) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, V4l2Sink,
-                         testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv,
-                                         PixelFormat::rgb24),
+                         testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv, PixelFormat::rgb24,
+                                         PixelFormat::rggb8, PixelFormat::bggr8, PixelFormat::gbrg16,
+                                         PixelFormat::bggr16),
                          [](const auto& instance) { return std::string(name(instance.param)); });
 
 }  // namespace

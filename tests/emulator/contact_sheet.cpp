@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <vector>
 
 #include "tests/support/temporary_folder.h"
@@ -22,7 +24,8 @@ std::array<int, 2> png_size(const std::string& path) {
 
 TEST(ContactSheet, SpreadsAnyNumberOfFramesOverAtMostTwentyFourTiles) {
     const test::TemporaryFolder folder;
-    for (const PixelFormat pixel : {PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv, PixelFormat::rgb24}) {
+    for (const PixelFormat pixel : {PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv, PixelFormat::rgb24,
+                                    PixelFormat::grbg8, PixelFormat::bggr16}) {
         const VideoFormat format{64, 48, pixel};
         const std::vector<std::uint8_t> frame(frame_bytes(format), 100);
         for (const int frames : {1, 5, 24, 25, 1000}) {
@@ -34,6 +37,31 @@ TEST(ContactSheet, SpreadsAnyNumberOfFramesOverAtMostTwentyFourTiles) {
             const auto [w, h] = png_size(path);
             EXPECT_EQ(w, std::min(6, tiles) * 68 + 4) << frames;
             EXPECT_EQ(h, (tiles + 5) / 6 * 52 + 4) << frames;
+        }
+    }
+}
+
+TEST(ContactSheet, MosaicsHaveTheirColours) {
+    const test::TemporaryFolder folder;
+    for (const PixelFormat pixel :
+         {PixelFormat::rggb8, PixelFormat::grbg8, PixelFormat::gbrg16, PixelFormat::bggr16}) {
+        const VideoFormat format{64, 48, pixel};
+        std::vector<std::uint8_t> frame(frame_bytes(format));
+        const std::size_t size = bytes_per_pixel(pixel);
+        const std::array<std::uint8_t, 3> rgb{255, 100, 0};
+        for (int y = 0; y < 48; ++y)
+            for (int x = 0; x < 64; ++x)
+                frame[static_cast<std::size_t>(y * 64 + x) * size + size - 1] = rgb[bayer_band(pixel, x, y)];
+        ContactSheet sheet(format);
+        sheet.offer(0, frame);
+        const std::string path = folder / "sheet.png";
+        ASSERT_TRUE(sheet.write(path));
+        const cv::Mat image = cv::imread(path);
+        for (const auto& [x, y] : {std::pair{20, 10}, {21, 10}, {20, 11}, {21, 11}}) {
+            const auto bgr = image.at<cv::Vec3b>(y, x);
+            EXPECT_EQ(bgr[2], 255) << name(pixel);
+            EXPECT_NEAR(bgr[1], 168, 2) << name(pixel) << ": 100 by the sRGB curve";
+            EXPECT_EQ(bgr[0], 0) << name(pixel);
         }
     }
 }

@@ -65,12 +65,43 @@ TEST_P(EveryFormat, MeanAndVarianceAreTheDetectors) {
                     5 * std::sqrt(variance / kPixels) + 0.1 * std::sqrt(12 * model.rounding_dn2))
             << level;
         if (GetParam() == PixelFormat::yuyv) continue;  // its luma is rounded twice
+        if (is_bayer(GetParam())) {                     // means of 3 x 3: 36 / 256 of the variance, and correlated
+            EXPECT_NEAR(seen.variance / variance, 36.0 / 256, 0.03) << level;
+            continue;
+        }
         EXPECT_NEAR(seen.variance / variance, 1, 0.12) << level;
     }
 }
 INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat,
-                         testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv,
-                                         PixelFormat::rgb24));
+                         testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv, PixelFormat::rgb24,
+                                         PixelFormat::gbrg8, PixelFormat::rggb16));
+
+TEST(MeasuredImage, NoiseModelHasDarkCurrentPrnuAndDsnu) {
+    Camera camera = camera_with(PixelFormat::y16, true);
+    camera.detector->dark_current_e_s = 4e8;  // 8000 e-
+    camera.detector->prnu = 0.03;
+    camera.detector->dsnu_e = 80;
+    const SensorModel model = sensor_model(camera);
+    for (const float level : {0.f, 60.f, 120.f}) {
+        const Rgb light{level, level, level};
+        const Moments seen = moments(frame_of(camera, light));
+        const double expected = model.dn(light), variance = model.variance_dn2(expected);
+        EXPECT_NEAR(seen.mean, expected, 5 * std::sqrt(variance / (kWidth * kHeight))) << level;
+        EXPECT_NEAR(seen.variance / variance, 1, 5 * std::sqrt(2.0 / (kWidth * kHeight))) << level;
+    }
+}
+
+TEST(MeasuredImage, MosaicsOfEvenLightAreEven) {
+    for (const PixelFormat format :
+         {PixelFormat::rggb16, PixelFormat::grbg16, PixelFormat::gbrg16, PixelFormat::bggr16})
+        for (const bool embedded_line : {false, true}) {
+            Camera camera = camera_with(format, false);
+            camera.embedded_line = embedded_line;
+            const MeasuredImage image = frame_of(camera, {50, 100, 200});
+            const double expected = sensor_model(camera).dn({50, 100, 200});
+            for (const float dn : image.dn) ASSERT_NEAR(dn, expected, 1);
+        }
+}
 
 TEST(MeasuredImage, IdealSensorsAreLinearUpToWhite) {
     const Camera camera = camera_with(PixelFormat::y16, false);

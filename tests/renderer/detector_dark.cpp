@@ -90,7 +90,7 @@ Camera noisy(int width, int height) {
     c.detector->black_level_dn = 5;
     return c;
 }
-std::vector<int> dn_of(const Camera& c, const RadianceImage& image, std::uint64_t seed, std::uint32_t frame) {
+std::vector<int> dn_of_image(const Camera& c, const RadianceImage& image, std::uint64_t seed, std::uint32_t frame) {
     std::vector<std::uint8_t> bytes(frame_bytes({c.width, c.height, c.format, 0}));
     expose(c, image, seed, frame, bytes);
     std::vector<int> dn(bytes.size() / 2);
@@ -108,7 +108,7 @@ TEST(DarkPixels, DrawAsPixelsOfVanishingLightDo) {
         RadianceImage image(c.width, c.height);
         const auto light = static_cast<float>(electrons / electrons_per_radiance(*c.detector, 0));
         std::fill(image.pixels.begin(), image.pixels.end(), Rgb{light, 0, 0});
-        const std::vector<int> dn = dn_of(c, image, 11, 4);
+        const std::vector<int> dn = dn_of_image(c, image, 11, 4);
 
         std::vector<double> count(4096), expected(4096);
         double mean = 0, true_mean = 0, square = 0, true_square = 0;
@@ -143,8 +143,8 @@ TEST(DarkPixels, DrawAsPixelsOfVanishingLightDo) {
 TEST(DarkPixels, DrawIndependently) {
     const Camera c = noisy(500, 500);
     const RadianceImage black(c.width, c.height);
-    const std::vector<int> dn = dn_of(c, black, 7, 1);
-    EXPECT_EQ(dn, dn_of(c, black, 7, 1));
+    const std::vector<int> dn = dn_of_image(c, black, 7, 1);
+    EXPECT_EQ(dn, dn_of_image(c, black, 7, 1));
     const auto correlation = [&](const std::vector<int>& a, const std::vector<int>& b, std::size_t lag) {
         const auto n = static_cast<double>(a.size());
         double sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
@@ -158,13 +158,13 @@ TEST(DarkPixels, DrawIndependently) {
     const double most = 4.5 / std::sqrt(static_cast<double>(dn.size()));
     for (const std::size_t lag : {1, 2, 15, 16, 17, 32, 48, 64, 256, 500, 1024})
         EXPECT_LT(std::abs(correlation(dn, dn, lag)), most) << lag;
-    EXPECT_LT(std::abs(correlation(dn, dn_of(c, black, 7, 2), 0)), most);
-    EXPECT_LT(std::abs(correlation(dn, dn_of(c, black, 8, 1), 0)), most);
-    EXPECT_LT(std::abs(correlation(dn, dn_of(c, black, std::uint64_t{1} << 32 | 7, 1), 0)), most);
+    EXPECT_LT(std::abs(correlation(dn, dn_of_image(c, black, 7, 2), 0)), most);
+    EXPECT_LT(std::abs(correlation(dn, dn_of_image(c, black, 8, 1), 0)), most);
+    EXPECT_LT(std::abs(correlation(dn, dn_of_image(c, black, std::uint64_t{1} << 32 | 7, 1), 0)), most);
     // Nor do they share anything with what they would draw if they had light.
     RadianceImage faint(c.width, c.height);
     std::fill(faint.pixels.begin(), faint.pixels.end(), Rgb{1e-12f, 0, 0});
-    EXPECT_LT(std::abs(correlation(dn, dn_of(c, faint, 7, 1), 0)), most);
+    EXPECT_LT(std::abs(correlation(dn, dn_of_image(c, faint, 7, 1), 0)), most);
 }
 
 TEST(DarkPixels, AreNotChangedByTheLightOfOthers) {
@@ -174,7 +174,8 @@ TEST(DarkPixels, AreNotChangedByTheLightOfOthers) {
     std::fill(lit.pixels.begin(), lit.pixels.end(), Rgb{3, 4, 5});
     for (std::size_t i = 0; i < some.pixels.size(); ++i)
         if (i % 7 == 3 || i / 1000 % 3 == 0) some.pixels[i] = lit.pixels[i];
-    const std::vector<int> dark_dn = dn_of(c, black, 2, 3), lit_dn = dn_of(c, lit, 2, 3), dn = dn_of(c, some, 2, 3);
+    const std::vector<int> dark_dn = dn_of_image(c, black, 2, 3), lit_dn = dn_of_image(c, lit, 2, 3),
+                           dn = dn_of_image(c, some, 2, 3);
     for (std::size_t i = 0; i < dn.size(); ++i)
         ASSERT_EQ(dn[i], (some.pixels[i] == black.pixels[i] ? dark_dn : lit_dn)[i]) << i;
 }

@@ -8,8 +8,7 @@
 
 #include "renderer/camera/detector.h"
 #include "renderer/camera/digitise.h"
-#include "tests/renderer/detector_philox.h"
-#include "tests/support/shapes.h"
+#include "tests/renderer/detector_support.h"
 
 namespace narpa {
 namespace {
@@ -17,39 +16,6 @@ namespace {
 using namespace test;
 
 constexpr PixelFormat kFormats[] = {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::yuyv};
-
-Camera noisy_camera(int width, int height, PixelFormat format) {
-    Camera c = camera(width, height, 100);
-    c.format = format;
-    c.detector = Detector{};
-    c.detector->shot_noise = true;
-    c.detector->read_noise_e = 6;
-    c.detector->black_level_dn = 40;
-    return c;
-}
-/// Black sky, faint and bright pixels side by side, and what no radiance should be.
-RadianceImage motley(int width, int height) {
-    RadianceImage image(width, height);
-    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-        const Block w = philox({static_cast<std::uint32_t>(i), 0, 0, 0}, {5, 5});
-        const auto level = [&](std::uint32_t word) {
-            return w[3] % 3 == 0 ? 0.0f : std::exp2(static_cast<float>(word >> 8) * 0x1p-24f * 18 - 8);
-        };
-        image.pixels[i] = {level(w[0]), level(w[1]), level(w[2])};
-    }
-    const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
-    if (image.pixels.size() > 20) {
-        image.pixels[1] = {nan, 30, -infinity};
-        image.pixels[2] = {infinity, -0.0f, 1};
-        image.pixels[17] = {-1, 1e30f, 1e-40f};
-    }
-    return image;
-}
-std::vector<std::uint8_t> bytes_of(const Camera& c, const RadianceImage& image) {
-    std::vector<std::uint8_t> out(frame_bytes({image.width, image.height, c.format, 0}));
-    expose(c, image, 3, 8, out);
-    return out;
-}
 
 /// One pixel's DN in one band as the header of the detector describes it, with the standard library's functions.
 double plain_level(const DetectorConstants& s, double mean_e, std::uint32_t pixel, std::uint32_t band) {

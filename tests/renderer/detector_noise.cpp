@@ -158,6 +158,43 @@ TEST(Poisson, LanesKnowNothingOfEachOther) {
     EXPECT_NEAR(together[12] / 1e27, 1, 1e-12);
 }
 
+TEST(Poisson, FaintCountsHaveTheClosedFormByChiSquared) {
+    constexpr std::uint32_t n = 1'600'000;  // seed 13
+    for (const double mean : {0.05, 0.5, 2.0, 10.0}) {
+        Lanes<double> means;
+        means.fill(mean);
+        std::vector<double> count(64);
+        double sum = 0, squares = 0, cubes = 0;
+        for (std::uint32_t first = 0; first < n; first += kLanes) {
+            const RandomLanes random = philox(PhiloxSchedule(13), first, 0, 0);
+            for (const double k : poisson(means, normals(random), random)) {
+                ++count.at(static_cast<std::size_t>(k));
+                sum += k, squares += (k - mean) * (k - mean), cubes += std::pow(k - mean, 3);
+            }
+        }
+        // Central moments mean, mean, mean (skewness mean^-1/2); four standard errors of each estimate.
+        const double m2 = mean * mean, m3 = m2 * mean;
+        EXPECT_NEAR(sum / n, mean, 4 * std::sqrt(mean / n)) << mean;
+        EXPECT_NEAR(squares / n, mean, 4 * std::sqrt((mean + 2 * m2) / n)) << mean;
+        EXPECT_NEAR(cubes / n, mean, 4 * std::sqrt((mean + 18 * m2 + 6 * m3) / n)) << mean;
+        double p = std::exp(-mean), chi_squared = 0, rest = n, rest_count = n;
+        int classes = 0;
+        for (std::size_t k = 0; p * n >= 10 || static_cast<double>(k) < mean;
+             p *= mean / static_cast<double>(++k)) {
+            const double expected = p * n;
+            if (k < 3) {
+                EXPECT_NEAR(count[k], expected, 4 * std::sqrt(expected * (1 - p))) << "P(" << k << ") of " << mean;
+            }
+            chi_squared += (count[k] - expected) * (count[k] - expected) / expected;
+            rest -= expected, rest_count -= count[k];
+            ++classes;
+        }
+        chi_squared += (rest_count - rest) * (rest_count - rest) / rest;  // all beyond, as one class
+        // `classes` degrees of freedom; exceeded once in about 1e4.
+        EXPECT_LT(chi_squared, classes + 4.5 * std::sqrt(2.0 * classes)) << mean;
+    }
+}
+
 TEST(Poisson, HasTheDistributionOnBothSidesOfTheThreshold) {
     constexpr std::uint32_t n = 400'000;
     for (const double mean : {0.3, 4.0, 31.9, 32.1, 200.0}) {

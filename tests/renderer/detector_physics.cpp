@@ -6,51 +6,12 @@
 
 #include "renderer/camera/detector.h"
 #include "renderer/camera/solar_bands.h"
-#include "tests/support/shapes.h"
+#include "tests/renderer/detector_support.h"
 
 namespace narpa {
 namespace {
 
 using namespace test;
-
-Camera sensor(int width, int height, PixelFormat format) {
-    Camera c = camera(width, height, 100);
-    c.format = format;
-    c.detector = Detector{};
-    return c;
-}
-std::vector<std::uint8_t> bytes_of(const Camera& c, const Rgb& radiance, std::uint64_t seed = 0,
-                                   std::uint32_t frame = 0) {
-    RadianceImage image(c.width, c.height);
-    std::fill(image.pixels.begin(), image.pixels.end(), radiance);
-    std::vector<std::uint8_t> out(frame_bytes({c.width, c.height, c.format, 0}));
-    expose(c, image, seed, frame, out);
-    return out;
-}
-/// The ADC's numbers of a Y16 frame.
-std::vector<int> dn_of(const Camera& c, const Rgb& radiance, std::uint64_t seed = 0, std::uint32_t frame = 0) {
-    const auto bytes = bytes_of(c, radiance, seed, frame);
-    std::vector<int> dn(bytes.size() / 2);
-    for (std::size_t i = 0; i < dn.size(); ++i)
-        dn[i] = (bytes[2 * i] | (bytes[2 * i + 1] << 8)) >> (16 - c.detector->bits);
-    return dn;
-}
-struct Moments {
-    double mean, variance;
-};
-Moments moments(const std::vector<int>& v) {
-    const double n = static_cast<double>(v.size());
-    const double mean = std::accumulate(v.begin(), v.end(), 0.0) / n;
-    double squares = 0;
-    for (const int x : v) squares += (x - mean) * (x - mean);
-    return {mean, squares / (n - 1)};
-}
-/// The even grey radiance that collects this many electrons in a monochrome pixel.
-Rgb radiance_for(const Detector& d, double electrons) {
-    const double k = electrons_per_radiance(d, 0) + electrons_per_radiance(d, 1) + electrons_per_radiance(d, 2);
-    const float l = static_cast<float>(electrons / k);
-    return {l, l, l};
-}
 
 TEST(SolarBands, AreThoseOfABlackbodyAt5772K) {
     const double k = 1.380649e-23, sigma = 5.670374419e-8, T = kSolarTemperature_k;

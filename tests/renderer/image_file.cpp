@@ -128,7 +128,8 @@ TEST(ImageFile, PfmIsReadByOpenCv) {
 }
 
 TEST(ImageFile, PngIsTheCamerasOwnOutput) {
-    for (const PixelFormat format : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::yuyv}) {
+    for (const PixelFormat format : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::yuyv,
+                                     PixelFormat::gbrg8, PixelFormat::rggb16}) {
         const Shot shot(format);
         const std::string path = scratch(std::string(name(format)) + ".png");
         const auto written = write_image(path, shot.frame());
@@ -139,10 +140,10 @@ TEST(ImageFile, PngIsTheCamerasOwnOutput) {
         int lit = 0;
         for (int i = 0; i < 96; ++i) {
             const std::size_t at = static_cast<std::size_t>(i);
-            if (format == PixelFormat::grey) {
+            if (bytes_per_pixel(format) == 1) {
                 ASSERT_EQ(image.type(), CV_8UC1);
                 EXPECT_EQ(image.at<std::uint8_t>(i), shot.bytes[at]);
-            } else if (format == PixelFormat::y16) {
+            } else if (is_16_bit(format)) {
                 ASSERT_EQ(image.type(), CV_16UC1);
                 EXPECT_EQ(image.at<std::uint16_t>(i), shot.bytes[2 * at] | shot.bytes[2 * at + 1] << 8);
             } else {

@@ -40,15 +40,20 @@ Start start_steps(int fd, const VideoFormat& format) noexcept {
     if (capabilities == 0) return {Step::query, errno};
     if (!(capabilities & V4L2_CAP_VIDEO_OUTPUT)) return {Step::output, 0};
 
-    v4l2_format f{};
-    f.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-    f.fmt.pix = v4l2_wanted_format(format);
-    if (xioctl(fd, VIDIOC_S_FMT, &f) < 0) return {Step::format_call, errno};
-    if (!is_same_format(f.fmt.pix, v4l2_wanted_format(format))) return {Step::format_kept, 0, f.fmt.pix};
+    Start start{Step::format_kept};
+    for (const v4l2_pix_format& pix : {v4l2_wanted_format(format), v4l2_carrier_format(format)}) {
+        v4l2_format f{};
+        f.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+        f.fmt.pix = pix;
+        start = {xioctl(fd, VIDIOC_S_FMT, &f) < 0 ? Step::format_call : Step::format_kept, errno, f.fmt.pix};
+        if (start.step == Step::format_kept && is_same_format(f.fmt.pix, pix)) start.step = Step::started;
+        if (start.step == Step::started) break;
+    }
+    if (start.step != Step::started) return start;
     set_frame_rate(fd, format.period_ns);
     int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     if (xioctl(fd, VIDIOC_STREAMON, &type) < 0 && errno != EINVAL) return {Step::stream, errno};
-    return {Step::started, 0};
+    return start;
 }
 
 Start start_device(const char* path, const VideoFormat& format) noexcept {
@@ -136,7 +141,7 @@ Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const
     Start start = start_device(path.c_str(), format);
     if (start.step != Step::started) return describe(path, format, start);
     return queued_sink(std::make_unique<V4l2Writer>(path, format, std::move(start.fd)), format, full,
-                       "V4L2 output " + path + ", " + format_text(v4l2_wanted_format(format)));
+                       "V4L2 output " + path + ", " + format_text(start.got));
 }
 
 }  // namespace narpa

@@ -63,6 +63,12 @@ v4l2_pix_format v4l2_wanted_format(const VideoFormat& format) noexcept {
     return pix;
 }
 
+v4l2_pix_format v4l2_carrier_format(const VideoFormat& format) noexcept {
+    VideoFormat carrier = format;
+    if (is_bayer(format.pixel) && is_16_bit(format.pixel)) carrier.pixel = PixelFormat::y16;
+    return v4l2_wanted_format(carrier);
+}
+
 bool is_same_format(const v4l2_pix_format& a, const v4l2_pix_format& b) noexcept {
     return a.width == b.width && a.height == b.height && a.pixelformat == b.pixelformat &&
            a.bytesperline == b.bytesperline;

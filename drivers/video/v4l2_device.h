@@ -18,6 +18,9 @@ int xioctl(int fd, unsigned long request, void* argument) noexcept;
 
 [[nodiscard]] v4l2_pix_format v4l2_wanted_format(const VideoFormat& format) noexcept;
 /// Size, pixels and bytes a line agree.
+/// The same bytes by a code that drivers without 16-bit mosaics know (v4l2loopback 0.12.7 is one): Y16. Other
+/// formats as they are wanted.
+[[nodiscard]] v4l2_pix_format v4l2_carrier_format(const VideoFormat& format) noexcept;
 [[nodiscard]] bool is_same_format(const v4l2_pix_format& a, const v4l2_pix_format& b) noexcept;
 /// "640x480 GREY, 640 bytes a line".
 [[nodiscard]] std::string format_text(const v4l2_pix_format& pix);

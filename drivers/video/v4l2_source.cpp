@@ -75,7 +75,8 @@ Result<Stage> agree_on_format(int fd, const VideoFormat& format) {
     const v4l2_pix_format before = f.fmt.pix;
     f.fmt.pix = wanted;
     if (xioctl(fd, VIDIOC_S_FMT, &f) < 0) f.fmt.pix = before;
-    if (is_same_format(f.fmt.pix, wanted)) return Stage::streaming;
+    if (is_same_format(f.fmt.pix, wanted) || is_same_format(f.fmt.pix, v4l2_carrier_format(format)))
+        return Stage::streaming;
     return Error{.what =
                      "expected frames of " + format_text(wanted) + ", the device has " + format_text(f.fmt.pix)};
 }

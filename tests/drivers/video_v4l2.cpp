@@ -28,6 +28,13 @@ TEST(V4l2Format, CodesAreThoseOfTheKernel) {
     }
 }
 
+TEST(V4l2Format, MosaicsOf16BitsMayTravelAsY16) {
+    const auto carrier = [](PixelFormat pixel) { return format_text(v4l2_carrier_format({64, 48, pixel})); };
+    EXPECT_EQ(carrier(PixelFormat::gbrg16), "64x48 Y16 , 128 bytes a line");
+    EXPECT_EQ(carrier(PixelFormat::gbrg8), "64x48 GBRG, 64 bytes a line");
+    EXPECT_EQ(carrier(PixelFormat::yuyv), "64x48 YUYV, 128 bytes a line");
+}
+
 constexpr int kReaderFrames = 6;
 
 class V4l2Sink : public testing::TestWithParam<PixelFormat> {

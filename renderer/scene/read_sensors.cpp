@@ -57,7 +57,8 @@ void read_sensor_array(TableReader& table, Detector& d) {
     read_defects(table, "blinking_pixel_share", "blinking_e_s", d.blinking_pixel_share, d.blinking_e_s);
     d.blooming = table.boolean("blooming").value_or(false);
     d.cosmic_rays_per_cm2_s = table.number("cosmic_rays_per_cm2_s", {.low = 0, .high = 1e6}).value_or(0);
-    d.sensitive_depth_m = table.number("sensitive_depth_m", kPositive).value_or(d.sensitive_depth_m);
+    d.sensitive_depth_m =
+        table.number("sensitive_depth_m", {.low = 0, .high = 0.01, .low_open = true}).value_or(d.sensitive_depth_m);
 }
 
 std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_ns) {

@@ -158,7 +158,7 @@ const BadScene kBad[] = {
     {"BloomingNumber", CAMERA FIELD "detector = {blooming = 1}\n", 5, 24, "expected true or false"},
     {"CosmicRaysTooMany", CAMERA FIELD "detector = {cosmic_rays_per_cm2_s = 1e7}\n", 5, 37, "got 1"},
     {"SensitiveDepthZero", CAMERA FIELD "detector = {sensitive_depth_m = 0}\n", 5, 33,
-     "got 0, expected a number > 0"},
+     "got 0, expected a number in (0, 0.01]"},
     {"BlackLevelAboveFullScale", CAMERA "fov_diagonal_deg = 9\ndetector = {bits = 8, black_level_dn = 255}\n", 5,
      40, "expected an integer in [0, 254]"},
     {"ShotNoiseNumber", CAMERA "fov_diagonal_deg = 9\ndetector = {shot_noise = 1}\n", 5, 26,

@@ -196,7 +196,7 @@ TEST(SensorArray, TakesAnyRadianceAndTheLargestAmounts) {
         Detector& d = *c.detector;
         d.dark_current_e_s = d.dsnu_e = d.hot_pixel_e_s = d.blinking_e_s = d.read_noise_e = 1e300;
         d.temperature_c = 200, d.dark_reference_c = -273.15, d.dark_doubling_c = 1;
-        d.sensitive_depth_m = 1e300, d.cosmic_rays_per_cm2_s = 1e6, d.pixel_pitch_m = 1;
+        d.sensitive_depth_m = 0.01, d.cosmic_rays_per_cm2_s = 1e6, d.pixel_pitch_m = 1;
         d.full_well_e = 1e300;
         EXPECT_EQ(bytes_of(c, image), bytes_of(c, image)) << name(format);
         d.gain_e_per_dn = 1e-300;

@@ -1,5 +1,7 @@
 #include "renderer/camera/scene_camera.h"
 
+#include <cmath>
+
 namespace narpa {
 namespace {
 
@@ -16,6 +18,10 @@ Camera scaled(const Camera& camera, double factor_x, double factor_y) {
     c.height = static_cast<int>(camera.height * factor_y * (1 + kRounding));
     set_intrinsics(c, pinhole_of(camera).with_scale(factor_x, factor_y));
     if (camera.model) c.model = camera.model->scaled(factor_x, factor_y);
+    if (c.point_spread) {
+        const double factor = std::sqrt(factor_x * factor_y);
+        c.point_spread->sigma_px *= factor, c.point_spread->cutoff_per_px /= factor;
+    }
     return c;
 }
 

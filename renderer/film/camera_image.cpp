@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/constants.h"
+#include "renderer/camera/image_optics.h"
 #include "renderer/film/budgeted_frame.h"
 #include "renderer/film/camera_batch.h"
 #include "renderer/geometry/flush_denormals.h"
@@ -104,6 +105,8 @@ struct CameraRenderer::Impl {
     FramePasses passes{render_scene.tracer(), camera};
     PassCosts costs{};
     std::vector<std::uint32_t> unseen = unseen_pixels(camera);
+    ImageOptics optics{camera};
+    RadianceImage before_optics{optics.any() ? camera.width : 0, optics.any() ? camera.height : 0};
 };
 
 CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera)
@@ -111,7 +114,8 @@ CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& ca
 CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
-                                    RadianceImage& out, Aovs* aovs) {
+                                    RadianceImage& final_image, Aovs* aovs) {
+    RadianceImage& out = impl_->optics.any() ? impl_->before_optics : final_image;
     const RenderScene& render_scene = impl_->render_scene;
     const Camera& camera = impl_->camera;
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
@@ -129,6 +133,7 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose,
         account = render_within_budget(impl_->passes, impl_->costs, render_scene, camera, at, pose, settings, out,
                                        variance);
     for (const std::uint32_t pixel : impl_->unseen) out.pixels[pixel] = {};
+    if (impl_->optics.any()) impl_->optics.apply(out, final_image);
     return account;
 }
 

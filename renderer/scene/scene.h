@@ -4,6 +4,7 @@
 /// empty optional), costs nothing, and is decided once, before the first frame.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -105,6 +106,20 @@ struct Lens {
     double focus_distance_m = 0;  ///< from the lens, along z; infinite is allowed
 };
 
+/// The blur of the lens, the same all over the image; renderer/camera/point_spread.h.
+struct PointSpreadFunction {
+    double sigma_px = 0;       ///< of a Gaussian; 0: none
+    double cutoff_per_px = 0;  ///< diffraction: pixel pitch / (wavelength * f-number); 0: none
+};
+
+/// The share of light at theta radians from the optical axis: cos^4 theta, if asked for, times 1 + a theta^2 + b
+/// theta^4
+/// + c theta^6.
+struct Vignetting {
+    bool cos4 = false;
+    std::array<double, 3> polynomial{};  ///< a, b, c
+};
+
 enum class LatePolicy : std::uint8_t { drop, repeat, late, blank };
 
 struct Camera {
@@ -122,6 +137,9 @@ struct Camera {
     double white_radiance = 0;  ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
     std::optional<Detector> detector;
     std::optional<Lens> lens{};  ///< none: a pinhole
+    std::optional<PointSpreadFunction> point_spread{};
+    std::optional<Vignetting> vignetting{};
+    double veiling_glare = 0;  ///< share of the light that is spread evenly over the image
 };
 
 struct Lidar {

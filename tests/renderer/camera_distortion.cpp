@@ -119,6 +119,7 @@ protected:
         camera.width = 480, camera.height = 360;
         camera.format = PixelFormat::grey;
         camera.white_radiance = 1.1;
+        camera.point_spread = PointSpreadFunction{.sigma_px = 1};
     }
 
     void take_views(const Pinhole& pinhole, const Distortion& distortion, int views) {
@@ -148,7 +149,6 @@ protected:
             render_radiance(*render_scene, at, camera, inverse(T_camera_board), settings, image);
             cv::Mat1b frame(camera.height, camera.width);
             expose(camera, image, 0, 0, {frame.data, frame.total()});
-            cv::GaussianBlur(frame, frame, {}, 1.0);
             std::vector<cv::Point2f> found;
             if (!cv::findChessboardCornersSB(frame, {kCorners, kCorners}, found, cv::CALIB_CB_ACCURACY)) continue;
             cv::cornerSubPix(frame, found, {4, 4}, {-1, -1},

@@ -11,6 +11,7 @@
 #include "estimator/stereo/stereo_matcher.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
+#include "renderer/projection/distortion.h"
 #include "tests/estimator/pnp_ceres.h"
 #include "tests/support/equidistant_camera.h"
 #include "tests/support/shapes.h"
@@ -92,6 +93,50 @@ TEST_F(EquidistantPoints, PixelsWhoseRaysPointBackwardsAreRejected) {
     see(10, 0.5);
     pixels[3] = {640 + 500 * 1.7, 500};
     EXPECT_EQ(PnpSolver(64).solve(input(0.5)).status, PnpStatus::behind_camera);
+}
+
+/// The product's lenses: errors match their covariance and the bound as for a pinhole; a pinhole's model of the
+/// same image is wrong, and the residuals show it.
+TEST(DistortedPoints, PnpErrorsMatchTheBoundAndIgnoringTheLensDoesNot) {
+    const Pinhole pinhole{500, 500, 320, 240};
+    const Distortion barrel{Distortion::Model::opencv, {-0.25, 0.06, 1e-3, -5e-4}},
+        wide{Distortion::Model::fisheye, {-0.02, 0.005, -0.003, 4e-4}};
+    constexpr int kTrials = 200;
+    constexpr double kSigma_px = 0.3;
+    for (const Distortion& distortion : {barrel, wide}) {
+        const auto model = distorted(pinhole, distortion);
+        PnpSolver solver(64);
+        std::mt19937_64 random(11);
+        std::uniform_real_distribution<double> u(-1, 1);
+        std::normal_distribution<double> normal;
+        double nees = 0, over_bound = 0, ignored = 0;
+        for (int trial = 0; trial < kTrials; ++trial) {
+            const Rigid3 truth{random_attitude(random), {0.2, -0.1, 3.5}};
+            std::vector<Vec3> body_m;
+            std::vector<Pixel> pixels;
+            while (body_m.size() < 40) {
+                const Vec3 p = 1.4 * Vec3{u(random), u(random), u(random)};
+                const auto image = model->project(truth * p);
+                if (!image) continue;
+                body_m.push_back(p);
+                pixels.push_back({image->x + kSigma_px * normal(random), image->y + kSigma_px * normal(random)});
+            }
+            const PnpInput input{model, body_m, pixels, kSigma_px};
+            const PnpSolution& s = solver.solve(input);
+            ASSERT_TRUE(s.ok()) << in_words(s.status);
+            const auto bound = pnp_bound(input, truth);
+            ASSERT_TRUE(bound);
+            const Vector6 error = error_between(s.fit.T_camera_body, truth);
+            nees += normalised_error_squared(error, s.fit.covariance) / kTrials;
+            over_bound += normalised_error_squared(error, *bound) / kTrials;
+            const PnpSolution& without = solver.solve({pinhole, body_m, pixels, kSigma_px});
+            if (!without.ok()) continue;
+            ignored += normalised_error_squared(error_between(without.fit.T_camera_body, truth), *bound) / kTrials;
+        }
+        EXPECT_NEAR(nees, 6, 4 * std::sqrt(12.0 / kTrials));
+        EXPECT_NEAR(over_bound, 6, 4 * std::sqrt(12.0 / kTrials));
+        EXPECT_GT(ignored, 1000);
+    }
 }
 
 /// A bumpy body 30 degrees off the axis of a wide camera.

@@ -22,13 +22,13 @@ namespace {
 /// At 180 degrees all points of a circle would be one direction.
 constexpr double kMostAngle_rad = 3.14;
 /// The table's start is 1e-5 off at most but for the last entries before a rim where the slope ends.
-constexpr int kNewtonSteps = 4;
+constexpr int kAngleSteps = 4;
 
 inline Vec3 direction_of(const KannalaBrandt& m, const RadialInverse& inverse, const Vec3& wanted) noexcept {
     const double distorted = std::sqrt(wanted.x * wanted.x + wanted.y * wanted.y);
     const double begin = distorted * inverse.ratio(distorted);
     double theta = begin;
-    for (int i = 0; i < kNewtonSteps; ++i) theta = theta - (m.radius(theta) - distorted) / m.slope(theta);
+    for (int i = 0; i < kAngleSteps; ++i) theta = theta - (m.radius(theta) - distorted) / m.slope(theta);
     const bool found = std::abs(m.radius(theta) - distorted) < 1e-10 && theta <= inverse.most() * (1 + 1e-12);
     const SinCos at = sincos_of_turns((found ? theta : begin) * (0.5 / std::numbers::pi));
     const double side = distorted > 0 ? at.sin / distorted : 0;

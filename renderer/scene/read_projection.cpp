@@ -41,15 +41,15 @@ std::optional<Distortion> read_distortion(TableReader& camera) {
 }
 
 /// The focal length with which the image spans `angle` from edge to edge along the unit image direction (x, y),
-/// over `extent_px`. Nothing where the lens does not see so wide.
-std::optional<double> focal_length(const Camera& camera, double angle, double x, double y, double extent_px) {
+/// over `extent_px`. 0 where the lens does not see so wide.
+double focal_length(const Camera& camera, double angle, double x, double y, double extent_px) {
     const auto model = camera.distortion ? distorted({1, 1, 0, 0}, *camera.distortion)
                                          : std::make_shared<const Pinhole>(1, 1, 0, 0);
     const Vec3 to_side = std::sin(0.5 * angle) * Vec3{x, y, 0}, forward{0, 0, std::cos(0.5 * angle)};
     const auto one = model->project(forward + to_side), other = model->project(forward - to_side);
-    if (!one || !other) return std::nullopt;
+    if (!one || !other) return 0;
     const double extent = std::hypot(one->x - other->x, one->y - other->y);
-    return extent > 0 ? std::optional(extent_px / extent) : std::nullopt;
+    return extent > 0 ? extent_px / extent : 0;
 }
 
 void read_field_of_view(TableReader& table, Camera& camera) {
@@ -59,12 +59,12 @@ void read_field_of_view(TableReader& table, Camera& camera) {
     const auto take = [&](const char* key, double x, double y, double extent_px) {
         const auto deg = table.number(key, angle);
         if (!deg) return;
-        const auto f = focal_length(camera, *deg * kPi / 180, x, y, extent_px);
-        if (!f)
+        const double f = focal_length(camera, *deg * kPi / 180, x, y, extent_px);
+        if (f == 0)
             return table.fail(key, fmt::format("the lens does not see {} degrees: beyond some angle the distortion "
                                                "would fold the image; expected less",
                                                *deg));
-        camera.fx = camera.fy = *f;
+        camera.fx = camera.fy = f;
     };
     take("fov_diagonal_deg", camera.width / diagonal_px, camera.height / diagonal_px, diagonal_px);
     take("fov_horizontal_deg", 1, 0, camera.width);

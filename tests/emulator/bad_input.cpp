@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"LockstepWithoutABus", "run SCENE --lockstep --video nav=none", nullptr, 2, "--can"},
         // Pictures and scans
         Mistake{"UnknownImageKind", "render SCENE -o FOLDERa.gif", nullptr, 2, "a.gif"},
-        Mistake{"FolderThatIsNotThere", "render SCENE -o /nowhere/a.png", nullptr, 2, "/nowhere/a.png"},
+        Mistake{"FolderThatCannotBeMade", "render SCENE -o /proc/nowhere/a.png", nullptr, 2, "/proc/nowhere/a.png"},
         Mistake{"DepthWithoutPaths", "render SCENE --max-depth 3 -o FOLDERa.png", nullptr, 2, "--max-depth"},
         Mistake{"OutputsThatAPngCannotHold", "render SCENE --aov depth -o FOLDERa.png", nullptr, 2, "FILE.exr"},
         Mistake{"TimeBeyondTheClock", "render SCENE --time 1e12 -o FOLDERa.png", nullptr, 2, "--time"},

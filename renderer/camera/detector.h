@@ -1,12 +1,13 @@
 /// renderer/camera/detector.h - linear radiance -> electrons -> digital numbers -> the bytes of a pixel format.
 ///
 /// Photons of band b on a pixel = pi L_b fraction_b / (4 N^2) * pitch^2 * t * lambda_b / (h c), with the band's
-/// share of sunlight and its mean wavelength from solar_bands.h; the lens is ideal (no loss, no fall-off to the
-/// corners). A monochrome format (GREY, Y16) sums the bands in one pixel; a colour format (YUYV, RGB24) gives each
-/// band an ideal pixel of its own; a Bayer mosaic keeps of each pixel the band of its place. Electrons = photons *
-/// quantum efficiency, with Poisson noise, clipped at the full well; read noise is added; DN = black level +
-/// electrons / gain, rounded and clamped to 0 .. 2^bits - 1. All noise is added before rounding. Signals are
-/// double, noise is single precision (noise.h); pixels without light draw their DN from a table (dark_levels.h).
+/// share of sunlight and its mean wavelength from solar_bands.h; what the lens loses is lost in the radiance
+/// already (image_optics.h). A monochrome format (GREY, Y16) sums the bands in one pixel; a colour format (YUYV,
+/// RGB24) gives each band an ideal pixel of its own; a Bayer mosaic keeps of each pixel the band of its place.
+/// Electrons = photons * quantum efficiency, with Poisson noise, clipped at the full well; read noise is added;
+/// DN = black level + electrons / gain, rounded and clamped to 0 .. 2^bits - 1. All noise is added before rounding.
+/// Signals are double, noise is single precision (noise.h); pixels without light draw their DN from a table
+/// (dark_levels.h).
 ///
 /// What makes pixels differ from each other, and dark current, is in sensor_array.h; where the scene names nothing
 /// of it, none of its code runs.

@@ -16,9 +16,9 @@ constexpr int kBands = 3;
 
 /// The share of light along a direction at so many radians from the axis.
 double relative_illumination(const Vignetting& v, double theta) {
-    const double s = theta * theta, cos2 = std::cos(theta) * std::cos(theta);
+    const double s = theta * theta, cosine = std::max(0.0, std::cos(theta));
     const auto [a, b, c] = v.polynomial;
-    return std::max(0.0, (v.cos4 ? cos2 * cos2 : 1) * (1 + s * (a + s * (b + s * c))));
+    return std::max(0.0, (v.cos4 ? std::pow(cosine, 4) : 1) * (1 + s * (a + s * (b + s * c))));
 }
 
 std::vector<float> gain_of(const Camera& camera) {

@@ -1,5 +1,6 @@
 #include "renderer/camera/point_spread.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>

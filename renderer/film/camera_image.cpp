@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 
 #include "base/constants.h"
 #include "renderer/camera/image_optics.h"
@@ -78,7 +79,9 @@ void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
 std::vector<std::uint32_t> unseen_pixels(const Camera& camera) {
     std::vector<std::uint32_t> unseen;
     const CameraModelHandle model(camera);
-    if (model->pinhole() != nullptr) return unseen;
+    const double right = camera.width - 1, bottom = camera.height - 1;
+    const std::array<ImagePoint, 4> corners{{{0, 0}, {right, 0}, {0, bottom}, {right, bottom}}};
+    if (std::ranges::all_of(corners, [&](const ImagePoint& p) { return model->sees(p); })) return unseen;
     for (int y = 0; y < camera.height; ++y)
         for (int x = 0; x < camera.width; ++x)
             if (!model->sees({static_cast<double>(x), static_cast<double>(y)}))

@@ -89,6 +89,35 @@ TEST(PointSpreadFunction, SlantedEdgeHasTheTransferOfTheAperture) {
         expect_transfer(PointSpreadFunction{.cutoff_per_px = pitch_m / (550e-9 * 4)});
 }
 
+/// Of the filter itself, over all frequencies and many spreads, where the edges above sample a few.
+TEST(PointSpreadFunction, FilterHasTheTransferUpToHalfACycle) {
+    std::vector<PointSpreadFunction> spreads;
+    for (double sigma_px = 0.1; sigma_px <= 8; sigma_px *= 1.2) spreads.push_back({.sigma_px = sigma_px});
+    for (double cutoff = 0.2; cutoff < 20; cutoff *= 1.2) spreads.push_back({.cutoff_per_px = cutoff});
+    for (double cutoff = 0.2; cutoff < 20; cutoff *= 2) spreads.push_back({.sigma_px = 0.7, .cutoff_per_px = cutoff});
+    for (const PointSpreadFunction& spread : spreads) {
+        const SeparableFilter filter = filter_of(spread);
+        double worst = 0;
+        for (double fx = 0; fx <= 0.5; fx += 0.02)
+            for (double fy = 0; fy <= 0.5; fy += 0.02) {
+                double sum = 0;
+                for (const auto& [column, row] : filter.terms) {
+                    double along_x = 0, along_y = 0;
+                    for (int k = -filter.radius; k <= filter.radius; ++k) {
+                        const auto at = static_cast<std::size_t>(k + filter.radius);
+                        along_x += static_cast<double>(row[at]) * std::cos(2 * pi * fx * k);
+                        along_y += static_cast<double>(column[at]) * std::cos(2 * pi * fy * k);
+                    }
+                    sum += along_x * along_y;
+                }
+                worst = std::max(worst, std::abs(sum - transfer(spread, fx, fy)));
+            }
+        // A slow aperture's faint rings reach beyond the widest filter.
+        const bool slow = spread.cutoff_per_px > 0 && spread.cutoff_per_px < 0.5;
+        EXPECT_LT(worst, slow ? 0.024 : 0.011) << spread.sigma_px << " px, " << spread.cutoff_per_px << " cycles/px";
+    }
+}
+
 TEST(PointSpreadFunction, KeepsTheLightOfAPoint) {
     for (const PointSpreadFunction& spread :
          {PointSpreadFunction{.sigma_px = 0.8}, PointSpreadFunction{.sigma_px = 0.5, .cutoff_per_px = 0.7}}) {

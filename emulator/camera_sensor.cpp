@@ -49,7 +49,7 @@ void CameraSensor::start_at(std::int64_t t_ns) noexcept {
 void CameraSensor::warm_up() {
     for (int i = 0; i < 2; ++i) unit_.warm_up();
     const FrameLedger ledger =
-        unit_.expose(next_, last_pose_ns(), monotonic_ns() + world_.scene().render.budget_ns);
+        unit_.expose(next_, unit_.t_mid_ns(next_), monotonic_ns() + world_.scene().render.budget_ns);
     unit_.embed(ledger);
     unit_.handed_over(monotonic_ns());
 }
@@ -63,7 +63,7 @@ void CameraSensor::make_next(const Clock& clock) {
     const std::int64_t deadline = deadline_ns(next_), started = clock.now_ns();
     const std::int64_t wall_start = monotonic_ns();
 
-    FrameLedger ledger = unit_.expose(next_, last_pose_ns(), clock.to_monotonic(deadline));
+    FrameLedger ledger = unit_.expose(next_, unit_.t_mid_ns(next_), clock.to_monotonic(deadline));
     ledger.t_render_start_ns = started;
     ledger.t_render_end_ns = clock.now_ns();
     ledger.t_deadline_ns = deadline;
@@ -151,10 +151,14 @@ std::uint64_t CameraSensor::drops() const noexcept {
 void CameraSensor::log(const FrameLedger& l) noexcept {
     if (!truth_log_) return;
     std::array<char, RowLog::kMaxLine> row;
-    for (std::size_t i = 0; i < world_.scene().bodies.size(); ++i) {
-        truth_log_->append({row.data(), format_trajectory_row(row, l.t_exposure_mid_ns,
-                                                              world_.scene().bodies[i].name, unit_.motions()[i])});
-    }
+    const auto append = [&](std::int64_t t_ns, std::span<const Motion> motions) {
+        for (std::size_t i = 0; i < motions.size(); ++i)
+            truth_log_->append(
+                {row.data(), format_trajectory_row(row, t_ns, world_.scene().bodies[i].name, motions[i])});
+    };
+    append(l.t_exposure_start_ns, unit_.motions_at_start());
+    append(l.t_exposure_mid_ns, unit_.motions());
+    append(l.t_exposure_end_ns, unit_.motions_at_end());
     // After the hand-over, which so never waits for it.
     ledger_log_->append({row.data(), format_ledger_row(row, l, image_crc32(unit_.bytes()))});
     sheet_->offer(l.frame, unit_.bytes());

@@ -49,10 +49,14 @@ public:
     [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-camera", 50, true}; }
     [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
     void start_at(std::int64_t t_ns) noexcept override;
-    /// The middle of the next exposure.
-    [[nodiscard]] std::int64_t last_pose_ns() const noexcept override { return unit_.t_mid_ns(next_); }
+    /// The middle of the next exposure; its end where the camera has a shutter.
+    [[nodiscard]] std::int64_t last_pose_ns() const noexcept override {
+        return unit_.camera().shutter ? due_ns() : unit_.t_mid_ns(next_);
+    }
     /// The end of the next exposure.
-    [[nodiscard]] std::int64_t due_ns() const noexcept override { return last_pose_ns() + unit_.exposure_ns() / 2; }
+    [[nodiscard]] std::int64_t due_ns() const noexcept override {
+        return unit_.t_mid_ns(next_) + (unit_.exposure_ns() + 1) / 2;
+    }
     /// Two frames of maximum work, the faster of which calibrates the renderer; then one as in the run, which
     /// measures the time from radiance to hand-over.
     void warm_up() override;

@@ -20,6 +20,19 @@ double full_scale_radiance(const Camera& camera) noexcept {
     return std::min(d.full_well_e, top_e) / (is_mono(camera.format) ? electrons : electrons / 3);
 }
 
+std::int64_t exposure_ns(const Camera& camera) noexcept {
+    if (!camera.detector) return 0;
+    const std::int64_t rows_ns = camera.shutter ? camera.shutter->row_time_ns * (camera.height - 1) : 0;
+    return static_cast<std::int64_t>(camera.detector->exposure_s * 1e9) + rows_ns;
+}
+
+CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at) noexcept {
+    const auto pose = [&](double time) { return world.sensor_pose(camera.mount, camera.T_mount_camera, at, time); };
+    if (!camera.shutter) return pose(kMidExposure);
+    const auto row_ns = static_cast<double>(camera.shutter->row_time_ns);
+    return {pose(0), pose(1), row_ns / static_cast<double>(exposure_ns(camera))};
+}
+
 CameraUnit::CameraUnit(const World& world, std::size_t index)
     : world_(world),
       camera_(world.scene().cameras[index]),
@@ -27,6 +40,8 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
       full_scale_(full_scale_radiance(camera_)),
       placement_(world.scene().bodies.size()),
       motions_(world.scene().bodies.size()),
+      starts_(camera_.shutter ? motions_.size() : 0),
+      ends_(starts_.size()),
       renderer_(world.render_scene(), camera_),
       sensor_array_(SensorArray::create(camera_, world.scene().render.seed)),
       radiance_(camera_.width, camera_.height),
@@ -34,10 +49,6 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
 
 VideoFormat CameraUnit::format() const noexcept {
     return {camera_.width, camera_.height, camera_.format, camera_.period_ns};
-}
-
-std::int64_t CameraUnit::exposure_ns() const noexcept {
-    return camera_.detector ? static_cast<std::int64_t>(camera_.detector->exposure_s * 1e9) : 0;
 }
 
 FrameBudget CameraUnit::budget(std::int64_t deadline_ns) const noexcept {
@@ -72,7 +83,14 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
                                std::atomic<std::size_t>* pixels_done) {
     const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_, motions_);
-    const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, placement_);
+    const std::int64_t start_ns = t_mid_ns - exposure_ns() / 2, end_ns = start_ns + exposure_ns();
+    if (camera_.shutter) {
+        world_.place(start_ns, camera_.mount, placement_, starts_);
+        world_.place(end_ns, camera_.mount, placement_, ends_);
+        for (std::size_t i = 0; i < starts_.size(); ++i)
+            placement_.set(i, starts_[i].T_world_body, ends_[i].T_world_body);
+    }
+    const CameraPose pose = camera_pose(world_, camera_, placement_);
     const std::int64_t begun_ns = monotonic_ns();
     FrameSettings settings;
     settings.spp = render.spp;
@@ -82,7 +100,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     settings.max_depth = render.max_depth;
     settings.pixels_done = pixels_done;
     settings.budget = budget;
-    const FrameAccount account = renderer_.render(placement_, T_world_camera, settings, radiance_, aovs);
+    const FrameAccount account = renderer_.render(placement_, pose, settings, radiance_, aovs);
     t_radiance_ns_ = monotonic_ns();
     durations_.radiance_ns = t_radiance_ns_ - begun_ns;
     const std::int64_t lit_ns = t_radiance_ns_;
@@ -100,8 +118,8 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     ledger.t_pose_ns = source.t_pose_ns;
     put_cost(account, ledger);
     ledger.t_exposure_mid_ns = t_mid_ns;
-    ledger.t_exposure_start_ns = t_mid_ns - exposure_ns() / 2;
-    ledger.t_exposure_end_ns = ledger.t_exposure_start_ns + exposure_ns();
+    ledger.t_exposure_start_ns = start_ns;
+    ledger.t_exposure_end_ns = end_ns;
     return ledger;
 }
 

@@ -19,6 +19,11 @@ namespace narpa {
 /// fraction of it.
 [[nodiscard]] double full_scale_radiance(const Camera& camera) noexcept;
 
+/// From the start of the first row's exposure to the end of the last one's; 0 without a detector.
+[[nodiscard]] std::int64_t exposure_ns(const Camera& camera) noexcept;
+/// Where the camera is during an exposure in which the bodies move as in `at`, and when it takes which row.
+[[nodiscard]] CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at) noexcept;
+
 /// Recent durations from the end of the radiance to the hand-over: the part of a time budget reserved for them.
 class Allowance {
 public:
@@ -47,7 +52,7 @@ public:
     [[nodiscard]] VideoFormat format() const noexcept;
     /// The middle of the exposure of frame k: k * period.
     [[nodiscard]] std::int64_t t_mid_ns(std::uint32_t frame) const noexcept { return frame * camera_.period_ns; }
-    [[nodiscard]] std::int64_t exposure_ns() const noexcept;
+    [[nodiscard]] std::int64_t exposure_ns() const noexcept { return narpa::exposure_ns(camera_); }
 
     /// Renders frame `frame` as it is at t_mid. The same frame number, time and poses give the same bytes.
     /// Fills the ledger's identity, pose and exposure; the caller adds when it was made. `aovs` may be null.
@@ -67,8 +72,11 @@ public:
     [[nodiscard]] const BodyPoses& placement() const noexcept { return placement_; }
     /// Of the last frame.
     [[nodiscard]] const FrameDurations& durations() const noexcept { return durations_; }
-    /// Of every body, as the last frame shows it.
+    /// Of every body at mid-exposure of the last frame.
     [[nodiscard]] std::span<const Motion> motions() const noexcept { return motions_; }
+    /// The same at the exposure's start and end; empty where the camera has no shutter.
+    [[nodiscard]] std::span<const Motion> motions_at_start() const noexcept { return starts_; }
+    [[nodiscard]] std::span<const Motion> motions_at_end() const noexcept { return ends_; }
 
 private:
     [[nodiscard]] FrameBudget budget(std::int64_t deadline_ns) const noexcept;
@@ -81,7 +89,7 @@ private:
     std::uint8_t index_;
     double full_scale_;
     BodyPoses placement_;
-    std::vector<Motion> motions_;
+    std::vector<Motion> motions_, starts_, ends_;
     CameraRenderer renderer_;
     std::unique_ptr<SensorArray> sensor_array_;  ///< null where the scene names none
     RadianceImage radiance_;

@@ -14,33 +14,61 @@
 namespace narpa {
 namespace {
 
-/// Where the bodies were in each of the frames, in the frames' order.
+/// The poses of all bodies at one time of the log, in the order of the scene's bodies.
+class LoggedPoses {
+public:
+    LoggedPoses(std::vector<TrajectoryRow> rows, const World& world, std::string file)
+        : rows_(std::move(rows)), world_(world), file_(std::move(file)) {
+        std::stable_sort(rows_.begin(), rows_.end(), by_time);
+    }
+
+    Result<std::vector<Rigid3>> at(std::int64_t t_ns, const LoggedFrame& frame,
+                                   const std::string& ledger_file) const {
+        const std::size_t bodies = world_.scene().bodies.size();
+        const auto [begin, end] =
+            std::equal_range(rows_.begin(), rows_.end(), TrajectoryRow{t_ns, {}, {}, 0}, by_time);
+        std::vector<Rigid3> poses(bodies);
+        for (auto row = begin; row != end; ++row) {
+            const auto body = world_.body_named(row->body);
+            if (!body)
+                return Error{fmt::format("body \"{}\" at {:.9f} s, which the scene \"{}\" does not have", row->body,
+                                         static_cast<double>(t_ns) * 1e-9, world_.scene().file),
+                             file_, row->line};
+            poses[*body] = row->motion.T_world_body;
+        }
+        if (static_cast<std::size_t>(end - begin) != bodies)
+            return Error{fmt::format("frame {} at {} ns: {} holds {} poses for this time, expected {}",
+                                     frame.ledger.frame, t_ns, file_, end - begin, bodies),
+                         ledger_file, frame.line, 1};
+        return poses;
+    }
+
+private:
+    static bool by_time(const TrajectoryRow& a, const TrajectoryRow& b) { return a.t_ns < b.t_ns; }
+    std::vector<TrajectoryRow> rows_;
+    const World& world_;
+    std::string file_;
+};
+
+/// Where the bodies were in each of the frames, in the frames' order: at mid-exposure, or from its start to its
+/// end.
 Result<std::vector<BodyPoses>> placements_of(const std::vector<LoggedFrame>& frames, const World& world,
-                                             const std::string& ledger_file, const std::string& truth_file) {
+                                             bool over_time, const std::string& ledger_file,
+                                             const std::string& truth_file) {
     auto rows = read_trajectory(truth_file);
     if (!rows) return rows.error();
-    const auto by_time = [](const TrajectoryRow& a, const TrajectoryRow& b) { return a.t_ns < b.t_ns; };
-    std::stable_sort(rows->begin(), rows->end(), by_time);
+    const LoggedPoses logged(*std::move(rows), world, truth_file);
     const std::size_t bodies = world.scene().bodies.size();
     std::vector<BodyPoses> placements;
     placements.reserve(frames.size());
     for (const LoggedFrame& frame : frames) {
-        const std::int64_t t_ns = frame.ledger.t_exposure_mid_ns;
-        const auto [begin, end] =
-            std::equal_range(rows->begin(), rows->end(), TrajectoryRow{t_ns, {}, {}, 0}, by_time);
+        const FrameLedger& l = frame.ledger;
+        const auto start = logged.at(over_time ? l.t_exposure_start_ns : l.t_exposure_mid_ns, frame, ledger_file);
+        if (!start) return start.error();
+        const auto end = over_time ? logged.at(l.t_exposure_end_ns, frame, ledger_file) : start;
+        if (!end) return end.error();
         BodyPoses& at = placements.emplace_back(bodies);
-        for (auto row = begin; row != end; ++row) {
-            const auto body = world.body_named(row->body);
-            if (!body)
-                return Error{fmt::format("body \"{}\" at {:.9f} s, which the scene \"{}\" does not have", row->body,
-                                         static_cast<double>(t_ns) * 1e-9, world.scene().file),
-                             truth_file, row->line};
-            at.set(*body, row->motion.T_world_body);
-        }
-        if (static_cast<std::size_t>(end - begin) != bodies)
-            return Error{fmt::format("frame {} at {} ns: {} holds {} poses for this time, expected {}",
-                                     frame.ledger.frame, t_ns, truth_file, end - begin, bodies),
-                         ledger_file, frame.line, 1};
+        for (std::size_t i = 0; i < bodies; ++i) at.set(i, (*start)[i], (*end)[i]);
     }
     return placements;
 }
@@ -80,7 +108,8 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
     if (!frames) return frames.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
-    auto placements = placements_of(*frames, **world, stem + ".ledger.csv", stem + ".truth.csv");
+    const bool over_time = (*world)->scene().cameras[*index].shutter.has_value();
+    auto placements = placements_of(*frames, **world, over_time, stem + ".ledger.csv", stem + ".truth.csv");
     if (!placements) return placements.error();
     std::unique_ptr<Replay> replay(new Replay(*std::move(world), *index));
     replay->frames_ = *std::move(frames);
@@ -109,7 +138,7 @@ FrameSettings Replay::settings_of(std::size_t i) const {
 std::vector<std::string> Replay::make(std::size_t i) {
     const LoggedFrame& logged = frames_[i];
     const FrameSettings settings = settings_of(i);
-    const FrameAccount account = renderer_.render(placements_[i], T_world_camera(i), settings, picture_);
+    const FrameAccount account = renderer_.render(placements_[i], pose(i), settings, picture_);
     made_ = i;
 
     std::vector<std::string> differs;
@@ -151,8 +180,7 @@ ReferenceComparison Replay::against(int spp) {
     settings.budget = {};
     settings.spp = spp;
     settings.seed = ~settings.seed;
-    const FrameAccount account =
-        renderer_.render(placements_[made_], T_world_camera(made_), settings, reference_, &aovs);
+    const FrameAccount account = renderer_.render(placements_[made_], pose(made_), settings, reference_, &aovs);
     return {compare(picture_, reference_, aovs.body, full_scale_), std::max(0.0, account.standard_error)};
 }
 

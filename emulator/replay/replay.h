@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "emulator/camera_unit.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/replay/image_compare.h"
 #include "emulator/world.h"
@@ -58,9 +59,7 @@ public:
 private:
     Replay(std::unique_ptr<World> world, std::size_t camera_index);
     [[nodiscard]] FrameSettings settings_of(std::size_t i) const;
-    [[nodiscard]] Rigid3 T_world_camera(std::size_t i) const {
-        return world_->sensor_pose(camera_.mount, camera_.T_mount_camera, placements_[i]);
-    }
+    [[nodiscard]] CameraPose pose(std::size_t i) const { return camera_pose(*world_, camera_, placements_[i]); }
     [[nodiscard]] bool bytes_repeat(const LoggedFrame& logged);
 
     std::unique_ptr<World> world_;

@@ -88,6 +88,31 @@ std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_n
     return d;
 }
 
+/// Pictures over time need an exposure, which the detector has.
+std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
+    enum class Kind : std::uint8_t { global, rolling };
+    static constexpr std::array<std::pair<std::string_view, Kind>, 2> kKinds{
+        {{"global", Kind::global}, {"rolling", Kind::rolling}}};
+    auto table = camera.table("shutter");
+    if (!table) return std::nullopt;
+    table->require("kind", "\"global\" or \"rolling\"");
+    const Kind kind = table->choice<Kind>("kind", kKinds).value_or(Kind::global);
+    Shutter shutter;
+    const auto row_time_s = table->number("row_time_s", kPositive);
+    if (kind == Kind::rolling) table->require("row_time_s", "the time from one row's start to the next one's");
+    if (kind == Kind::global) table->refuse("row_time_s", "belongs to kind = \"rolling\"");
+    if (row_time_s) shutter.row_time_ns = std::llround(std::min(*row_time_s, 1e3) * 1e9);
+    if (!c.detector) table->fail("kind", "needs an exposure_s, expected a [camera.detector]");
+    const double image_s = (c.detector ? c.detector->exposure_s : 0) +
+                           1e-9 * static_cast<double>(shutter.row_time_ns) * (c.height - 1);
+    if (image_s >= 1e-9 * static_cast<double>(c.period_ns))
+        table->fail("row_time_s",
+                    fmt::format("exposure and rows take {:g} s, expected less than 1 / rate_hz = {:g} s", image_s,
+                                1e-9 * static_cast<double>(c.period_ns)));
+    table->finish();
+    return shutter;
+}
+
 /// Thin lens, by the diameter of its aperture or by its focal length and the camera's f-number: the detector's,
 /// which takes the lens's where it has none of its own.
 std::optional<Lens> read_lens(TableReader& camera, std::optional<Detector>& detector) {
@@ -179,6 +204,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
         table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");
     camera.late = read_late_policy(table);
     camera.detector = read_detector(table, camera.period_ns);
+    camera.shutter = read_shutter(table, camera);
     camera.lens = read_lens(table, camera.detector);
     camera.point_spread = read_point_spread(table, camera.detector);
     camera.vignetting = read_vignetting(table);

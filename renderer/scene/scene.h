@@ -106,6 +106,11 @@ struct Lens {
     double focus_distance_m = 0;  ///< from the lens, along z; infinite is allowed
 };
 
+/// When the rows of an image are exposed. Without it every frame is a picture of one moment, mid-exposure.
+struct Shutter {
+    std::int64_t row_time_ns = 0;  ///< from the start of one row's exposure to the next one's; 0: a global shutter
+};
+
 /// The blur of the lens, the same all over the image; renderer/camera/point_spread.h.
 struct PointSpreadFunction {
     double sigma_px = 0;       ///< of a Gaussian; 0: none
@@ -136,6 +141,7 @@ struct Camera {
     LatePolicy late = LatePolicy::late;
     double white_radiance = 0;  ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
     std::optional<Detector> detector;
+    std::optional<Shutter> shutter{};
     std::optional<Lens> lens{};  ///< none: a pinhole
     std::optional<PointSpreadFunction> point_spread{};
     std::optional<Vignetting> vignetting{};

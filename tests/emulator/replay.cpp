@@ -120,6 +120,13 @@ TEST_F(ReplayTest, ARunWithFixedSamplesRepeatsBitForBit) {
     EXPECT_EQ(expect_repeats(run(scene_with("spp = 3", kDetector))), 5U);
 }
 
+/// The log has the poses at the exposure's start and end.
+TEST_F(ReplayTest, ARollingShutterRepeatsBitForBit) {
+    const std::string camera = std::string(kDetector) + "\nshutter = {kind = \"rolling\", row_time_s = 0.001}";
+    for (const char* budget : {"spp = 3", "budget_rays = 20000"})
+        EXPECT_GE(expect_repeats(run(scene_with(budget, camera))), 4U) << budget;
+}
+
 /// Without indirect light and with it: what paths share depends on which are traced
 /// together.
 TEST_F(ReplayTest, ByPathsToo) {

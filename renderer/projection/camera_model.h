@@ -61,8 +61,8 @@ public:
     [[nodiscard]] virtual std::optional<ImagePoint> project(const Vec3& point) const noexcept = 0;
     /// Of `project`, at a point that has an image.
     [[nodiscard]] virtual ProjectionJacobian jacobian(const Vec3& point) const noexcept = 0;
-    /// Does light reach the detector there? False beyond the image circle of a lens: such pixels stay black. Where it
-    /// is true is convex.
+    /// Does light reach the detector there? False beyond the image circle of a lens: such pixels stay black. Where
+    /// it is true is convex.
     [[nodiscard]] virtual bool sees(const ImagePoint&) const noexcept { return true; }
 
     /// Image area per solid angle about a unit direction that has an image, px^2 sr^-1; 1 over it is the solid

@@ -92,7 +92,8 @@ void ImageOptics::filter_row(const SeparableFilter::Term& term, int y) noexcept 
                       .x;
     std::fill_n(out, n, 0.0f);
     for (int k = 0; k <= 2 * filter_.radius; ++k)
-        add_weighted(term.row[static_cast<std::size_t>(k)], &padded_row(y)[extent.first + k].x, out, n);
+        add_weighted(term.row[static_cast<std::size_t>(2 * filter_.radius - k)], &padded_row(y)[extent.first + k].x,
+                     out, n);
 }
 
 void ImageOptics::gather_row(const SeparableFilter::Term& term, int y, float* out) const noexcept {
@@ -101,7 +102,7 @@ void ImageOptics::gather_row(const SeparableFilter::Term& term, int y, float* ou
         const Extent extent = lit_[from];
         if (extent.first == extent.end) continue;
         const auto first = static_cast<std::size_t>(extent.first);
-        add_weighted(term.column[static_cast<std::size_t>(k + filter_.radius)],
+        add_weighted(term.column[static_cast<std::size_t>(filter_.radius - k)],
                      &rows_[from * static_cast<std::size_t>(width_) + first].x, out + kBands * first,
                      static_cast<std::size_t>(kBands * (extent.end - extent.first)));
     }

@@ -9,7 +9,6 @@ namespace narpa {
 namespace {
 
 constexpr int kGrid = 128;  ///< pixels of the period on which the filter is computed
-constexpr int kMostRadius = 31;
 constexpr double kLightBeyond = 2e-3;
 /// Terms are added until what is missing is below this share of the largest.
 constexpr double kLeastTerm = 1e-4;
@@ -22,10 +21,13 @@ cv::Mat1d periodic_filter(const PointSpreadFunction& spread) {
             const auto frequency = [](int k) {
                 return (k <= kGrid / 2 ? k : k - kGrid) / static_cast<double>(kGrid);
             };
-            spectrum(j, i) = {transfer(spread, frequency(i), frequency(j)), 0};
+            const std::complex<double> t = transfer(spread, frequency(i), frequency(j));
+            spectrum(j, i) = {t.real(), t.imag()};
         }
+    cv::Mat2d complex;
+    cv::dft(spectrum, complex, cv::DFT_INVERSE | cv::DFT_SCALE);
     cv::Mat1d filter;
-    cv::dft(spectrum, filter, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+    cv::extractChannel(complex, filter, 0);
     return filter;
 }
 
@@ -36,7 +38,7 @@ double at(const cv::Mat1d& periodic, int x, int y) {
 int radius_of(const cv::Mat1d& periodic) {
     double inside = at(periodic, 0, 0);
     for (int r = 0;; ++r) {
-        if (std::abs(1 - inside) < kLightBeyond || r == kMostRadius) return r;
+        if (std::abs(1 - inside) < kLightBeyond || r == kPointSpreadReach_px) return r;
         for (int k = -r; k <= r; ++k)
             inside +=
                 at(periodic, k, r + 1) + at(periodic, k, -r - 1) + at(periodic, r + 1, k) + at(periodic, -r - 1, k);
@@ -45,15 +47,39 @@ int radius_of(const cv::Mat1d& periodic) {
     }
 }
 
+/// Products of finite numbers, without the library's handling of infinite ones.
+std::complex<double> times(std::complex<double> a, std::complex<double> b) {
+    return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+
+/// The sum of sample(x, y) e^(-2 pi i (fx (x - centre_x) + fy (y - centre_y))) at (fx, fy) cycles a sample:
+/// Horner's rule in x and y.
+std::complex<double> fourier_sum(const PointSpreadImage& image, double fx, double fy) {
+    const auto phase = [](double cycles) { return std::polar(1.0, -2 * std::numbers::pi * cycles); };
+    const std::complex<double> one_x = phase(fx), one_y = phase(fy);
+    std::complex<double> sum = 0;
+    for (std::size_t at = image.samples.size(); at > 0;) {
+        std::complex<double> row = 0;
+        for (int x = 0; x < image.width; ++x) row = times(row, one_x) + image.samples[--at];
+        sum = times(sum, one_y) + row;
+    }
+    return times(sum, phase(-fx * image.centre_x - fy * image.centre_y));
+}
+
 }  // namespace
 
-double transfer(const PointSpreadFunction& spread, double fx, double fy) noexcept {
+std::complex<double> transfer(const PointSpreadFunction& spread, double fx, double fy) noexcept {
     using std::numbers::pi;
     const double f = std::hypot(fx, fy);
-    double t = std::exp(-2 * pi * pi * spread.sigma_px * spread.sigma_px * f * f);
+    std::complex<double> t = std::exp(-2 * pi * pi * spread.sigma_px * spread.sigma_px * f * f);
     if (spread.cutoff_per_px > 0) {
         const double v = std::min(f / spread.cutoff_per_px, 1.0);
         t *= 2 / pi * (std::acos(v) - v * std::sqrt(1 - v * v));
+    }
+    if (spread.image) {
+        const double gx = fx / spread.samples_per_px, gy = fy / spread.samples_per_px;
+        const bool in_band = std::max(std::abs(gx), std::abs(gy)) <= 0.5;
+        t = in_band ? times(t, fourier_sum(*spread.image, gx, gy)) : 0;
     }
     return t;
 }

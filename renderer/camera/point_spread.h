@@ -1,13 +1,15 @@
 /// renderer/camera/point_spread.h - the blur of a lens as a filter of the pixels' radiance.
 #pragma once
 
+#include <complex>
 #include <vector>
 
 #include "renderer/scene/scene.h"
 
 namespace narpa {
 
-/// A filter as a sum of products of one column and one row, each 2 radius + 1 long; it sums to 1.
+/// The image of a point as a sum of products of one column and one row, each 2 radius + 1 long, the point in the
+/// middle; it sums to 1.
 struct SeparableFilter {
     struct Term {
         std::vector<float> column, row;
@@ -18,8 +20,9 @@ struct SeparableFilter {
 
 /// The optical transfer function at (fx, fy) cycles a pixel: exp(-2 pi^2 sigma^2 f^2) for `sigma_px`; for
 /// `cutoff_per_px` the incoherent one of a circular aperture, 2 / pi (acos v - v sqrt(1 - v^2)) with v = f / cutoff
-/// (Goodman, Introduction to Fourier Optics, 6.3); their product where both are given.
-[[nodiscard]] double transfer(const PointSpreadFunction& spread, double fx, double fy) noexcept;
+/// (Goodman, Introduction to Fourier Optics, 6.3); for `image` its Fourier sum, 0 beyond half a cycle a sample; the
+/// product of those that are given. Complex where an image is not symmetric: transfer(-f) is its conjugate.
+[[nodiscard]] std::complex<double> transfer(const PointSpreadFunction& spread, double fx, double fy) noexcept;
 
 /// Pixels have the mean radiance over their area already. The filter's own transfer function is `transfer` up to
 /// half a cycle a pixel, so that the image has that of pixel times lens, and nothing is counted twice. It ends

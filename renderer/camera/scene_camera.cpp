@@ -21,6 +21,7 @@ Camera scaled(const Camera& camera, double factor_x, double factor_y) {
     if (c.point_spread) {
         const double factor = std::sqrt(factor_x * factor_y);
         c.point_spread->sigma_px *= factor, c.point_spread->cutoff_per_px /= factor;
+        c.point_spread->samples_per_px /= factor;
     }
     return c;
 }

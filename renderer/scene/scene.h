@@ -111,10 +111,22 @@ struct Shutter {
     std::int64_t row_time_ns = 0;  ///< from the start of one row's exposure to the next one's; 0: a global shutter
 };
 
+/// Pixels from a point that the filter of a point spread reaches at most.
+inline constexpr int kPointSpreadReach_px = 31;
+
+/// What a lens makes of a point, as samples that sum to 1, row by row.
+struct PointSpreadImage {
+    int width = 0, height = 0;
+    double centre_x = 0, centre_y = 0;  ///< where a pinhole images the point; the first sample is at (0, 0)
+    std::vector<double> samples;
+};
+
 /// The blur of the lens, the same all over the image; renderer/camera/point_spread.h.
 struct PointSpreadFunction {
     double sigma_px = 0;       ///< of a Gaussian; 0: none
     double cutoff_per_px = 0;  ///< diffraction: pixel pitch / (wavelength * f-number); 0: none
+    std::shared_ptr<const PointSpreadImage> image{};
+    double samples_per_px = 1;  ///< of the image
 };
 
 /// The share of light at theta radians from the optical axis: cos^4 theta, if asked for, times 1 + a theta^2 + b

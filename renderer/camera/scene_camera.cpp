@@ -18,8 +18,9 @@ Camera scaled(const Camera& camera, double factor_x, double factor_y) {
     c.height = static_cast<int>(camera.height * factor_y * (1 + kRounding));
     set_intrinsics(c, pinhole_of(camera).with_scale(factor_x, factor_y));
     if (camera.model) c.model = camera.model->scaled(factor_x, factor_y);
+    const double factor = std::sqrt(factor_x * factor_y);
+    if (c.ghost) c.ghost->radius_px *= factor;
     if (c.point_spread) {
-        const double factor = std::sqrt(factor_x * factor_y);
         c.point_spread->sigma_px *= factor, c.point_spread->cutoff_per_px /= factor;
         c.point_spread->samples_per_px /= factor;
     }

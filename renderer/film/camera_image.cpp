@@ -7,6 +7,7 @@
 
 #include "base/constants.h"
 #include "renderer/camera/image_optics.h"
+#include "renderer/camera/sun_ghost.h"
 #include "renderer/film/budgeted_frame.h"
 #include "renderer/film/camera_batch.h"
 #include "renderer/geometry/flush_denormals.h"
@@ -109,7 +110,17 @@ struct CameraRenderer::Impl {
     PassCosts costs{};
     std::vector<std::uint32_t> unseen = unseen_pixels(camera);
     ImageOptics optics{camera};
-    RadianceImage before_optics{optics.any() ? camera.width : 0, optics.any() ? camera.height : 0};
+    std::unique_ptr<const SunGhost> ghost = SunGhost::create(render_scene.scene(), camera);
+    bool after_light = optics.any() || ghost;
+    RadianceImage before_optics{after_light ? camera.width : 0, after_light ? camera.height : 0};
+
+    void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
+        if (optics.any())
+            optics.apply(before_optics, out);
+        else
+            std::ranges::copy(before_optics.pixels, out.pixels.begin());
+        if (ghost) ghost->add(render_scene.tracer(), at, pose, out);
+    }
 };
 
 CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera)
@@ -118,7 +129,7 @@ CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                                     RadianceImage& final_image, Aovs* aovs) {
-    RadianceImage& out = impl_->optics.any() ? impl_->before_optics : final_image;
+    RadianceImage& out = impl_->after_light ? impl_->before_optics : final_image;
     const RenderScene& render_scene = impl_->render_scene;
     const Camera& camera = impl_->camera;
     std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
@@ -136,7 +147,7 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose,
         account = render_within_budget(impl_->passes, impl_->costs, render_scene, camera, at, pose, settings, out,
                                        variance);
     for (const std::uint32_t pixel : impl_->unseen) out.pixels[pixel] = {};
-    if (impl_->optics.any()) impl_->optics.apply(out, final_image);
+    if (impl_->after_light) impl_->apply_optics(at, pose, final_image);
     return account;
 }
 

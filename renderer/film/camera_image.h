@@ -26,8 +26,9 @@ namespace narpa {
 ///
 /// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: subpixel_bodies.h.
 ///
-/// Vignetting, point spread and veiling glare come last, over the whole image (image_optics.h). The account's error
-/// and the variance are those before them: a filter averages noise, so they are upper bounds then.
+/// Vignetting, point spread and veiling glare come last, over the whole image (image_optics.h), and then the Sun's
+/// ghost (sun_ghost.h). The account's error and the variance are those before them: a filter averages noise, so
+/// they are upper bounds then.
 ///
 /// A pose that moves within the exposure, or bodies that do in a picture taken over time (CameraPose), are blurred:
 /// each sample takes a moment of its own, and one sample a pixel the middle of its row's exposure. Tile culling,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/constants.h"
 #include "renderer/scene/point_spread_file.h"
 #include "renderer/scene/scene_parts.h"
 
@@ -96,13 +97,31 @@ std::optional<Vignetting> read_vignetting(TableReader& camera) {
     return v;
 }
 
+std::optional<Ghost> read_ghost(TableReader& camera, bool has_sun) {
+    auto table = camera.table("ghost");
+    if (!table) return std::nullopt;
+    Ghost ghost;
+    table->require("strength", "a share of the Sun's light, the product of two reflectances");
+    table->require("radius_px", "the radius of the disc");
+    table->require("within_deg", "the Sun's largest angle from the optical axis");
+    ghost.strength = table->number("strength", {.low = 0, .high = 1, .low_open = true}).value_or(0);
+    ghost.radius_px = table->number("radius_px", {.low = 1, .high = 1e4}).value_or(1);
+    ghost.scale = table->number("scale", {.low = -10, .high = 10}).value_or(1);
+    ghost.within_rad =
+        table->number("within_deg", {.low = 0, .high = 89, .low_open = true}).value_or(0) * kPi / 180;
+    if (!has_sun) table->fail("strength", "there is no Sun, expected a [sun]");
+    table->finish();
+    return ghost;
+}
+
 }  // namespace
 
-void read_optics(TableReader& table, Camera& camera, const std::filesystem::path& folder) {
+void read_optics(TableReader& table, Camera& camera, bool has_sun, const std::filesystem::path& folder) {
     camera.lens = read_lens(table, camera.detector);
     camera.point_spread = read_point_spread(table, camera.detector, folder);
     camera.vignetting = read_vignetting(table);
     camera.veiling_glare = table.number("veiling_glare", {.low = 0, .high = 1, .high_open = true}).value_or(0);
+    camera.ghost = read_ghost(table, has_sun);
 }
 
 }  // namespace narpa

@@ -140,7 +140,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.late = read_late_policy(table);
     camera.detector = read_detector(table, camera.period_ns);
     camera.shutter = read_shutter(table, camera);
-    read_optics(table, camera, folder);
+    read_optics(table, camera, scene.sun.has_value(), folder);
     camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
     if (!camera.detector && !(camera.white_radiance > 0))
         table.require("white_radiance", "a number > 0, as there is neither [sun] nor [ambient] to take it from");

@@ -129,6 +129,14 @@ struct PointSpreadFunction {
     double samples_per_px = 1;  ///< of the image
 };
 
+/// An image of the aperture in the Sun's light, by two reflections in the lens; renderer/camera/sun_ghost.h.
+struct Ghost {
+    double strength = 0;  ///< of the Sun's light that enters the aperture
+    double radius_px = 1;
+    double scale = 1;       ///< distance from the principal point over that of the Sun's image, on the other side
+    double within_rad = 0;  ///< angle of the Sun from the optical axis, below a right angle
+};
+
 /// The share of light at theta radians from the optical axis: cos^4 theta, if asked for, times 1 + a theta^2 + b
 /// theta^4
 /// + c theta^6.
@@ -158,6 +166,7 @@ struct Camera {
     std::optional<PointSpreadFunction> point_spread{};
     std::optional<Vignetting> vignetting{};
     double veiling_glare = 0;  ///< share of the light that is spread evenly over the image
+    std::optional<Ghost> ghost{};
 };
 
 struct Lidar {

@@ -50,8 +50,8 @@ void read_lights(TableReader& root, SceneReading& reading);
 void read_sensors(TableReader& root, SceneReading& reading);
 /// Resolution and projection of a camera; paths in it start at `folder`.
 void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder);
-/// Lens, point spread, vignetting and glare of a camera, after its detector; paths start at `folder`.
-void read_optics(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder);
+/// Lens, point spread, vignetting, glare and ghost of a camera, after its detector; paths start at `folder`.
+void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const std::filesystem::path& folder);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);
 

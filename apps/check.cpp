@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -112,6 +113,7 @@ nlohmann::json describe(const World& world) {
     for (const Lidar& l : s.lidars)
         lidars.push_back({{"name", l.name}, {"model", l.model->spec().name}, {"rate_hz", l.rate_hz}});
     for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
+    const std::size_t stars = s.stars ? s.stars->stars.size() : 0;
     nlohmann::json render{{"method", name_of(s.render.method, kMethods)}};
     if (s.render.budget_rays > 0)
         render["budget_rays"] = s.render.budget_rays;
@@ -123,6 +125,7 @@ nlohmann::json describe(const World& world) {
     return {{"name", s.name},
             {"render", render},
             {"lights", lights},
+            {"stars", stars},
             {"bodies", bodies},
             {"cameras", cameras},
             {"lidars", lidars},
@@ -166,6 +169,20 @@ void print_light(const Scene& s) {
                         l.mount < 0 ? "" : " on body " + s.bodies[static_cast<std::size_t>(l.mount)].name));
 }
 
+/// Stars in the view of a camera at time 0, hidden by bodies or not.
+std::size_t stars_in_view(const World& world, const Camera& camera) {
+    const StarField& field = *world.scene().stars;
+    BodyPoses at(world.scene().bodies.size());
+    world.place(0, camera.mount, at);
+    const Quat q_icrs_camera = field.q_icrs_world * world.sensor_pose(camera.mount, camera.T_mount_camera, at).q;
+    const CameraModelHandle model(camera);
+    return static_cast<std::size_t>(std::ranges::count_if(field.stars, [&](const Star& star) {
+        const auto p = model->project(conjugate(q_icrs_camera) * star.direction);
+        return p && p->x > -0.5 && p->x < camera.width - 0.5 && p->y > -0.5 && p->y < camera.height - 0.5 &&
+               model->sees(*p);
+    }));
+}
+
 void print_scene(const World& world) {
     const Scene& s = world.scene();
     say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
@@ -177,6 +194,11 @@ void print_scene(const World& world) {
     for (const Camera& c : s.cameras)
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
                         1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
+    if (s.stars) {
+        say(fmt::format("  stars: {}", s.stars->stars.size()));
+        for (const Camera& c : s.cameras)
+            say(fmt::format("  camera {}: {} stars in its view at time 0", c.name, stars_in_view(world, c)));
+    }
     for (const Lidar& l : s.lidars)
         say(fmt::format("  lidar {}: {} at {} turns per second", l.name, l.model->spec().name, l.rate_hz));
 }

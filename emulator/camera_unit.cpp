@@ -26,11 +26,20 @@ std::int64_t exposure_ns(const Camera& camera) noexcept {
     return static_cast<std::int64_t>(camera.detector->exposure_s * 1e9) + rows_ns;
 }
 
-CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at) noexcept {
-    const auto pose = [&](double time) { return world.sensor_pose(camera.mount, camera.T_mount_camera, at, time); };
-    if (!camera.shutter) return pose(kMidExposure);
-    const auto row_ns = static_cast<double>(camera.shutter->row_time_ns);
-    return {pose(0), pose(1), row_ns / static_cast<double>(exposure_ns(camera))};
+CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at, std::int64_t t_mid_ns,
+                       std::span<const Motion> motions) noexcept {
+    const auto at_time = [&](double time) {
+        return world.sensor_pose(camera.mount, camera.T_mount_camera, at, time);
+    };
+    CameraPose pose = at_time(kMidExposure);
+    if (camera.shutter) {
+        const auto row_ns = static_cast<double>(camera.shutter->row_time_ns);
+        pose = {at_time(0), at_time(1), row_ns / static_cast<double>(exposure_ns(camera))};
+    }
+    const std::int64_t start_ns = t_mid_ns - exposure_ns(camera) / 2, end_ns = start_ns + exposure_ns(camera);
+    pose.set_clock(1e-9 * static_cast<double>(start_ns), 1e-9 * static_cast<double>(end_ns),
+                   camera.mount < 0 ? Vec3{} : motions[static_cast<std::size_t>(camera.mount)].velocity_m_s);
+    return pose;
 }
 
 CameraUnit::CameraUnit(const World& world, std::size_t index)
@@ -90,7 +99,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
         for (std::size_t i = 0; i < starts_.size(); ++i)
             placement_.set(i, starts_[i].T_world_body, ends_[i].T_world_body);
     }
-    const CameraPose pose = camera_pose(world_, camera_, placement_);
+    const CameraPose pose = camera_pose(world_, camera_, placement_, t_mid_ns, motions_);
     const std::int64_t begun_ns = monotonic_ns();
     FrameSettings settings;
     settings.spp = render.spp;

@@ -22,7 +22,9 @@ namespace narpa {
 /// From the start of the first row's exposure to the end of the last one's; 0 without a detector.
 [[nodiscard]] std::int64_t exposure_ns(const Camera& camera) noexcept;
 /// Where the camera is during an exposure in which the bodies move as in `at`, and when it takes which row.
-[[nodiscard]] CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at) noexcept;
+/// `motions`: of every body at mid-exposure.
+[[nodiscard]] CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at,
+                                     std::int64_t t_mid_ns, std::span<const Motion> motions) noexcept;
 
 /// Recent durations from the end of the radiance to the hand-over: the part of a time budget reserved for them.
 class Allowance {

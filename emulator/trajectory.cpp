@@ -8,17 +8,12 @@
 #include <fstream>
 #include <map>
 
-#include "emulator/log/csv.h"
+#include "base/csv.h"
 
 namespace narpa {
 namespace {
 
 constexpr int kColumns = 15;
-
-std::string_view trimmed(std::string_view text) {
-    text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
-    return text.substr(0, text.find_last_not_of(" \t") + 1);
-}
 
 Result<TrajectoryRow> read_row(std::string_view line, const std::string& path, int number) {
     const auto bad = [&](std::string_view at, std::string what) {

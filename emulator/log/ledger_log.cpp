@@ -8,7 +8,7 @@
 #include <numeric>
 #include <type_traits>
 
-#include "emulator/log/csv.h"
+#include "base/csv.h"
 #include "protocols/ledger_fields.h"
 
 namespace narpa {

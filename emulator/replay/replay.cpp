@@ -14,33 +14,33 @@
 namespace narpa {
 namespace {
 
-/// The poses of all bodies at one time of the log, in the order of the scene's bodies.
-class LoggedPoses {
+/// The motions of all bodies at one time of the log, in the order of the scene's bodies.
+class LoggedMotions {
 public:
-    LoggedPoses(std::vector<TrajectoryRow> rows, const World& world, std::string file)
+    LoggedMotions(std::vector<TrajectoryRow> rows, const World& world, std::string file)
         : rows_(std::move(rows)), world_(world), file_(std::move(file)) {
         std::stable_sort(rows_.begin(), rows_.end(), by_time);
     }
 
-    Result<std::vector<Rigid3>> at(std::int64_t t_ns, const LoggedFrame& frame,
+    Result<std::vector<Motion>> at(std::int64_t t_ns, const LoggedFrame& frame,
                                    const std::string& ledger_file) const {
         const std::size_t bodies = world_.scene().bodies.size();
         const auto [begin, end] =
             std::equal_range(rows_.begin(), rows_.end(), TrajectoryRow{t_ns, {}, {}, 0}, by_time);
-        std::vector<Rigid3> poses(bodies);
+        std::vector<Motion> motions(bodies);
         for (auto row = begin; row != end; ++row) {
             const auto body = world_.body_named(row->body);
             if (!body)
                 return Error{fmt::format("body \"{}\" at {:.9f} s, which the scene \"{}\" does not have", row->body,
                                          static_cast<double>(t_ns) * 1e-9, world_.scene().file),
                              file_, row->line};
-            poses[*body] = row->motion.T_world_body;
+            motions[*body] = row->motion;
         }
         if (static_cast<std::size_t>(end - begin) != bodies)
             return Error{fmt::format("frame {} at {} ns: {} holds {} poses for this time, expected {}",
                                      frame.ledger.frame, t_ns, file_, end - begin, bodies),
                          ledger_file, frame.line, 1};
-        return poses;
+        return motions;
     }
 
 private:
@@ -50,25 +50,32 @@ private:
     std::string file_;
 };
 
-/// Where the bodies were in each of the frames, in the frames' order: at mid-exposure, or from its start to its
-/// end.
-Result<std::vector<BodyPoses>> placements_of(const std::vector<LoggedFrame>& frames, const World& world,
-                                             bool over_time, const std::string& ledger_file,
-                                             const std::string& truth_file) {
+/// Where the bodies and the camera were in each of the frames, in the frames' order.
+struct LoggedPlacements {
+    std::vector<BodyPoses> bodies;
+    std::vector<CameraPose> cameras;
+};
+Result<LoggedPlacements> placements_of(const std::vector<LoggedFrame>& frames, const World& world,
+                                       const Camera& camera, const std::string& ledger_file,
+                                       const std::string& truth_file) {
     auto rows = read_trajectory(truth_file);
     if (!rows) return rows.error();
-    const LoggedPoses logged(*std::move(rows), world, truth_file);
+    const LoggedMotions logged(*std::move(rows), world, truth_file);
     const std::size_t bodies = world.scene().bodies.size();
-    std::vector<BodyPoses> placements;
-    placements.reserve(frames.size());
+    LoggedPlacements placements;
+    placements.bodies.reserve(frames.size());
+    placements.cameras.reserve(frames.size());
     for (const LoggedFrame& frame : frames) {
         const FrameLedger& l = frame.ledger;
-        const auto start = logged.at(over_time ? l.t_exposure_start_ns : l.t_exposure_mid_ns, frame, ledger_file);
+        const auto middle = logged.at(l.t_exposure_mid_ns, frame, ledger_file);
+        if (!middle) return middle.error();
+        const auto start = camera.shutter ? logged.at(l.t_exposure_start_ns, frame, ledger_file) : middle;
         if (!start) return start.error();
-        const auto end = over_time ? logged.at(l.t_exposure_end_ns, frame, ledger_file) : start;
+        const auto end = camera.shutter ? logged.at(l.t_exposure_end_ns, frame, ledger_file) : middle;
         if (!end) return end.error();
-        BodyPoses& at = placements.emplace_back(bodies);
-        for (std::size_t i = 0; i < bodies; ++i) at.set(i, (*start)[i], (*end)[i]);
+        BodyPoses& at = placements.bodies.emplace_back(bodies);
+        for (std::size_t i = 0; i < bodies; ++i) at.set(i, (*start)[i].T_world_body, (*end)[i].T_world_body);
+        placements.cameras.push_back(camera_pose(world, camera, at, l.t_exposure_mid_ns, *middle));
     }
     return placements;
 }
@@ -108,12 +115,13 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
     if (!frames) return frames.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
-    const bool over_time = (*world)->scene().cameras[*index].shutter.has_value();
-    auto placements = placements_of(*frames, **world, over_time, stem + ".ledger.csv", stem + ".truth.csv");
+    auto placements = placements_of(*frames, **world, (*world)->scene().cameras[*index], stem + ".ledger.csv",
+                                    stem + ".truth.csv");
     if (!placements) return placements.error();
     std::unique_ptr<Replay> replay(new Replay(*std::move(world), *index));
     replay->frames_ = *std::move(frames);
-    replay->placements_ = *std::move(placements);
+    replay->placements_ = std::move(placements->bodies);
+    replay->poses_ = std::move(placements->cameras);
     return replay;
 }
 
@@ -138,7 +146,7 @@ FrameSettings Replay::settings_of(std::size_t i) const {
 std::vector<std::string> Replay::make(std::size_t i) {
     const LoggedFrame& logged = frames_[i];
     const FrameSettings settings = settings_of(i);
-    const FrameAccount account = renderer_.render(placements_[i], pose(i), settings, picture_);
+    const FrameAccount account = renderer_.render(placements_[i], poses_[i], settings, picture_);
     made_ = i;
 
     std::vector<std::string> differs;
@@ -180,7 +188,7 @@ ReferenceComparison Replay::against(int spp) {
     settings.budget = {};
     settings.spp = spp;
     settings.seed = ~settings.seed;
-    const FrameAccount account = renderer_.render(placements_[made_], pose(made_), settings, reference_, &aovs);
+    const FrameAccount account = renderer_.render(placements_[made_], poses_[made_], settings, reference_, &aovs);
     return {compare(picture_, reference_, aovs.body, full_scale_), std::max(0.0, account.standard_error)};
 }
 

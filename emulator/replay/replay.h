@@ -59,7 +59,6 @@ public:
 private:
     Replay(std::unique_ptr<World> world, std::size_t camera_index);
     [[nodiscard]] FrameSettings settings_of(std::size_t i) const;
-    [[nodiscard]] CameraPose pose(std::size_t i) const { return camera_pose(*world_, camera_, placements_[i]); }
     [[nodiscard]] bool bytes_repeat(const LoggedFrame& logged);
 
     std::unique_ptr<World> world_;
@@ -67,7 +66,8 @@ private:
     std::uint8_t index_;
     double full_scale_;
     std::vector<LoggedFrame> frames_;
-    std::vector<BodyPoses> placements_;
+    std::vector<BodyPoses> placements_;  ///< of each frame
+    std::vector<CameraPose> poses_;
     CameraRenderer renderer_;
     std::unique_ptr<SensorArray> sensor_array_;
     RadianceImage picture_, reference_;

@@ -14,7 +14,7 @@ ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std:
       camera_(camera),
       target_(target),
       at_(at),
-      renderer_(render_scene_, camera_),
+      renderer_(render_scene_, camera_, false),
       radiance_(camera.width, camera.height) {}
 
 void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {

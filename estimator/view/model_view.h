@@ -17,6 +17,7 @@ namespace narpa {
 [[nodiscard]] Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target,
                                   BodyPoses& at);
 
+/// The scene's stars are left out: they have nothing of the target.
 class ModelView {
 public:
     /// `render_scene` outlives it. `target`: index of the body whose pose is estimated. `at`: where every body is

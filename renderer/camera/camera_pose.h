@@ -22,6 +22,14 @@ public:
         middle_ = moves_ ? interpolated(0.5) : start;
     }
 
+    /// When the exposure begins and ends on the simulation clock, and the camera's velocity in the world, for
+    /// stars: they turn with the clock, and are displaced by aberration. 0 where not set.
+    void set_clock(double start_s, double end_s, const Vec3& velocity_m_s) {
+        start_s_ = start_s, end_s_ = end_s, velocity_m_s_ = velocity_m_s;
+    }
+    [[nodiscard]] double seconds(double time) const noexcept { return start_s_ + time * (end_s_ - start_s_); }
+    [[nodiscard]] const Vec3& velocity_m_s() const noexcept { return velocity_m_s_; }
+
     [[nodiscard]] bool over_time() const noexcept { return over_time_; }
     [[nodiscard]] bool moves() const noexcept { return moves_; }
     [[nodiscard]] Rigid3 at(double time) const noexcept { return moves_ ? interpolated(time) : middle_; }
@@ -40,6 +48,8 @@ private:
 
     Rigid3 start_, end_, middle_;
     double row_time_ = 0;
+    double start_s_ = 0, end_s_ = 0;
+    Vec3 velocity_m_s_{};
     bool over_time_ = false, moves_ = false;
 };
 

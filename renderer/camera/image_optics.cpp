@@ -50,7 +50,7 @@ ImageOptics::ImageOptics(const Camera& camera)
       width_(camera.width),
       height_(camera.height),
       veil_(static_cast<float>(camera.veiling_glare)) {
-    if (!any_) return;
+    if (!camera.vignetting && !camera.point_spread) return;
     if (camera.vignetting) gain_ = gain_of(camera);
     if (camera.point_spread)
         filter_ = filter_of(*camera.point_spread);
@@ -115,15 +115,29 @@ Rgb ImageOptics::mean(const RadianceImage& image) const noexcept {
 }
 
 void ImageOptics::apply(const RadianceImage& in, RadianceImage& out) noexcept {
+    if (filter_.terms.empty()) {
+        std::ranges::copy(in.pixels, out.pixels.begin());
+        return;
+    }
     std::ranges::fill(out.pixels, Rgb{});
     tbb::parallel_for(0, height_, [&](int y) { pad_row(in, y); });
     for (const SeparableFilter::Term& term : filter_.terms) {
         tbb::parallel_for(0, height_, [&](int y) { filter_row(term, y); });
         tbb::parallel_for(0, height_, [&](int y) { gather_row(term, y, floats_of(out, y)); });
     }
+}
+
+void ImageOptics::add_veil(RadianceImage& image) const noexcept {
     if (!(veil_ > 0)) return;
-    const Rgb veil = veil_ * mean(out);
-    for (Rgb& c : out.pixels) c = (1 - veil_) * c + veil;
+    const Rgb veil = veil_ * mean(image);
+    for (Rgb& c : image.pixels) c = (1 - veil_) * c + veil;
+}
+
+float ImageOptics::gain_at(const ImagePoint& p) const noexcept {
+    if (gain_.empty()) return 1;
+    const double x = std::clamp(std::round(p.x), 0.0, width_ - 1.0);
+    const double y = std::clamp(std::round(p.y), 0.0, height_ - 1.0);
+    return gain_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
 }
 
 }  // namespace narpa

@@ -16,10 +16,14 @@ public:
     explicit ImageOptics(const Camera& camera);
 
     [[nodiscard]] bool any() const noexcept { return any_; }
-    /// `out` = what reaches the detector; both images have the camera's size and are not the same. Beyond the
-    /// border the image is taken to go on as it ends. Same bytes on any number of threads; allocates nothing; runs
-    /// on the calling thread's TBB arena. Rows without light cost nothing.
+    /// Vignetting and point spread; where there is neither, a copy. Both images have the camera's size and are not
+    /// the same. Beyond the border the image is taken to go on as it ends. Same bytes on any number of threads;
+    /// allocates nothing; runs on the calling thread's TBB arena. Rows without light cost nothing.
     void apply(const RadianceImage& in, RadianceImage& out) noexcept;
+    /// Veiling glare of the light that the image has by now; then it is what reaches the detector.
+    void add_veil(RadianceImage& image) const noexcept;
+    /// Share of the light that vignetting leaves at the pixel nearest to an image point.
+    [[nodiscard]] float gain_at(const ImagePoint& p) const noexcept;
 
 private:
     struct Extent {

@@ -7,6 +7,7 @@
 
 #include "base/constants.h"
 #include "renderer/camera/image_optics.h"
+#include "renderer/camera/star_light.h"
 #include "renderer/camera/sun_ghost.h"
 #include "renderer/film/budgeted_frame.h"
 #include "renderer/film/camera_batch.h"
@@ -106,25 +107,29 @@ FrameAccount render_uniform(FramePasses& passes, const Frame& f, RadianceImage& 
 struct CameraRenderer::Impl {
     const RenderScene& render_scene;
     const Camera& camera;
+    bool with_stars;
     FramePasses passes{render_scene.tracer(), camera};
     PassCosts costs{};
     std::vector<std::uint32_t> unseen = unseen_pixels(camera);
     ImageOptics optics{camera};
+    /// Null where there are none.
+    std::unique_ptr<StarLight> stars = with_stars && render_scene.scene().stars
+                                           ? std::make_unique<StarLight>(render_scene.scene(), camera)
+                                           : nullptr;
     std::unique_ptr<const SunGhost> ghost = SunGhost::create(render_scene.scene(), camera);
-    bool after_light = optics.any() || ghost;
+    bool after_light = optics.any() || stars || ghost;
     RadianceImage before_optics{after_light ? camera.width : 0, after_light ? camera.height : 0};
 
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
-        if (optics.any())
-            optics.apply(before_optics, out);
-        else
-            std::ranges::copy(before_optics.pixels, out.pixels.begin());
+        optics.apply(before_optics, out);
+        if (stars) stars->add(render_scene.tracer(), at, pose, optics, out);
+        optics.add_veil(out);
         if (ghost) ghost->add(render_scene.tracer(), at, pose, out);
     }
 };
 
-CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera)
-    : impl_(new Impl{render_scene, camera}) {}
+CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera, bool with_stars)
+    : impl_(new Impl{render_scene, camera, with_stars}) {}
 CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,

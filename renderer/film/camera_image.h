@@ -26,9 +26,9 @@ namespace narpa {
 ///
 /// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: subpixel_bodies.h.
 ///
-/// Vignetting, point spread and veiling glare come last, over the whole image (image_optics.h), and then the Sun's
-/// ghost (sun_ghost.h). The account's error and the variance are those before them: a filter averages noise, so
-/// they are upper bounds then.
+/// Last come, over the whole image, vignetting and point spread (image_optics.h), the stars (star_light.h), veiling
+/// glare and the Sun's ghost (sun_ghost.h). The account's error and the variance are those before them: a filter
+/// averages noise, so they are upper bounds then.
 ///
 /// A pose that moves within the exposure, or bodies that do in a picture taken over time (CameraPose), are blurred:
 /// each sample takes a moment of its own, and one sample a pixel the middle of its row's exposure. Tile culling,
@@ -47,8 +47,8 @@ void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const
 /// between.
 class CameraRenderer {
 public:
-    /// Both outlive it.
-    CameraRenderer(const RenderScene& render_scene, const Camera& camera);
+    /// Both outlive it. `with_stars`: those of the scene, if it has any.
+    CameraRenderer(const RenderScene& render_scene, const Camera& camera, bool with_stars = true);
     ~CameraRenderer();
 
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,

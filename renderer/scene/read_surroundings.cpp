@@ -45,6 +45,11 @@ std::optional<toml::date_time> date_of(const toml::node& node) {
     return std::nullopt;
 }
 
+double julian_year(std::int64_t unix_ns) {
+    constexpr double kJ2000_s = 946'728'000, kYear_s = 365.25 * 86400;  // seconds of leap do not matter here
+    return 2000 + (1e-9 * static_cast<double>(unix_ns) - kJ2000_s) / kYear_s;
+}
+
 /// UTC; a time without an offset is UTC. False when the scene has none.
 bool read_epoch(TableReader& table, Scene& scene) {
     const toml::node* node = table.find("epoch");
@@ -137,6 +142,7 @@ void read_surroundings(TableReader& root, SceneReading& reading) {
     const bool has_epoch = read_scene_table(root, reading.scene);
     read_sun(root, reading.scene, has_epoch);
     read_ambient(root, reading.scene);
+    read_stars(root, reading, has_epoch ? std::optional(julian_year(reading.scene.epoch_unix_ns)) : std::nullopt);
     read_render(root, reading.scene);
 }
 

@@ -56,6 +56,22 @@ struct Sun {
     double angular_diameter_rad = 0.533 * 3.14159265358979323846 / 180.0;
 };
 
+/// A point of light at infinity.
+struct Star {
+    Vec3 direction{};  ///< unit, ICRS, as seen from the solar system's barycentre at the scene's epoch
+    double v_magnitude = 0, b_v = 0.65;  ///< Johnson V and B - V
+};
+
+/// What lies behind everything, and where the world frame stands in it.
+struct StarField {
+    std::vector<Star> stars;
+    Quat q_icrs_world{};  ///< at simulation time 0
+    Vec3 rate_rad_s{};    ///< of the world frame in ICRS, world axes
+    Vec3 velocity_m_s{};  ///< of the world frame's origin from the barycentre, world axes: for aberration
+    /// At a simulation time.
+    [[nodiscard]] Quat q_icrs_world_at(double t_s) const { return q_icrs_world * exp_rotation(t_s * rate_rad_s); }
+};
+
 /// A lamp or any other source that is not a body's surface. In its own frame it shines along +z.
 struct Light {
     enum class Kind : std::uint8_t {
@@ -197,6 +213,7 @@ struct Scene {
     std::string name, file;
     std::int64_t epoch_unix_ns = 0;  ///< UTC of simulation time 0
     std::optional<Sun> sun;
+    std::optional<StarField> stars{};
     Rgb ambient{};  ///< radiance arriving from everywhere, W m^-2 sr^-1 a band
     std::vector<Light> lights;
     std::vector<Body> bodies;

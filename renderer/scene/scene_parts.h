@@ -42,6 +42,8 @@ struct SceneReading {
 
 /// [scene], [sun], [ambient], [render].
 void read_surroundings(TableReader& root, SceneReading& reading);
+/// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.
+void read_stars(TableReader& root, SceneReading& reading, std::optional<double> epoch_year);
 /// [[body]], without opening any mesh.
 void read_bodies(TableReader& root, SceneReading& reading);
 /// [[light]]; bodies come first.

@@ -127,6 +127,18 @@ TEST_F(ReplayTest, ARollingShutterRepeatsBitForBit) {
         EXPECT_GE(expect_repeats(run(scene_with(budget, camera))), 4U) << budget;
 }
 
+/// They turn with the clock and move with the velocity of the body that carries the camera.
+TEST_F(ReplayTest, StarsRepeatBitForBit) {
+    std::string catalogue = "name,ra_deg,dec_deg,v_mag,b_v,pm_ra_mas_yr,pm_dec_mas_yr\n";
+    for (int ra = 0; ra < 360; ra += 10)  // bright enough for this detector
+        for (int dec = -80; dec <= 80; dec += 10) catalogue += fmt::format("s,{},{},-12,,,\n", ra, dec);
+    std::ofstream(folder_ / "stars.csv") << catalogue;
+    const std::string stars = "[stars]\ncatalogue = \"stars.csv\"\nrate_rad_s = [1, 2, 3]\n\n";
+    for (const char* shutter : {"", "\nshutter = {kind = \"rolling\", row_time_s = 0.001}"})
+        EXPECT_GE(expect_repeats(run(stars + scene_with("spp = 1", std::string(kDetector) + shutter))), 4U)
+            << shutter;
+}
+
 /// Without indirect light and with it: what paths share depends on which are traced
 /// together.
 TEST_F(ReplayTest, ByPathsToo) {

@@ -1,4 +1,4 @@
-/// emulator/log/csv.h - reading lines of comma-separated values.
+/// base/csv.h - reading lines of comma-separated values.
 #pragma once
 
 #include <algorithm>
@@ -17,6 +17,12 @@ namespace narpa {
         if (end == line.size()) return cells;
         start = end + 1;
     }
+}
+
+/// Without the spaces and tabs around it.
+[[nodiscard]] inline std::string_view trimmed(std::string_view text) {
+    text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+    return text.substr(0, text.find_last_not_of(" \t") + 1);
 }
 
 }  // namespace narpa

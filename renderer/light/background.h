@@ -1,6 +1,6 @@
 /// renderer/light/background.h - what escaped rays see: the radiance from beyond all bodies.
 ///
-/// A new kind (stars, a sky) is a class in files of its own, handed to RenderScene::create. The Sun's disc is no
+/// A new kind (a sky) is a class in files of its own, handed to RenderScene::create. The Sun's disc is no
 /// part of it (sun_disc.h). Units: W m^-2 sr^-1; directions are unit, in world axes, away from the viewer.
 #pragma once
 

@@ -39,7 +39,8 @@ TEST(Check, ReportsLightsMethodAndMaterialsByKind) {
           "phong\n",
           "light beacon: point on body target\n", "light earthshine: directional\n",
           "light floodlight: disc of radius 0.05 m on body chaser\n", "light panel: rectangle of 1 x 0.5 m\n",
-          "camera overview: 500 x 500 RGB24 at 2.5 Hz, with a lens\n"})
+          "camera overview: 500 x 500 RGB24 at 2.5 Hz, with a lens\n", "stars: 4\n",
+          "camera overview: 0 stars in its view at time 0\n"})
         EXPECT_NE(said.out.find(words), std::string::npos) << words << "in\n" << said.out;
 }
 
@@ -50,6 +51,7 @@ TEST(Check, JsonHasTheSame) {
     EXPECT_EQ(scene.at("render"), (nlohmann::json{{"method", "path"}, {"spp", 4}, {"max_depth", 12}}));
     EXPECT_EQ(scene.at("material_kinds").at("phong"), 2);
     EXPECT_EQ(scene.at("lights").size(), 4u);
+    EXPECT_EQ(scene.at("stars"), 4);
     EXPECT_EQ(scene.at("lights")[2], (nlohmann::json{{"name", "floodlight"}, {"kind", "disc"}}));
     EXPECT_EQ(scene.at("bodies")[3].at("ellipsoid_semi_axes_m"), (nlohmann::json{13000.0, 11400.0, 9100.0}));
     EXPECT_EQ(scene.at("cameras")[0].at("lens"), true);

@@ -62,7 +62,7 @@ public:
     }
     /// Files of tests/data/scenes that seeds name.
     void copy_scene_data() const {
-        for (const char* name : {"cube.obj", "cube.mtl", "checker.ppm", "normals.ppm"})
+        for (const char* name : {"cube.obj", "cube.mtl", "checker.ppm", "normals.ppm", "stars.csv"})
             std::filesystem::copy_file(std::string(NARPA_SOURCE_DIR "/tests/data/scenes/") + name, *this / name);
     }
 

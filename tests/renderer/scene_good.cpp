@@ -52,6 +52,8 @@ TEST(SceneFile, ReadsSurroundings) {
     expect_near(s.sun->direction, normalized(Vec3{1, -0.5, 0.2}), 1e-15);
     EXPECT_DOUBLE_EQ(s.sun->angular_diameter_rad, 0.533 * kPi / 180);
     EXPECT_EQ(s.ambient, (Rgb{0.1f, 0.1f, 0.2f}));
+    ASSERT_TRUE(s.stars);
+    EXPECT_EQ(s.stars->stars.size(), 4u);
     EXPECT_EQ(s.render.method, RenderSettings::Method::path);
     EXPECT_EQ(s.render.max_depth, 12);
     EXPECT_EQ(s.render.spp, 4);

@@ -31,5 +31,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     }
     for (const Body& b : scene->bodies) fuzz::require(is_unit(b.initial.T_world_body.q), "an attitude is unit");
     if (scene->sun) fuzz::require(std::abs(norm(scene->sun->direction) - 1) < 1e-12, "the Sun's direction is unit");
+    if (scene->stars)
+        for (const Star& star : scene->stars->stars)
+            fuzz::require(std::abs(norm(star.direction) - 1) < 1e-12, "a star's direction is unit");
     return 0;
 }

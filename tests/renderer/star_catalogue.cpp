@@ -18,7 +18,7 @@ using namespace test;
 constexpr double kDeg = kPi / 180;
 const std::string kHeader = std::string(kStarHeader) + "\n";
 
-double angle_deg(const Vec3& a, const Vec3& b) {
+double separation_deg(const Vec3& a, const Vec3& b) {
     return std::atan2(norm(cross(a, b)), dot(a, b)) / kDeg;
 }
 
@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(StarCatalogue, MovesByProperMotion) {
     // Barnard's star: 10.36 arcsec a year towards position angle 355.6 degrees. 61 Cygni A: 5.28 arcsec a year.
     const CatalogueStar barnard{"Barnard", 269.452075, 4.693391, 9.51, 1.73, -798.58, 10328.12};
-    EXPECT_NEAR(angle_deg(star_direction(barnard, 0), star_direction(barnard, 25)) * 3600, 25 * 10.359, 0.01);
+    EXPECT_NEAR(separation_deg(star_direction(barnard, 0), star_direction(barnard, 25)) * 3600, 25 * 10.359, 0.01);
     EXPECT_GT(star_direction(barnard, 25).z, star_direction(barnard, 0).z);
     const CatalogueStar cygni{"61 Cyg A", 316.724742, 38.749417, 5.2, 1.07, 4168.31, 3269.20};
     const Vec3 later = star_direction(cygni, 10);
@@ -142,11 +142,11 @@ TEST(BrightestStars, FormTheirConstellations) {
         EXPECT_NE(star, stars->end()) << name;
         return star_direction(*star, 0);
     };
-    EXPECT_NEAR(angle_deg(named("Dubhe"), named("Merak")), 5.37, 0.01);       // the pointers
-    EXPECT_NEAR(angle_deg(named("Betelgeuse"), named("Rigel")), 18.6, 0.05);  // across Orion
-    EXPECT_NEAR(angle_deg(named("Alnitak"), named("Mintaka")), 2.74, 0.01);   // his belt
-    EXPECT_NEAR(angle_deg(named("Castor"), named("Pollux")), 4.51, 0.01);     // the twins
-    EXPECT_NEAR(angle_deg(named("Polaris"), Vec3{0, 0, 1}), 0.736, 0.001);    // beside the pole
+    EXPECT_NEAR(separation_deg(named("Dubhe"), named("Merak")), 5.37, 0.01);       // the pointers
+    EXPECT_NEAR(separation_deg(named("Betelgeuse"), named("Rigel")), 18.6, 0.05);  // across Orion
+    EXPECT_NEAR(separation_deg(named("Alnitak"), named("Mintaka")), 2.74, 0.01);   // his belt
+    EXPECT_NEAR(separation_deg(named("Castor"), named("Pollux")), 4.51, 0.01);     // the twins
+    EXPECT_NEAR(separation_deg(named("Polaris"), Vec3{0, 0, 1}), 0.736, 0.001);    // beside the pole
     for (const CatalogueStar& s : *stars) EXPECT_LT(s.v_magnitude, 3.5) << s.name;
 }
 
@@ -162,7 +162,7 @@ TEST(BrightestStars, StandWhereHipparcosFoundThem) {
         for (const auto& row : hipparcos.at("data")) {
             if (row[0].is_null() || row[1].is_null() || row[2].is_null()) continue;
             const CatalogueStar h{"", row[1], row[2], row[0]};
-            const double angle = angle_deg(star_direction(h, 0), star_direction(s, 1991.25 - 2000));
+            const double angle = separation_deg(star_direction(h, 0), star_direction(s, 1991.25 - 2000));
             if (angle < nearest_deg) nearest_deg = angle, v = h.v_magnitude;
         }
         EXPECT_LT(nearest_deg * 3600, 0.05) << s.name;

@@ -17,8 +17,8 @@ inline Scene sky(const std::vector<Vec3>& directions, double v_magnitude = 0) {
     return scene;
 }
 
-inline RadianceImage image_of(const Scene& scene, const Camera& camera, const CameraPose& pose = {},
-                              const BodyPoses* at = nullptr) {
+inline RadianceImage starry_image(const Scene& scene, const Camera& camera, const CameraPose& pose = {},
+                                  const BodyPoses* at = nullptr) {
     auto render_scene = RenderScene::create(scene, 1);
     EXPECT_TRUE(render_scene);
     RadianceImage image(camera.width, camera.height);

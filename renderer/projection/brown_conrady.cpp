@@ -6,7 +6,10 @@
 #include "base/lanes.h"
 
 namespace narpa {
-BrownConrady::Distorted BrownConrady::distort(double u, double v) const noexcept {
+
+// Inline, as a function that other libraries can replace is called instead, and loops over lanes with calls stay
+// scalar.
+inline BrownConrady::Distorted BrownConrady::distort(double u, double v) const noexcept {
     const double s = u * u + v * v, uv = u * v;
     const double above = 1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3)),
                  below = 1 + s * (c_.k4 + s * (c_.k5 + s * c_.k6));

@@ -8,11 +8,14 @@
 #include "base/lanes.h"
 
 namespace narpa {
-double KannalaBrandt::radius(double theta) const noexcept {
+
+// Inline, as functions that other libraries can replace are called instead, and loops over lanes with calls stay
+// scalar.
+inline double KannalaBrandt::radius(double theta) const noexcept {
     const double s = theta * theta;
     return theta * (1 + s * (c_.k1 + s * (c_.k2 + s * (c_.k3 + s * c_.k4))));
 }
-double KannalaBrandt::slope(double theta) const noexcept {
+inline double KannalaBrandt::slope(double theta) const noexcept {
     const double s = theta * theta;
     return 1 + s * (3 * c_.k1 + s * (5 * c_.k2 + s * (7 * c_.k3 + s * 9 * c_.k4)));
 }

@@ -64,6 +64,12 @@ fov_horizontal_deg = 30.0
 format = "YUYV"
 embedded_line = true
 lens = {focal_length_m = 0.05, f_number = 2.8, focus_distance_m = 2.0}
+distortion = {model = "opencv", coefficients = [-0.2, 0.05, 0.001, 0.001]}
+psf = {sigma_px = 1.0}
+vignetting = {cos4 = true}
+veiling_glare = 0.02
+ghost = {strength = 1e-4, radius_px = 20, within_deg = 60}
+shutter = {kind = "rolling", row_time_s = 1e-5}
 
 [camera.detector]
 read_noise_e = 5.0

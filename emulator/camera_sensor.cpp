@@ -9,23 +9,16 @@
 #include "emulator/can_node.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/trajectory.h"
+#include "renderer/camera/read_out.h"
 
 namespace narpa {
-namespace {
-
-/// YUYV holds black as luma 16 and chroma 128 (ITU-R BT.601), the others as zeros.
-void fill_black(PixelFormat format, std::span<std::uint8_t> bytes) noexcept {
-    for (std::size_t i = 0; i < bytes.size(); ++i)
-        bytes[i] = format != PixelFormat::yuyv ? 0 : i % 2 == 0 ? 16 : 128;
-}
-
-}  // namespace
-
 CameraSensor::CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
     : world_(world), unit_(world, camera), sinks_(std::move(sinks)) {
     const LatePolicy late = unit_.camera().late;
     if (late == LatePolicy::repeat || late == LatePolicy::blank) spare_.resize(unit_.bytes().size());
     fill_black(unit_.camera().format, spare_);
+    if (unit_.camera().control) control_.emplace(unit_.camera(), static_cast<std::uint8_t>(camera));
+    plan();
 }
 
 Status CameraSensor::log_to(const std::string& folder, bool wait_when_full) {
@@ -44,26 +37,45 @@ Status CameraSensor::log_to(const std::string& folder, bool wait_when_full) {
 void CameraSensor::start_at(std::int64_t t_ns) noexcept {
     const std::int64_t period = unit_.camera().period_ns;
     next_ = static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period - 1) / period));
+    if (control_) control_->start_at(t_ns);
+    plan();
+}
+
+void CameraSensor::plan() noexcept {
+    if (!control_) {
+        t_mid_ns_ = unit_.t_mid_ns(next_);
+        return;
+    }
+    control_->plan();
+    if (control_->settings() != unit_.settings() || control_->command_counter() != unit_.command_counter())
+        unit_.set(control_->settings(), control_->command_counter());
+    const std::int64_t t_start_ns = control_->t_start_ns();
+    t_mid_ns_ = t_start_ns == Clock::kNever ? t_start_ns : t_start_ns + unit_.exposure_ns() / 2;
+}
+
+void CameraSensor::advance(std::optional<double> level) noexcept {
+    ++next_;
+    if (control_) control_->advance(level);
+    plan();
 }
 
 void CameraSensor::warm_up() {
     for (int i = 0; i < 2; ++i) unit_.warm_up();
-    const FrameLedger ledger =
-        unit_.expose(next_, unit_.t_mid_ns(next_), monotonic_ns() + world_.scene().render.budget_ns);
+    const FrameLedger ledger = unit_.expose(next_, 0, monotonic_ns() + world_.scene().render.budget_ns);
     unit_.embed(ledger);
     unit_.handed_over(monotonic_ns());
 }
 
-std::int64_t CameraSensor::deadline_ns(std::uint32_t frame) const noexcept {
+std::int64_t CameraSensor::deadline_ns() const noexcept {
     const std::int64_t budget = world_.scene().render.budget_ns;
-    return budget > 0 ? unit_.t_mid_ns(frame) + unit_.exposure_ns() / 2 + budget : unit_.t_mid_ns(frame + 1);
+    return t_mid_ns_ + (budget > 0 ? unit_.exposure_ns() / 2 + budget : unit_.settings().period_ns);
 }
 
 void CameraSensor::make_next(const Clock& clock) {
-    const std::int64_t deadline = deadline_ns(next_), started = clock.now_ns();
+    const std::int64_t deadline = deadline_ns(), started = clock.now_ns();
     const std::int64_t wall_start = monotonic_ns();
 
-    FrameLedger ledger = unit_.expose(next_, unit_.t_mid_ns(next_), clock.to_monotonic(deadline));
+    FrameLedger ledger = unit_.expose(next_, t_mid_ns_, clock.to_monotonic(deadline));
     ledger.t_render_start_ns = started;
     ledger.t_render_end_ns = clock.now_ns();
     ledger.t_deadline_ns = deadline;
@@ -79,7 +91,9 @@ void CameraSensor::make_next(const Clock& clock) {
     log(ledger);
     if (estimator_ && ledger.delivery == Delivery::frame)
         estimator_->take(ledger, unit_.bytes(), unit_.placement());
-    ++next_;
+    std::optional<double> level;
+    if (unit_.settings().auto_exposure) level = mean_level(unit_.format(), unit_.settings().region, unit_.bytes());
+    advance(level);
     skip_missed(clock);
 }
 
@@ -123,12 +137,18 @@ void CameraSensor::account(const FrameLedger& ledger) noexcept {
     stats_.samples_1e3.add(std::llround(1e3 * static_cast<double>(ledger.samples_per_pixel)));
     if (ledger.expected_error >= 0)
         stats_.error_1e9.add(std::llround(1e9 * std::min(1.0, static_cast<double>(ledger.expected_error))));
-    if (keeps_ledgers_) stats_.ledgers_lost += !ledgers_.push(ledger);
+    if (!keeps_ledgers_) return;
+    stats_.ledgers_lost += !ledgers_.push(ledger);
+    if (control_) (void)states_.push({ledger.frame, ledger.camera, ledger.command_counter, unit_.settings()});
 }
 
 void CameraSensor::skip_missed(const Clock& clock) noexcept {
-    for (; last_pose_ns() < clock.end_ns() && due_ns() + unit_.camera().period_ns <= clock.now_ns(); ++next_)
-        ++stats_.skipped;
+    // A trigger is not skipped: its frame is late.
+    const auto missed = [&] {
+        return unit_.settings().trigger == TriggerMode::free_running && last_pose_ns() < clock.end_ns() &&
+               due_ns() + unit_.settings().period_ns <= clock.now_ns();
+    };
+    for (; missed(); advance(std::nullopt)) ++stats_.skipped;
 }
 
 void CameraSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept {
@@ -137,6 +157,7 @@ void CameraSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& fa
         faults.deadline_missed |= !ledger.deadline_met;
         can.send(ledger, t_ns);
     }
+    for (CameraState state; states_.pop(state);) can.send(state, t_ns);
 }
 
 std::uint64_t CameraSensor::drops() const noexcept {

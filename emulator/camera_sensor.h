@@ -4,10 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/video/video_sink.h"
+#include "emulator/camera_control.h"
 #include "emulator/camera_unit.h"
 #include "emulator/log/contact_sheet.h"
 #include "emulator/log/histogram.h"
@@ -49,13 +51,14 @@ public:
     [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-camera", 50, true}; }
     [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
     void start_at(std::int64_t t_ns) noexcept override;
-    /// The middle of the next exposure; its end where the camera has a shutter.
+    void plan() noexcept override;
+    /// The middle of the next exposure; its end where the camera has a shutter. Clock::kNever: nothing triggers it.
     [[nodiscard]] std::int64_t last_pose_ns() const noexcept override {
-        return unit_.camera().shutter ? due_ns() : unit_.t_mid_ns(next_);
+        return unit_.camera().shutter ? due_ns() : t_mid_ns_;
     }
     /// The end of the next exposure.
     [[nodiscard]] std::int64_t due_ns() const noexcept override {
-        return unit_.t_mid_ns(next_) + (unit_.exposure_ns() + 1) / 2;
+        return t_mid_ns_ == Clock::kNever ? t_mid_ns_ : t_mid_ns_ + (unit_.exposure_ns() + 1) / 2;
     }
     /// Two frames of maximum work, the faster of which calibrates the renderer; then one as in the run, which
     /// measures the time from radiance to hand-over.
@@ -68,6 +71,9 @@ public:
     [[nodiscard]] std::string in_words(bool lockstep) const override;
 
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
+    /// Null where the scene has no `control`.
+    [[nodiscard]] CameraControl* control() noexcept { return control_ ? &*control_ : nullptr; }
+    [[nodiscard]] const CameraControl* control() const noexcept { return control_ ? &*control_ : nullptr; }
     [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }
     [[nodiscard]] const std::vector<std::unique_ptr<VideoSink>>& sinks() const noexcept { return sinks_; }
     SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
@@ -75,8 +81,10 @@ public:
 private:
     /// Hands over the frame just rendered, by the late policy, and completes its ledger.
     void hand_over(FrameLedger& ledger, const Clock& clock) noexcept;
-    /// Of the hand-over: the end of the time budget, or the middle of the next exposure.
-    [[nodiscard]] std::int64_t deadline_ns(std::uint32_t frame) const noexcept;
+    /// Of the next frame's hand-over: the end of the time budget, or the middle of the exposure after it.
+    [[nodiscard]] std::int64_t deadline_ns() const noexcept;
+    /// The next frame was exposed or skipped. `level`: CameraControl::advance.
+    void advance(std::optional<double> level) noexcept;
     [[nodiscard]] Delivery deliver(bool in_time) noexcept;
     void send(std::span<const std::uint8_t> bytes) noexcept;
     void account(const FrameLedger& ledger) noexcept;
@@ -87,9 +95,12 @@ private:
     const World& world_;
     CameraUnit unit_;
     std::vector<std::unique_ptr<VideoSink>> sinks_;
+    std::optional<CameraControl> control_;
     std::uint32_t next_ = 0;
+    std::int64_t t_mid_ns_ = 0;        ///< of the next frame
     std::vector<std::uint8_t> spare_;  ///< `repeat`: the last frame in time; `blank`: black; else empty
     SpscRing<FrameLedger, 64> ledgers_;
+    SpscRing<CameraState, 64> states_;  ///< of a camera that is operated
     bool keeps_ledgers_ = false;
     OnlineEstimator* estimator_ = nullptr;
     CameraStats stats_;

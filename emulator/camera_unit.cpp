@@ -5,6 +5,7 @@
 #include "emulator/clock.h"
 #include "protocols/video/embedded_line.h"
 #include "renderer/camera/detector.h"
+#include "renderer/camera/read_out.h"
 
 namespace narpa {
 
@@ -20,23 +21,16 @@ double full_scale_radiance(const Camera& camera) noexcept {
     return std::min(d.full_well_e, top_e) / (is_mono(camera.format) ? electrons : electrons / 3);
 }
 
-std::int64_t exposure_ns(const Camera& camera) noexcept {
-    if (!camera.detector) return 0;
-    const std::int64_t rows_ns = camera.shutter ? camera.shutter->row_time_ns * (camera.height - 1) : 0;
-    return static_cast<std::int64_t>(camera.detector->exposure_s * 1e9) + rows_ns;
-}
-
-CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at, std::int64_t t_mid_ns,
-                       std::span<const Motion> motions) noexcept {
+CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at, std::int64_t start_ns,
+                       std::int64_t end_ns, std::span<const Motion> motions) noexcept {
     const auto at_time = [&](double time) {
         return world.sensor_pose(camera.mount, camera.T_mount_camera, at, time);
     };
     CameraPose pose = at_time(kMidExposure);
     if (camera.shutter) {
         const auto row_ns = static_cast<double>(camera.shutter->row_time_ns);
-        pose = {at_time(0), at_time(1), row_ns / static_cast<double>(exposure_ns(camera))};
+        pose = {at_time(0), at_time(1), row_ns / static_cast<double>(end_ns - start_ns)};
     }
-    const std::int64_t start_ns = t_mid_ns - exposure_ns(camera) / 2, end_ns = start_ns + exposure_ns(camera);
     pose.set_clock(1e-9 * static_cast<double>(start_ns), 1e-9 * static_cast<double>(end_ns),
                    camera.mount < 0 ? Vec3{} : motions[static_cast<std::size_t>(camera.mount)].velocity_m_s);
     return pose;
@@ -46,6 +40,7 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
     : world_(world),
       camera_(world.scene().cameras[index]),
       index_(static_cast<std::uint8_t>(index)),
+      settings_(settings_of(camera_)),
       full_scale_(full_scale_radiance(camera_)),
       placement_(world.scene().bodies.size()),
       motions_(world.scene().bodies.size()),
@@ -58,6 +53,13 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
 
 VideoFormat CameraUnit::format() const noexcept {
     return {camera_.width, camera_.height, camera_.format, camera_.period_ns};
+}
+
+void CameraUnit::set(const CameraSettings& settings, std::uint8_t command_counter) noexcept {
+    settings_ = settings;
+    command_counter_ = command_counter;
+    apply(settings, world_.scene().cameras[index_], camera_);
+    full_scale_ = full_scale_radiance(camera_);
 }
 
 FrameBudget CameraUnit::budget(std::int64_t deadline_ns) const noexcept {
@@ -99,7 +101,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
         for (std::size_t i = 0; i < starts_.size(); ++i)
             placement_.set(i, starts_[i].T_world_body, ends_[i].T_world_body);
     }
-    const CameraPose pose = camera_pose(world_, camera_, placement_, t_mid_ns, motions_);
+    const CameraPose pose = camera_pose(world_, camera_, placement_, start_ns, end_ns, motions_);
     const std::int64_t begun_ns = monotonic_ns();
     FrameSettings settings;
     settings.spp = render.spp;
@@ -117,6 +119,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     if (settings.budget.kind == FrameBudget::Kind::time)
         t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, render.seed, frame, bytes_, sensor_array_.get());
+    if (camera_.control) read_out(format(), settings_.region, settings_.binning, bytes_);
     durations_.sensor_ns = monotonic_ns() - lit_ns;
 
     FrameLedger ledger;
@@ -126,6 +129,12 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     ledger.pose_stale = source.stale;
     ledger.t_pose_ns = source.t_pose_ns;
     put_cost(account, ledger);
+    ledger.command_counter = command_counter_;
+    ledger.trigger = settings_.trigger;
+    ledger.gain_cdb = settings_.gain_cdb;
+    ledger.binning = settings_.binning;
+    ledger.region_x = settings_.region.x, ledger.region_y = settings_.region.y;
+    ledger.region_width = settings_.region.width, ledger.region_height = settings_.region.height;
     ledger.t_exposure_mid_ns = t_mid_ns;
     ledger.t_exposure_start_ns = start_ns;
     ledger.t_exposure_end_ns = end_ns;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "emulator/camera_control.h"
 #include "emulator/world.h"
 #include "protocols/ledger.h"
 #include "renderer/camera/sensor_array.h"
@@ -19,12 +20,11 @@ namespace narpa {
 /// fraction of it.
 [[nodiscard]] double full_scale_radiance(const Camera& camera) noexcept;
 
-/// From the start of the first row's exposure to the end of the last one's; 0 without a detector.
-[[nodiscard]] std::int64_t exposure_ns(const Camera& camera) noexcept;
-/// Where the camera is during an exposure in which the bodies move as in `at`, and when it takes which row.
-/// `motions`: of every body at mid-exposure.
+/// Where the camera is during an exposure from the first row's start to the last one's end in which the bodies move
+/// as in `at`, and when it takes which row. `motions`: of every body at mid-exposure.
 [[nodiscard]] CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at,
-                                     std::int64_t t_mid_ns, std::span<const Motion> motions) noexcept;
+                                     std::int64_t start_ns, std::int64_t end_ns,
+                                     std::span<const Motion> motions) noexcept;
 
 /// Recent durations from the end of the radiance to the hand-over: the part of a time budget reserved for them.
 class Allowance {
@@ -62,6 +62,10 @@ public:
     /// `pixels_done` counts the finished pixels, for a progress display; may be null.
     FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns = 0,
                        Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);
+    /// Of the frames from now on. Only for a camera that is operated (Camera::control).
+    void set(const CameraSettings& settings, std::uint8_t command_counter) noexcept;
+    [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
+    [[nodiscard]] std::uint8_t command_counter() const noexcept { return command_counter_; }
     /// Renders a frame of maximum work and discards it: triggers one-time allocations and calibrates the renderer.
     void warm_up();
     /// Writes the ledger into the last row, if the scene has embedded_line.
@@ -89,6 +93,8 @@ private:
     const World& world_;
     Camera camera_;
     std::uint8_t index_;
+    CameraSettings settings_;
+    std::uint8_t command_counter_ = 0;
     double full_scale_;
     BodyPoses placement_;
     std::vector<Motion> motions_, starts_, ends_;

@@ -49,8 +49,11 @@ bool CanNode::next_frame(std::int64_t t_now_ns) noexcept {
     return !waiting_;
 }
 
-/// The status of the body whose frame it is.
+/// The status of the body or camera whose frame it is.
 PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept {
+    if (!cameras_.empty())
+        if (const DecodeStatus status = take_camera_message(frame, t_now_ns); status != DecodeStatus::not_mine)
+            return status;
     for (Listener& l : listeners_) {
         PoseCommand command;
         const PoseStatus status = l.decoder.accept(frame, t_now_ns, command);
@@ -77,6 +80,56 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
     return PoseStatus::not_mine;
 }
 
+DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
+    const bool plain = !frame.extended && !frame.remote && !frame.error && !frame.fd;
+    if (frame.id == kSyncId && plain && frame.size <= 1) {  // CiA 301: empty, or a counter
+        sync(t_now_ns);
+        return DecodeStatus::complete;
+    }
+    CameraCommand c;
+    if (const auto status = camera_commands_.accept(frame, t_now_ns, c); status != DecodeStatus::not_mine) {
+        if (status == DecodeStatus::complete) command(c, t_now_ns);
+        return status;
+    }
+    CameraTrigger t;
+    const auto status = camera_triggers_.accept(frame, t_now_ns, t);
+    if (status == DecodeStatus::complete) trigger(t, t_now_ns);
+    return status;
+}
+
+void CanNode::command(const CameraCommand& command, std::int64_t t_now_ns) noexcept {
+    for (CameraControl* camera : cameras_)
+        if (camera->camera() == command.camera) return send(camera->command(command, t_now_ns), t_now_ns);
+    send(CameraReply{command.counter, command.camera, false, CameraAnswer::not_controllable, t_now_ns}, t_now_ns);
+}
+
+/// All cameras that it names start at the same time.
+void CanNode::trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept {
+    const auto named = [&](std::uint8_t camera) { return camera < 16 && (trigger.cameras >> camera & 1) != 0; };
+    if (trigger.at_once) {
+        trigger.t_ns = t_now_ns;
+        for (const CameraControl* camera : cameras_)
+            if (named(camera->camera()) && camera->awaits(TriggerMode::command))
+                trigger.t_ns = std::max(trigger.t_ns, camera->earliest_trigger_ns(t_now_ns));
+    }
+    for (std::uint8_t i = 0; i < 16; ++i) {
+        if (!named(i)) continue;
+        const auto camera = std::ranges::find(cameras_, i, &CameraControl::camera);
+        send(camera != cameras_.end()
+                 ? (*camera)->trigger(trigger, t_now_ns)
+                 : CameraReply{trigger.counter, i, true, CameraAnswer::not_controllable, t_now_ns},
+             t_now_ns);
+    }
+}
+
+void CanNode::sync(std::int64_t t_now_ns) noexcept {
+    std::int64_t latency_ns = 0;
+    for (const CameraControl* camera : cameras_)
+        if (camera->awaits(TriggerMode::sync)) latency_ns = std::max(latency_ns, camera->latency_ns());
+    for (CameraControl* camera : cameras_)
+        if (camera->awaits(TriggerMode::sync)) camera->sync(t_now_ns + latency_ns, t_now_ns);
+}
+
 /// The latest time that the body's next command may have. In lockstep the clock follows the commands: its first one
 /// may have any time, and a recorded one may follow a pause of the recording.
 std::int64_t CanNode::latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept {
@@ -94,6 +147,14 @@ void CanNode::send(const EstimateReport& estimate, std::int64_t t_now_ns) noexce
     for (const CanFrame& frame : encode(estimate, bus_.carries_fd())) put(frame, t_now_ns);
 }
 
+void CanNode::send(const CameraState& state, std::int64_t t_now_ns) noexcept {
+    for (const CanFrame& frame : encode(state, bus_.carries_fd())) put(frame, t_now_ns);
+}
+
+void CanNode::send(const CameraReply& reply, std::int64_t t_now_ns) noexcept {
+    for (const CanFrame& frame : encode(reply, bus_.carries_fd())) put(frame, t_now_ns);
+}
+
 void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
     heartbeat.counter = heartbeat_counter_++;
     put(encode(heartbeat), t_now_ns);
@@ -101,7 +162,7 @@ void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
 }
 
 void CanNode::put(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
-    if (bus_.send(frame)) log_frame(frame, t_now_ns);
+    if (bus_.recorded() || bus_.send(frame)) log_frame(frame, t_now_ns);  // nobody hears a recorded bus
 }
 
 void CanNode::log_frame(const CanFrame& frame, std::int64_t t_ns, std::string_view interface) noexcept {

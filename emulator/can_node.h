@@ -10,6 +10,7 @@
 
 #include "drivers/can/can_bus.h"
 #include "drivers/can/client_hub.h"
+#include "emulator/camera_control.h"
 #include "emulator/log/row_log.h"
 #include "emulator/world.h"
 #include "protocols/can/messages.h"
@@ -56,7 +57,10 @@ public:
     [[nodiscard]] bool ended() const noexcept { return bus_.ended() && !waiting_; }
     void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
     void send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept;
+    void send(const CameraState& state, std::int64_t t_now_ns) noexcept;
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
+    /// Commands and triggers go to this camera too, which outlives the run. Before it.
+    void operate(CameraControl& camera) { cameras_.push_back(&camera); }
 
     /// The times up to and from which every commanded body has commands: the limits of a lockstep run's clock.
     /// `commanded` is false until every commanded body has a command.
@@ -76,6 +80,11 @@ private:
     };
     bool next_frame(std::int64_t t_now_ns) noexcept;
     PoseStatus take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept;
+    DecodeStatus take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
+    void command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
+    void trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept;
+    void sync(std::int64_t t_now_ns) noexcept;
+    void send(const CameraReply& reply, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] std::int64_t latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept;
     void put(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
     void log_frame(const CanFrame& frame, std::int64_t t_ns, std::string_view interface = "narpa") noexcept;
@@ -90,6 +99,9 @@ private:
     ReceivedFrame received_{};
     bool waiting_ = false;  ///< received_ is not due yet
     std::vector<Listener> listeners_;
+    std::vector<CameraControl*> cameras_;  ///< those that are operated
+    MessageDecoder<CameraCommand> camera_commands_;
+    MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
     std::uint8_t heartbeat_counter_ = 0;
     std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged

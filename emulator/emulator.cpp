@@ -176,6 +176,9 @@ Status Emulator::open() {
     auto sensors = open_sensors(*world_, options_, can_ != nullptr);
     if (!sensors) return sensors.error();
     sensors_ = *std::move(sensors);
+    for (const auto& sensor : sensors_)
+        if (auto* camera = dynamic_cast<CameraSensor*>(sensor.get()); camera && camera->control() && can_)
+            can_->operate(*camera->control());
     if (options_.estimate) {
         auto estimator = open_estimator(*world_, options_, sensors_, can_ != nullptr);
         if (!estimator) return estimator.error();

@@ -18,12 +18,26 @@ namespace {
 constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
+constexpr std::int64_t kTriggerPollNs = 500'000;         // of a sensor that waits for a trigger
 constexpr int kWaitsAlone = 10;                          // so many, for a commander that comes back
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
 /// Calls f on the threads on which the sensor works.
 void execute(const Sensor& sensor, TracingThreads& threads, const auto& f) {
     sensor.thread().in_arena ? threads.arena.execute(f) : f();
+}
+
+/// Until the sensor's next item is due. False: the run has ended.
+bool wait_for_item(Sensor& sensor, const RealTimeClock& clock, const StopFlag& stop) {
+    for (;;) {
+        sensor.plan();
+        const std::int64_t t_pose = sensor.last_pose_ns(), due = sensor.due_ns();
+        const bool idle = t_pose == Clock::kNever;
+        if ((idle ? clock.now_ns() : t_pose) >= clock.end_ns()) return false;
+        if (!clock.wait_until(idle ? clock.now_ns() + kTriggerPollNs : due, stop)) return false;
+        sensor.plan();
+        if (!idle && sensor.due_ns() == due) return true;
+    }
 }
 
 struct StartClock {
@@ -100,7 +114,7 @@ void Emulator::run_sensor(Sensor& sensor, RealTimeRun& run, const StopFlag& stop
     if (&sensor == std::ranges::find_if(sensors_, traces)->get()) threads_->gather();
     execute(sensor, *threads_, [&] { sensor.warm_up(); });
     run.start.arrive_and_wait();
-    while (sensor.last_pose_ns() < run.clock.end_ns() && run.clock.wait_until(sensor.due_ns(), stop)) {
+    while (wait_for_item(sensor, run.clock, stop)) {
         execute(sensor, *threads_, [&] { sensor.make_next(run.clock); });
         t_ns_.store(run.clock.now_ns(), std::memory_order_relaxed);
     }
@@ -174,6 +188,7 @@ void Emulator::run_lockstep(const StopFlag& stop) {
 void Emulator::advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFlag& stop) {
     const auto last_pose = [](const auto& sensor) { return sensor->last_pose_ns(); };
     while (!stop.load(std::memory_order_relaxed)) {
+        for (const auto& sensor : sensors_) sensor->plan();
         Sensor& next = **std::ranges::min_element(sensors_, {}, last_pose);
         const std::int64_t t_pose = next.last_pose_ns();
         if (t_pose > t_ns || t_pose >= clock.end_ns()) break;

@@ -80,7 +80,17 @@ json CameraSensor::report() const {
                          {"dropped_failed", c.failed},
                          {"reconnects", c.reconnects}});
     }
+    json control = nullptr;
+    if (control_) {
+        const CameraControlCounters c = control_->counters();
+        control = {{"commands", c.commands},
+                   {"commands_refused", c.commands_refused},
+                   {"triggers", c.triggers},
+                   {"triggers_refused", c.triggers_refused},
+                   {"triggers_dropped", c.triggers_dropped}};
+    }
     return {{"name", name()},
+            {"control", control},
             {"frames", s.frames},
             {"handed_over", s.handed_over},
             {"skipped", s.skipped},
@@ -237,6 +247,11 @@ std::string CameraSensor::in_words(bool lockstep) const {
                            s.error_1e9.percentile_ns(0.5) * 1e-9, s.error_1e9.percentile_ns(0.99) * 1e-9,
                            s.error_1e9.max_ns() * 1e-9);
     out += "\n";
+    if (control_) {
+        const CameraControlCounters c = control_->counters();
+        out += fmt::format("    commands: {} accepted, {} refused; triggers: {} accepted, {} refused, {} dropped\n",
+                           c.commands, c.commands_refused, c.triggers, c.triggers_refused, c.triggers_dropped);
+    }
     for (const auto& sink : sinks_) {
         const VideoCounters c = sink->counters();
         out += fmt::format("    -> {}: {} written, {}\n", sink->description(), c.written,

@@ -40,8 +40,11 @@ public:
 
     /// The first item at or after this time is next.
     virtual void start_at(std::int64_t t_ns) noexcept = 0;
-    /// The latest pose that the item needs. In lockstep, items are made in this order, once commands reach it; a
-    /// run that ends at t contains the items with last_pose_ns() < t.
+    /// Takes in what has come for it over CAN, which may change what is next. Before each reading of the schedule.
+    virtual void plan() noexcept {}
+    /// The latest pose that the item needs; Clock::kNever where the sensor waits for a trigger. In lockstep, items
+    /// are made in this order, once commands reach it; a run that ends at t contains the items with last_pose_ns()
+    /// < t.
     [[nodiscard]] virtual std::int64_t last_pose_ns() const noexcept = 0;
     /// When the item can be made; not before last_pose_ns().
     [[nodiscard]] virtual std::int64_t due_ns() const noexcept = 0;

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "protocols/camera_control.h"
+
 namespace narpa {
 
 /// What limited the frame.
@@ -38,7 +40,7 @@ struct FrameLedger {
     static constexpr std::size_t kPasses = 8;
     using Passes = std::array<std::uint32_t, kPasses>;
 
-    std::uint32_t frame = 0;        ///< frame number k; exposure mid = k * period
+    std::uint32_t frame = 0;        ///< frame number k; exposure mid = k * period, but of operated cameras
     std::uint8_t camera = 0;        ///< index of the camera in the scene
     std::uint8_t pose_counter = 0;  ///< counter of the newest pose command that the frame used
     bool pose_stale = false;        ///< a commanded body had no command, or one older than stale_after_s
@@ -58,6 +60,12 @@ struct FrameLedger {
     std::int64_t t_render_start_ns = 0, t_render_end_ns = 0;
     std::int64_t t_hand_over_ns = 0;  ///< 0: not handed over, or not yet: the embedded line is written before
     std::int64_t t_deadline_ns = 0;   ///< for the hand-over
+    // What the frame was taken with, beside its exposure: CameraSettings.
+    std::uint8_t command_counter = 0;  ///< of the newest camera command in effect; 0 before the first
+    TriggerMode trigger = TriggerMode::free_running;
+    std::int16_t gain_cdb = 0;
+    std::uint8_t binning = 1;
+    std::uint16_t region_x = 0, region_y = 0, region_width = 0, region_height = 0;
     friend bool operator==(const FrameLedger&, const FrameLedger&) = default;
 };
 

@@ -16,7 +16,8 @@ struct LedgerField {
     std::variant<std::monostate, std::uint8_t FrameLedger::*, std::uint32_t FrameLedger::*,
                  std::uint64_t FrameLedger::*, std::int64_t FrameLedger::*, float FrameLedger::*,
                  bool FrameLedger::*, Delivery FrameLedger::*, BudgetKind FrameLedger::*,
-                 FrameLedger::Passes FrameLedger::*>
+                 FrameLedger::Passes FrameLedger::*, std::int16_t FrameLedger::*, std::uint16_t FrameLedger::*,
+                 TriggerMode FrameLedger::*>
         member{};
     int column = -1;          ///< position in the CSV log; -1: not there
     std::string_view name{};  ///< of that column
@@ -43,8 +44,8 @@ inline constexpr auto kLedgerBudgetKinds = numbered(kBudgetKinds);
 inline constexpr auto kLedgerDeliveries = numbered(kDeliveries);
 
 // clang-format off
-/// In the order of the DBC.
-inline constexpr std::array<LedgerField, 23> kLedgerFields{{
+/// First those of the CAN message, in the order of the DBC. The last are on CAN in a message of their own, CameraState.
+inline constexpr std::array<LedgerField, 31> kLedgerFields{{
     {&FrameLedger::frame, 0, "frame", 12, 0,
      {"Frame", "", "Frame number", 1, false, {0, 0, 32}, {0, 0, 32}}},
     {&FrameLedger::camera, -1, "", 6, 0,
@@ -92,12 +93,21 @@ inline constexpr std::array<LedgerField, 23> kLedgerFields{{
      {"Rays", "", "Rays of all kinds", 1, false, {8, 0, 40}, {0, 392, 40}}},
     {&FrameLedger::budget, 19, "budget", 40, 0,
      {"Budget", "", "Samples a pixel, rays, or nanoseconds: see BudgetKind", 1, false, {9, 0, 40}, {0, 432, 40}}},
+    {&FrameLedger::command_counter, 21, "command_counter", 11, 0, {}},
+    {&FrameLedger::trigger, 22, "trigger", 155, 0, {.choices = kTriggerModeChoices}},
+    {&FrameLedger::gain_cdb, 23, "gain_cdb", 152, 0, {}},
+    {&FrameLedger::binning, 24, "binning", 154, 0, {}},
+    {&FrameLedger::region_x, 25, "region_x", 144, 0, {}},
+    {&FrameLedger::region_y, 26, "region_y", 146, 0, {}},
+    {&FrameLedger::region_width, 27, "region_width", 148, 0, {}},
+    {&FrameLedger::region_height, 28, "region_height", 150, 0, {}},
 }};
 // clang-format on
 
 inline constexpr auto kLedgerSignals = [] {
-    std::array<Signal, kLedgerFields.size()> signals{};
-    std::ranges::transform(kLedgerFields, signals.begin(), &LedgerField::signal);
+    std::array<Signal, 23> signals{};
+    std::transform(kLedgerFields.begin(), kLedgerFields.begin() + signals.size(), signals.begin(),
+                   [](const LedgerField& field) { return field.signal; });
     return signals;
 }();
 
@@ -110,7 +120,7 @@ inline constexpr SetLayout kLedgerLayout{"Ledger", "Time ledger of one camera fr
 
 /// The fields of the CSV log, in its order.
 inline constexpr auto kLedgerColumns = [] {
-    std::array<LedgerField, 21> columns{};
+    std::array<LedgerField, 29> columns{};
     for (const LedgerField& f : kLedgerFields)
         if (f.column >= 0) columns[static_cast<std::size_t>(f.column)] = f;
     return columns;

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <numeric>
 #include <type_traits>
+#include <utility>
 
 #include "base/csv.h"
 #include "protocols/ledger_fields.h"
@@ -51,7 +52,9 @@ std::string read_cell(std::string_view text, const LedgerField& field, Whole& va
     const auto choices = field.signal.choices;
     const bool good = read_number(text, value);
     if (!choices.empty())
-        return good && value < choices.size() ? "" : fmt::format("a {}, 0 to {}", field.name, choices.size() - 1);
+        return good && std::cmp_less(value, choices.size())
+                   ? ""
+                   : fmt::format("a {}, 0 to {}", field.name, choices.size() - 1);
     return good ? "" : sizeof(Whole) == 1 ? "a whole number up to 255" : "a whole number";
 }
 std::string read_cell(std::string_view text, const LedgerField&, std::int64_t& t_ns) {
@@ -92,6 +95,7 @@ std::string check_cell(const LedgerField& field, const FrameLedger& l) {
         return "numbers of samples, together at most as many as the frame's";
     if (field.name == "budget" && l.budget_kind == BudgetKind::samples && (l.budget < 1 || l.budget > kMostSpp))
         return fmt::format("samples for each pixel, 1 to {}", kMostSpp);
+    if (field.name == "binning" && l.binning < 1) return "a whole number from 1 to 255";
     return "";
 }
 

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <optional>
 
+#include "emulator/camera_control.h"
 #include "emulator/camera_unit.h"
 #include "emulator/log/run_record.h"
 #include "protocols/video/embedded_line.h"
 #include "renderer/camera/detector.h"
+#include "renderer/camera/read_out.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa {
@@ -75,9 +77,28 @@ Result<LoggedPlacements> placements_of(const std::vector<LoggedFrame>& frames, c
         if (!end) return end.error();
         BodyPoses& at = placements.bodies.emplace_back(bodies);
         for (std::size_t i = 0; i < bodies; ++i) at.set(i, (*start)[i].T_world_body, (*end)[i].T_world_body);
-        placements.cameras.push_back(camera_pose(world, camera, at, l.t_exposure_mid_ns, *middle));
+        placements.cameras.push_back(
+            camera_pose(world, camera, at, l.t_exposure_start_ns, l.t_exposure_end_ns, *middle));
     }
     return placements;
+}
+
+/// An operated camera can have been set as each frame states.
+Status check_settings(const std::vector<LoggedFrame>& frames, const Camera& camera,
+                      const std::string& ledger_file) {
+    if (!camera.control) return Ok{};
+    for (const LoggedFrame& f : frames) {
+        const FrameLedger& l = f.ledger;
+        if (l.region_width == 0 || l.region_height == 0 || l.region_x + l.region_width > camera.width ||
+            l.region_y + l.region_height > camera.height)
+            return Error{
+                fmt::format("frame {}: a region of {} x {} at ({}, {}), expected one within {} x {}", l.frame,
+                            l.region_width, l.region_height, l.region_x, l.region_y, camera.width, camera.height),
+                ledger_file, f.line, 1};
+        if (l.t_exposure_end_ns - l.t_exposure_start_ns <= rows_ns(camera))
+            return Error{fmt::format("frame {}: its exposure takes no time", l.frame), ledger_file, f.line, 1};
+    }
+    return Ok{};
 }
 
 /// "rays: 512, logged 513", where they are not the same.
@@ -92,6 +113,7 @@ Replay::Replay(std::unique_ptr<World> world, std::size_t camera_index)
     : world_(std::move(world)),
       camera_(world_->scene().cameras[camera_index]),
       index_(static_cast<std::uint8_t>(camera_index)),
+      settings_(narpa::settings_of(camera_)),
       full_scale_(full_scale_radiance(camera_)),
       renderer_(world_->render_scene(), camera_),
       sensor_array_(SensorArray::create(camera_, world_->scene().render.seed)),
@@ -115,8 +137,9 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
     if (!frames) return frames.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
-    auto placements = placements_of(*frames, **world, (*world)->scene().cameras[*index], stem + ".ledger.csv",
-                                    stem + ".truth.csv");
+    const Camera& as_in_the_scene = (*world)->scene().cameras[*index];
+    if (auto good = check_settings(*frames, as_in_the_scene, stem + ".ledger.csv"); !good) return good.error();
+    auto placements = placements_of(*frames, **world, as_in_the_scene, stem + ".ledger.csv", stem + ".truth.csv");
     if (!placements) return placements.error();
     std::unique_ptr<Replay> replay(new Replay(*std::move(world), *index));
     replay->frames_ = *std::move(frames);
@@ -143,8 +166,20 @@ FrameSettings Replay::settings_of(std::size_t i) const {
     return s;
 }
 
+/// The camera as it was set for the frame.
+void Replay::set(const FrameLedger& l) {
+    if (!camera_.control) return;
+    settings_.exposure_ns = l.t_exposure_end_ns - l.t_exposure_start_ns - rows_ns(camera_);
+    settings_.gain_cdb = l.gain_cdb;
+    settings_.binning = l.binning;
+    settings_.region = {l.region_x, l.region_y, l.region_width, l.region_height};
+    apply(settings_, world_->scene().cameras[index_], camera_);
+    full_scale_ = full_scale_radiance(camera_);
+}
+
 std::vector<std::string> Replay::make(std::size_t i) {
     const LoggedFrame& logged = frames_[i];
+    set(logged.ledger);
     const FrameSettings settings = settings_of(i);
     const FrameAccount account = renderer_.render(placements_[i], poses_[i], settings, picture_);
     made_ = i;
@@ -160,6 +195,9 @@ std::vector<std::string> Replay::make(std::size_t i) {
         expect_same("expected_error", static_cast<float>(account.standard_error / full_scale_), l.expected_error,
                     differs);
     expose(camera_, picture_, settings.seed, l.frame, bytes_, sensor_array_.get());
+    if (camera_.control)
+        read_out({camera_.width, camera_.height, camera_.format, camera_.period_ns}, settings_.region,
+                 settings_.binning, bytes_);
     if (has_image(i) && !bytes_repeat(logged))
         differs.push_back(
             fmt::format("image_crc32: {:08x}, logged {:08x}", image_crc32(bytes_), logged.image_crc32));

@@ -58,12 +58,14 @@ public:
 
 private:
     Replay(std::unique_ptr<World> world, std::size_t camera_index);
+    void set(const FrameLedger& ledger);
     [[nodiscard]] FrameSettings settings_of(std::size_t i) const;
     [[nodiscard]] bool bytes_repeat(const LoggedFrame& logged);
 
     std::unique_ptr<World> world_;
-    const Camera& camera_;
+    Camera camera_;  ///< as it was set for the frame
     std::uint8_t index_;
+    CameraSettings settings_;
     double full_scale_;
     std::vector<LoggedFrame> frames_;
     std::vector<BodyPoses> placements_;  ///< of each frame

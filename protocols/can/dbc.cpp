@@ -97,6 +97,10 @@ std::string write_dbc(std::span<const CanBody> bodies, int cameras) {
                   ledger_base_id(static_cast<std::uint8_t>(i)), telemetry);
     write_set(out, kEstimateLayout, "", kEstimateBaseId, telemetry);
     write_set(out, kHeartbeatLayout, "", kHeartbeatId, telemetry);
+    write_set(out, kCameraCommandLayout, "", kCameraCommandBaseId, command);
+    write_set(out, kCameraTriggerLayout, "", kCameraTriggerBaseId, command);
+    write_set(out, kCameraReplyLayout, "", kCameraReplyBaseId, telemetry);
+    write_set(out, kCameraStateLayout, "", kCameraStateBaseId, telemetry);
     write_set(out, kActuatorLayout, "", kActuatorBaseId, navigation);
     write_set(out, kNavigationLayout, "", kNavigationBaseId, navigation);
     write_set(out, kAttitudeLayout, "", kAttitudeBaseId, dynamics);

@@ -25,6 +25,10 @@ std::string message_name(std::uint32_t id, std::span<const CanBody> bodies) {
     if (base == kNavigationBaseId) name = "navigation estimate";
     if (base == kAttitudeBaseId) name = "attitude report";
     if (base == kDynamicsBaseId) name = "dynamics report";
+    if (base == kCameraCommandBaseId) name = "camera command";
+    if (base == kCameraTriggerBaseId) name = "camera trigger";
+    if (base == kCameraReplyBaseId) name = "camera reply";
+    if (base == kCameraStateBaseId) name = "camera state";
     for (const CanBody& body : bodies)
         if (base == body.base_id) name = "pose of " + body.name;
     return name.empty() ? "frame" : name + ", part " + std::to_string(id % kBaseIdStep);

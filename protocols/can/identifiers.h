@@ -20,8 +20,11 @@ inline constexpr std::uint32_t kTelemetryBaseId = 0x600;  ///< ledgers: one set 
 inline constexpr std::uint8_t kMaxTelemetryCameras = 16;
 inline constexpr std::uint32_t kHeartbeatId = 0x701;  ///< CiA 301: 0x700 + node identifier 1
 inline constexpr std::uint32_t kEstimateBaseId = 0x710;
-inline constexpr std::uint32_t kActuatorBaseId = 0x720, kNavigationBaseId = 0x730;  ///< from navigation
-inline constexpr std::uint32_t kAttitudeBaseId = 0x740, kDynamicsBaseId = 0x750;    ///< from dynamics
+inline constexpr std::uint32_t kActuatorBaseId = 0x720, kNavigationBaseId = 0x730;          ///< from navigation
+inline constexpr std::uint32_t kAttitudeBaseId = 0x740, kDynamicsBaseId = 0x750;            ///< from dynamics
+inline constexpr std::uint32_t kCameraCommandBaseId = 0x760, kCameraTriggerBaseId = 0x770;  ///< to cameras
+inline constexpr std::uint32_t kCameraReplyBaseId = 0x780, kCameraStateBaseId = 0x790;      ///< from cameras
+inline constexpr std::uint32_t kSyncId = 0x080;  ///< CiA 301: the SYNC object
 
 /// Of a message between navigation and dynamics.
 [[nodiscard]] constexpr bool is_closed_loop(std::uint32_t id) noexcept {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <tuple>
+#include <type_traits>
 
 namespace narpa {
 namespace {
@@ -244,6 +246,107 @@ struct Codec<DynamicsReport>
     : MemberCodec<DynamicsReport, kDynamicsLayout, kDynamicsBaseId, &DynamicsReport::counter, &DynamicsReport::t_ns,
                   &DynamicsReport::t_start_ns, &DynamicsReport::phase> {};
 
+// --- Cameras that are operated while they run -------------------------------------------------------------------
+
+/// Calls f with each member of the settings, in the order of camera_setting_signals.
+template <class Settings>
+void for_each_setting(Settings& s, const auto& f) noexcept {
+    f(s.running), f(s.trigger), f(s.auto_exposure), f(s.binning), f(s.gain_cdb), f(s.exposure_ns);
+    if constexpr (std::is_same_v<std::remove_const_t<Settings>, CameraCommand>)
+        f(s.region_x), f(s.region_y), f(s.region_width), f(s.region_height);
+    else
+        f(s.region.x), f(s.region.y), f(s.region.width), f(s.region.height);
+    f(s.period_ns);
+}
+
+struct PutSetting {
+    RawWriter& writer;
+    template <class Value>
+    void operator()(const std::optional<Value>& value) const noexcept {
+        writer.raw[writer.i++] = value ? static_cast<std::int64_t>(*value) : kNotAvailable;
+    }
+    template <class Value>
+    void operator()(const Value& value) const noexcept {
+        writer.raw[writer.i++] = static_cast<std::int64_t>(value);
+    }
+};
+struct GetSetting {
+    RawReader& reader;
+    template <class Value>
+    void operator()(std::optional<Value>& value) const noexcept {
+        value.reset();
+        if (reader.raw[reader.i] != kNotAvailable) return (*this)(value.emplace());
+        ++reader.i;
+    }
+    template <class Value>
+    void operator()(Value& value) const noexcept {
+        value = static_cast<Value>(reader.raw[reader.i++]);
+    }
+};
+
+/// No value is negative but the gain, every choice is a known one, and every value fits its member.
+DecodeStatus check_settings(const RawSignals& raw, SignalTable signals, bool absent_allowed) noexcept {
+    if (!has_known_choices(raw, signals)) return DecodeStatus::not_a_number;
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+        const bool gain = signals[i].unit == "dB", pixels = signals[i].unit == "px";
+        const std::int64_t most = signals[i].name == "Binning" ? 255 : pixels ? 65535 : raw_max(true, 62);
+        const bool absent = raw[i] == kNotAvailable;
+        if (absent ? !absent_allowed : (raw[i] < 0 && !gain) || raw[i] > most) return DecodeStatus::not_a_number;
+    }
+    return DecodeStatus::complete;
+}
+
+template <>
+struct Codec<CameraCommand> {
+    static constexpr const SetLayout& layout = kCameraCommandLayout;
+    static std::uint32_t base_id(std::uint8_t) noexcept { return kCameraCommandBaseId; }
+    static std::uint8_t camera(const CameraCommand&) noexcept { return 0; }
+    static std::uint8_t counter(const CameraCommand& c) noexcept { return c.counter; }
+    static RawSignals raw_of(const CameraCommand& c) noexcept {
+        RawWriter writer{layout.signals};
+        writer.put(c.camera);
+        for_each_setting(c, PutSetting{writer});
+        return writer.raw;
+    }
+    static DecodeStatus check(const RawSignals& raw) noexcept { return check_settings(raw, layout.signals, true); }
+    static void read(const RawSignals& raw, std::uint8_t counter, std::int64_t, CameraCommand& out) noexcept {
+        RawReader reader{layout.signals, raw};
+        out.counter = counter;
+        reader.get(out.camera);
+        for_each_setting(out, GetSetting{reader});
+    }
+};
+
+template <>
+struct Codec<CameraState> {
+    static constexpr const SetLayout& layout = kCameraStateLayout;
+    static std::uint32_t base_id(std::uint8_t) noexcept { return kCameraStateBaseId; }
+    static std::uint8_t camera(const CameraState&) noexcept { return 0; }
+    static std::uint8_t counter(const CameraState& s) noexcept { return static_cast<std::uint8_t>(s.frame); }
+    static RawSignals raw_of(const CameraState& s) noexcept {
+        RawWriter writer{layout.signals};
+        writer.put(s.frame), writer.put(s.camera), writer.put(s.command_counter);
+        for_each_setting(s.settings, PutSetting{writer});
+        return writer.raw;
+    }
+    static DecodeStatus check(const RawSignals& raw) noexcept { return check_settings(raw, layout.signals, false); }
+    static void read(const RawSignals& raw, std::uint8_t, std::int64_t, CameraState& out) noexcept {
+        RawReader reader{layout.signals, raw};
+        reader.get(out.frame), reader.get(out.camera), reader.get(out.command_counter);
+        for_each_setting(out.settings, GetSetting{reader});
+    }
+};
+
+template <>
+struct Codec<CameraTrigger>
+    : MemberCodec<CameraTrigger, kCameraTriggerLayout, kCameraTriggerBaseId, &CameraTrigger::counter,
+                  &CameraTrigger::cameras, &CameraTrigger::at_once, &CameraTrigger::t_ns> {};
+
+using R = CameraReply;
+template <>
+struct Codec<R> : MemberCodec<R, kCameraReplyLayout, kCameraReplyBaseId, &R::counter, &R::camera, &R::to_trigger,
+                              &R::answer, &R::t_ns> {};
+
 // --- Estimate: a lost one has no pose ---------------------------------------------------------------------------
 
 using E = EstimateReport;
@@ -333,7 +436,7 @@ struct Codec<FrameLedger> {
     static std::uint8_t counter(const FrameLedger& l) noexcept { return static_cast<std::uint8_t>(l.frame); }
     static RawSignals raw_of(const FrameLedger& l) noexcept {
         RawSignals raw{};
-        for (std::size_t i = 0; i < kLedgerFields.size(); ++i)
+        for (std::size_t i = 0; i < kLedgerSignals.size(); ++i)
             visit_field(kLedgerFields[i], l,
                         [&](const auto& value) { raw[i] = to_raw(kLedgerSignals[i], l.t_exposure_mid_ns, value); });
         raw[kPoseKnown] = l.t_pose_ns != 0;
@@ -346,7 +449,7 @@ struct Codec<FrameLedger> {
     static void read(const RawSignals& raw, std::uint8_t, std::int64_t t_reference_ns, FrameLedger& out) noexcept {
         out = {};
         const std::int64_t t_mid_ns = time_of(raw[kExposureMid], t_reference_ns);
-        for (std::size_t i = 0; i < kLedgerFields.size(); ++i)
+        for (std::size_t i = 0; i < kLedgerSignals.size(); ++i)
             visit_field(kLedgerFields[i], out, FromRaw{kLedgerSignals[i], raw[i], t_mid_ns, t_reference_ns});
         if (raw[kPoseKnown] == 0) out.t_pose_ns = 0;
     }
@@ -388,6 +491,10 @@ NARPA_CAN_MESSAGE(ActuatorCommand);
 NARPA_CAN_MESSAGE(NavigationEstimate);
 NARPA_CAN_MESSAGE(AttitudeReport);
 NARPA_CAN_MESSAGE(DynamicsReport);
+NARPA_CAN_MESSAGE(CameraCommand);
+NARPA_CAN_MESSAGE(CameraTrigger);
+NARPA_CAN_MESSAGE(CameraReply);
+NARPA_CAN_MESSAGE(CameraState);
 #undef NARPA_CAN_MESSAGE
 
 }  // namespace narpa

@@ -84,9 +84,10 @@ struct Heartbeat {
 /// Writes `out` only when the status is `complete`.
 [[nodiscard]] DecodeStatus decode(const CanFrame& frame, std::int64_t t_reference_ns, Heartbeat& out) noexcept;
 
-/// Message: FrameLedger, EstimateReport, and of the closed loop ActuatorCommand, NavigationEstimate,
-/// AttitudeReport, DynamicsReport. The counter of a set is the message's own, or the low 8 bits of its frame or
-/// cycle number. Values beyond a signal's range saturate; numbers that are not finite are "not available".
+/// Message: FrameLedger, EstimateReport; of operated cameras CameraCommand, CameraTrigger, CameraReply,
+/// CameraState; and of the closed loop ActuatorCommand, NavigationEstimate, AttitudeReport, DynamicsReport. The
+/// counter of a set is the message's own, or the low 8 bits of its frame or cycle number. Values beyond a signal's
+/// range saturate; numbers that are not finite are "not available".
 ///
 /// Ledger: times other than exposure mid and pose time travel as whole microseconds after exposure mid. Of the
 /// passes their number travels, not what each took: that is in the log. Estimate: in state `lost`, pose and

@@ -14,6 +14,7 @@
 #include <span>
 #include <string_view>
 
+#include "protocols/camera_control.h"
 #include "protocols/can/identifiers.h"
 #include "protocols/closed_loop.h"
 #include "protocols/estimate.h"
@@ -263,5 +264,78 @@ inline constexpr auto kDynamicsSignals = laid_out(std::to_array<Signal>({
 
 inline constexpr SetLayout kDynamicsLayout{"Dynamics", "Before the pose commands of the same time", kDynamicsFrames,
                                            kDynamicsSignals, 104};
+
+// --- Cameras that are operated while they run -------------------------------------------------------------------
+
+inline constexpr double kGainSteps_per_dB = 100;
+inline constexpr auto kOffOnChoices = std::to_array<Choice>({{0, "off"}, {1, "on"}});
+inline constexpr auto kTriggerModeChoices = numbered(kTriggerModes);
+inline constexpr auto kCameraAnswerChoices = numbered(kCameraAnswers);
+
+/// Classic frames from `first` on: what a camera is set to. A signal of a command may be "not available".
+[[nodiscard]] constexpr std::array<Signal, 11> camera_setting_signals(std::uint8_t first) {
+    const auto at = [&](int frame) { return static_cast<std::uint8_t>(first + frame); };
+    return {{
+        {"Running", "", "Frames are exposed", 1, true, {at(0), 0, 8}, {}, kOffOnChoices},
+        {"Trigger", "", "What starts an exposure", 1, true, {at(0), 8, 8}, {}, kTriggerModeChoices},
+        {"AutoExposure", "", "The camera sets its exposure time", 1, true, {at(0), 16, 8}, {}, kOffOnChoices},
+        {"Binning", "", "n: blocks of n x n pixels have their mean", 1, true, {at(0), 24, 8}},
+        {"Gain", "dB", "Over the gain of the scene's detector", kGainSteps_per_dB, true, {at(0), 32, 16}},
+        {"Exposure", "ns", "Exposure time of one row", 1, true, {at(1), 0, 48}},
+        {"RegionX", "px", "First column that is read out", 1, true, {at(2), 0, 24}},
+        {"RegionY", "px", "First row that is read out", 1, true, {at(2), 24, 24}},
+        {"RegionWidth", "px", "Columns that are read out", 1, true, {at(3), 0, 24}},
+        {"RegionHeight", "px", "Rows that are read out", 1, true, {at(3), 24, 24}},
+        {"Period", "ns", "From frame to frame, and the least between triggers", 1, true, {at(4), 0, 48}},
+    }};
+}
+
+inline constexpr std::array<std::string_view, 6> kCameraCommandFrames{
+    "CameraCommandCamera",   "CameraCommandSwitches", "CameraCommandExposure",
+    "CameraCommandRegionXY", "CameraCommandRegionWH", "CameraCommandPeriod"};
+inline constexpr auto kCameraCommandSignals =
+    laid_out(std::to_array<Signal>({{"Camera", "", "Index of the camera in the scene", 1, false, {0, 0, 8}}}),
+             camera_setting_signals(1));
+inline constexpr SetLayout kCameraCommandLayout{"CameraCommand",
+                                                "Changes a camera's settings; not available: as it is",
+                                                kCameraCommandFrames, kCameraCommandSignals, 248};
+
+inline constexpr std::array<std::string_view, 2> kCameraTriggerFrames{"CameraTriggerCameras", "CameraTriggerTime"};
+inline constexpr auto kCameraTriggerSignals = laid_out(std::to_array<Signal>({
+    {"Cameras", "", "Bit i: camera i of the scene", 1, false, {0, 0, 16}},
+    {"AtOnce", "", "As soon as the cameras can, instead of at Time", 1, false, {0, 16, 8}, {}, kOffOnChoices},
+    {"Time", "ns", "Start of the exposure: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
+}));
+inline constexpr SetLayout kCameraTriggerLayout{"CameraTrigger",
+                                                "Exposes one frame of each camera named, at the same time",
+                                                kCameraTriggerFrames, kCameraTriggerSignals, 72};
+
+inline constexpr std::array<std::string_view, 2> kCameraReplyFrames{"CameraReplyAnswer", "CameraReplyTime"};
+inline constexpr auto kCameraReplySignals = laid_out(std::to_array<Signal>({
+    {"Camera", "", "Index of the camera in the scene", 1, false, {0, 0, 8}},
+    {"ToTrigger", "", "Answers a trigger, not a command", 1, false, {0, 8, 8}, {}, kOffOnChoices},
+    {"Answer", "", "Accepted, or why not", 1, false, {0, 16, 8}, {}, kCameraAnswerChoices},
+    {"Time",
+     "ns",
+     "From which the settings act, or start of the exposure: simulation clock modulo 2^48 ns",
+     1,
+     false,
+     {1, 0, 48}},
+}));
+inline constexpr SetLayout kCameraReplyLayout{"CameraReply", "Counter: of the command or trigger that it answers",
+                                              kCameraReplyFrames, kCameraReplySignals, 72};
+
+inline constexpr std::array<std::string_view, 6> kCameraStateFrames{"CameraStateFrame",    "CameraStateSwitches",
+                                                                    "CameraStateExposure", "CameraStateRegionXY",
+                                                                    "CameraStateRegionWH", "CameraStatePeriod"};
+inline constexpr auto kCameraStateSignals =
+    laid_out(std::to_array<Signal>({
+                 {"Frame", "", "Frame number", 1, false, {0, 0, 32}},
+                 {"Camera", "", "Index of the camera in the scene", 1, false, {0, 32, 8}},
+                 {"CommandCounter", "", "Of the newest command in effect", 1, false, {0, 40, 8}},
+             }),
+             camera_setting_signals(1));
+inline constexpr SetLayout kCameraStateLayout{"CameraState", "What a frame was taken with", kCameraStateFrames,
+                                              kCameraStateSignals, 288};
 
 }  // namespace narpa

@@ -14,11 +14,11 @@
 
 namespace narpa {
 
-/// magic, version, size, camera, pose counter, flags, step, budget's kind, reserved | frame, samples per pixel,
-/// error | samples, rays, budget | passes | eight times | CRC
+/// magic, version, size, camera, pose counter, flags, step, budget's kind, command counter | frame, samples per
+/// pixel, error | samples, rays, budget | passes | eight times | region, gain, binning, trigger | CRC
 inline constexpr std::size_t kEmbeddedLineBytes =
-    4 + 8 * 1 + 3 * 4 + 3 * 8 + 4 * FrameLedger::kPasses + 8 * 8 + 4;  ///< 148
-inline constexpr std::uint8_t kEmbeddedLineVersion = 2;
+    4 + 8 * 1 + 3 * 4 + 3 * 8 + 4 * FrameLedger::kPasses + 8 * 8 + 12 + 4;  ///< 160
+inline constexpr std::uint8_t kEmbeddedLineVersion = 3;
 
 /// Writes the ledger into the first kEmbeddedLineBytes of `row`, the bytes of the last row. False, and nothing
 /// written: the row is too narrow.

@@ -4,14 +4,15 @@ On classic CAN a set is several frames of 8 bytes that take effect together, on 
 (protocols/can/README.md). The sets are
 
     Pose (one for each body's can_id), Ledger (one for each camera), Heartbeat, Estimate,
-    Attitude, Dynamics (from the dynamics), Actuator, Navigation (from the navigation).
+    Attitude, Dynamics (from the dynamics), Actuator, Navigation (from the navigation),
+    CameraCommand, CameraTrigger (to cameras), CameraReply, CameraState (from them).
 """
 import time
 from dataclasses import dataclass
 
 from narpa import dbc
 
-POSE, LEDGER = "Pose", "Ledger"
+POSE, LEDGER, CAMERA_COMMAND = "Pose", "Ledger", "CameraCommand"
 LEDGER_BASE, STEP = 0x600, 16  # identifiers: camera k's ledger at LEDGER_BASE + STEP * k; bodies below LEDGER_BASE
 
 
@@ -74,12 +75,15 @@ class SignalSet:
         self.name, self.base, self.classic, self.fd = name, base, classic, fd  # {offset: Message}; Message or None
 
     def encode(self, values, counter, fd=False):
-        """[(identifier, bytes)]. `values` may give a vector by the name that its signals share: Position=(x, y, z)."""
+        """[(identifier, bytes)]. `values` may give a vector by the name that its signals share: Position=(x, y, z).
+        Signals that are not given are 0; in a CameraCommand "not available", which leaves the setting as it is."""
         offsets = {self.fd.identifier % STEP: self.fd} if fd and self.fd else self.classic
         known = {name for message in offsets.values() for name in message.signals} - {"Counter", "Crc"}
         values = expanded(values, known)
         if unknown := values.keys() - known:
             raise ValueError(f"{self.name} has no signal {', '.join(sorted(unknown))}, expected {', '.join(sorted(known))}")
+        if self.name == CAMERA_COMMAND:
+            values = {"Camera": 0} | {name: None for name in known - {"Camera"}} | values
         frames = []
         for offset, message in offsets.items():
             own = {name: values[name] for name in message.signals if name in values}

@@ -113,6 +113,38 @@ std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
     return shutter;
 }
 
+std::optional<CameraControlLimits> read_control(TableReader& camera, const Camera& c) {
+    static constexpr std::array<std::pair<std::string_view, TriggerMode>, 3> kModes{
+        {{kTriggerModes[0], TriggerMode::free_running},
+         {kTriggerModes[1], TriggerMode::command},
+         {kTriggerModes[2], TriggerMode::sync}}};
+    auto table = camera.table("control");
+    if (!table) return std::nullopt;
+    if (!c.detector) {
+        table->fail("latency_s", "needs an exposure_s, expected a [camera.detector]");
+        return std::nullopt;
+    }
+    const double period_s = 1e-9 * static_cast<double>(c.period_ns);
+    const double rows_s = c.shutter ? 1e-9 * static_cast<double>(c.shutter->row_time_ns) * (c.height - 1) : 0;
+    CameraControlLimits control;
+    const auto ns = [&](std::string_view key, const Range& range, double otherwise_s) {
+        return static_cast<std::int64_t>(std::llround(table->number(key, range).value_or(otherwise_s) * 1e9));
+    };
+    const double exposure_s = c.detector->exposure_s;
+    // At least a millisecond: the thread of the bus may be so late.
+    control.latency_ns = ns("latency_s", {.low = 1e-3, .high = 10}, 0.01);
+    control.trigger = table->choice<TriggerMode>("trigger", kModes).value_or(control.trigger);
+    control.exposure_min_ns = ns("exposure_min_s", {.low = 1e-9, .high = exposure_s}, std::min(1e-5, exposure_s));
+    control.exposure_max_ns =
+        ns("exposure_max_s", {.low = exposure_s, .high = 100}, std::max(exposure_s, 0.9 * (period_s - rows_s)));
+    control.gain_max_cdb =
+        static_cast<std::int16_t>(100 * table->number("gain_max_db", {.low = 0, .high = 60}).value_or(24));
+    control.auto_exposure = table->boolean("auto_exposure").value_or(false);
+    control.level = table->number("auto_exposure_level", {.low = 0.01, .high = 0.9}).value_or(control.level);
+    table->finish();
+    return control;
+}
+
 /// What an ideal sensor maps to full scale: a white Lambert surface that faces the Sun, or the brightest band of
 /// the ambient light where there is no Sun. 0: neither is there.
 double white_radiance(const Scene& scene) {
@@ -140,6 +172,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.late = read_late_policy(table);
     camera.detector = read_detector(table, camera.period_ns);
     camera.shutter = read_shutter(table, camera);
+    camera.control = read_control(table, camera);
     read_optics(table, camera, scene.sun.has_value(), folder);
     camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
     if (!camera.detector && !(camera.white_radiance > 0))

@@ -15,6 +15,7 @@
 #include "base/pixel_format.h"
 #include "base/pose.h"
 #include "base/vec3.h"
+#include "protocols/camera_control.h"
 #include "renderer/material/material.h"
 #include "renderer/projection/distortion.h"
 
@@ -127,6 +128,16 @@ struct Shutter {
     std::int64_t row_time_ns = 0;  ///< from the start of one row's exposure to the next one's; 0: a global shutter
 };
 
+/// A camera that is operated over CAN while it runs: protocols/camera_control.h.
+struct CameraControlLimits {
+    std::int64_t latency_ns = 10'000'000;             ///< from a command to the first exposure that it may act on
+    TriggerMode trigger = TriggerMode::free_running;  ///< at the start
+    std::int64_t exposure_min_ns = 10'000, exposure_max_ns = 0;
+    std::int16_t gain_max_cdb = 2400;
+    bool auto_exposure = false;  ///< at the start
+    double level = 0.3;          ///< that auto-exposure aims at: mean of the image, share of full scale
+};
+
 /// Pixels from a point that the filter of a point spread reaches at most.
 inline constexpr int kPointSpreadReach_px = 31;
 
@@ -178,6 +189,7 @@ struct Camera {
     double white_radiance = 0;  ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
     std::optional<Detector> detector;
     std::optional<Shutter> shutter{};
+    std::optional<CameraControlLimits> control{};
     std::optional<Lens> lens{};  ///< none: a pinhole
     std::optional<PointSpreadFunction> point_spread{};
     std::optional<Vignetting> vignetting{};

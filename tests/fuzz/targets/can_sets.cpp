@@ -44,6 +44,7 @@ public:
         (void)decode(f, t_ns, heartbeat);
         take(ledgers_, f, t_ns), take(estimates_, f, t_ns), take(actuators_, f, t_ns), take(navigation_, f, t_ns);
         take(attitudes_, f, t_ns), take(dynamics_, f, t_ns);
+        take(camera_commands_, f, t_ns), take(camera_triggers_, f, t_ns), take(camera_states_, f, t_ns);
     }
 
     void check_counts() const {
@@ -68,6 +69,9 @@ private:
     MessageDecoder<NavigationEstimate> navigation_;
     MessageDecoder<AttitudeReport> attitudes_;
     MessageDecoder<DynamicsReport> dynamics_;
+    MessageDecoder<CameraCommand> camera_commands_;
+    MessageDecoder<CameraTrigger> camera_triggers_;
+    MessageDecoder<CameraState> camera_states_;
 };
 
 }  // namespace

@@ -1,0 +1,195 @@
+#include "emulator/camera_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/camera/detector.h"
+#include "renderer/camera/read_out.h"
+
+namespace narpa {
+namespace {
+
+constexpr int kMostBinning = 16;
+constexpr std::int64_t kMostPeriodNs = 1'000'000'000'000;
+
+bool runs_free(const CameraSettings& s) noexcept {
+    return s.running && s.trigger == TriggerMode::free_running;
+}
+
+template <class Value>
+void change(Value& setting, const std::optional<Value>& wanted) noexcept {
+    if (wanted) setting = *wanted;
+}
+
+CameraSettings changed(CameraSettings s, const CameraCommand& c) noexcept {
+    change(s.running, c.running), change(s.trigger, c.trigger), change(s.auto_exposure, c.auto_exposure);
+    change(s.exposure_ns, c.exposure_ns), change(s.gain_cdb, c.gain_cdb), change(s.binning, c.binning);
+    change(s.region.x, c.region_x), change(s.region.y, c.region_y);
+    change(s.region.width, c.region_width), change(s.region.height, c.region_height);
+    change(s.period_ns, c.period_ns);
+    return s;
+}
+
+}  // namespace
+
+std::int64_t rows_ns(const Camera& camera) noexcept {
+    return camera.shutter ? camera.shutter->row_time_ns * (camera.height - 1) : 0;
+}
+
+std::int64_t exposure_ns(const Camera& camera) noexcept {
+    return camera.detector ? std::llround(camera.detector->exposure_s * 1e9) + rows_ns(camera) : 0;
+}
+
+CameraSettings settings_of(const Camera& camera) noexcept {
+    CameraSettings s;
+    if (camera.detector) s.exposure_ns = std::llround(camera.detector->exposure_s * 1e9);
+    if (camera.control) s.trigger = camera.control->trigger, s.auto_exposure = camera.control->auto_exposure;
+    s.region.width = static_cast<std::uint16_t>(camera.width);
+    s.region.height = static_cast<std::uint16_t>(camera.height);
+    s.period_ns = camera.period_ns;
+    return s;
+}
+
+void apply(const CameraSettings& settings, const Camera& as_in_the_scene, Camera& camera) noexcept {
+    camera.detector->exposure_s = static_cast<double>(settings.exposure_ns) * 1e-9;
+    camera.detector->gain_e_per_dn =
+        gain_e_per_dn(*as_in_the_scene.detector) * std::pow(10.0, -settings.gain_cdb / 2000.0);
+}
+
+CameraControl::CameraControl(const Camera& camera, std::uint8_t index)
+    : limits_(*camera.control),
+      index_(index),
+      format_(camera.format),
+      width_(camera.width),
+      height_(camera.height),
+      rows_ns_(rows_ns(camera)),
+      least_period_ns_(camera.period_ns),
+      latest_(settings_of(camera)),
+      t_next_trigger_ns_(0),
+      exposure_ns_(latest_.exposure_ns),
+      settings_(latest_) {
+    plan();
+}
+
+// --- From the CAN thread
+// ------------------------------------------------------------------------------------------
+
+CameraReply CameraControl::command(const CameraCommand& command, std::int64_t t_now_ns) noexcept {
+    if (latest_.auto_exposure) latest_.exposure_ns = exposure_ns_.load(std::memory_order_relaxed);
+    const CameraSettings wanted = changed(latest_, command);
+    CameraReply reply{command.counter, index_, false, check(command, wanted), t_now_ns};
+    const std::int64_t t_ns = t_now_ns + limits_.latency_ns;
+    if (reply.answer == CameraAnswer::accepted && !orders_.push({t_ns, wanted, command.counter}))
+        reply.answer = CameraAnswer::overrun;
+    if (reply.answer != CameraAnswer::accepted) {
+        ++counters_.commands_refused;
+        return reply;
+    }
+    ++counters_.commands;
+    latest_ = wanted;
+    reply.t_ns = t_ns;
+    return reply;
+}
+
+CameraAnswer CameraControl::check(const CameraCommand& command, const CameraSettings& wanted) const noexcept {
+    using enum CameraAnswer;
+    const int right = wanted.region.x + wanted.region.width, bottom = wanted.region.y + wanted.region.height;
+    const bool pairs = format_ == PixelFormat::yuyv;
+    if (command.exposure_ns && wanted.auto_exposure) return auto_exposure;
+    if (wanted.period_ns > kMostPeriodNs || wanted.period_ns < least_period_ns_) return period_range;
+    if (wanted.exposure_ns < limits_.exposure_min_ns || wanted.exposure_ns > limits_.exposure_max_ns ||
+        image_ns(wanted) > wanted.period_ns)
+        return exposure_range;
+    if (wanted.gain_cdb < 0 || wanted.gain_cdb > limits_.gain_max_cdb) return gain_range;
+    if (wanted.region.width == 0 || wanted.region.height == 0 || right > width_ || bottom > height_ ||
+        (pairs && (wanted.region.x % 2 != 0 || wanted.region.width % 2 != 0)))
+        return region_range;
+    if (wanted.binning < 1 || wanted.binning > (can_bin(format_) ? kMostBinning : 1)) return binning_range;
+    return accepted;
+}
+
+CameraReply CameraControl::trigger(const CameraTrigger& trigger, std::int64_t t_now_ns) noexcept {
+    const CameraAnswer answer = take_trigger(TriggerMode::command, trigger.t_ns, t_now_ns);
+    return {trigger.counter, index_, true, answer, answer == CameraAnswer::accepted ? trigger.t_ns : t_now_ns};
+}
+
+void CameraControl::sync(std::int64_t t_ns, std::int64_t t_now_ns) noexcept {
+    (void)take_trigger(TriggerMode::sync, t_ns, t_now_ns);
+}
+
+CameraAnswer CameraControl::take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept {
+    using enum CameraAnswer;
+    const CameraAnswer answer = !awaits(mode)                          ? wrong_mode
+                                : t_ns < earliest_trigger_ns(t_now_ns) ? too_soon
+                                : !triggers_.push(t_ns)                ? overrun
+                                                                       : accepted;
+    ++(answer == accepted ? counters_.triggers : counters_.triggers_refused);
+    if (answer == accepted) t_next_trigger_ns_ = t_ns + latest_.period_ns;
+    return answer;
+}
+
+CameraControlCounters CameraControl::counters() const noexcept {
+    CameraControlCounters c = counters_;
+    c.triggers_dropped = dropped_.load(std::memory_order_relaxed);
+    return c;
+}
+
+// --- From the camera's thread
+// -------------------------------------------------------------------------------------
+
+void CameraControl::start_at(std::int64_t t_ns) noexcept {
+    const std::int64_t period = settings_.period_ns;
+    t_mid_ns_ = std::max<std::int64_t>(0, (t_ns + period - 1) / period) * period;
+    plan();
+}
+
+void CameraControl::plan() noexcept {
+    while (adopt_next()) {
+    }
+    t_start_ns_ = runs_free(settings_) ? t_mid_ns_ - image_ns(settings_) / 2 : trigger_ ? *trigger_ : Clock::kNever;
+}
+
+/// Adopts an order that acts on the next exposure, or drops a trigger that comes to nothing. False: neither.
+bool CameraControl::adopt_next() noexcept {
+    // Orders first: whoever has seen one sees the triggers that came before it.
+    if (Order order; !order_ && orders_.pop(order)) order_ = order;
+    if (std::int64_t t_ns = 0; !trigger_ && triggers_.pop(t_ns)) trigger_ = t_ns;
+    if (order_ && settings_.auto_exposure && order_->settings.auto_exposure)
+        order_->settings.exposure_ns = settings_.exposure_ns;
+    const bool free = runs_free(settings_);
+    if (trigger_ && (free || !settings_.running || *trigger_ < t_adopted_ns_) &&
+        !(order_ && order_->t_ns <= *trigger_)) {
+        trigger_.reset();
+        dropped_.fetch_add(1, std::memory_order_relaxed);
+        return true;
+    }
+    if (!order_) return false;
+    const std::int64_t t_acts_on = free       ? t_mid_ns_ - image_ns(order_->settings) / 2
+                                   : trigger_ ? *trigger_
+                                              : Clock::kNever;
+    if (order_->t_ns > t_acts_on) return false;
+    settings_ = order_->settings;
+    command_counter_ = order_->counter;
+    t_adopted_ns_ = order_->t_ns;
+    if (!free && runs_free(settings_)) t_mid_ns_ = t_adopted_ns_ + image_ns(settings_) / 2;
+    order_.reset();
+    return true;
+}
+
+void CameraControl::advance(std::optional<double> level) noexcept {
+    if (runs_free(settings_))
+        t_mid_ns_ += settings_.period_ns;
+    else
+        trigger_.reset();
+    if (settings_.auto_exposure && level) {
+        const double factor = std::clamp(limits_.level / std::max(*level, 1e-3), 0.5, 2.0);
+        const std::int64_t most = std::min(limits_.exposure_max_ns, settings_.period_ns - rows_ns_);
+        settings_.exposure_ns =
+            std::clamp(std::llround(factor * static_cast<double>(settings_.exposure_ns)),
+                       static_cast<long long>(limits_.exposure_min_ns), static_cast<long long>(most));
+        exposure_ns_.store(settings_.exposure_ns, std::memory_order_relaxed);
+    }
+    plan();
+}
+
+}  // namespace narpa

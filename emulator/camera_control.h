@@ -1,0 +1,110 @@
+/// emulator/camera_control.h - a camera that is operated over CAN while it runs: checks commands and triggers as
+/// they come, and decides when the next exposure starts and with which settings.
+///
+/// The CAN thread calls `command`, `trigger` and `sync`, the camera's thread the rest. A command that is received
+/// at t acts on the first frame whose exposure, with the new settings, starts at t + latency or later.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <optional>
+
+#include "emulator/clock.h"
+#include "emulator/spsc_ring.h"
+#include "protocols/camera_control.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// From the start of the first row's exposure to that of the last one's.
+[[nodiscard]] std::int64_t rows_ns(const Camera& camera) noexcept;
+/// From the start of the first row's exposure to the end of the last one's; 0 without a detector.
+[[nodiscard]] std::int64_t exposure_ns(const Camera& camera) noexcept;
+
+/// As the scene has them.
+[[nodiscard]] CameraSettings settings_of(const Camera& camera) noexcept;
+/// The camera with these settings; of region, binning and trigger nothing.
+void apply(const CameraSettings& settings, const Camera& as_in_the_scene, Camera& camera) noexcept;
+
+struct CameraControlCounters {
+    std::uint64_t commands = 0, triggers = 0;  ///< accepted
+    std::uint64_t commands_refused = 0, triggers_refused = 0;
+    std::uint64_t triggers_dropped = 0;  ///< accepted, but the camera was stopped or in another mode by then
+};
+
+class CameraControl {
+public:
+    CameraControl(const Camera& camera, std::uint8_t index);
+    [[nodiscard]] std::uint8_t camera() const noexcept { return index_; }
+
+    // From the CAN thread. `t_now_ns`: when it was received.
+
+    [[nodiscard]] CameraReply command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
+    [[nodiscard]] CameraReply trigger(const CameraTrigger& trigger, std::int64_t t_now_ns) noexcept;
+    /// Of a SYNC object: exposes one frame at t_ns where the camera is in that mode.
+    void sync(std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
+    /// Runs in this mode, once all commands so far act.
+    [[nodiscard]] bool awaits(TriggerMode mode) const noexcept {
+        return latest_.running && latest_.trigger == mode;
+    }
+    [[nodiscard]] std::int64_t latency_ns() const noexcept { return limits_.latency_ns; }
+    /// The earliest start that a trigger received now may have.
+    [[nodiscard]] std::int64_t earliest_trigger_ns(std::int64_t t_now_ns) const noexcept {
+        return std::max(t_now_ns + limits_.latency_ns, t_next_trigger_ns_);
+    }
+    [[nodiscard]] CameraControlCounters counters() const noexcept;
+
+    // From the camera's thread.
+
+    /// Takes what has come and plans the next exposure.
+    void plan() noexcept;
+    /// Free-running frames are at multiples of the period, from this time on.
+    void start_at(std::int64_t t_ns) noexcept;
+    /// Start of the next exposure; Clock::kNever while none is known.
+    [[nodiscard]] std::int64_t t_start_ns() const noexcept { return t_start_ns_; }
+    /// Of the next exposure.
+    [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
+    [[nodiscard]] std::uint8_t command_counter() const noexcept { return command_counter_; }
+    /// The exposure was taken or skipped: the next one. `level`: mean of its image, of full scale; absent: skipped.
+    void advance(std::optional<double> level) noexcept;
+
+private:
+    struct Order {
+        std::int64_t t_ns = 0;
+        CameraSettings settings{};
+        std::uint8_t counter = 0;
+    };
+    [[nodiscard]] CameraAnswer check(const CameraCommand& command, const CameraSettings& wanted) const noexcept;
+    [[nodiscard]] CameraAnswer take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
+    bool adopt_next() noexcept;
+    /// From the start of the first row to the end of the last one.
+    [[nodiscard]] std::int64_t image_ns(const CameraSettings& s) const noexcept { return s.exposure_ns + rows_ns_; }
+
+    const CameraControlLimits limits_;
+    const std::uint8_t index_;
+    const PixelFormat format_;
+    const int width_, height_;
+    const std::int64_t rows_ns_, least_period_ns_;
+
+    // The CAN thread's.
+    CameraSettings latest_;           ///< accepted, in effect or not
+    std::int64_t t_next_trigger_ns_;  ///< the earliest start that a trigger may have
+    CameraControlCounters counters_{};
+
+    SpscRing<Order, 64> orders_;
+    SpscRing<std::int64_t, 64> triggers_;
+    std::atomic<std::int64_t> exposure_ns_;  ///< as auto-exposure has it
+    std::atomic<std::uint64_t> dropped_{0};
+
+    // The camera's thread's.
+    CameraSettings settings_;
+    std::uint8_t command_counter_ = 0;
+    std::optional<Order> order_;           ///< the next one that is not in effect
+    std::optional<std::int64_t> trigger_;  ///< the next one that is not exposed
+    std::int64_t t_adopted_ns_ = 0;        ///< of the newest order in effect
+    std::int64_t t_mid_ns_ = 0;            ///< of the next free-running frame
+    std::int64_t t_start_ns_ = 0;
+};
+
+}  // namespace narpa

@@ -98,7 +98,7 @@ CameraAnswer CameraControl::check(const CameraCommand& command, const CameraSett
     if (command.exposure_ns && wanted.auto_exposure) return auto_exposure;
     if (wanted.period_ns > kMostPeriodNs || wanted.period_ns < least_period_ns_) return period_range;
     if (wanted.exposure_ns < limits_.exposure_min_ns || wanted.exposure_ns > limits_.exposure_max_ns ||
-        image_ns(wanted) > wanted.period_ns)
+        image_ns(wanted) >= wanted.period_ns)
         return exposure_range;
     if (wanted.gain_cdb < 0 || wanted.gain_cdb > limits_.gain_max_cdb) return gain_range;
     if (wanted.region.width == 0 || wanted.region.height == 0 || right > width_ || bottom > height_ ||
@@ -183,7 +183,7 @@ void CameraControl::advance(std::optional<double> level) noexcept {
         trigger_.reset();
     if (settings_.auto_exposure && level) {
         const double factor = std::clamp(limits_.level / std::max(*level, 1e-3), 0.5, 2.0);
-        const std::int64_t most = std::min(limits_.exposure_max_ns, settings_.period_ns - rows_ns_);
+        const std::int64_t most = std::min(limits_.exposure_max_ns, settings_.period_ns - rows_ns_ - 1);
         settings_.exposure_ns =
             std::clamp(std::llround(factor * static_cast<double>(settings_.exposure_ns)),
                        static_cast<long long>(limits_.exposure_min_ns), static_cast<long long>(most));

@@ -63,7 +63,7 @@ struct CameraTrigger {
 enum class CameraAnswer : std::uint8_t {
     accepted,
     not_controllable,  ///< no such camera, or the scene gives it no `control`
-    exposure_range,    ///< outside the camera's limits, or exposure and rows take longer than the period
+    exposure_range,    ///< outside the camera's limits, or exposure and rows take a period or longer
     gain_range,
     region_range,   ///< empty, or not within the image
     binning_range,  ///< or not of this pixel format

@@ -29,7 +29,9 @@ void RowLog::append(std::string_view line) noexcept {
 }
 
 void RowLog::write(std::span<const std::uint8_t> item, const WriteQueue&) noexcept {
-    if (std::fwrite(item.data(), 1, item.size(), file_) != item.size()) ++lost_;
+    if (std::fwrite(item.data(), 1, item.size(), file_) == item.size()) return;
+    if (reason_ == 0) reason_ = errno;
+    ++lost_;
 }
 
 Status RowLog::close() {
@@ -37,12 +39,13 @@ Status RowLog::close() {
     std::uint64_t dropped = queue_->dropped();
     queue_.reset();  // ends its thread, which writes the file and `lost_`
     dropped += lost_;
-    const bool closed = std::fclose(file_) == 0;
+    if (std::fclose(file_) != 0 && reason_ == 0) reason_ = errno;
     file_ = nullptr;
+    if (reason_ != 0)
+        return Error{fmt::format("cannot be written: {}", std::strerror(reason_)), path_, 0, 0, ErrorKind::failed};
     if (dropped > 0)
-        return Error{fmt::format("{} lines could not be written", dropped), path_, 0, 0, ErrorKind::failed};
-    if (!closed)
-        return Error{fmt::format("cannot be written: {}", std::strerror(errno)), path_, 0, 0, ErrorKind::failed};
+        return Error{fmt::format("{} lines could not be written in time", dropped), path_, 0, 0,
+                     ErrorKind::failed};
     return Ok{};
 }
 

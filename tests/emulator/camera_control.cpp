@@ -190,6 +190,21 @@ TEST_F(CameraControlTest, ReplayRepeatsFramesOfChangingSettings) {
         EXPECT_TRUE((*replay)->make(i).empty()) << "frame " << i << ": " << (*replay)->make(i).front();
 }
 
+TEST_F(CameraControlTest, ReplayRefusesARegionOutsideTheImage) {
+    open();
+    for (int k = 0; k <= 3; ++k) pose(k);
+    (void)run(small_scene(operated()));
+    const std::string ledger = folder_ / "run/nav.ledger.csv";
+    std::string text = slurp(ledger);
+    text.replace(text.find(",64,48,"), 7, ",65,48,");
+    std::ofstream(ledger) << text;
+    const auto replay = Replay::open(folder_ / "run", "nav", "");
+    ASSERT_FALSE(replay);
+    EXPECT_NE(replay.error().text().find("nav.ledger.csv:2:1: frame 0: a region of 65 x 48 at (0, 0)"),
+              std::string::npos)
+        << replay.error().text();
+}
+
 TEST_F(CameraControlTest, OneTriggerExposesAllItsCamerasAtTheSameNanosecond) {
     open();
     constexpr int kTriggers = 6000;  // 10 minutes at 10 Hz

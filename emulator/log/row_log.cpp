@@ -44,8 +44,7 @@ Status RowLog::close() {
     if (reason_ != 0)
         return Error{fmt::format("cannot be written: {}", std::strerror(reason_)), path_, 0, 0, ErrorKind::failed};
     if (dropped > 0)
-        return Error{fmt::format("{} lines could not be written in time", dropped), path_, 0, 0,
-                     ErrorKind::failed};
+        return Error{fmt::format("{} lines could not be written in time", dropped), path_, 0, 0, ErrorKind::failed};
     return Ok{};
 }
 

@@ -37,7 +37,7 @@ private:
     std::string path_;
     std::FILE* file_;
     std::uint64_t lost_ = 0;  // the queue's thread only, until it has ended
-    int reason_ = 0;  ///< errno of the first line that the file did not take
+    int reason_ = 0;          ///< errno of the first line that the file did not take
     std::unique_ptr<WriteQueue> queue_;
 };
 

@@ -30,8 +30,10 @@ FD_KINDS = [
     dict(arbitration_id=0x18FF50E5, is_extended_id=True, is_fd=True, data=bytes(12)),
 ]
 
+PATIENCE_S = 60.0  # ends a test that would hang; a loaded machine may need seconds
 
-def answer(bus, sent, seconds=20.0):
+
+def answer(bus, sent, seconds=PATIENCE_S):
     """The next frame that is not our own: udp_multicast gives a sender its own frames too."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -43,9 +45,10 @@ def answer(bus, sent, seconds=20.0):
 
 def check(bus, kind):
     sent = can.Message(check=True, **kind)
-    for _ in range(5):  # a datagram may be lost
+    datagrams = sys.argv[1] != "slcan"  # they may be lost
+    for _ in range(5 if datagrams else 1):
         bus.send(sent)
-        got = answer(bus, sent, 4.0)
+        got = answer(bus, sent, 4.0 if datagrams else PATIENCE_S)
         if got is not None:
             break
     assert got is not None, "no answer to %r" % sent
@@ -62,8 +65,8 @@ def main():
     for kind in KINDS + (FD_KINDS if interface == "udp_multicast" else []):
         check(bus, kind)
     if interface == "slcan":
-        assert bus.get_version(2.0) == (10, 13), "V"
-        assert bus.get_serial_number(2.0) is not None, "N"
+        assert bus.get_version(PATIENCE_S) == (10, 13), "V"
+        assert bus.get_serial_number(PATIENCE_S) is not None, "N"
         n = 3000
         for i in range(n):
             bus.send(can.Message(arbitration_id=0x100, is_extended_id=False, data=i.to_bytes(8, "little")))

@@ -39,14 +39,15 @@ inline bool same(const CanFrame& a, const CanFrame& b) {
            a.bit_rate_switch == b.bit_rate_switch && a.size == b.size && a.data == b.data;
 }
 
-/// Turns `step` until it returns true. The number of turns is bounded only so that a broken bus fails its test
-/// instead of hanging it: 2000 waits of 10 ms with nothing happening.
+/// Repeats `step` until it returns true. The time is bounded only so that a broken bus fails its test instead of
+/// hanging it.
 inline bool turn_until(CanBus& bus, const std::function<bool()>& step) {
-    for (int i = 0; i < 2000; ++i) {
-        if (step()) return true;
+    const std::int64_t until_ns = monotonic_ns() + 120 * kSecond_ns;
+    while (!step()) {
+        if (monotonic_ns() > until_ns) return false;
         bus.wait(10'000'000);
     }
-    return false;
+    return true;
 }
 
 /// Waits for one frame.

@@ -46,10 +46,10 @@ inline bool is_installed(const char* program) {
     return !output_of(std::string("command -v ") + program).empty();
 }
 
-/// Waits for something that must happen soon; false after half a minute.
+/// Waits for something that must happen soon; false after two minutes.
 template <class Condition>
 bool eventually(Condition condition) {
-    for (int i = 0; i < 30'000; ++i) {
+    for (int i = 0; i < 120'000; ++i) {
         if (condition()) return true;
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }

@@ -71,21 +71,28 @@ CameraControl::CameraControl(const Camera& camera, std::uint8_t index)
     plan();
 }
 
-// --- From the CAN thread
-// ------------------------------------------------------------------------------------------
+// --- From the CAN thread ---------------------------------------------
 
 CameraReply CameraControl::command(const CameraCommand& command, std::int64_t t_now_ns) noexcept {
     if (latest_.auto_exposure) latest_.exposure_ns = exposure_ns_.load(std::memory_order_relaxed);
-    const CameraSettings wanted = changed(latest_, command);
+    CameraSettings wanted = changed(latest_, command);
+    if (wanted.auto_exposure && !command.exposure_ns)
+        wanted.exposure_ns = std::min(wanted.exposure_ns, longest_ns(wanted));
     CameraReply reply{command.counter, index_, false, check(command, wanted), t_now_ns};
     const std::int64_t t_ns = t_now_ns + limits_.latency_ns;
-    if (reply.answer == CameraAnswer::accepted && !orders_.push({t_ns, wanted, command.counter}))
+    const bool changes_mode = wanted.running != latest_.running || wanted.trigger != latest_.trigger;
+    if (reply.answer == CameraAnswer::accepted &&
+        !orders_.push({t_ns, wanted, command.counter, latest_mode_ + changes_mode}))
         reply.answer = CameraAnswer::overrun;
     if (reply.answer != CameraAnswer::accepted) {
         ++counters_.commands_refused;
         return reply;
     }
     ++counters_.commands;
+    if (changes_mode) {  // the triggers after t_ns come to nothing
+        ++latest_mode_;
+        t_next_trigger_ns_ = std::min(t_next_trigger_ns_, t_ns + latest_.period_ns);
+    }
     latest_ = wanted;
     reply.t_ns = t_ns;
     return reply;
@@ -97,8 +104,7 @@ CameraAnswer CameraControl::check(const CameraCommand& command, const CameraSett
     const bool pairs = format_ == PixelFormat::yuyv;
     if (command.exposure_ns && wanted.auto_exposure) return auto_exposure;
     if (wanted.period_ns > kMostPeriodNs || wanted.period_ns < least_period_ns_) return period_range;
-    if (wanted.exposure_ns < limits_.exposure_min_ns || wanted.exposure_ns > limits_.exposure_max_ns ||
-        image_ns(wanted) >= wanted.period_ns)
+    if (wanted.exposure_ns < limits_.exposure_min_ns || wanted.exposure_ns > longest_ns(wanted))
         return exposure_range;
     if (wanted.gain_cdb < 0 || wanted.gain_cdb > limits_.gain_max_cdb) return gain_range;
     if (wanted.region.width == 0 || wanted.region.height == 0 || right > width_ || bottom > height_ ||
@@ -119,10 +125,10 @@ void CameraControl::sync(std::int64_t t_ns, std::int64_t t_now_ns) noexcept {
 
 CameraAnswer CameraControl::take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept {
     using enum CameraAnswer;
-    const CameraAnswer answer = !awaits(mode)                          ? wrong_mode
-                                : t_ns < earliest_trigger_ns(t_now_ns) ? too_soon
-                                : !triggers_.push(t_ns)                ? overrun
-                                                                       : accepted;
+    const CameraAnswer answer = !awaits(mode)                           ? wrong_mode
+                                : t_ns < earliest_trigger_ns(t_now_ns)  ? too_soon
+                                : !triggers_.push({t_ns, latest_mode_}) ? overrun
+                                                                        : accepted;
     ++(answer == accepted ? counters_.triggers : counters_.triggers_refused);
     if (answer == accepted) t_next_trigger_ns_ = t_ns + latest_.period_ns;
     return answer;
@@ -134,8 +140,7 @@ CameraControlCounters CameraControl::counters() const noexcept {
     return c;
 }
 
-// --- From the camera's thread
-// -------------------------------------------------------------------------------------
+// --- From the camera's thread ----------------------------------------
 
 void CameraControl::start_at(std::int64_t t_ns) noexcept {
     const std::int64_t period = settings_.period_ns;
@@ -146,32 +151,28 @@ void CameraControl::start_at(std::int64_t t_ns) noexcept {
 void CameraControl::plan() noexcept {
     while (adopt_next()) {
     }
-    t_start_ns_ = runs_free(settings_) ? t_mid_ns_ - image_ns(settings_) / 2 : trigger_ ? *trigger_ : Clock::kNever;
+    t_start_ns_ = runs_free(settings_) ? t_mid_ns_ - image_ns(settings_) / 2 : t_trigger_ns();
 }
 
-/// Adopts an order that acts on the next exposure, or drops a trigger that comes to nothing. False: neither.
+/// Adopts an order that acts on the next exposure, or drops a trigger of a mode that was left. False: neither.
 bool CameraControl::adopt_next() noexcept {
     // Orders first: whoever has seen one sees the triggers that came before it.
     if (Order order; !order_ && orders_.pop(order)) order_ = order;
-    if (std::int64_t t_ns = 0; !trigger_ && triggers_.pop(t_ns)) trigger_ = t_ns;
-    if (order_ && settings_.auto_exposure && order_->settings.auto_exposure)
-        order_->settings.exposure_ns = settings_.exposure_ns;
-    const bool free = runs_free(settings_);
-    if (trigger_ && (free || !settings_.running || *trigger_ < t_adopted_ns_) &&
-        !(order_ && order_->t_ns <= *trigger_)) {
+    if (Trigger trigger; !trigger_ && triggers_.pop(trigger)) trigger_ = trigger;
+    if (trigger_ && trigger_->mode < mode_) {
         trigger_.reset();
         dropped_.fetch_add(1, std::memory_order_relaxed);
         return true;
     }
     if (!order_) return false;
-    const std::int64_t t_acts_on = free       ? t_mid_ns_ - image_ns(order_->settings) / 2
-                                   : trigger_ ? *trigger_
-                                              : Clock::kNever;
-    if (order_->t_ns > t_acts_on) return false;
+    if (settings_.auto_exposure && order_->settings.auto_exposure)
+        order_->settings.exposure_ns = std::min(settings_.exposure_ns, longest_ns(order_->settings));
+    const bool free = runs_free(settings_);
+    if (order_->t_ns > (free ? t_mid_ns_ - image_ns(order_->settings) / 2 : t_trigger_ns())) return false;
     settings_ = order_->settings;
     command_counter_ = order_->counter;
-    t_adopted_ns_ = order_->t_ns;
-    if (!free && runs_free(settings_)) t_mid_ns_ = t_adopted_ns_ + image_ns(settings_) / 2;
+    mode_ = order_->mode;
+    if (!free && runs_free(settings_)) t_mid_ns_ = order_->t_ns + image_ns(settings_) / 2;
     order_.reset();
     return true;
 }
@@ -183,10 +184,8 @@ void CameraControl::advance(std::optional<double> level) noexcept {
         trigger_.reset();
     if (settings_.auto_exposure && level) {
         const double factor = std::clamp(limits_.level / std::max(*level, 1e-3), 0.5, 2.0);
-        const std::int64_t most = std::min(limits_.exposure_max_ns, settings_.period_ns - rows_ns_ - 1);
-        settings_.exposure_ns =
-            std::clamp(std::llround(factor * static_cast<double>(settings_.exposure_ns)),
-                       static_cast<long long>(limits_.exposure_min_ns), static_cast<long long>(most));
+        const auto wanted_ns = static_cast<std::int64_t>(factor * static_cast<double>(settings_.exposure_ns));
+        settings_.exposure_ns = std::clamp(wanted_ns, limits_.exposure_min_ns, longest_ns(settings_));
         exposure_ns_.store(settings_.exposure_ns, std::memory_order_relaxed);
     }
     plan();

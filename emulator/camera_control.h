@@ -74,12 +74,25 @@ private:
         std::int64_t t_ns = 0;
         CameraSettings settings{};
         std::uint8_t counter = 0;
+        std::uint64_t mode = 0;  ///< counts the changes of mode so far
+    };
+    struct Trigger {
+        std::int64_t t_ns = 0;
+        std::uint64_t mode = 0;  ///< the one that it is for
     };
     [[nodiscard]] CameraAnswer check(const CameraCommand& command, const CameraSettings& wanted) const noexcept;
     [[nodiscard]] CameraAnswer take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
     bool adopt_next() noexcept;
+    /// Of the next exposure that is not free-running.
+    [[nodiscard]] std::int64_t t_trigger_ns() const noexcept {
+        return trigger_ && trigger_->mode == mode_ ? trigger_->t_ns : Clock::kNever;
+    }
     /// From the start of the first row to the end of the last one.
     [[nodiscard]] std::int64_t image_ns(const CameraSettings& s) const noexcept { return s.exposure_ns + rows_ns_; }
+    /// The longest exposure at this period: an image ends before the next begins.
+    [[nodiscard]] std::int64_t longest_ns(const CameraSettings& s) const noexcept {
+        return std::min(limits_.exposure_max_ns, s.period_ns - rows_ns_ - 1);
+    }
 
     const CameraControlLimits limits_;
     const std::uint8_t index_;
@@ -88,22 +101,23 @@ private:
     const std::int64_t rows_ns_, least_period_ns_;
 
     // The CAN thread's.
-    CameraSettings latest_;           ///< accepted, in effect or not
+    CameraSettings latest_;  ///< accepted, in effect or not
+    std::uint64_t latest_mode_ = 0;
     std::int64_t t_next_trigger_ns_;  ///< the earliest start that a trigger may have
     CameraControlCounters counters_{};
 
     SpscRing<Order, 64> orders_;
-    SpscRing<std::int64_t, 64> triggers_;
+    SpscRing<Trigger, 64> triggers_;
     std::atomic<std::int64_t> exposure_ns_;  ///< as auto-exposure has it
     std::atomic<std::uint64_t> dropped_{0};
 
     // The camera's thread's.
     CameraSettings settings_;
     std::uint8_t command_counter_ = 0;
-    std::optional<Order> order_;           ///< the next one that is not in effect
-    std::optional<std::int64_t> trigger_;  ///< the next one that is not exposed
-    std::int64_t t_adopted_ns_ = 0;        ///< of the newest order in effect
-    std::int64_t t_mid_ns_ = 0;            ///< of the next free-running frame
+    std::uint64_t mode_ = 0;
+    std::optional<Order> order_;      ///< the next one that is not in effect
+    std::optional<Trigger> trigger_;  ///< the next one that is not exposed
+    std::int64_t t_mid_ns_ = 0;       ///< of the next free-running frame
     std::int64_t t_start_ns_ = 0;
 };
 

@@ -24,11 +24,9 @@ struct Traffic {
 
 class CameraControlTest : public LoopTest {
 protected:
-    static std::string operated(const std::string& control = "control = {latency_s = 0.01}",
-                                const std::string& format = "GREY") {
-        return "rate_hz = 20\nformat = \"" + format +
-               "\"\ndetector = {exposure_s = 0.002, full_well_e = 20000.0, shot_noise = true, read_noise_e = "
-               "5.0}\n" +
+    static std::string operated(const std::string& control = "control = {latency_s = 0.01}") {
+        return "rate_hz = 20\nformat = \"GREY\"\n"
+               "detector = {exposure_s = 0.002, full_well_e = 20000.0, shot_noise = true, read_noise_e = 5.0}\n" +
                control;
     }
     static std::string with_second_camera(std::string text) {
@@ -190,6 +188,20 @@ TEST_F(CameraControlTest, ReplayRepeatsFramesOfChangingSettings) {
         EXPECT_TRUE((*replay)->make(i).empty()) << "frame " << i << ": " << (*replay)->make(i).front();
 }
 
+/// The scene's exposure is 0.3 ns more than a log has; no command ever changes it.
+TEST_F(CameraControlTest, ReplayRepeatsFramesBeforeTheFirstCommand) {
+    open();
+    for (int k = 0; k <= 3; ++k) pose(k);
+    std::string text = operated();
+    text.replace(text.find("0.002"), 5, "0.0020000003");
+    (void)run(small_scene(text));
+    auto replay = Replay::open(folder_ / "run", "nav", "");
+    ASSERT_TRUE(replay) << replay.error().text();
+    ASSERT_FALSE((*replay)->frames().empty());
+    for (std::size_t i = 0; i < (*replay)->frames().size(); ++i)
+        EXPECT_TRUE((*replay)->make(i).empty()) << "frame " << i;
+}
+
 TEST_F(CameraControlTest, ReplayRefusesARegionOutsideTheImage) {
     open();
     for (int k = 0; k <= 3; ++k) pose(k);
@@ -310,8 +322,62 @@ TEST_F(CameraControlTest, CommandsThatCannotBeAreAnswered) {
                                     CameraAnswer::wrong_mode, CameraAnswer::not_controllable}));
 }
 
-// --- Read-out
-// -----------------------------------------------------------------------------------------------------
+// --- Its schedule, without a loop -------------------------------------
+
+class CameraSchedule : public testing::Test {
+protected:
+    static Camera camera(CameraControlLimits limits) {
+        Camera c;
+        c.width = 64, c.height = 48;
+        c.period_ns = 50 * kMs;
+        c.detector = Detector{};
+        c.detector->exposure_s = 0.002;
+        limits.exposure_max_ns = 400 * kMs;
+        c.control = limits;
+        return c;
+    }
+    /// Answered as it should be.
+    static void expect_accepted(const CameraReply& reply) { EXPECT_EQ(reply.answer, CameraAnswer::accepted); }
+};
+
+TEST_F(CameraSchedule, ATriggerFarAheadIsForgottenWithItsMode) {
+    for (const bool planned_between : {true, false}) {
+        SCOPED_TRACE(planned_between);
+        CameraControl control(camera({.trigger = TriggerMode::command}), 0);
+        CameraCommand free, by_command;
+        free.trigger = TriggerMode::free_running, by_command.trigger = TriggerMode::command;
+        expect_accepted(control.trigger({1, 1, false, 1'000'000 * kMs}, 0));
+        expect_accepted(control.command(free, 100 * kMs));
+        if (planned_between) control.plan();
+        expect_accepted(control.command(by_command, 200 * kMs));
+        expect_accepted(control.trigger({2, 1, false, 1000 * kMs}, 300 * kMs));
+        control.plan();
+        while (control.t_start_ns() < 300 * kMs) control.advance({});
+        EXPECT_EQ(control.t_start_ns(), 1000 * kMs);
+        control.advance({});
+        EXPECT_EQ(control.t_start_ns(), Clock::kNever);
+        EXPECT_EQ(control.counters().triggers_dropped, 1U);
+    }
+}
+
+TEST_F(CameraSchedule, ExposuresNeverOverlapWhenThePeriodGetsShorter) {
+    CameraControl control(camera({.auto_exposure = true}), 0);
+    CameraCommand slow, fast;
+    slow.period_ns = 500 * kMs, fast.period_ns = 50 * kMs;
+    expect_accepted(control.command(slow, 0));
+    std::int64_t ended_ns = -kMs - 1;
+    for (int frame = 0; frame < 100; ++frame) {
+        control.plan();
+        EXPECT_GT(control.t_start_ns(), ended_ns) << frame;
+        ended_ns = control.t_start_ns() + control.settings().exposure_ns;
+        if (frame == 50) expect_accepted(control.command(fast, control.t_start_ns()));
+        control.advance(0.001);  // dark: the exposure doubles to its limit
+    }
+    EXPECT_EQ(control.settings().period_ns, 50 * kMs);
+    EXPECT_EQ(control.settings().exposure_ns, 50 * kMs - 1);
+}
+
+// --- Read-out -------------------------------------------------------
 
 TEST(ReadOut, OutsideTheRegionIsBlackAndBlocksHaveTheirMean) {
     std::vector<std::uint8_t> bytes(8 * 6);

@@ -49,7 +49,9 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
       renderer_(world.render_scene(), camera_),
       sensor_array_(SensorArray::create(camera_, world.scene().render.seed)),
       radiance_(camera_.width, camera_.height),
-      bytes_(frame_bytes(format())) {}
+      bytes_(frame_bytes(format())) {
+    if (camera_.control) set(settings_, 0);  // whole nanoseconds, as logs have them
+}
 
 VideoFormat CameraUnit::format() const noexcept {
     return {camera_.width, camera_.height, camera_.format, camera_.period_ns};

@@ -139,7 +139,9 @@ void CameraSensor::account(const FrameLedger& ledger) noexcept {
         stats_.error_1e9.add(std::llround(1e9 * std::min(1.0, static_cast<double>(ledger.expected_error))));
     if (!keeps_ledgers_) return;
     stats_.ledgers_lost += !ledgers_.push(ledger);
-    if (control_) (void)states_.push({ledger.frame, ledger.camera, ledger.command_counter, unit_.settings()});
+    if (control_)
+        stats_.states_lost +=
+            !states_.push({ledger.frame, ledger.camera, ledger.command_counter, unit_.settings()});
 }
 
 void CameraSensor::skip_missed(const Clock& clock) noexcept {

@@ -27,7 +27,7 @@ struct CameraStats {
     std::uint64_t deadline_missed = 0;
     std::uint64_t stale = 0;                               ///< frames that show a body without a fresh command
     std::uint64_t repeated = 0, blanked = 0;               ///< handed over in place of late frames
-    std::uint64_t ledgers_lost = 0;                        ///< the CAN thread did not keep up
+    std::uint64_t ledgers_lost = 0, states_lost = 0;       ///< the CAN thread did not keep up
     std::array<std::uint64_t, kStepNames.size()> steps{};  ///< frames that got so far
     Histogram wake_late, render, hand_over;  ///< after it was due; duration; from mid-exposure to hand-over
     Histogram radiance, sensor, send;        ///< parts of it: durations
@@ -52,6 +52,9 @@ public:
     [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
     void start_at(std::int64_t t_ns) noexcept override;
     void plan() noexcept override;
+    [[nodiscard]] std::int64_t schedule_holds_ns() const noexcept override {
+        return control_ ? 500'000 : Sensor::schedule_holds_ns();
+    }
     /// The middle of the next exposure; its end where the camera has a shutter. Clock::kNever: nothing triggers it.
     [[nodiscard]] std::int64_t last_pose_ns() const noexcept override {
         return unit_.camera().shutter ? due_ns() : t_mid_ns_;

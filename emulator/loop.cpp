@@ -18,7 +18,6 @@ namespace {
 constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
-constexpr std::int64_t kTriggerPollNs = 500'000;         // of a sensor that waits for a trigger
 constexpr int kWaitsAlone = 10;                          // so many, for a commander that comes back
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
@@ -29,15 +28,14 @@ void execute(const Sensor& sensor, TracingThreads& threads, const auto& f) {
 
 /// Until the sensor's next item is due. False: the run has ended.
 bool wait_for_item(Sensor& sensor, const RealTimeClock& clock, const StopFlag& stop) {
-    for (;;) {
+    while (!stop.load(std::memory_order_relaxed)) {
         sensor.plan();
-        const std::int64_t t_pose = sensor.last_pose_ns(), due = sensor.due_ns();
-        const bool idle = t_pose == Clock::kNever;
-        if ((idle ? clock.now_ns() : t_pose) >= clock.end_ns()) return false;
-        if (!clock.wait_until(idle ? clock.now_ns() + kTriggerPollNs : due, stop)) return false;
-        sensor.plan();
-        if (!idle && sensor.due_ns() == due) return true;
+        const std::int64_t now = clock.now_ns(), t_pose = sensor.last_pose_ns(), due = sensor.due_ns();
+        if ((t_pose == Clock::kNever ? now : t_pose) >= clock.end_ns()) return false;
+        if (now >= due) return true;
+        (void)clock.wait_until(std::min(due, now + sensor.schedule_holds_ns()), stop);
     }
+    return false;
 }
 
 struct StartClock {

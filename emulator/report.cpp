@@ -87,7 +87,8 @@ json CameraSensor::report() const {
                    {"commands_refused", c.commands_refused},
                    {"triggers", c.triggers},
                    {"triggers_refused", c.triggers_refused},
-                   {"triggers_dropped", c.triggers_dropped}};
+                   {"triggers_dropped", c.triggers_dropped},
+                   {"states_lost", s.states_lost}};
     }
     return {{"name", name()},
             {"control", control},

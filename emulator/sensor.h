@@ -42,6 +42,8 @@ public:
     virtual void start_at(std::int64_t t_ns) noexcept = 0;
     /// Takes in what has come for it over CAN, which may change what is next. Before each reading of the schedule.
     virtual void plan() noexcept {}
+    /// In real time the schedule is read again after so long, while the sensor waits.
+    [[nodiscard]] virtual std::int64_t schedule_holds_ns() const noexcept { return kSecond_ns; }
     /// The latest pose that the item needs; Clock::kNever where the sensor waits for a trigger. In lockstep, items
     /// are made in this order, once commands reach it; a run that ends at t contains the items with last_pose_ns()
     /// < t.

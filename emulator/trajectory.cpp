@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <map>
 
 #include "base/csv.h"
@@ -49,21 +48,9 @@ bool accept_attitude(Quat& q) noexcept {
 }
 
 Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path) {
-    std::ifstream in(path);
-    if (!in) return Error{"cannot be opened, expected a trajectory (CSV)", path};
     std::vector<TrajectoryRow> rows;
     std::map<std::string, std::int64_t> last;
-    std::string line;
-    bool header = false;
-    for (int number = 1; std::getline(in, line); ++number) {
-        if (!line.empty() && line.back() == '\r') line.pop_back();
-        if (line.empty() || line.front() == '#') continue;
-        if (!header) {
-            if (line != kTrajectoryHeader)
-                return Error{fmt::format("expected the header line \"{}\"", kTrajectoryHeader), path, number, 1};
-            header = true;
-            continue;
-        }
+    const auto take = [&](std::string_view line, int number) -> Status {
         auto row = read_row(line, path, number);
         if (!row) return row.error();
         const auto [at, first] = last.try_emplace(row->body, row->t_ns);
@@ -74,8 +61,10 @@ Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path) {
                          path, number, 1};
         at->second = row->t_ns;
         rows.push_back(*std::move(row));
-    }
-    if (rows.empty()) return Error{"no rows, expected a header line and at least one row", path};
+        return Ok{};
+    };
+    if (auto read = read_csv_lines(path, kTrajectoryHeader, "a trajectory", "row", take); !read)
+        return read.error();
     return rows;
 }
 

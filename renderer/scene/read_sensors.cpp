@@ -88,6 +88,11 @@ std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_n
     return d;
 }
 
+/// From the start of the first row's exposure to that of the last one's.
+double rows_s(const Camera& c, const std::optional<Shutter>& shutter) {
+    return shutter ? 1e-9 * static_cast<double>(shutter->row_time_ns) * (c.height - 1) : 0;
+}
+
 /// Pictures over time need an exposure, which the detector has.
 std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
     enum class Kind : std::uint8_t { global, rolling };
@@ -103,8 +108,7 @@ std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
     if (kind == Kind::global) table->refuse("row_time_s", "belongs to kind = \"rolling\"");
     if (row_time_s) shutter.row_time_ns = std::llround(std::min(*row_time_s, 1e3) * 1e9);
     if (!c.detector) table->fail("kind", "needs an exposure_s, expected a [camera.detector]");
-    const double image_s = (c.detector ? c.detector->exposure_s : 0) +
-                           1e-9 * static_cast<double>(shutter.row_time_ns) * (c.height - 1);
+    const double image_s = (c.detector ? c.detector->exposure_s : 0) + rows_s(c, shutter);
     if (image_s >= 1e-9 * static_cast<double>(c.period_ns))
         table->fail("row_time_s",
                     fmt::format("exposure and rows take {:g} s, expected less than 1 / rate_hz = {:g} s", image_s,
@@ -125,7 +129,6 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
         return std::nullopt;
     }
     const double period_s = 1e-9 * static_cast<double>(c.period_ns);
-    const double rows_s = c.shutter ? 1e-9 * static_cast<double>(c.shutter->row_time_ns) * (c.height - 1) : 0;
     CameraControlLimits control;
     const auto ns = [&](std::string_view key, const Range& range, double otherwise_s) {
         return static_cast<std::int64_t>(std::llround(table->number(key, range).value_or(otherwise_s) * 1e9));
@@ -135,8 +138,8 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
     control.latency_ns = ns("latency_s", {.low = 1e-3, .high = 10}, 0.01);
     control.trigger = table->choice<TriggerMode>("trigger", kModes).value_or(control.trigger);
     control.exposure_min_ns = ns("exposure_min_s", {.low = 1e-9, .high = exposure_s}, std::min(1e-5, exposure_s));
-    control.exposure_max_ns =
-        ns("exposure_max_s", {.low = exposure_s, .high = 100}, std::max(exposure_s, 0.9 * (period_s - rows_s)));
+    control.exposure_max_ns = ns("exposure_max_s", {.low = exposure_s, .high = 100},
+                                 std::max(exposure_s, 0.9 * (period_s - rows_s(c, c.shutter))));
     control.gain_max_cdb =
         static_cast<std::int16_t>(100 * table->number("gain_max_db", {.low = 0, .high = 60}).value_or(24));
     control.auto_exposure = table->boolean("auto_exposure").value_or(false);

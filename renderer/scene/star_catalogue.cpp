@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <string_view>
 
 #include "base/constants.h"
@@ -55,25 +54,14 @@ Result<CatalogueStar> read_line(std::string_view line, const std::string& file, 
 }  // namespace
 
 Result<std::vector<CatalogueStar>> read_star_catalogue(const std::string& file) {
-    std::ifstream in(file);
-    if (!in) return Error{"cannot be opened, expected a star catalogue (CSV)", file};
     std::vector<CatalogueStar> stars;
-    std::string line;
-    bool header = false;
-    for (int number = 1; std::getline(in, line); ++number) {
-        if (!line.empty() && line.back() == '\r') line.pop_back();
-        if (line.empty() || line.front() == '#') continue;
-        if (!header) {
-            if (line != kStarHeader)
-                return Error{fmt::format("expected the header line \"{}\"", kStarHeader), file, number, 1};
-            header = true;
-            continue;
-        }
+    const auto take = [&](std::string_view line, int number) -> Status {
         auto star = read_line(line, file, number);
         if (!star) return star.error();
         stars.push_back(*std::move(star));
-    }
-    if (stars.empty()) return Error{"no stars, expected a header line and at least one star", file};
+        return Ok{};
+    };
+    if (auto read = read_csv_lines(file, kStarHeader, "a star catalogue", "star", take); !read) return read.error();
     return stars;
 }
 

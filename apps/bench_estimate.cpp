@@ -25,6 +25,7 @@ struct EstimateBenchOptions {
     std::vector<double> along, up;
     bool quick = false;
     int threads = 0, size = 320;
+    double turn_deg_s = 0;
     PnpBenchOptions pnp;
     ApproachOptions approach;
 };
@@ -109,6 +110,7 @@ Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
     if (!meant) return meant.error();
     const std::size_t target = *meant;
     ApproachOptions options = o.approach;
+    options.turn_rad_s = o.turn_deg_s * kDegree;
     if (!o.along.empty()) options.along = {o.along[0], o.along[1], o.along[2]};
     if (!o.up.empty()) options.up = {o.up[0], o.up[1], o.up[2]};
     if (!(norm(cross(options.along, options.up)) > 1e-6 * norm(options.along) * norm(options.up)))
@@ -273,6 +275,19 @@ Command add_bench_estimate(Parser bench_command) {
         .type_name("X,Y,Z")
         .comma_separated()
         .values(3, 3);
+    c.option("--turn", o->turn_deg_s, "approach: deg/s that the camera turns, where the scene gives it a shutter")
+        .range(0.0, 100.0)
+        .finite();
+    c.option("--speed", o->approach.speed_m_s, "approach: m/s that it passes the target, likewise")
+        .range(0.0, 1e4)
+        .finite();
+    c.option("--ignore", o->approach.ignored,
+             fmt::format("approach: what the estimators do not know of the camera, separated by commas: {}",
+                         fmt::join(kIgnorable, ", ")))
+        .comma_separated()
+        .one_of({kIgnorable.begin(), kIgnorable.end()})
+        .type_name("LIST");
+    c.option("--frame-spp", o->approach.frame_spp, "approach: samples a pixel of the frames").range(1, 65'536);
     c.option("--basin-trials", o->approach.basin_trials, "approach: starts of each distance; 0: none")
         .range(0, 100'000);
     c.option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")

@@ -54,7 +54,7 @@ Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, F
         std::vector<std::string> differs;
         threads.arena.execute([&] {
             differs = run.make(i);
-            tracked.push_back(tracker.take(ledger.frame, ledger.t_exposure_mid_ns, run.bytes(), run.placement(i)));
+            tracked.push_back(tracker.take(ledger, run.bytes(), run.placement(i)));
         });
         if (!differs.empty())
             return Error{
@@ -186,11 +186,6 @@ void remove_own_body(std::vector<RangePoint>& points, const World& world, const 
     });
 }
 
-/// How the target moves in the LiDAR's axes from one time to another.
-SweepMotion motion_between(const Rigid3& T_lidar_target, const Rigid3& later, double dt_s) {
-    return {(later.t - T_lidar_target.t) / dt_s, rotation_vector(later.q * conjugate(T_lidar_target.q)) / dt_s};
-}
-
 Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_options) {
     const std::int64_t t_ns = std::llround(o.time_s * 1e9);
     auto world = world_of(o, t_ns, t_ns);
@@ -206,11 +201,17 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
         return Error{image.error().what, o.frame};
     BodyPoses at(scene.bodies.size());
     (*world)->place(t_ns, scene.cameras[*camera].mount, at);
+    FrameLedger taken;  // as the scene has it
+    taken.t_exposure_mid_ns = t_ns;
+    taken.t_exposure_start_ns = t_ns - exposure_ns(scene.cameras[*camera]) / 2;
+    taken.t_exposure_end_ns = taken.t_exposure_start_ns + exposure_ns(scene.cameras[*camera]);
+    taken.region_width = static_cast<std::uint16_t>(scene.cameras[*camera].width);
+    taken.region_height = static_cast<std::uint16_t>(scene.cameras[*camera].height);
     TracingThreads threads(o.threads);
     TrackedFrame tracked;
     {
         const Progress progress("estimating the pose in " + o.frame);
-        threads.arena.execute([&] { tracked = (*tracker)->take(0, t_ns, *bytes, at); });
+        threads.arena.execute([&] { tracked = (*tracker)->take(taken, *bytes, at); });
     }
     if (!tracked.measured) return Error{"gives no pose: " + tracked.why, o.frame, 0, 0, ErrorKind::failed};
     nlohmann::json document =
@@ -243,7 +244,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
         return inverse((*world)->sensor_pose(lidar.mount, lidar.T_mount_lidar, at)) * at.T_world_body[*target];
     };
     const Rigid3 truth = T_lidar_target_at(t_ns);
-    const SweepMotion motion = motion_between(truth, T_lidar_target_at(t_ns + kLater_ns), kLater_ns * 1e-9);
+    const ApparentMotion motion = motion_between(truth, T_lidar_target_at(t_ns + kLater_ns), kLater_ns * 1e-9);
     std::mt19937_64 random(tracker.seed);
     const Rigid3 guess = off_truth(truth, tracker, random);
     const double search_m = 0.01 * tracker.start_percent * norm(truth.t) +

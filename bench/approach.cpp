@@ -6,6 +6,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "base/time.h"
@@ -29,6 +30,17 @@ BodyPoses at_time_0(const World& world) {
     BodyPoses at(world.scene().bodies.size());
     world.place(0, -1, at);
     return at;
+}
+
+/// As the estimators know it.
+Camera without(const std::vector<std::string>& ignored, Camera camera) {
+    for (const std::string& what : ignored) {
+        if (what == "distortion") camera.model = nullptr;
+        if (what == "rows" && camera.shutter) camera.shutter->row_time_ns = 0;
+        if (what == "shutter") camera.shutter.reset();
+        if (what == "psf") camera.point_spread.reset();
+    }
+    return camera;
 }
 
 /// One method, initialised for the camera and the target.
@@ -55,10 +67,11 @@ public:
         ApproachFrame out;
         out.range_m = norm(view.truth.t);
         const std::int64_t start_ns = monotonic_ns();
+        dense_.motion = view.motion;
         Rigid3 T{};
         Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
         if (method_ == EstimateMethod::features) {
-            const FeatureEstimate e = points_->align(view.image, view.at, guess);
+            const FeatureEstimate e = points_->align(view.image, view.at, guess, view.motion);
             out.claimed = e.ok(), out.renders = static_cast<int>(e.rounds.size());
             T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
         } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
@@ -120,7 +133,7 @@ ApproachFrames::ApproachFrames(const World& world, const Camera& camera, std::si
       sensor_(sensor_model(camera)),
       view_(world.render_scene(), camera_, target, at_),
       bytes_(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})),
-      made_{{}, at_, {}, {}} {}
+      made_{{}, {}, at_, {}, {}} {}
 
 /// Near the line of approach, looking nearly at the target's origin.
 Rigid3 ApproachFrames::pose(double range_m, std::uint32_t number) const {
@@ -137,6 +150,16 @@ Rigid3 ApproachFrames::pose(double range_m, std::uint32_t number) const {
     return inverse({aimed * exp_rotation(some(kOffset)), position});
 }
 
+/// The camera turns about an axis of its own, and moves in a direction of its own, across the line of sight.
+ApparentMotion ApproachFrames::motion(std::uint32_t number) const {
+    std::mt19937_64 random(options_.seed * 1'000'033 + number);
+    std::uniform_real_distribution<double> around(0, 2 * std::numbers::pi);
+    const double axis = around(random), direction = around(random);
+    const Vec3 rate = -options_.turn_rad_s * Vec3{std::cos(axis), std::sin(axis), 0};
+    const Vec3 passing = options_.speed_m_s * Vec3{std::cos(direction), std::sin(direction), 0};
+    return {cross(rate, made_.truth.t) + passing, rate};
+}
+
 const ApproachView& ApproachFrames::make(int k, int n) {
     const double part = n > 1 ? static_cast<double>(k) / (n - 1) : 0;
     return make_at(options_.from_m * std::pow(options_.to_m / options_.from_m, part),
@@ -149,6 +172,8 @@ const ApproachView& ApproachFrames::make_at(double range_m, std::uint32_t number
     settings.spp = options_.frame_spp;
     settings.seed = ~options_.seed;  // not that of the renders that it is compared with
     settings.frame = number;
+    made_.motion = motion(number);
+    view_.begin_frame(at_, made_.motion, row_times(camera_));
     view_.render(made_.truth, settings, true);
     expose(camera_, view_.radiance(), settings.seed, number, bytes_);
     made_.at.T_world_body = view_.placement().T_world_body;
@@ -170,7 +195,7 @@ std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_ind
     std::vector<ApproachRun> runs;
     std::deque<Method> methods;  // stable addresses
     for (const EstimateMethod m : o.methods) {
-        methods.emplace_back(m, world, camera, target, o);
+        methods.emplace_back(m, world, without(o.ignored, camera), target, o);
         runs.push_back({m, {}, {}, {}});
     }
     // All methods estimate from the same frames and starts.

@@ -2,10 +2,12 @@
 /// how large an error of the guess each method tolerates.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/stop.h"
@@ -28,7 +30,14 @@ struct ApproachOptions {
     int basin_trials = 10;
     double basin_range_m = 20;
     std::uint64_t seed = 1;
+    /// Of cameras with a shutter, in a direction of its own for each frame: the camera turns, and passes the
+    /// target.
+    double turn_rad_s = 0, speed_m_s = 0;
+    std::vector<std::string>
+        ignored;  ///< kIgnorable: what the estimators do not know of the camera; rows: the rolling of its shutter
 };
+/// Words of ApproachOptions::ignored.
+inline constexpr std::array<std::string_view, 4> kIgnorable{"distortion", "rows", "shutter", "psf"};
 
 struct ApproachFrame {
     double range_m = 0;
@@ -66,8 +75,9 @@ struct ApproachRun {
 
 /// A frame of the approach as the camera exposes it, with its true pose.
 struct ApproachView {
-    Rigid3 truth{};  ///< T_camera_target
-    BodyPoses at;    ///< of every body
+    Rigid3 truth{};           ///< T_camera_target
+    ApparentMotion motion{};  ///< in camera axes
+    BodyPoses at;             ///< of every body
     MeasuredImage image;
     std::vector<float> variance_dn2;  ///< of the Monte Carlo noise, which no real sensor has
 };
@@ -83,6 +93,7 @@ public:
 
 private:
     [[nodiscard]] Rigid3 pose(double range_m, std::uint32_t number) const;
+    [[nodiscard]] ApparentMotion motion(std::uint32_t number) const;
 
     const ApproachOptions& options_;
     Camera camera_;

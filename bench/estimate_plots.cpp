@@ -45,8 +45,8 @@ Status plot_approach_frames(const std::string& path, const World& world, std::si
             const ApproachView& made = frames.make(k, kFrames);
             const Vector6 off =
                 random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(made.truth.t), random);
-            const FeatureEstimate e = alignment.align(made.image, made.at, displaced(made.truth, off));
-            view.place_bodies(made.at);
+            const FeatureEstimate e = alignment.align(made.image, made.at, displaced(made.truth, off), made.motion);
+            view.begin_frame(made.at, made.motion, row_times(camera));
             FrameSettings settings;
             settings.spp = 4;
             view.render(e.T_camera_target, settings, false);

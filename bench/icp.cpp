@@ -51,7 +51,7 @@ public:
         return {exp_rotation(uniform(-3.14, 3.14) * axis) * quat_from_columns(axis, y, cross(axis, y)),
                 distance * aim};
     }
-    [[nodiscard]] SweepMotion motion() {
+    [[nodiscard]] ApparentMotion motion() {
         const auto within = [&](double most) {
             return Vec3{uniform(-most, most), uniform(-most, most), uniform(-most, most)};
         };
@@ -64,7 +64,7 @@ public:
 
     /// One turn, from behind to behind. The pose is valid at its middle, when the rotor points forward. Points pass
     /// through the model's packets.
-    void scan(const Rigid3& T_lidar_target, const SweepMotion& motion, std::vector<RangePoint>& out) {
+    void scan(const Rigid3& T_lidar_target, const ApparentMotion& motion, std::vector<RangePoint>& out) {
         const auto turn_ns = static_cast<std::int64_t>(1e9 / kRotation_hz);
         out.clear();
         const std::int64_t period_ns = model_.packet_period_ns(kRotation_hz);
@@ -155,7 +155,7 @@ std::vector<IcpRun> run_icp(const World& world, std::size_t target, const std::v
         Sums sums;
         for (int i = 0; i < at.starts; ++i) {
             const Rigid3 truth = sweeps.pose();
-            const SweepMotion motion = sweeps.motion();
+            const ApparentMotion motion = sweeps.motion();
             sweeps.scan(truth, motion, points);
             const Rigid3 start = sweeps.start_near(truth, at);
             const double reach_m = world.tracer().bounding_radius_m(target);

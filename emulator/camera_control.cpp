@@ -50,6 +50,15 @@ CameraSettings settings_of(const Camera& camera) noexcept {
     return s;
 }
 
+CameraSettings settings_of(const FrameLedger& ledger, const Camera& as_in_the_scene) noexcept {
+    CameraSettings s = settings_of(as_in_the_scene);
+    s.exposure_ns = ledger.t_exposure_end_ns - ledger.t_exposure_start_ns - rows_ns(as_in_the_scene);
+    s.gain_cdb = ledger.gain_cdb;
+    s.binning = ledger.binning;
+    s.region = {ledger.region_x, ledger.region_y, ledger.region_width, ledger.region_height};
+    return s;
+}
+
 void apply(const CameraSettings& settings, const Camera& as_in_the_scene, Camera& camera) noexcept {
     camera.detector->exposure_s = static_cast<double>(settings.exposure_ns) * 1e-9;
     camera.detector->gain_e_per_dn =

@@ -13,6 +13,7 @@
 #include "emulator/clock.h"
 #include "emulator/spsc_ring.h"
 #include "protocols/camera_control.h"
+#include "protocols/ledger.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -24,6 +25,8 @@ namespace narpa {
 
 /// As the scene has them.
 [[nodiscard]] CameraSettings settings_of(const Camera& camera) noexcept;
+/// As the frame was taken with; of trigger, period and auto-exposure the scene's.
+[[nodiscard]] CameraSettings settings_of(const FrameLedger& ledger, const Camera& as_in_the_scene) noexcept;
 /// The camera with these settings; of region, binning and trigger nothing.
 void apply(const CameraSettings& settings, const Camera& as_in_the_scene, Camera& camera) noexcept;
 

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "base/time.h"
+#include "emulator/camera_control.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 
@@ -69,6 +70,7 @@ FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t t
                            const TrackerOptions& options)
     : world_(world),
       camera_(world.scene().cameras[camera]),
+      index_(camera),
       target_(target),
       options_(options),
       random_(options.seed),
@@ -91,11 +93,43 @@ Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, s
     return std::unique_ptr<FrameTracker>(new FrameTracker(world, camera, *target, options));
 }
 
-TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
+Status FrameTracker::set(const FrameLedger& ledger) {
+    if (!camera_.control) return Ok{};
+    const Camera& as_in_the_scene = world_.scene().cameras[index_];
+    const CameraSettings taken = settings_of(ledger, as_in_the_scene);
+    apply(taken, as_in_the_scene, camera_);
+    features_->set_detector(*camera_.detector);
+    if (pixels_) pixels_->set_detector(*camera_.detector);
+    if (taken.binning == 1 && taken.region.width == camera_.width && taken.region.height == camera_.height)
+        return Ok{};
+    return Error{fmt::format("{} x {} pixels, binned by {}: expected the whole image, not binned",
+                             taken.region.width, taken.region.height, taken.binning)};
+}
+
+ApparentMotion FrameTracker::motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const {
+    const double length_s = 1e-9 * static_cast<double>(ledger.t_exposure_end_ns - ledger.t_exposure_start_ns);
+    if (!camera_.shutter || !(length_s > 0)) return {};
+    const auto q_frame_chaser = [&](double time) {
+        return (world_.sensor_pose(camera_.mount, camera_.T_mount_camera, at, time) * inverse(T_chaser_camera())).q;
+    };
+    const Quat q_middle = q_frame_chaser(kMidExposure);
+    const Rigid3 T_chaser_target = T_chaser_camera() * guess;
+    const auto known = tracker_.started() ? tracker_.filter().state() : RelativeState{};
+    const auto at_time = [&](double time) {
+        const double t_s = (time - kMidExposure) * length_s;
+        const Quat q = conjugate(q_frame_chaser(time));
+        const Rigid3 T{normalized(q * q_middle * T_chaser_target.q * exp_rotation(t_s * known.rate_rad_s)),
+                       q * (q_middle * T_chaser_target.t + t_s * known.velocity_m_s)};
+        return inverse(T_chaser_camera()) * T;
+    };
+    return motion_between(at_time(0), at_time(1), length_s);
+}
+
+TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes,
                                 const BodyPoses& at) {
-    const std::int64_t start_ns = monotonic_ns();
+    const std::int64_t start_ns = monotonic_ns(), t_ns = ledger.t_exposure_mid_ns;
     TrackedFrame out;
-    out.frame = frame;
+    out.frame = ledger.frame;
     out.t_ns = t_ns;
     const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, at);
     out.truth = inverse(T_world_camera) * at.T_world_body[target_];
@@ -107,12 +141,11 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
     } else {
         out.guess = off_truth(out.truth, options_, random_);
     }
-    if (const auto image = measured_image(camera_, bytes)) {
-        measure_by_features(*image, at, out);
-        if (pixels_) measure_by_pixels(*image, at, out);
-    } else {
-        out.why = image.error().what;
-    }
+    const ApparentMotion moving = motion(ledger, at, out.guess);
+    if (const Status usable = set(ledger); usable)
+        measure(bytes, at, moving, out);
+    else
+        out.why = usable.error().what;
     if (out.measured) {
         const UpdateResult update =
             tracker_.update({t_ns, *out.measured, out.covariance, T_chaser_camera(), q_frame_chaser});
@@ -130,12 +163,24 @@ TrackedFrame FrameTracker::take(std::uint32_t frame, std::int64_t t_ns, std::spa
     }
     out.ms = seconds_since(start_ns) * 1e3;
     if (pixels_ && out.measured)  // at the truth: after the estimate, and not part of its time
-        if (const auto bound = pixels_->bound(at, out.truth, dense_options())) out.bound = *bound;
+        if (const auto bound = pixels_->bound(at, out.truth, dense_options(moving))) out.bound = *bound;
     return out;
 }
 
-void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
-    const FeatureEstimate e = features_->align(image, at, out.guess);
+void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const ApparentMotion& motion,
+                           TrackedFrame& out) {
+    const auto image = measured_image(camera_, bytes);
+    if (!image) {
+        out.why = image.error().what;
+        return;
+    }
+    measure_by_features(*image, at, motion, out);
+    if (pixels_) measure_by_pixels(*image, at, motion, out);
+}
+
+void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPoses& at,
+                                       const ApparentMotion& motion, TrackedFrame& out) {
+    const FeatureEstimate e = features_->align(image, at, out.guess, motion);
     out.matches = e.agreeing;
     out.renders = static_cast<int>(e.rounds.size());
     if (!e.ok()) {
@@ -148,8 +193,9 @@ void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPos
 }
 
 /// Starts from the pose by features; without one, from the guess.
-void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out) {
-    DenseOptions dense = dense_options();
+void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
+                                     TrackedFrame& out) {
+    DenseOptions dense = dense_options(motion);
     if (out.measured) dense.coarsest = 1;
     const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense);
     out.measured.reset();
@@ -167,8 +213,9 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
     out.covariance = e->covariance;
 }
 
-DenseOptions FrameTracker::dense_options() const {
+DenseOptions FrameTracker::dense_options(const ApparentMotion& motion) const {
     DenseOptions dense;
+    dense.motion = motion;
     dense.seed = ~options_.seed;
     dense.method = world_.scene().render.method;
     dense.max_depth = world_.scene().render.max_depth;

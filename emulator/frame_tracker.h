@@ -14,7 +14,9 @@
 #include "base/result.h"
 #include "emulator/world.h"
 #include "estimator/filter/pose_filter.h"
+#include "estimator/pose/apparent_motion.h"
 #include "protocols/estimate.h"
+#include "protocols/ledger.h"
 
 namespace narpa {
 
@@ -77,25 +79,35 @@ public:
     [[nodiscard]] std::size_t target() const noexcept { return target_; }
     [[nodiscard]] const TrackerOptions& options() const noexcept { return options_; }
 
-    /// Takes a frame as the camera put it out. `at`: where the bodies were; of it only the light on the target, the
-    /// bodies beside it, the camera's own attitude, and the truth for the errors are used. Until a frame has given
-    /// a pose, guesses are the truth displaced as the options state. Runs on the calling thread's TBB arena.
-    TrackedFrame take(std::uint32_t frame, std::int64_t t_ns, std::span<const std::uint8_t> bytes,
-                      const BodyPoses& at);
+    /// Takes a frame as the camera put it out, with the exposure and gain of its ledger; a frame of a part of the
+    /// image or of binned pixels gives no pose. `at`: where the bodies were; of it only the light on the target,
+    /// the bodies beside it, the camera's own attitude during the exposure, and the truth for the errors are used.
+    /// Until a frame has given a pose, guesses are the truth displaced as the options state. Runs on the calling
+    /// thread's TBB arena.
+    TrackedFrame take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
 
 private:
     FrameTracker(const World& world, std::size_t camera, std::size_t target, const TrackerOptions& options);
-    void measure_by_features(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
-    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, TrackedFrame& out);
-    [[nodiscard]] DenseOptions dense_options() const;
+    /// Of `camera_`, from what the frame was taken with. An Error where its pixels are not the scene's.
+    [[nodiscard]] Status set(const FrameLedger& ledger);
+    /// Of the target in camera axes during the exposure, by the filter and the camera's own attitude; 0 without a
+    /// shutter.
+    [[nodiscard]] ApparentMotion motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const;
+    void measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const ApparentMotion& motion,
+                 TrackedFrame& out);
+    void measure_by_features(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
+                             TrackedFrame& out);
+    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
+                           TrackedFrame& out);
+    [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion) const;
     /// The pose is known well enough for a render to be compared from there.
     [[nodiscard]] bool is_tracked(const Quat& q_frame_chaser) const;
     /// The chaser is the body that carries the camera, or the camera itself.
     [[nodiscard]] Rigid3 T_chaser_camera() const { return camera_.mount < 0 ? Rigid3{} : camera_.T_mount_camera; }
 
     const World& world_;
-    const Camera camera_;
-    std::size_t target_;
+    Camera camera_;
+    std::size_t index_, target_;
     TrackerOptions options_;
     std::mt19937_64 random_;
     std::unique_ptr<FeatureAlignment> features_;

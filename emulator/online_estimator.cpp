@@ -36,7 +36,7 @@ void OnlineEstimator::take(const FrameLedger& ledger, std::span<const std::uint8
     }
     ledger_ = ledger;
     std::copy(bytes.begin(), bytes.end(), bytes_.begin());
-    std::copy(at.T_world_body.begin(), at.T_world_body.end(), at_.T_world_body.begin());
+    at_ = at;  // allocates nothing: of as many bodies
     slot_.store(full, std::memory_order_release);
     slot_.notify_one();
 }
@@ -57,7 +57,7 @@ void OnlineEstimator::wake() noexcept {
 }
 
 void OnlineEstimator::process(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at) {
-    TrackedFrame tracked = tracker_->take(ledger.frame, ledger.t_exposure_mid_ns, bytes, at);
+    TrackedFrame tracked = tracker_->take(ledger, bytes, at);
     if (keeps_reports_) (void)reports_.push(tracked.report(index_));
     if (log_) log_->append(estimate_row(tracked));
     if (frames_.size() < kMostKept) frames_.push_back(std::move(tracked));

@@ -169,11 +169,9 @@ FrameSettings Replay::settings_of(std::size_t i) const {
 /// The camera as it was set for the frame.
 void Replay::set(const FrameLedger& l) {
     if (!camera_.control) return;
-    settings_.exposure_ns = l.t_exposure_end_ns - l.t_exposure_start_ns - rows_ns(camera_);
-    settings_.gain_cdb = l.gain_cdb;
-    settings_.binning = l.binning;
-    settings_.region = {l.region_x, l.region_y, l.region_width, l.region_height};
-    apply(settings_, world_->scene().cameras[index_], camera_);
+    const Camera& as_in_the_scene = world_->scene().cameras[index_];
+    settings_ = narpa::settings_of(l, as_in_the_scene);
+    apply(settings_, as_in_the_scene, camera_);
     full_scale_ = full_scale_radiance(camera_);
 }
 

@@ -29,7 +29,7 @@ const std::array<std::array<double, 2>, kLanes>& disc() {
 BeamAssociation::BeamAssociation(const Tracer& tracer, std::size_t target)
     : tracer_(tracer), at_rest_(tracer.scene().bodies.size()), target_(static_cast<std::uint32_t>(target)) {}
 
-void BeamAssociation::take(std::span<const RangePoint> points, const SweepMotion& motion) {
+void BeamAssociation::take(std::span<const RangePoint> points, const ApparentMotion& motion) {
     turning_ = !(motion.rate_rad_s == Vec3{});
     beams_.clear();
     for (const RangePoint& p : points) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/cloud/range_points.h"
+#include "estimator/pose/apparent_motion.h"
 #include "estimator/pose/pose_estimate.h"
 #include "renderer/geometry/tracer.h"
 
@@ -31,7 +32,7 @@ public:
     BeamAssociation(const Tracer& tracer, std::size_t target);
 
     /// Sets the sweep. Allocates only for more points than ever before.
-    void take(std::span<const RangePoint> points, const SweepMotion& motion);
+    void take(std::span<const RangePoint> points, const ApparentMotion& motion);
     [[nodiscard]] std::size_t size() const noexcept { return beams_.size(); }
 
     /// For every `stride`-th point from the first, in order, at this pose at the time of the sweep. With `search_m`

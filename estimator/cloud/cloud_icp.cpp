@@ -43,7 +43,7 @@ Status check(std::span<const RangePoint> points) {
     return Ok{};
 }
 
-Status check(const Rigid3& T, const SweepMotion& motion) {
+Status check(const Rigid3& T, const ApparentMotion& motion) {
     if (!is_finite(T.t) || !(std::abs(norm(T.q) - 1) < 1e-6))
         return Error{"the pose to start from: expected a finite position and a unit quaternion"};
     if (!is_finite(motion.velocity_m_s) || !is_finite(motion.rate_rad_s))
@@ -165,7 +165,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     return out;
 }
 
-Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const SweepMotion& motion,
+Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const ApparentMotion& motion,
                                       const Rigid3& start, double search_m) {
     if (auto good = check(points); !good) return good.error();
     if (auto good = check(start, motion); !good) return good.error();

@@ -51,7 +51,7 @@ public:
     /// the beams. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
     /// search that is not finite, or fewer than six beams that meet the model. Allocates only for more points than
     /// ever before, or an Error.
-    [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const SweepMotion& motion,
+    [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const ApparentMotion& motion,
                                               const Rigid3& start, double search_m = 0);
 
 private:

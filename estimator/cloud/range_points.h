@@ -20,13 +20,6 @@ struct RangePoint {
     [[nodiscard]] Vec3 position_m() const { return origin_m + range_m * direction; }
 };
 
-/// The target's motion in the LiDAR's axes during the sweep: at t_s after the time of the pose its attitude
-/// is exp_rotation(t_s * rate) * q and its origin lies at t + t_s * velocity.
-struct SweepMotion {
-    Vec3 velocity_m_s{};
-    Vec3 rate_rad_s{};
-};
-
 /// Standard deviations of a return. Seen along the normal of a surface that the beam meets at the angle i from it,
 /// a point is off by sqrt((range cos i)^2 + (distance * pointing * sin i)^2): what pointing and the width of the
 /// footprint do to the range grows as tan i.

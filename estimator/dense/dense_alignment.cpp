@@ -32,11 +32,21 @@ std::string_view name(DenseStatus status) noexcept {
 }
 
 DenseAlignment::DenseAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target)
-    : render_scene_(render_scene), camera_(camera), target_(target), sensor_(sensor_model(camera)) {
+    : render_scene_(render_scene),
+      camera_(camera),
+      target_(target),
+      sensor_(sensor_model(camera)),
+      times_(row_times(camera)) {
     if (camera_.embedded_line) {  // the last row holds no light
         --camera_.height;
         camera_.embedded_line = false;
     }
+}
+
+void DenseAlignment::set_detector(const Detector& detector) {
+    camera_.detector = detector;
+    sensor_ = sensor_model(camera_);
+    times_.exposure_s = row_times(camera_).exposure_s;  // their middles stay
 }
 
 Status DenseAlignment::check(const MeasuredImage& frame, std::span<const float> frame_variance, const BodyPoses& at,
@@ -56,11 +66,12 @@ Status DenseAlignment::check(const MeasuredImage& frame, std::span<const float> 
 }
 
 LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
-                                 const MeasuredImage& frame, std::span<const float> frame_variance) {
+                                 const ApparentMotion& motion, const MeasuredImage& frame,
+                                 std::span<const float> frame_variance) {
     auto& kept = levels_[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
     if (!kept || kept->window() != window)
         kept.emplace(render_scene_, camera, sensor_, static_cast<double>(factor) * factor, window, target_, at);
-    kept->place_bodies(at);
+    kept->begin_frame(at, motion, times_.scaled(factor));
     kept->measure(coarser_image(frame, factor), coarser_variance(frame_variance, camera_, factor));
     return *kept;
 }
@@ -88,7 +99,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         }
         // From a guess the target may have far to go.
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
-        LevelView& view = level(factor, camera, *window, at, frame, frame_variance);
+        LevelView& view = level(factor, camera, *window, at, options.motion, frame, frame_variance);
         LevelSolver solver(camera, render_scene_, target_, factor, view, options, e);
         e.status = solver.run(first);
         if (factor != options.finest || e.status != DenseStatus::converged) continue;
@@ -107,7 +118,7 @@ Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camer
     const Camera camera = coarser_camera(camera_, options.finest);
     const std::optional<Window> window = window_about(render_scene_.tracer(), camera, target_, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
-    LevelView& view = level(options.finest, camera, *window, at, none, frame_variance);
+    LevelView& view = level(options.finest, camera, *window, at, options.motion, none, frame_variance);
     DenseEstimate e;
     e.T_camera_body = T_camera_body;
     return LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).bound();

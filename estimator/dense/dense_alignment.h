@@ -30,6 +30,7 @@ struct DenseOptions {
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
+    ApparentMotion motion{};  ///< the target's during the exposure, in camera axes, for cameras with a shutter
 };
 
 enum class DenseStatus : std::uint8_t {
@@ -58,13 +59,16 @@ public:
     DenseAlignment(const DenseAlignment&) = delete;
     DenseAlignment& operator=(const DenseAlignment&) = delete;
 
-    /// `at`: poses of all bodies at the time of the frame; the target's attitude determines its illumination, its
-    /// position and the camera's are not used. `frame_variance`: DN^2 of the frame in addition to the sensor's
+    /// `at`: poses of all bodies in the middle of the exposure; the target's attitude determines its illumination,
+    /// its position and the camera's are not used. `frame_variance`: DN^2 of the frame in addition to the sensor's
     /// noise, or empty. Memory is kept between frames while the target's window stays. Errors: sizes, options or a
     /// guess that is unusable.
     [[nodiscard]] Result<DenseEstimate> align(const MeasuredImage& frame, const BodyPoses& at,
                                               const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                               std::span<const float> frame_variance = {});
+
+    /// Exposure and gain of the frames from now on.
+    void set_detector(const Detector& detector);
 
     /// Cramer-Rao bound of the pose from one frame: the inverse of sum g g' / s^2, s^2 the sensor's and the frame's
     /// variance as in `align`, with the priors of the exposure. The information in the variance itself is left out:
@@ -76,12 +80,14 @@ private:
     [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
                                const BodyPoses& at, const Rigid3& guess) const;
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
-                     const MeasuredImage& frame, std::span<const float> frame_variance);
+                     const ApparentMotion& motion, const MeasuredImage& frame,
+                     std::span<const float> frame_variance);
 
     const RenderScene& render_scene_;
     Camera camera_;
     const std::size_t target_;
-    const SensorModel sensor_;
+    SensorModel sensor_;  ///< the levels refer to it
+    RowTimes times_;
     std::array<std::optional<LevelView>, 7> levels_{};  ///< by the logarithm of their factor
 };
 

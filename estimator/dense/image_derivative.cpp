@@ -32,6 +32,8 @@ constexpr int kShadingPoints = 2;
 /// Rays each way in any pixel; more where the radiance varies by more than this part of the sensor's noise.
 constexpr int kAnywhere = 3;
 constexpr double kVarying = 1;
+/// Parts of an exposure for each pixel of motion during it, and at the most.
+constexpr double kPartsPerPixel = 1, kMostParts = 8;
 
 bool depends_on_view(const Material& m) {
     if (is_specular(m) || m.kind == Material::Kind::lambert) return false;
@@ -56,15 +58,33 @@ double signal_of(const SensorModel& sensor, const Rgb& L) {
     return k[0] * static_cast<double>(L.x) + k[1] * static_cast<double>(L.y) + k[2] * static_cast<double>(L.z);
 }
 
+/// What the camera sees of the target while it is exposed.
+struct Seen {
+    const Rigid3& T_world_target;
+    const Rigid3& T_camera_target;  ///< in mid-exposure
+    const ApparentMotion& motion;
+    const RowTimes& times;
+
+    /// Of an image with so many rows for each of `times`.
+    [[nodiscard]] CameraPose path(double fineness, int rows) const {
+        return camera_path(T_world_target, T_camera_target, motion, times.scaled(1 / fineness), rows);
+    }
+};
+
+/// Through a point of the image, in the middle of its row's exposure.
+Ray ray_through(const Frame& f, double x, double y) {
+    return camera_ray(f.model, f.pose.at(f.pose.time(y, f.camera.height, 0.5)), x, y);
+}
+
 /// A camera with fineness x fineness pixels for each pixel of another.
 struct FineGrid {
-    /// All but `pixels` outlive it.
-    FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& pixels,
-             const Rigid3& T_world_camera, const FrameSettings& for_all, int factor)
+    /// All but `pixels` and `seen` outlive it.
+    FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& pixels, const Seen& seen,
+             const FrameSettings& for_all, int factor)
         : fineness(factor),
           camera(finer_camera(pixels, factor)),
           settings(one_ray(for_all)),
-          frame(make_frame(render_scene, at, camera, T_world_camera, settings)) {}
+          frame(make_frame(render_scene, at, camera, seen.path(factor, camera.height), settings)) {}
     FineGrid(const FineGrid&) = delete;
     FineGrid& operator=(const FineGrid&) = delete;
 
@@ -140,11 +160,18 @@ private:
     std::vector<RaySample> points_;
 };
 
+/// While a row is exposed.
+struct RowView {
+    Vec3 t_camera_target{};
+    ApparentMotion motion{};
+    double row_s = 0;  ///< to the next row
+};
+
 /// The first two terms of one pixel, on one grid.
 class PixelSides {
 public:
-    PixelSides(const FineGrid& grid, const PixelPatch& patch, int x, int y, const Vec3& t_camera_target)
-        : grid_(grid), patch_(patch), x_(x), y_(y), t_camera_target_(t_camera_target) {}
+    PixelSides(const FineGrid& grid, const PixelPatch& patch, int x, int y, const RowView& view)
+        : grid_(grid), patch_(patch), x_(x), y_(y), view_(view), fine_row_s_(view.row_s / grid.fineness) {}
 
     /// Sum over the sides within the pixel and its share of those on its border.
     Row sum() {
@@ -223,8 +250,8 @@ private:
             for (int k = 0; k < kHalvings; ++k) {
                 for (std::size_t i = 0; i < batch.size(); ++i) {
                     const Contour& c = batch[i];
-                    rays.put(i, camera_ray(f.model, f.T_world_camera, c.side.x + c.middle() * c.side.dx,
-                                           c.side.y + c.middle() * c.side.dy));
+                    rays.put(i,
+                             ray_through(f, c.side.x + c.middle() * c.side.dx, c.side.y + c.middle() * c.side.dy));
                 }
                 f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
                 for (std::size_t i = 0; i < batch.size(); ++i) batch[i].halve(hits.body[i], hits.range_m[i]);
@@ -249,9 +276,14 @@ private:
     [[nodiscard]] Row velocity(double x, double y, double range_m, bool horizontal) const {
         const CameraModel& model = *grid_.frame.model;
         const Vec3 point = range_m * model.direction({x, y});
-        const Vec3 a = point - t_camera_target_;  // about the target's origin, in camera axes
+        const Vec3 a = point - view_.t_camera_target;  // about the target's origin, in camera axes
         const ProjectionJacobian J = model.jacobian(point);
-        const Vec3& move = horizontal ? J.x : J.y;
+        Vec3 move = horizontal ? J.x : J.y;
+        if (fine_row_s_ != 0) {  // what moves down is exposed later, and has moved on by then
+            const Vec3 v_m_s = view_.motion.velocity_m_s + cross(view_.motion.rate_rad_s, a);
+            const Vec3 down = (1 / (1 - dot(J.y, v_m_s) * fine_row_s_)) * J.y;
+            move = horizontal ? J.x + dot(J.x, v_m_s) * fine_row_s_ * down : down;
+        }
         Row row;
         row << to_eigen(cross(a, move)), to_eigen(move);
         return row;
@@ -260,7 +292,8 @@ private:
     const FineGrid& grid_;
     const PixelPatch& patch_;
     const int x_, y_;
-    const Vec3 t_camera_target_;
+    const RowView& view_;
+    const double fine_row_s_;
     Row sum_ = Row::Zero();
     std::vector<Contour> contours_;
     double jumps_ = 0;
@@ -273,7 +306,7 @@ Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, cons
     for (int j = 0; j < kShadingPoints; ++j)
         for (int i = 0; i < kShadingPoints; ++i) {
             constexpr double kStep = 1.0 / kShadingPoints, kFirst = 0.5 * kStep - 0.5;
-            const Ray ray = camera_ray(f.model, f.T_world_camera, x + kFirst + kStep * i, y + kFirst + kStep * j);
+            const Ray ray = ray_through(f, x + kFirst + kStep * i, y + kFirst + kStep * j);
             const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
             if (hit.body < 0 || hit.body == f.camera.mount) continue;
             if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) continue;
@@ -303,7 +336,13 @@ Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, cons
 
 ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                  const BodyPoses& at)
-    : render_scene_(render_scene), camera_(camera), target_(target), at_(at) {
+    : render_scene_(render_scene),
+      camera_(camera),
+      target_(target),
+      at_(at),
+      optics_(camera),
+      before_optics_(optics_.any() ? camera.width : 0, optics_.any() ? camera.height : 0),
+      after_optics_(before_optics_) {
     const auto& materials = render_scene.scene().materials;
     view_dependent_ = render_scene.scene().sun && std::any_of(materials.begin(), materials.end(), depends_on_view);
     derivative_.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
@@ -311,36 +350,69 @@ ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& 
 
 std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_target, const SensorModel& sensor,
                                                      const FrameSettings& settings, int fineness) {
-    const Rigid3 T_world_camera = place_camera(T_camera_target, camera_, target_, at_);
-    const FineGrid coarse(render_scene_, at_, camera_, T_world_camera, settings, std::min(fineness, kAnywhere));
+    std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
+    const double range_m = std::max(norm(T_camera_target.t), 1e-9);
+    const double blur_rad = times_.exposure_s *
+                            (norm(motion_.velocity_m_s) +
+                             norm(motion_.rate_rad_s) * render_scene_.tracer().bounding_radius_m(target_)) /
+                            range_m;
+    const double blur_px = blur_rad * CameraModelHandle(camera_)->pixels_per_radian();
+    const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMostParts));
+    for (int k = 0; k < parts; ++k)
+        add(T_camera_target, sensor, settings, fineness, times_.part(k, parts), 1.0F / static_cast<float>(parts));
+    if (optics_.any()) apply_optics();
+    return derivative_;
+}
+
+void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
+                          int fineness, const RowTimes& times, float weight) {
+    (void)place_camera(T_camera_target, camera_, target_, at_);
+    const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
+    const FineGrid coarse(render_scene_, at_, camera_, seen, settings, std::min(fineness, kAnywhere));
     const FrameSettings plain = settings;
-    const Frame frame = make_frame(render_scene_, at_, camera_, T_world_camera, plain);
-    const FineGrid fine(render_scene_, at_, camera_, T_world_camera, settings, fineness);
-    const Vec3& t = T_camera_target.t;
+    const Frame frame = make_frame(render_scene_, at_, camera_, seen.path(1, camera_.height), plain);
+    const FineGrid fine(render_scene_, at_, camera_, seen, settings, fineness);
     const double varying_dn = kVarying * std::sqrt(sensor.variance_dn2(sensor.black_dn));
-    const auto pixel = [&](PixelPatch& patch, int x, int y) -> Row {
+    const auto pixel = [&](PixelPatch& patch, int x, int y, const RowView& view) -> Row {
         patch.trace(coarse, sensor, x, y);
         if (!patch.sees_anything()) return Row::Zero();
-        PixelSides sides(coarse, patch, x, y, t);
+        PixelSides sides(coarse, patch, x, y, view);
         Row sum = sides.sum();
         if (fineness > kAnywhere && sides.change() > varying_dn) {
             patch.trace(fine, sensor, x, y);
-            sum = PixelSides(fine, patch, x, y, t).sum();
+            sum = PixelSides(fine, patch, x, y, view).sum();
         }
         if (!view_dependent_) return sum;
-        return sum + shading_change(frame, sensor, x, y, t);
+        return sum + shading_change(frame, sensor, x, y, view.t_camera_target);
     };
-    tbb::parallel_for(0, camera_.height, [&](int y) {
+    tbb::parallel_for(1, std::max(camera_.height - 1, 1), [&](int y) {
         const FlushDenormals flush;
         PixelPatch patch;
-        const bool border = y == 0 || y == camera_.height - 1;
-        for (int x = 0; x < camera_.width; ++x)
+        const double t_s = times.at(y);
+        const RowView view{moved(T_camera_target, motion_, t_s).t, motion_, times.row_s};
+        const Quat back = exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to that of mid-exposure
+        for (int x = 1; x < camera_.width - 1; ++x) {
+            Row row = pixel(patch, x, y, view);
+            row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
             derivative_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) +
-                        static_cast<std::size_t>(x)] = border || x == 0 || x == camera_.width - 1
-                                                           ? PixelDerivative(PixelDerivative::Zero())
-                                                           : PixelDerivative(pixel(patch, x, y).cast<float>());
+                        static_cast<std::size_t>(x)] += weight * row.cast<float>();
+        }
     });
-    return derivative_;
+}
+
+/// The image's optics, over three columns at a time.
+void ImageDerivative::apply_optics() {
+    for (const int first : {0, 3}) {
+        for (std::size_t i = 0; i < derivative_.size(); ++i) {
+            const PixelDerivative& d = derivative_[i];
+            before_optics_.pixels[i] = {d[first], d[first + 1], d[first + 2]};
+        }
+        optics_.apply(before_optics_, after_optics_);
+        for (std::size_t i = 0; i < derivative_.size(); ++i) {
+            const Rgb& d = after_optics_.pixels[i];
+            derivative_[i].segment<3>(first) << d.x, d.y, d.z;
+        }
+    }
 }
 
 }  // namespace narpa

@@ -16,8 +16,9 @@
 ///
 /// The target's illumination does not change with the pose (ModelView): shadows move with the surface, the radiance
 /// of a Lambert surface is constant, and for other materials direct sunlight changes as the BSDF does with the
-/// direction to the camera. Not included: the same for lamps and indirect light, and shadows of the body that
-/// carries the camera.
+/// direction to the camera. Over an exposure it is the mean over parts of it, each row at its own time; vignetting
+/// and the point spread of the lens act on the derivative as on the image. Not included: the same for lamps and
+/// indirect light, and shadows of the body that carries the camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,6 +28,8 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/view/measured_image.h"
+#include "estimator/view/row_times.h"
+#include "renderer/camera/image_optics.h"
 #include "renderer/film/camera_image.h"
 
 namespace narpa {
@@ -39,8 +42,10 @@ public:
     /// `camera` is that of the image. `render_scene` outlives it.
     ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at);
 
-    /// As ModelView::place_bodies.
-    void place_bodies(const BodyPoses& at) { at_ = at; }
+    /// As ModelView::begin_frame.
+    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
+        at_ = at, motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
+    }
 
     /// Jacobian of the predicted DN at this pose, without clipping. Row-major; zero in the outermost pixels, which
     /// lack neighbours. `fineness` >= 1: rays each way in a pixel where the radiance varies. Runs on the calling
@@ -49,11 +54,20 @@ public:
                                         const FrameSettings& settings, int fineness);
 
 private:
+    /// Adds it, times `weight`, for a moment of each row.
+    void add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings, int fineness,
+             const RowTimes& times, float weight);
+    void apply_optics();
+
     const RenderScene& render_scene_;
     const Camera camera_;
     const std::size_t target_;
     BodyPoses at_;
+    ApparentMotion motion_{};
+    RowTimes times_{};
     bool view_dependent_ = false;  ///< any material
+    ImageOptics optics_;
+    RadianceImage before_optics_, after_optics_;
     std::vector<PixelDerivative> derivative_;
 };
 

@@ -91,9 +91,10 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
     signal_variance_.resize(n);
 }
 
-void LevelView::place_bodies(const BodyPoses& at) {
-    view_.place_bodies(at);
-    derivative_.place_bodies(at);
+void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
+    const RowTimes in_window = times.from(window_.y);
+    view_.begin_frame(at, motion, in_window);
+    derivative_.begin_frame(at, motion, in_window);
 }
 
 void LevelView::measure(const MeasuredImage& image, std::span<const float> variance) {

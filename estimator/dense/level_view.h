@@ -31,8 +31,8 @@ public:
               double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
-    /// As ModelView::place_bodies.
-    void place_bodies(const BodyPoses& at);
+    /// As ModelView::begin_frame; `times`: of the rows of `camera`.
+    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times);
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);

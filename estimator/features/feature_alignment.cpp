@@ -130,7 +130,17 @@ struct FeatureAlignment::Points {
 
 FeatureAlignment::FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                    const BodyPoses& at, const FeatureSettings& settings)
-    : view_(render_scene, camera, target, at), sensor_(sensor_model(camera)), settings_(settings) {}
+    : view_(render_scene, camera, target, at),
+      sensor_(sensor_model(camera)),
+      times_(row_times(camera)),
+      settings_(settings) {}
+
+void FeatureAlignment::set_detector(const Detector& detector) {
+    Camera camera = view_.camera();
+    camera.detector = detector;
+    sensor_ = sensor_model(camera);
+    times_ = row_times(camera);
+}
 
 /// The rays of lanes 1 to 4 meet the surface that lane 0 meets.
 bool FeatureAlignment::on_smooth_surface(const HitBatch& hits) const {
@@ -201,10 +211,11 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
     }
 }
 
-FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess) {
+FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                        const ApparentMotion& motion) {
     FeatureEstimate estimate;
     estimate.T_camera_target = guess;
-    view_.place_bodies(at);
+    view_.begin_frame(at, motion, times_);
     const CameraModelHandle model(view_.camera());
     const CameraModel& camera = *model;
     const ToneScale tones(frame, sensor_);
@@ -219,6 +230,13 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         FeatureRound& round = estimate.rounds.emplace_back();
         view_.render(estimate.T_camera_target, render_settings, false);
         gather(frame, toned_frame, tones, points);
+        if (!times_.at_once()) {
+            // As if all were seen at once: where each point would have to be to be seen there in mid-exposure.
+            const Rigid3& T = estimate.T_camera_target;
+            for (std::size_t i = 0; i < points.size(); ++i)
+                points.body_m[i] =
+                    inverse(T) * (moved(T, motion, times_.at(points.pixels[i].v)) * points.body_m[i]);
+        }
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;
             return estimate;

@@ -60,9 +60,13 @@ public:
     FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at,
                      const FeatureSettings& settings = {});
 
-    /// `at`: poses of the bodies when the frame is exposed. Wrong matches (occlusion, other illumination) are
-    /// rejected as outliers. Runs on the calling thread's TBB arena.
-    [[nodiscard]] FeatureEstimate align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess);
+    /// `at`: poses of the bodies in the middle of the exposure; `motion`: the target's during it, in camera axes,
+    /// for cameras with a shutter. Wrong matches (occlusion, other illumination) are rejected as outliers. Runs on
+    /// the calling thread's TBB arena.
+    [[nodiscard]] FeatureEstimate align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                        const ApparentMotion& motion = {});
+    /// Exposure and gain of the frames from now on.
+    void set_detector(const Detector& detector);
 
 private:
     struct Points;
@@ -72,6 +76,7 @@ private:
 
     ModelView view_;
     SensorModel sensor_;
+    RowTimes times_;
     FeatureSettings settings_;
     std::vector<std::uint8_t> on_target_;  ///< of each pixel of the view
 };

@@ -18,8 +18,15 @@ ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std:
       radiance_(camera.width, camera.height) {}
 
 void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {
+    T_camera_target_ = T_camera_target;
     T_world_camera_ = place_camera(T_camera_target, camera_, target_, at_);
-    renderer_.render(at_, T_world_camera_, settings, radiance_, aovs ? &aovs_ : nullptr);
+    const CameraPose path = camera_path(T_world_target(), T_camera_target, motion_, times_, camera_.height);
+    renderer_.render(at_, path, settings, radiance_, aovs ? &aovs_ : nullptr);
+}
+
+Rigid3 ModelView::T_world_camera(double row) const noexcept {
+    if (motion_ == ApparentMotion{}) return T_world_camera_;
+    return T_world_target() * inverse(moved(T_camera_target_, motion_, times_.at(row)));
 }
 
 void ModelView::trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept {
@@ -27,7 +34,7 @@ void ModelView::trace_pixels(std::span<const ImagePoint> points, HitBatch& hits)
     RayBatch rays;
     rays.n = points.size();
     for (std::size_t i = 0; i < rays.n; ++i)
-        rays.put(i, camera_ray(model, T_world_camera_, points[i].x, points[i].y));
+        rays.put(i, camera_ray(model, T_world_camera(points[i].y), points[i].x, points[i].y));
     tracer().intersect(at_, rays, tracer().all_bodies(), hits);
 }
 

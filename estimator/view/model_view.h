@@ -1,12 +1,13 @@
 /// estimator/view/model_view.h - the image that the camera would take of the target at a given pose.
 ///
 /// The target keeps its pose in the world, and so its illumination; the camera is placed relative to it, together
-/// with the body that carries it.
+/// with the body that carries it. During an exposure over time only the camera moves.
 #pragma once
 
 #include <cstddef>
 #include <span>
 
+#include "estimator/view/row_times.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 
@@ -24,8 +25,10 @@ public:
     /// at the time of the frame; the target's attitude there determines its illumination.
     ModelView(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at);
 
-    /// Sets the poses of all bodies, for another frame.
-    void place_bodies(const BodyPoses& at) { at_ = at; }
+    /// Another frame: poses of all bodies, the target's motion in camera axes, and when rows are exposed.
+    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
+        at_ = at, motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
+    }
 
     /// Renders the image at this pose, with `aovs` also depth, position, normal and body. Allocates nothing after
     /// the first call of a kind.
@@ -35,22 +38,28 @@ public:
     [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_.tracer(); }
     [[nodiscard]] std::size_t target() const noexcept { return target_; }
     /// Of the last render: linear radiance; first hits through the pixel centres, world coordinates; poses of the
-    /// bodies and of the camera.
+    /// bodies and of the camera in the middle of the exposure.
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
     [[nodiscard]] const Aovs& aovs() const noexcept { return aovs_; }
     [[nodiscard]] const BodyPoses& placement() const noexcept { return at_; }
     [[nodiscard]] const Rigid3& T_world_camera() const noexcept { return T_world_camera_; }
     [[nodiscard]] const Rigid3& T_world_target() const noexcept { return at_.T_world_body[target_]; }
 
-    /// The first hits of the rays through up to kLanes image points, from the camera of the last render.
+    /// The first hits of the rays through up to kLanes image points, from the camera of the last render in the
+    /// middle of their row's exposure.
     void trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept;
 
 private:
+    /// In the middle of the row's exposure.
+    [[nodiscard]] Rigid3 T_world_camera(double row) const noexcept;
+
     const RenderScene& render_scene_;
     Camera camera_;
     std::size_t target_;
     BodyPoses at_;
-    Rigid3 T_world_camera_{};
+    ApparentMotion motion_{};
+    RowTimes times_{};
+    Rigid3 T_world_camera_{}, T_camera_target_{};
     CameraRenderer renderer_;
     RadianceImage radiance_;
     Aovs aovs_;

@@ -54,8 +54,8 @@ Autopilot::Prediction Autopilot::predict(std::int64_t t_ns) {
 void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
     const Prediction p = predict(t_ns);
     CameraPoseEstimator& estimator = cameras_[camera];
-    take(estimator.camera().name, t_ns, estimator.measure(bytes, t_ns, p.t_s, p.q_world_chaser, p.T_chaser_target),
-         frames_);
+    take(estimator.camera().name, t_ns,
+         estimator.measure(bytes, t_ns, p.t_s, p.q_world_chaser, p.T_chaser_target, p.motion), frames_);
 }
 
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {

@@ -76,7 +76,7 @@ private:
         double t_s = 0;
         Quat q_world_chaser{};
         Rigid3 T_chaser_target{};
-        SweepMotion motion{};
+        ApparentMotion motion{};
         double position_sigma_m = 0, rotation_sigma_rad = 0;
     };
     Autopilot() = default;

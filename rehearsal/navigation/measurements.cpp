@@ -38,7 +38,8 @@ CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, 
                  feature_settings(seed)) {}
 
 MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
-                                               const Quat& q_world_chaser, const Rigid3& T_chaser_target) {
+                                               const Quat& q_world_chaser, const Rigid3& T_chaser_target,
+                                               const ApparentMotion& motion) {
     const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
     const auto image = measured_image(camera_, bytes);
@@ -48,7 +49,9 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     }
     const BodyPoses& at =
         model_.place(t_s, normalized(q_world_chaser * T_chaser_target.q), inverse(T_chaser_target));
-    const FeatureEstimate e = alignment_.align(*image, at, inverse(camera_.T_mount_camera) * T_chaser_target);
+    const Rigid3 guess = inverse(camera_.T_mount_camera) * T_chaser_target;
+    const FeatureEstimate e =
+        alignment_.align(*image, at, guess, rotated(conjugate(camera_.T_mount_camera.q), motion));
     out.points = e.agreeing;
     out.ms = seconds_since(start_ns) * 1e3;
     if (!e.ok()) {
@@ -78,13 +81,13 @@ void LidarPoseEstimator::remove_own_body(std::span<const RangePoint> points) {
 }
 
 MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points, std::int64_t t_ns,
-                                              const SweepMotion& motion, const Rigid3& T_chaser_target,
+                                              const ApparentMotion& motion, const Rigid3& T_chaser_target,
                                               double position_sigma_m, double rotation_sigma_rad) {
     const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
     remove_own_body(points);
     const Quat q_lidar_chaser = conjugate(lidar_.T_mount_lidar.q);
-    const SweepMotion in_lidar{q_lidar_chaser * motion.velocity_m_s, q_lidar_chaser * motion.rate_rad_s};
+    const ApparentMotion in_lidar = rotated(q_lidar_chaser, motion);
     const double reach_m = model_->tracer().bounding_radius_m(model_->target());
     const double off_m = kSearchSigmas * (position_sigma_m + rotation_sigma_rad * reach_m);
     const auto e =

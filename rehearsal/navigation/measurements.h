@@ -29,9 +29,11 @@ public:
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     /// `bytes`: in the camera's format. `t_ns`: mid-exposure, t_s after the scenario's time 0. `T_chaser_target`:
-    /// predicted, body axes. Runs on the calling thread's TBB arena.
+    /// predicted, body axes; `motion`: the target's in the chaser's, during the exposure. Runs on the calling
+    /// thread's TBB arena.
     [[nodiscard]] MeasurementResult measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
-                                            const Quat& q_world_chaser, const Rigid3& T_chaser_target);
+                                            const Quat& q_world_chaser, const Rigid3& T_chaser_target,
+                                            const ApparentMotion& motion = {});
 
 private:
     SceneModel& model_;
@@ -50,7 +52,7 @@ public:
     /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
     /// `position_sigma_m`, `rotation_sigma_rad`: standard deviations of `T_chaser_target`.
     [[nodiscard]] MeasurementResult measure(std::span<const RangePoint> points, std::int64_t t_ns,
-                                            const SweepMotion& motion, const Rigid3& T_chaser_target,
+                                            const ApparentMotion& motion, const Rigid3& T_chaser_target,
                                             double position_sigma_m, double rotation_sigma_rad);
 
 private:

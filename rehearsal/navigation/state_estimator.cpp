@@ -213,7 +213,7 @@ Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {
            Rigid3{state.q_frame_target, state.position_m} * Rigid3{{}, -scenario_.target.centre_of_mass_m};
 }
 
-SweepMotion StateEstimator::motion_in_chaser() const {
+ApparentMotion StateEstimator::motion_in_chaser() const {
     const RelativeMotion m = motion();
     const Quat q_chaser_world = conjugate(m.q_world_chaser);
     const Vec3 target_rate = m.q_world_target * m.target_rate_rad_s;

@@ -8,6 +8,7 @@
 
 #include "estimator/cloud/range_points.h"
 #include "estimator/filter/pose_filter.h"
+#include "estimator/pose/apparent_motion.h"
 #include "protocols/closed_loop.h"
 #include "rehearsal/navigation/flight_control.h"
 
@@ -82,7 +83,7 @@ public:
     /// T_chaser_target at another time near by, by the estimated rates.
     [[nodiscard]] Rigid3 predicted(std::int64_t t_ns) const;
     /// Of the target in the chaser's body axes: velocity of its body origin, and rate.
-    [[nodiscard]] SweepMotion motion_in_chaser() const;
+    [[nodiscard]] ApparentMotion motion_in_chaser() const;
     [[nodiscard]] double t_s(std::int64_t t_ns) const noexcept {
         return 1e-9 * static_cast<double>(t_ns - t_start_ns_);
     }

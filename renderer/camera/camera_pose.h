@@ -37,7 +37,7 @@ public:
     [[nodiscard]] const Rigid3& middle() const noexcept { return middle_; }
 
     /// When a ray of this row is taken. `u` in [0, 1): its place within the exposure of the row.
-    [[nodiscard]] double time(int row, int rows, double u) const noexcept {
+    [[nodiscard]] double time(double row, int rows, double u) const noexcept {
         return row * row_time_ + u * (1 - (rows - 1) * row_time_);
     }
 

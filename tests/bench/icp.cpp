@@ -39,8 +39,8 @@ TEST(SweepPoints, OfEmulatedPacketsLieOnTheStation) {
     };
     const Rigid3 truth = pose_at(turn_ns);
     const Vector6 per_ms = error_between(pose_at(turn_ns - 500'000), pose_at(turn_ns + 500'000));
-    const SweepMotion motion{1e3 * Vec3{per_ms[3], per_ms[4], per_ms[5]},
-                             1e3 * Vec3{per_ms[0], per_ms[1], per_ms[2]}};
+    const ApparentMotion motion{1e3 * Vec3{per_ms[3], per_ms[4], per_ms[5]},
+                                1e3 * Vec3{per_ms[0], per_ms[1], per_ms[2]}};
 
     const LidarModel& model = *unit.lidar().model;
     std::vector<RangePoint> points;

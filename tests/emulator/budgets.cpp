@@ -132,7 +132,7 @@ std::vector<FrameLedger> fly(CanBus& hub, const std::vector<PoseCommand>& comman
     }
     LedgerDecoder decoder;
     std::vector<FrameLedger> ledgers;
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
     while (ledgers.size() < frames && std::chrono::steady_clock::now() < until) {
         bus->wait(10'000'000);
         FrameLedger ledger;

@@ -6,9 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "emulator/camera_unit.h"
 #include "emulator/log/estimate_report.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/projection/distortion.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
@@ -98,6 +100,64 @@ TEST_F(EstimateTest, EveryFrameOfALockstepRunIsLookedAt) {
     EXPECT_TRUE(std::filesystem::exists(log + "/nav.estimate.png"));
 }
 
+/// A chaser that turns at 3 deg/s takes frames row by row, through a lens that distorts and blurs.
+TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
+    Scene s = docking();
+    Camera& c = s.cameras[0];
+    c.shutter = Shutter{200'000};  // 48 ms from the first row to the last
+    c.model = distorted(pinhole_of(c), {Distortion::Model::opencv, {-0.3, 0.1, 1e-3, -8e-4}});
+    c.point_spread = PointSpreadFunction{.sigma_px = 0.7};
+    Motion& chaser = s.bodies[1].initial;
+    chaser.T_world_body.t = {14, 0.4, -0.3};
+    chaser.velocity_m_s = {-0.1, 0.02, 0.01};
+    chaser.rate_rad_s = {0.01, 0.05, 0.01};
+    Scene at_once = s;
+    at_once.cameras[0].shutter.reset();
+    const auto world = World::create(s), ignorant = World::create(at_once);
+    ASSERT_TRUE(world && ignorant);
+    CameraUnit unit(**world, 0);
+    const auto knows = FrameTracker::create(**world, 0, {}), ignores = FrameTracker::create(**ignorant, 0, {});
+    ASSERT_TRUE(knows && ignores);
+    double found = 0, ignored = 0;
+    for (std::uint32_t k = 0; k < 4; ++k) {
+        const FrameLedger ledger = unit.expose(k, unit.t_mid_ns(k));
+        const TrackedFrame a = (*knows)->take(ledger, unit.bytes(), unit.placement());
+        const TrackedFrame b = (*ignores)->take(ledger, unit.bytes(), unit.placement());
+        ASSERT_TRUE(a.measured && b.measured) << a.why << b.why;
+        found += error_between(*a.measured, a.truth).head<3>().squaredNorm();
+        ignored += error_between(*b.measured, b.truth).head<3>().squaredNorm();
+    }
+    EXPECT_LT(found, 4 * 1e-7);
+    EXPECT_GT(ignored, 4 * found);
+}
+
+/// Frames are taken with the exposure and gain that their ledgers have; parts of the image give no pose.
+TEST_F(EstimateTest, KnowsTheSettingsOfTheFrame) {
+    Scene s = docking();
+    s.cameras[0].control = CameraControlLimits{.exposure_max_ns = 10'000'000};
+    const auto world = World::create(s);
+    ASSERT_TRUE(world) << world.error().text();
+    CameraUnit unit(**world, 0);
+    TrackerOptions options;
+    options.start_deg = options.start_percent = 1;
+    const auto tracker = FrameTracker::create(**world, 0, options);
+    ASSERT_TRUE(tracker);
+    CameraSettings settings = unit.settings();
+    settings.exposure_ns /= 4, settings.gain_cdb = 600;  // half as bright
+    unit.set(settings, 1);
+    FrameLedger ledger = unit.expose(0, 0);
+    const TrackedFrame dark = (*tracker)->take(ledger, unit.bytes(), unit.placement());
+    ASSERT_TRUE(dark.measured) << dark.why;
+    EXPECT_LT(error_between(*dark.measured, dark.truth).head<3>().norm(), 3e-3);
+    settings.binning = 2;
+    unit.set(settings, 2);
+    ledger = unit.expose(1, unit.t_mid_ns(1));
+    const TrackedFrame binned = (*tracker)->take(ledger, unit.bytes(), unit.placement());
+    EXPECT_FALSE(binned.measured);
+    EXPECT_EQ(binned.state, EstimateState::predicted);
+    EXPECT_EQ(binned.why, "320 x 240 pixels, binned by 2: expected the whole image, not binned");
+}
+
 TEST_F(EstimateTest, GoesOutOnCan) {
     RunOptions o;
     o.bus = "slcan:0";
@@ -118,7 +178,7 @@ TEST_F(EstimateTest, GoesOutOnCan) {
     }
     EstimateDecoder decoder;
     std::vector<EstimateReport> reports;
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
     while (reports.size() < 3 && std::chrono::steady_clock::now() < until) {
         bus->wait(10'000'000);
         EstimateReport report;

@@ -37,7 +37,7 @@ Scene craft_scene() {
     return scene;
 }
 
-const SweepMotion kTumbling{{0.3, -0.2, 0.1}, {0.05, 0.08, -0.1}};
+const ApparentMotion kTumbling{{0.3, -0.2, 0.1}, {0.05, 0.08, -0.1}};
 
 struct Bench {
     Scene scene = craft_scene();
@@ -45,7 +45,7 @@ struct Bench {
 
     /// Of a sixth of a turn in 1/60 s about the y axis, 32 lines of 0.7 degrees, 0.2 degrees apart, as a
     /// VLP-16 looks: x right, y forward.
-    [[nodiscard]] std::vector<RangePoint> sweep(const Rigid3& T_lidar_target, const SweepMotion& motion,
+    [[nodiscard]] std::vector<RangePoint> sweep(const Rigid3& T_lidar_target, const ApparentMotion& motion,
                                                 std::mt19937_64& random) const {
         std::normal_distribution<double> normal;
         std::vector<RangePoint> points;
@@ -159,7 +159,7 @@ TEST(IcpSweeps, OutliersDoNotMoveIt) {
 /// does not know.
 TEST(IcpSweeps, TheMotionDuringTheSweepCounts) {
     std::mt19937_64 random(13);
-    const SweepMotion fast{{3, -2, 4}, {0.5, 0.8, -1}};
+    const ApparentMotion fast{{3, -2, 4}, {0.5, 0.8, -1}};
     const Rigid3 T = truth(random);
     const auto points = bench().sweep(T, fast, random);
     CloudIcp icp(bench().tracer, 0, noisy());
@@ -188,7 +188,7 @@ TEST(IcpSweeps, AllocatesNothingAfterTheFirstSweep) {
 TEST(IcpSweeps, TheDerivativeIsThatOfTheDistance) {
     std::mt19937_64 random(15);
     const Rigid3 T = truth(random);
-    const SweepMotion fast{{3, -2, 4}, {0.5, 0.8, -1}};
+    const ApparentMotion fast{{3, -2, 4}, {0.5, 0.8, -1}};
     const auto points = bench().sweep(T, fast, random);
     BeamAssociation beams(bench().tracer, 0);
     beams.take(points, fast);

@@ -88,7 +88,7 @@ TEST(LidarPoseEstimator, MeasuresThePoseWhileTheChaserMoves) {
     test::Plant later = plant;
     later.step({}, {}, 1e-3);
     const Vector6 rate = error_between(truth, test::chaser_target(later)) / 1e-3;
-    const SweepMotion motion{to_vec3(rate.tail<3>()), to_vec3(rate.head<3>())};
+    const ApparentMotion motion{to_vec3(rate.tail<3>()), to_vec3(rate.head<3>())};
     const MeasurementResult s = estimator.measure(points, t_ns, motion, beside(truth), 0.1, 0.2 * kRadPerDeg);
     ASSERT_TRUE(s.pose) << s.why;
     const Vector6 error = error_between(s.pose->T_sensor_target, inverse(s.pose->T_chaser_sensor) * truth);

@@ -115,7 +115,7 @@ TEST(StateEstimator, ComputesTheMotionDuringASweep) {
     auto filter = StateEstimator::create(e.plant.scenario, 0, attitude(e.plant));
     ASSERT_TRUE(filter);
     // The estimator is at rest relative to the port; the chaser's rate is the gyroscope's.
-    const SweepMotion motion = filter->motion_in_chaser();
+    const ApparentMotion motion = filter->motion_in_chaser();
     const Rigid3 before = filter->estimate().T_chaser_target;
     const Rigid3 after = filter->predicted(10'000'000);
     const Vector6 moved = error_between(before, after) / 0.01;

@@ -28,8 +28,6 @@ Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredIm
         return Error{
             "a stereo pair with no focal length or a pose that is not one, expected finite numbers and a unit "
             "quaternion"};
-    if (CameraModelHandle(pair.left)->pinhole() == nullptr || CameraModelHandle(pair.right)->pinhole() == nullptr)
-        return Error{"a camera whose epipolar lines are curves, expected two pinholes"};
     if (norm(pair.T_right_left.t) == 0) return Error{"a stereo pair without a baseline, expected two places"};
     if (!(s.nearest_m > 0 && s.farthest_m > s.nearest_m))
         return Error{"depths from " + std::to_string(s.nearest_m) + " to " + std::to_string(s.farthest_m) +
@@ -37,6 +35,32 @@ Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredIm
     if (s.patch_radius_px < 2 || s.patch_radius_px > 50 || s.points_max < 1)
         return Error{"expected a patch radius of 2 .. 50 px and at least one point"};
     return Ok{};
+}
+
+Camera as_pinhole(Camera camera) {
+    camera.model = nullptr;
+    return camera;
+}
+
+/// As as_pinhole(camera) would have taken it. Pixels of which the frame has nothing are saturated: no patch is cut
+/// there.
+MeasuredImage through_pinhole(const Camera& camera, const MeasuredImage& image) {
+    const CameraModelHandle lens(camera);
+    if (lens->pinhole() != nullptr) return image;
+    const Pinhole pinhole = pinhole_of(camera);
+    cv::Mat x(image.height, image.width, CV_32F), y(image.height, image.width, CV_32F);
+    for (int v = 0; v < image.height; ++v)
+        for (int u = 0; u < image.width; ++u) {
+            const auto p = lens->project(pinhole.direction({1.0 * u, 1.0 * v}));
+            x.at<float>(v, u) = p ? static_cast<float>(p->x) : -1e4F;
+            y.at<float>(v, u) = p ? static_cast<float>(p->y) : -1e4F;
+        }
+    const double saturated = sensor_model(camera).top_dn;
+    MeasuredImage out = image;
+    cv::Mat to(image.height, image.width, CV_32F, out.dn.data());
+    cv::remap(cv::Mat(image.height, image.width, CV_32F, const_cast<float*>(image.dn.data())), to, x, y,
+              cv::INTER_CUBIC, cv::BORDER_CONSTANT, saturated);
+    return out;
 }
 
 std::vector<cv::Point2f> corners(const MeasuredImage& image, const StereoSettings& settings) {
@@ -108,9 +132,12 @@ PixelMeasurement exact_pixel(const Vector2d& px) {
 Result<StereoPoints> match_stereo(const StereoPair& pair, const MeasuredImage& left, const MeasuredImage& right,
                                   const StereoSettings& settings) {
     if (auto good = check(pair, left, right, settings); !good) return good.error();
-    Matching matching(pair, left, right, settings);
+    const StereoPair pinholes{as_pinhole(pair.left), as_pinhole(pair.right), pair.T_right_left};
+    const MeasuredImage seen_left = through_pinhole(pair.left, left),
+                        seen_right = through_pinhole(pair.right, right);
+    Matching matching(pinholes, seen_left, seen_right, settings);
     StereoPoints out;
-    for (const cv::Point2f& corner : corners(left, settings)) {
+    for (const cv::Point2f& corner : corners(seen_left, settings)) {
         if (out.counts.accepted == settings.points_max) break;
         matching.take_corner(cvRound(corner.x), cvRound(corner.y), out);
     }

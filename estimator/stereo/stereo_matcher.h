@@ -8,6 +8,10 @@
 /// signal): 0.026 px along the epipolar line and 0.016 px across it, as predicted within a tenth; without noise
 /// 0.029 and 0.015, where the predicted variance is 1.5 times too small. They are limited by relief within a patch,
 /// along the line, and by aliasing.
+///
+/// Frames through lenses that distort are first resampled (bicubic) as pinholes with the same focal lengths and
+/// principal points would have taken them, as epipolar lines must be straight. Pixels of StereoPoint then count in
+/// these, and what only the lens sees is not matched.
 #pragma once
 
 #include <vector>

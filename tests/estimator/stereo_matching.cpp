@@ -9,6 +9,7 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/stereo/stereo_matcher.h"
+#include "renderer/projection/distortion.h"
 
 namespace narpa {
 namespace {
@@ -64,9 +65,11 @@ Paint waves() {
 
 MeasuredImage picture(const Camera& c, const Rigid3& T_left_camera, const Plane& plane, const Paint& paint) {
     MeasuredImage image{c.width, c.height, {}};
+    const CameraModelHandle model(c);
     for (int v = 0; v < c.height; ++v)
         for (int u = 0; u < c.width; ++u) {
-            const Vec3 direction = T_left_camera.q * Vec3{(u - c.cx) / c.fx, (v - c.cy) / c.fy, 1};
+            const Vec3 direction =
+                T_left_camera.q * model->direction({static_cast<double>(u), static_cast<double>(v)});
             const Vector3d p = plane.met(to_eigen(T_left_camera.t), to_eigen(direction));
             image.dn.push_back(static_cast<float>(paint(p.x(), p.y())));
         }
@@ -85,8 +88,7 @@ struct Views {
     StereoPair pair;
     MeasuredImage left, right;
 };
-Views views(const Rigid3& T_right_left, const Paint& paint, const Plane& plane = {}) {
-    const Camera c = camera();
+Views views(const Rigid3& T_right_left, const Paint& paint, const Plane& plane = {}, const Camera& c = camera()) {
     return {{c, c, T_right_left}, picture(c, {}, plane, paint), picture(c, inverse(T_right_left), plane, paint)};
 }
 
@@ -152,6 +154,31 @@ std::string name_of(const testing::TestParamInfo<Rigid3>& at) {
     return std::array<const char*, 4>{"aside", "above", "down", "turned"}[at.index];
 }
 INSTANTIATE_TEST_SUITE_P(Baselines, StereoMatching, testing::Values(kAside, kAbove, kDown, kTurned), name_of);
+
+TEST(StereoMatcher, MatchesThroughLensesThatDistort) {
+    Camera barrel = camera();
+    barrel.model = distorted(pinhole_of(barrel), {Distortion::Model::opencv, {-0.8, 0.4, 2e-3, -1e-3}});
+    Views v = views(kTurned, waves(), {}, barrel);
+    add_noise(barrel, 1, v.left), add_noise(barrel, 2, v.right);
+    const auto found = match_stereo(v.pair, v.left, v.right, settings());
+    ASSERT_TRUE(found) << found.error().text();
+    const double n = static_cast<double>(found->points.size());
+    ASSERT_GE(n, 60);
+    double along = 0, across = 0;
+    for (const StereoPoint& p : found->points) {
+        const double e = p.point.point_m.z() - truth(barrel, {}, p.left_px).z();
+        along += e * e / p.point.covariance_m2(2, 2) / n;
+        across += p.point.epipolar_sigmas * p.point.epipolar_sigmas / n;
+    }
+    for (const double ratio : {along, across}) {
+        EXPECT_LT(ratio, 2);  // resampling correlates the noise of neighbours, which the covariance does not know
+        EXPECT_GT(ratio, 0.25);
+    }
+    for (Camera* c : {&v.pair.left, &v.pair.right}) c->model = nullptr;
+    const auto ignored = match_stereo(v.pair, v.left, v.right, settings());
+    ASSERT_TRUE(ignored);
+    EXPECT_LT(ignored->points.size(), found->points.size() / 2);
+}
 
 TEST(StereoMatcher, RefusesWhatRepeats) {
     // A pattern of 1 m each way: six pixels, of which the line crosses twenty.

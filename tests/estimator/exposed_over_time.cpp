@@ -114,7 +114,7 @@ protected:
     }
 
     Scene scene;
-    Camera camera = test::camera(160, 120, 170);
+    Camera camera = test::camera(120, 90, 128);
     std::optional<RenderScene> render_scene;
     BodyPoses at{1};
     Rigid3 truth{normalized(Quat{0.8, 0.3, -0.2, 0.4}), {0.4, -0.2, 4}};
@@ -130,6 +130,7 @@ TEST_P(ExposedOverTime, DenseAlignmentReachesItsBound) {
     DenseAlignment dense(*render_scene, camera, 0), ignoring(*render_scene, still, 0);
     DenseOptions options;
     options.motion = motion;
+    options.rays_per_pixel = 96;  // what blurs needs more: 16 give 19 for the global shutter, beside 6
     constexpr int kFrames = 3;
     double over_bound = 0, ignored = 0;
     for (std::uint32_t k = 0; k < kFrames; ++k) {
@@ -157,8 +158,8 @@ TEST_P(ExposedOverTime, FeatureAlignmentFindsThePose) {
         return error_between(truth, e.T_camera_target);
     };
     const Vector6 found = error(motion), ignored = error({});
-    EXPECT_LT(found.head<3>().norm(), 0.1 * kRadPerDeg);
-    EXPECT_LT(found.tail<3>().norm(), 2e-3);
+    EXPECT_LT(found.head<3>().norm(), 0.15 * kRadPerDeg);
+    EXPECT_LT(found.tail<3>().norm(), 4e-3);
     if (GetParam().row_ns > 0) {
         EXPECT_LT(found.head<3>().norm(), 0.6 * ignored.head<3>().norm());
     }
@@ -166,8 +167,8 @@ TEST_P(ExposedOverTime, FeatureAlignmentFindsThePose) {
 
 INSTANTIATE_TEST_SUITE_P(, ExposedOverTime,
                          testing::Values(Exposing{"global", 0, 0.08, false, false, 20},
-                                         Exposing{"rolling", 600'000, 0.002, false, false, 1e3},
-                                         Exposing{"all", 400'000, 0.02, true, true, 100}),
+                                         Exposing{"rolling", 800'000, 0.002, false, false, 1e3},
+                                         Exposing{"all", 500'000, 0.02, true, true, 100}),
                          [](const auto& exposing) { return exposing.param.name; });
 
 }  // namespace

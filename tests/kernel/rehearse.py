@@ -22,13 +22,13 @@ SCENARIO = """
 [scenario]
 based_on = "{scenes}/rehearsal/docking.toml"
 name = "kernel"
-title = "The last 0.8 m, on kernel devices"
+title = "The last 0.5 m, on kernel devices"
 scene = "scene.toml"
 duration_s = 120.0
 pose_rate_hz = 5.0
 
 [start]
-position_m = [0.8, 0.02, -0.02]
+position_m = [0.5, 0.02, -0.02]
 position_sigma_m = [0.02, 0.01, 0.01]
 velocity_sigma_m_s = [0.002, 0.002, 0.002]
 attitude_sigma_deg = [0.2, 0.2, 0.2]

@@ -105,6 +105,9 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     EXPECT_EQ(c.period_ns, 33'333'333);
     EXPECT_TRUE(c.embedded_line);
     EXPECT_EQ(c.late, LatePolicy::repeat);
+    ASSERT_TRUE(c.control);
+    EXPECT_EQ(c.control->latency_ns, 5'000'000);
+    EXPECT_EQ(c.control->gain_max_cdb, 1800);
     EXPECT_DOUBLE_EQ(c.white_radiance, 1361.0 / kPi);
     ASSERT_TRUE(c.detector);
     EXPECT_EQ(c.detector->exposure_s, 0.002);

@@ -152,16 +152,16 @@ TEST(BudgetFrame, StepsGoDownOneByOneAndEachShowsAWholeImage) {
 TEST(BudgetFrame, WhatABodyHasLeftShowsTheBackground) {
     // The same renderer and image, and the body elsewhere: whatever it has covered is black again, at every step.
     BudgetView v = craft_over_a_globe();
-    v.T_world_camera = looking({30, 0, 0}, {0, 0, 0});
+    v.pose = looking({30, 0, 0}, {0, 0, 0});
     CameraRenderer renderer(v.render_scene, v.camera);
     RadianceImage image(v.camera.width, v.camera.height);
     for (const Method method : {Method::direct, Method::path})
         for (const double rays : {0.1, 0.4, 2.0, 4.0, 16.0}) {
             v.at = placed(*v.scene);
-            renderer.render(v.at, v.T_world_camera, rays_a_pixel(v, 4), image);
+            renderer.render(v.at, v.pose, rays_a_pixel(v, 4), image);
             v.at = placed(*v.scene, {0, 3, 9});
             const FrameSettings s = rays_a_pixel(v, rays, 1, method);
-            const FrameAccount account = renderer.render(v.at, v.T_world_camera, s, image);
+            const FrameAccount account = renderer.render(v.at, v.pose, s, image);
             ASSERT_NE(account.step, FrameStep::nothing);
             EXPECT_TRUE(same_bytes(image, render(v, s).image)) << rays;
         }
@@ -229,7 +229,7 @@ TEST(BudgetFrame, AllocatesNothingAfterTheFirstFrame) {
         for (std::uint32_t i = 0; i < n; ++i)
             for (const Method method : {Method::direct, Method::path})
                 for (const double rays : {0.1, 2.0, 8.0})
-                    renderer.render(v.at, v.T_world_camera, rays_a_pixel(v, rays, i, method), image);
+                    renderer.render(v.at, v.pose, rays_a_pixel(v, rays, i, method), image);
     };
     tbb::task_arena arena(2);
     arena.execute([&] { frames(10); });  // the thread pool and Embree settle

@@ -20,17 +20,17 @@ using Kind = FrameBudget::Kind;
 /// A scene before a camera, small enough to be rendered thousands of times.
 class BudgetView {
 public:
-    BudgetView(Scene of, int width, int height, double focal_px, const Rigid3& pose)
+    BudgetView(Scene of, int width, int height, double focal_px, const Rigid3& T_world_camera)
         : scene(std::make_unique<Scene>(std::move(of))),
           render_scene(*RenderScene::create(*scene, 1)),
           camera(test::camera(width, height, focal_px)),
           at(placed(*scene)),
-          T_world_camera(pose) {}
+          pose(T_world_camera) {}
     std::unique_ptr<Scene> scene;  // the tracer keeps its address
     RenderScene render_scene;
     Camera camera;
     BodyPoses at;
-    Rigid3 T_world_camera;
+    CameraPose pose;
 
     [[nodiscard]] std::uint64_t pixels() const {
         return static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
@@ -90,7 +90,7 @@ inline constexpr float kUntouched = -7;  ///< no radiance: what an image has bef
 inline Shown render(CameraRenderer& renderer, const BudgetView& v, const FrameSettings& s) {
     Shown shown{RadianceImage(v.camera.width, v.camera.height), {}};
     std::fill(shown.image.pixels.begin(), shown.image.pixels.end(), Rgb{kUntouched, kUntouched, kUntouched});
-    shown.account = renderer.render(v.at, v.T_world_camera, s, shown.image);
+    shown.account = renderer.render(v.at, v.pose, s, shown.image);
     return shown;
 }
 inline Shown render(const BudgetView& v, const FrameSettings& s) {

@@ -25,7 +25,7 @@ TEST(SamplePlan, HalfOfAPowerOfTwoSamplesHavePaths) {
 struct UniformPlan {
     BudgetView view = craft_over_a_globe(75, 51);
     FrameSettings settings = samples_a_pixel(view, 4, 0, RenderSettings::Method::path);
-    Frame frame = make_frame(view.render_scene, view.at, view.camera, view.T_world_camera, settings);
+    Frame frame = make_frame(view.render_scene, view.at, view.camera, view.pose, settings);
     std::vector<std::uint32_t> tiles = std::vector<std::uint32_t>(10 * 7);
     SamplePlan plan{tiles.size()};
 

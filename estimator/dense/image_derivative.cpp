@@ -348,6 +348,11 @@ ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& 
     derivative_.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
 }
 
+void ImageDerivative::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
+    stand_still(at, at_);
+    motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
+}
+
 std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_target, const SensorModel& sensor,
                                                      const FrameSettings& settings, int fineness) {
     std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));

@@ -43,9 +43,7 @@ public:
     ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at);
 
     /// As ModelView::begin_frame.
-    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
-        at_ = at, motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
-    }
+    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times);
 
     /// Jacobian of the predicted DN at this pose, without clipping. Row-major; zero in the outermost pixels, which
     /// lack neighbours. `fineness` >= 1: rays each way in a pixel where the radiance varies. Runs on the calling

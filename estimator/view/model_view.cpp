@@ -9,6 +9,10 @@ Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::si
     return T_world_camera;
 }
 
+void stand_still(const BodyPoses& moving, BodyPoses& at) {
+    for (std::size_t i = 0; i < moving.T_world_body.size(); ++i) at.set(i, moving.T_world_body[i]);
+}
+
 ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at)
     : render_scene_(render_scene),
       camera_(camera),

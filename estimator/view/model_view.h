@@ -18,6 +18,9 @@ namespace narpa {
 [[nodiscard]] Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target,
                                   BodyPoses& at);
 
+/// All bodies as they are in mid-exposure: a target's motion is the camera's (camera_path).
+void stand_still(const BodyPoses& moving, BodyPoses& at);
+
 /// The scene's stars are left out: they have nothing of the target.
 class ModelView {
 public:
@@ -27,7 +30,8 @@ public:
 
     /// Another frame: poses of all bodies, the target's motion in camera axes, and when rows are exposed.
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
-        at_ = at, motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
+        stand_still(at, at_);
+        motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
     }
 
     /// Renders the image at this pose, with `aovs` also depth, position, normal and body. Allocates nothing after

@@ -100,7 +100,8 @@ TEST_F(EstimateTest, EveryFrameOfALockstepRunIsLookedAt) {
     EXPECT_TRUE(std::filesystem::exists(log + "/nav.estimate.png"));
 }
 
-/// A chaser that turns at 3 deg/s takes frames row by row, through a lens that distorts and blurs.
+/// A chaser that turns at 3 deg/s beside a target that moves takes frames row by row, through a lens that distorts
+/// and blurs.
 TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
     Scene s = docking();
     Camera& c = s.cameras[0];
@@ -109,7 +110,8 @@ TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
     c.point_spread = PointSpreadFunction{.sigma_px = 0.7};
     Motion& chaser = s.bodies[1].initial;
     chaser.T_world_body.t = {14, 0.4, -0.3};
-    chaser.velocity_m_s = {-0.1, 0.02, 0.01};
+    chaser.velocity_m_s = {-0.1, 0.22, 0.01};
+    s.bodies[0].initial.velocity_m_s = {0, 0.2, -0.1};
     chaser.rate_rad_s = {0.01, 0.05, 0.01};
     Scene at_once = s;
     at_once.cameras[0].shutter.reset();

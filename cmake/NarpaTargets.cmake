@@ -18,10 +18,15 @@ endif()
 set(NARPA_SANITIZE "" CACHE STRING "Sanitizers for every target: address,undefined or thread")
 set(NARPA_SANITIZED 0)
 if(NARPA_SANITIZE)
-  set(NARPA_SANITIZED 1)  # for code that has to know
+  set(NARPA_SANITIZED 1)
 endif()
 # Checks of every pointer: a quarter of the compile time, and what comes of such errors the address sanitizer reports.
 set(narpa_unchecked -fno-sanitize=null,alignment,object-size,pointer-overflow,vptr)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  set(narpa_unwanted_warnings -Wno-missing-braces -Wno-bitwise-instead-of-logical)  # loops over lanes have no branches
+elseif(NARPA_UNITY)
+  set(narpa_unwanted_warnings -Wno-subobject-linkage)
+endif()
 find_program(NARPA_CCACHE ccache)
 if(NARPA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${NARPA_CCACHE})
@@ -31,7 +36,8 @@ function(narpa_compile_options target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${NARPA_UNITY})
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
                                            -Woverloaded-virtual $<$<BOOL:${NARPA_WERROR}>:-Werror>
-                                           $<$<BOOL:${NARPA_UNITY}>:-Wno-subobject-linkage>)
+                                           ${narpa_unwanted_warnings})
+  target_compile_definitions(${target} PRIVATE NARPA_SANITIZED=${NARPA_SANITIZED})
   # Same bytes on every machine with the same instruction set: no fused multiply-add behind our back. Nobody reads errno
   # after sqrt.
   target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno)

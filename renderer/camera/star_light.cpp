@@ -91,10 +91,10 @@ StarLight::StarLight(const Scene& scene, const Camera& camera)
       buffer_(kBuffer) {
     const double right = camera.width - 1, bottom = camera.height - 1, reach = response_.radius() + 1;
     view_ = model_->bounds({-reach, -reach, right + reach, bottom + reach});
-    constexpr int kGrid = 8;
-    for (int j = 0; j <= kGrid; ++j)
-        for (int i = 0; i <= kGrid; ++i) {
-            const Vec3 d = model_->direction({right * i / kGrid, bottom * j / kGrid});
+    constexpr int kIntervals = 8;
+    for (int j = 0; j <= kIntervals; ++j)
+        for (int i = 0; i <= kIntervals; ++i) {
+            const Vec3 d = model_->direction({right * i / kIntervals, bottom * j / kIntervals});
             if (model_->project(d)) px_per_rad_ = std::max(px_per_rad_, largest_stretch(model_->jacobian(d)));
         }
     irradiance_.reserve(field_.stars.size());

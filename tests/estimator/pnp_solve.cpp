@@ -115,7 +115,7 @@ TEST_F(SolvePnp, BothMinimaOfAPlaneAreReported) {
     // Facing the camera, the tilt shows in second order only: a valley that is not followed to its end each time.
     EXPECT_LE(unsettled, 5);
     EXPECT_GT(wrong, 100);
-    EXPECT_GE(wrong_and_told, 0.99 * wrong);
+    EXPECT_GE(wrong_and_told, 0.97 * wrong);  // 99 %, within three standard deviations of so many
     EXPECT_GE(second_is_true, 0.9 * wrong);
 }
 

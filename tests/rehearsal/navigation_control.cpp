@@ -56,7 +56,7 @@ TEST(LegPath, ToContactContinuesAtItsSpeed) {
 
 TEST(LegPath, AwayReversesTheSpeedFirst) {
     const LegPath path = LegPath::away({2, 0, 0}, {1, 0, 0}, -0.1, 0.3, 0.02);
-    EXPECT_EQ(path.velocity_m_s(0), Vec3(-0.1, 0, 0));
+    EXPECT_EQ(path.velocity_m_s(0), (Vec3{-0.1, 0, 0}));
     EXPECT_NEAR(path.position_m(5).x, 2 - 0.25, 1e-12);
     EXPECT_NEAR(path.velocity_m_s(20).x, 0.3, 1e-12);
     EXPECT_NEAR(path.velocity_m_s(200).x, 0.3, 1e-12);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/each_isa.h"
 #include "renderer/camera/detector.h"
 #include "renderer/camera/digitise.h"
 #include "tests/renderer/detector_support.h"
@@ -134,7 +135,7 @@ TEST(DetectorPackets, YuyvRoundsItsFormulaExactly) {
     }
 }
 
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifdef NARPA_HAS_EACH_ISA
 // The inner loop as each instruction set has it; `expose` takes the widest that the machine knows.
 using Write = void(const DetectorConstants&, PixelFormat, std::span<const Rgb>, std::size_t, std::uint8_t*);
 [[gnu::flatten]] void on_base_line(const DetectorConstants& s, PixelFormat f, std::span<const Rgb> l,

@@ -29,11 +29,7 @@ void trace(const Tracer& tracer, const BodyPoses& at, const Lanes<Hit>& from, co
     for_each_lane(wanted, [&](std::size_t i) { hits[i] = batch[i]; });
 }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kFewerDepartures = 20;  // the sanitizers are that much slower
-#else
-constexpr int kFewerDepartures = 1;
-#endif
+constexpr int kFewerDepartures = NARPA_SANITIZED ? 20 : 1;  // the sanitizers are that much slower
 
 constexpr std::uint32_t kAll = (1u << kLanes) - 1;
 

@@ -11,11 +11,7 @@ namespace {
 
 using namespace test;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kFewer = 20;  // the sanitizers are that much slower
-#else
-constexpr int kFewer = 1;
-#endif
+constexpr int kFewer = NARPA_SANITIZED ? 20 : 1;  // the sanitizers are that much slower
 
 Result<Tracer> tracer_of(const Scene& s) {
     return Tracer::create(s, 1);

@@ -7,6 +7,7 @@
 
 #include <set>
 
+#include "base/each_isa.h"
 #include "renderer/camera/collect.h"
 #include "tests/renderer/detector_support.h"
 #include "tests/support/allocation_counter.h"
@@ -204,7 +205,7 @@ TEST(SensorArray, TakesAnyRadianceAndTheLargestAmounts) {
     }
 }
 
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifdef NARPA_HAS_EACH_ISA
 // The inner loops as each instruction set has them.
 using WriteFrame = void(const DetectorConstants&, const SiteConstants&, PixelFormat, const RadianceImage&, float*,
                         std::uint8_t*);

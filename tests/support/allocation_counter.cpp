@@ -36,7 +36,7 @@ std::uint64_t AllocationCounter::on_all_threads() const {
 
 }  // namespace narpa::test
 
-#if NARPA_COUNTS_ALLOCATIONS
+#if !NARPA_SANITIZED
 
 // glibc's heap under its second names.
 extern "C" {

@@ -9,17 +9,7 @@
 
 namespace narpa::test {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define NARPA_COUNTS_ALLOCATIONS 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define NARPA_COUNTS_ALLOCATIONS 0
-#endif
-#endif
-#ifndef NARPA_COUNTS_ALLOCATIONS
-#define NARPA_COUNTS_ALLOCATIONS 1
-#endif
-inline constexpr bool kAllocationsAreCounted = NARPA_COUNTS_ALLOCATIONS;
+inline constexpr bool kAllocationsAreCounted = !NARPA_SANITIZED;
 
 /// Counts while it lives; one at a time. Threads that run meanwhile are counted too.
 class AllocationCounter {

@@ -328,38 +328,40 @@ TEST_F(DynamicsOnSlcan, LogsTheTruth) {
 
 TEST_F(DynamicsOnSlcan, InRealTimePosesFollowTheEmulatorsClockFromAWholeSecondOn) {
     Scenario s = quiet();
-    s.duration_s = 0.6;
-    s.navigation.period_s = 0.1;
+    s.duration_s = 600;
+    s.navigation.period_s = 0.2;
     s.pose_rate_hz = 50;
     // A clock that shows 3.4 s at first.
     Partner partner(*hub, s);
     const auto begun = std::chrono::steady_clock::now();
-    const auto tell = [&] {
+    partner.on_turn = [&] {
         const std::chrono::nanoseconds since = std::chrono::steady_clock::now() - begun;
         partner.beat(3'400 * kMs + since.count(), RunState::running);
     };
-    partner.on_turn = tell;
+    // Ends the flight once it has sent enough: on a slow machine a command may be too late to be applied.
+    int too_old = 0;
     partner.on_period = [&](std::int64_t t_ns) {
         ActuatorCommand c;
+        c.t_ns = t_ns - ns(60);
+        partner.command(c);
         c.t_ns = t_ns;
         c.impulse_n_s = {0, 10, 0};
-        partner.command(c);
-        c.t_ns = t_ns - ns(60);  // long ago
+        if (++too_old >= 3) c.phase = GuidancePhase::done;
         partner.command(c);
     };
-    DynamicsOptions o;
-    const auto flown = fly(s, o, bus, partner);
+    const auto flown = fly(s, {}, bus, partner);
     ASSERT_TRUE(flown) << flown.error().text();
+    EXPECT_EQ((*flown)["ending"], "navigation_done");
     const std::int64_t start_ns = partner.reports.front().t_start_ns;
     EXPECT_EQ(start_ns % ns(1), 0);
     EXPECT_GE(start_ns, ns(4));
-    ASSERT_EQ(partner.poses.size(), 2 * 31u);
+    EXPECT_EQ(partner.poses.size() % 20, 2u);  // of two bodies ten times a period, and at the end
+    EXPECT_GE(partner.poses.size(), 3 * 20u);
     for (std::size_t i = 0; i < partner.poses.size(); ++i)
         EXPECT_EQ(partner.poses[i].command.t_valid_ns, start_ns + static_cast<std::int64_t>(i / 2) * 20 * kMs);
     EXPECT_EQ(partner.reports.back().phase, DynamicsPhase::finished);
-    const nlohmann::json& commands = (*flown)["actuator_commands"];
-    EXPECT_GE(commands["applied"].get<int>() + commands["late"].get<int>(), 1);
-    EXPECT_GE(commands["refused"], 5);
+    EXPECT_GE((*flown)["actuator_commands"]["applied"], 1);
+    EXPECT_GE((*flown)["actuator_commands"]["refused"], 3);
 }
 
 TEST(DynamicsOnUdp, TheSameRunInCanFd) {

@@ -46,7 +46,7 @@ DenseAlignment::DenseAlignment(const RenderScene& render_scene, const Camera& ca
 void DenseAlignment::set_detector(const Detector& detector) {
     camera_.detector = detector;
     sensor_ = sensor_model(camera_);
-    times_.exposure_s = row_times(camera_).exposure_s;  // their middles stay
+    times_.exposure_s = row_times(camera_).exposure_s;  // the middle of a row does not depend on it
 }
 
 Status DenseAlignment::check(const MeasuredImage& frame, std::span<const float> frame_variance, const BodyPoses& at,

@@ -110,8 +110,8 @@ TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
     c.point_spread = PointSpreadFunction{.sigma_px = 0.7};
     Motion& chaser = s.bodies[1].initial;
     chaser.T_world_body.t = {14, 0.4, -0.3};
-    chaser.velocity_m_s = {-0.1, 0.22, 0.01};
-    s.bodies[0].initial.velocity_m_s = {0, 0.2, -0.1};
+    chaser.velocity_m_s = {-0.1, 100.02, 0.01};
+    s.bodies[0].initial.velocity_m_s = {0, 100, 0};  // both are on an orbit
     chaser.rate_rad_s = {0.01, 0.05, 0.01};
     Scene at_once = s;
     at_once.cameras[0].shutter.reset();

@@ -67,9 +67,6 @@ struct Exposing {
 class ExposedOverTime : public testing::TestWithParam<Exposing> {
 protected:
     void SetUp() override {
-        scene.materials.push_back(lambert(0.7f));
-        add_mesh(scene, bumpy(4, 1, 0.3));
-        add_sun(scene, {0.5, -0.6, -1});
         auto made = RenderScene::create(scene);
         ASSERT_TRUE(made);
         at.set(0, truth);
@@ -113,7 +110,7 @@ protected:
         return displaced(truth, e);
     }
 
-    Scene scene;
+    const Scene scene = sunlit_bumpy_body();
     Camera camera = test::camera(120, 90, 128);
     std::optional<RenderScene> render_scene;
     BodyPoses at{1};

@@ -143,9 +143,6 @@ TEST(DistortedPoints, PnpErrorsMatchTheBoundAndIgnoringTheLensDoesNot) {
 class EquidistantFrame : public testing::Test {
 protected:
     void SetUp() override {
-        scene.materials.push_back(lambert(0.7f));
-        add_mesh(scene, bumpy(4, 1, 0.3));
-        add_sun(scene, {0.5, -0.6, -1});
         auto made = RenderScene::create(scene);
         ASSERT_TRUE(made);
         render_scene.emplace(std::move(*made));
@@ -176,7 +173,7 @@ protected:
         EXPECT_LT(error.tail<3>().norm(), m);
     }
 
-    Scene scene;
+    const Scene scene = sunlit_bumpy_body();
     Camera camera = test::camera(200, 160, 1);
     std::optional<RenderScene> render_scene;
     BodyPoses at{1};

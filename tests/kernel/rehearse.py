@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""In the rig: the last metre of a docking on real kernel devices: CAN FD on vcan0, frames through /dev/video10, LiDAR packets
+"""In the rig: the last half metre of a docking on real kernel devices: CAN FD on vcan0, frames through /dev/video10, LiDAR packets
 over UDP; in lockstep, with small frames. It docks and passes every gate.
 
 Usage: rehearse.py [BUS [CAMERA=DEVICE]]   (outside the rig: rehearse.py slcan:0)"""

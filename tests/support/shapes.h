@@ -143,6 +143,15 @@ inline Camera camera(int width, int height, double focal_px) {
     return c;
 }
 
+/// A bumpy grey body, about a metre in radius.
+inline Scene sunlit_bumpy_body() {
+    Scene scene;
+    scene.materials.push_back(lambert(0.7f));
+    add_mesh(scene, bumpy(4, 1, 0.3));
+    add_sun(scene, {0.5, -0.6, -1});
+    return scene;
+}
+
 /// All bodies where the scene puts them at time 0, moved by `offset`.
 inline BodyPoses placed(const Scene& s, const Vec3& offset = {}) {
     BodyPoses at(s.bodies.size());

@@ -279,7 +279,7 @@ GateResult Judge::duration() const {
         gate.reason = "it did not come to its goal";
         return gate;
     }
-    const double t_s = t_done_s.value_or(bus_.seconds(finished->t_ns));
+    const double t_s = t_done_s ? *t_done_s : bus_.seconds(finished->t_ns);
     gate.state = t_done_s && t_s <= scenario_.duration_s ? GateState::passed : GateState::failed;
     gate.unit = "s";
     gate.margin = scenario_.duration_s - t_s;

@@ -226,6 +226,19 @@ TEST(Judge, AnAbortFailsAtOnceUnlessItIsAllowed) {
     EXPECT_TRUE(judge(s, m).passed);
 }
 
+TEST(Judge, ARunThatBreaksOffAfterItHasDockedIsNotComplete) {
+    const Scenario s = small_scenario();
+    const Motion docked = chaser_at(s, {0, 0, 0}, {-0.05, 0, 0});
+    Messages m(s);
+    m.period(0, docked, 1);
+    m.report(1, DynamicsPhase::captured);
+    m.poses(1, docked);
+    const Verdict v = judge(s, m);
+    EXPECT_FALSE(v.passed);
+    EXPECT_EQ(gate(v, "complete").state, State::failed);
+    EXPECT_EQ(gate(v, "duration").state, State::passed);
+}
+
 TEST(Judge, ATimeOutIsReported) {
     Scenario s = small_scenario();
     Messages m(s);

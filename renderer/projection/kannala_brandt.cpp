@@ -1,6 +1,8 @@
 #include "renderer/projection/kannala_brandt.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/each_isa.h"
@@ -27,23 +29,45 @@ constexpr double kMostAngle_rad = 3.14;
 /// The table's start is 1e-5 off at most but for the last entries before a rim where the slope ends.
 constexpr int kAngleSteps = 4;
 
-inline Vec3 direction_of(const KannalaBrandt& m, const RadialInverse& inverse, const Vec3& wanted) noexcept {
-    const double distorted = std::sqrt(wanted.x * wanted.x + wanted.y * wanted.y);
-    const double begin = distorted * inverse.ratio(distorted);
-    double theta = begin;
-    for (int i = 0; i < kAngleSteps; ++i) theta = theta - (m.radius(theta) - distorted) / m.slope(theta);
-    const bool found = std::abs(m.radius(theta) - distorted) < 1e-10 && theta <= inverse.most() * (1 + 1e-12);
-    const SinCos at = sincos_of_turns((found ? theta : begin) * (0.5 / std::numbers::pi));
-    const double side = distorted > 0 ? at.sin / distorted : 0;
+inline double newton_step(const KannalaBrandt& m, double distorted, double theta) noexcept {
+    return theta - (m.radius(theta) - distorted) / m.slope(theta);
+}
+
+/// `theta`: where the search from `begin` has ended; that is the direction on or near the rim, where there is none.
+inline Vec3 direction_at(const KannalaBrandt& m, const RadialInverse& inverse, const Vec3& wanted, double distorted,
+                         double begin, double theta) noexcept {
+    const bool converged = std::abs(m.radius(theta) - distorted) < 1e-10;
+    const double last = theta <= inverse.most() * (1 + 1e-12) ? theta : begin;
+    const SinCos at = sincos_of_turns((converged ? last : begin) * (0.5 / std::numbers::pi));
+    const double side = at.sin / std::max(distorted, std::numeric_limits<double>::min());
     return {side * wanted.x, side * wanted.y, at.cos};
+}
+
+inline double length_of(const Vec3& wanted) noexcept {
+    return std::sqrt(wanted.x * wanted.x + wanted.y * wanted.y);
+}
+
+inline Vec3 direction_of(const KannalaBrandt& m, const RadialInverse& inverse, const Vec3& wanted) noexcept {
+    const double distorted = length_of(wanted), begin = distorted * inverse.ratio(distorted);
+    double theta = begin;
+    for (int k = 0; k < kAngleSteps; ++k) theta = newton_step(m, distorted, theta);
+    return direction_at(m, inverse, wanted, distorted, begin, theta);
 }
 
 NARPA_EACH_ISA void directions_of(const KannalaBrandt& m, const Pinhole& pinhole, const RadialInverse& inverse,
                                   const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
                                   Vec3Lanes& out) noexcept {
+    Lanes<double> distorted, begin, theta;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        distorted[i] = length_of(pinhole.on_plane({x[i], y[i]}));
+        theta[i] = begin[i] = distorted[i] * inverse.ratio(distorted[i]);
+    }
+    for (int k = 0; k < kAngleSteps; ++k)
+        for (std::size_t i = 0; i < kLanes; ++i) theta[i] = newton_step(m, distorted[i], theta[i]);
     Vec3Lanes direction;
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const Vec3 d = q * direction_of(m, inverse, pinhole.on_plane({x[i], y[i]}));
+        const Vec3 d =
+            q * direction_at(m, inverse, pinhole.on_plane({x[i], y[i]}), distorted[i], begin[i], theta[i]);
         direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
     }
     out = direction;

@@ -12,8 +12,6 @@
 namespace narpa {
 namespace {
 
-constexpr int kMostPixels = 16384;
-
 /// Wrong content of the file, at one of its lines.
 struct Fault {
     std::string what;
@@ -29,8 +27,8 @@ YAML::Node part(const YAML::Node& document, const char* key, const char* expecte
 int pixels(const YAML::Node& document, const char* key) {
     const YAML::Node node = part(document, key, "a number of pixels");
     int n = 0;
-    if (!YAML::convert<int>::decode(node, n) || n < 1 || n > kMostPixels)
-        throw Fault{fmt::format("{}: expected an integer in [1, {}]", key, kMostPixels), node.Mark()};
+    if (!YAML::convert<int>::decode(node, n) || n < 1 || n > kMostPixelsPerSide)
+        throw Fault{fmt::format("{}: expected an integer in [1, {}]", key, kMostPixelsPerSide), node.Mark()};
     return n;
 }
 

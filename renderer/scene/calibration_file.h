@@ -9,6 +9,8 @@
 
 namespace narpa {
 
+inline constexpr int kMostPixelsPerSide = 16384;  ///< of a camera's image
+
 struct Calibration {
     int width = 0, height = 0;
     Pinhole pinhole;

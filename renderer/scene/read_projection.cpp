@@ -87,9 +87,8 @@ void read_calibration_key(TableReader& table, Camera& camera, const std::filesys
 }
 
 void read_resolution(TableReader& table, Camera& camera) {
-    constexpr int kMostPixels = 16384;
     if (!table.has("calibration")) table.require("resolution", "[width, height] in pixels");
-    if (const auto size = table.size("resolution", kMostPixels))
+    if (const auto size = table.size("resolution", kMostPixelsPerSide))
         camera.width = (*size)[0], camera.height = (*size)[1];
 }
 

@@ -36,15 +36,15 @@ DirectionCone cone_about_border(const CameraModel& model, const ImageRect& r) no
     }
     Vec3Lanes border;
     model.directions({}, x, y, border);
-    const auto angle = [](const Vec3& a, const Vec3& b) { return std::atan2(norm(cross(a, b)), dot(a, b)); };
-    DirectionCone cone{model.direction({0.5 * (r.x_low + r.x_high), 0.5 * (r.y_low + r.y_high)}), 0};
-    double widest = 0;
+    const Vec3 axis = model.direction({0.5 * (r.x_low + r.x_high), 0.5 * (r.y_low + r.y_high)});
+    const auto chord_squared = [](const Vec3& a, const Vec3& b) { return dot(a - b, a - b); };
+    double farthest = 0, widest = 0;
     for (std::size_t i = 0; i < kLanes; ++i) {
-        cone.half_angle_rad = std::max(cone.half_angle_rad, angle(cone.axis, border[i]));
-        widest = std::max(widest, angle(border[i], border[(i + 1) % kLanes]));
+        farthest = std::max(farthest, chord_squared(axis, border[i]));
+        widest = std::max(widest, chord_squared(border[i], border[(i + 1) % kLanes]));
     }
-    cone.half_angle_rad += kStray * widest;
-    return cone;
+    const auto angle = [](double square) { return 2 * std::asin(std::min(0.5 * std::sqrt(square), 1.0)); };
+    return {axis, angle(farthest) + kStray * angle(widest)};
 }
 
 }  // namespace narpa

@@ -47,6 +47,18 @@ int radius_of(const cv::Mat1d& periodic) {
     }
 }
 
+/// What is beyond the widest filter goes to its outer parts, as the square of the distance: only the transfer of the
+/// lowest frequencies changes. To scale the filter instead would change that of all, by up to 1.7 times as much.
+void add_light_beyond(cv::Mat1d& square, int radius) {
+    const double beyond = 1 - cv::sum(square)[0];
+    if (beyond < kLightBeyond) return;
+    cv::Mat1d outer(square.size());
+    for (int j = 0; j < outer.rows; ++j)
+        for (int i = 0; i < outer.cols; ++i)
+            outer(j, i) = (i - radius) * (i - radius) + (j - radius) * (j - radius);
+    square += beyond / cv::sum(outer)[0] * outer;
+}
+
 /// Products of finite numbers, without the library's handling of infinite ones.
 std::complex<double> times(std::complex<double> a, std::complex<double> b) {
     return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
@@ -92,6 +104,7 @@ SeparableFilter filter_of(const PointSpreadFunction& spread) {
     cv::Mat1d square(size, size);
     for (int j = 0; j < size; ++j)
         for (int i = 0; i < size; ++i) square(j, i) = at(periodic, i - filter.radius, j - filter.radius);
+    add_light_beyond(square, filter.radius);
     const cv::SVD parts(square / cv::sum(square)[0]);
     const double largest = parts.w.at<double>(0);
     double sum = 0;

@@ -28,8 +28,8 @@ inline std::complex<double> transfer_of(const SeparableFilter& filter, double fx
 inline double worst_transfer_error(const PointSpreadFunction& spread) {
     const SeparableFilter filter = filter_of(spread);
     double worst = 0;
-    for (double fx = spread.image ? -0.5 : 0; fx <= 0.5; fx += 0.02)
-        for (double fy = 0; fy <= 0.5; fy += 0.02)
+    for (double fx = spread.image ? -0.5 : 0; fx <= 0.5; fx += (fx < 0.1 ? 0.005 : 0.02))
+        for (double fy = 0; fy <= 0.5; fy += (fy < 0.1 ? 0.005 : 0.02))
             worst = std::max(worst, std::abs(transfer_of(filter, fx, fy) - transfer(spread, fx, fy)));
     return worst;
 }

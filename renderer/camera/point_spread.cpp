@@ -47,8 +47,9 @@ int radius_of(const cv::Mat1d& periodic) {
     }
 }
 
-/// What is beyond the widest filter goes to its outer parts, as the square of the distance: only the transfer of the
-/// lowest frequencies changes. To scale the filter instead would change that of all, by up to 1.7 times as much.
+/// What is beyond the widest filter goes to its outer parts, as the square of the distance: only the transfer of
+/// the lowest frequencies changes. To scale the filter instead would change that of all, by up to 1.7 times as
+/// much.
 void add_light_beyond(cv::Mat1d& square, int radius) {
     const double beyond = 1 - cv::sum(square)[0];
     if (beyond < kLightBeyond) return;

@@ -272,12 +272,12 @@ NARPA_EACH_ISA void mark_boxes(std::span<const BoxNode> nodes, const TileGrid& g
 /// a sphere, the rays that meet it make a circular cone, and so do, about them, those of a rectangle of the image.
 class SeenEllipsoid {
 public:
-    SeenEllipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view) {
+    SeenEllipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, double slack_m) {
         const Vec3& semi_axes_m = bounds.semi_axes_m;
         // Rays from elsewhere on the lens meet what those from its centre meet when a ball of the lens's radius is
         // added to it: an ellipsoid that holds the sum (A. Kurzhanski, I. Valyi, "Ellipsoidal Calculus for
         // Estimation and Control", 1997, the one of least trace; of a sphere it is the sum itself).
-        const double ball = grid.lens_radius_m + view.rounding_m, p = norm(semi_axes_m) / (std::sqrt(3.0) * ball);
+        const double ball = grid.lens_radius_m + slack_m, p = norm(semi_axes_m) / (std::sqrt(3.0) * ball);
         Vec3 axes;
         for (int k = 0; k < 3; ++k)
             axes[k] = (1 + 1e-9) * std::sqrt((1 + 1 / p) * semi_axes_m[k] * semi_axes_m[k] + (1 + p) * ball * ball);
@@ -341,10 +341,11 @@ private:
 };
 
 /// Within the box about it, which is the tighter of the two for one that is very flat or long.
-void mark_ellipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, TileMask& mask) {
+void mark_ellipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, double slack_m,
+                    TileMask& mask) {
     const BoxNode node = box_about(bounds);
-    const double rounding_m = 0x1p-23 * (norm(bounds.centre_m) + norm(bounds.semi_axes_m)) + view.rounding_m;
-    const SeenBox box(node, grid, view, rounding_m);
+    const double rounding_m = 0x1p-23 * (norm(bounds.centre_m) + norm(bounds.semi_axes_m));
+    const SeenBox box(node, grid, view, rounding_m + slack_m);
     if (box.behind()) return;
     TileRect rect = grid.all;
     if (box.in_front()) {
@@ -352,7 +353,7 @@ void mark_ellipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyVi
         if (!e.within(grid)) return;
         rect = tiles_of(e, grid);
     }
-    SeenEllipsoid(bounds, grid, view).mark(rect, mask);
+    SeenEllipsoid(bounds, grid, view, slack_m).mark(rect, mask);
 }
 
 }  // namespace
@@ -367,7 +368,7 @@ void mark_by_projection(const Pinhole& pinhole, const Camera& camera, const Lens
                         TileMask& mask) noexcept {
     const TileGrid grid(pinhole, camera, lens, mask.all());
     if (body.boxes.empty())
-        mark_ellipsoid(body.bounds, grid, body.view, mask);
+        mark_ellipsoid(body.bounds, grid, body.view, body.slack_m, mask);
     else
         mark_boxes(body.boxes, grid, body.view, body.slack_m, mask);
 }

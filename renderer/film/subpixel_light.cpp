@@ -46,6 +46,25 @@ std::uint32_t samples_of(const SubpixelDisc& disc, int spp) {
     return 2 * static_cast<std::uint32_t>(samples / 2);
 }
 
+/// The integral from 0 to t of the cubic convolution kernel (Keys 1981, a = -1/2), by which a sampled function is
+/// interpolated without an error of second order.
+double cubic_integral(double t) {
+    const double x = std::min(std::abs(t), 2.0);
+    const double inner = std::min(x, 1.0), outer = std::max(x, 1.0);
+    const auto from_zero = [](double u) { return u - 5.0 / 6 * u * u * u + 3.0 / 8 * u * u * u * u; };
+    const auto from_one = [](double u) { return u * (2 + u * (-2 + u * (5.0 / 6 - u / 8))) - 17.0 / 24; };
+    return std::copysign(from_zero(inner) + from_one(outer), t);
+}
+
+/// The share of a sample's light that a pixel gets along one axis, by its distance from the sample, px. Without a
+/// point spread it is the sample's pixel that gets all. The filter of a point spread, which comes later, takes the
+/// image for a smooth function: a body then has to be where it is between the pixels, neither in the middle of one
+/// nor wider than it is. The share is that of the pixel's area in cubic interpolation; below zero at the edges.
+double pixel_share(bool spread, double distance_px) {
+    if (!spread) return distance_px > -0.5 && distance_px <= 0.5 ? 1 : 0;
+    return cubic_integral(distance_px + 0.5) - cubic_integral(distance_px - 0.5);
+}
+
 /// Sums the samples' light in the pixels of a block.
 class Collector {
 public:
@@ -56,14 +75,16 @@ public:
 
 private:
     void add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t samples);
+    /// Ray i is seen at this image point: true if it has a part in the block.
+    bool share_out(const ImagePoint& p, std::size_t i);
     void trace(std::size_t body);
 
     const Frame& f_;
     const PixelBlock& block_;
     CameraBatch batch_;
-    Lanes<std::size_t> pixel_{};  ///< of each ray: place in the block
-    Lanes<double> area_px2_{};    ///< of the image, that each ray stands for
-    Lanes<Vec3> light_{};         ///< of each pixel
+    Lanes<Lanes<double>> columns_{}, rows_{};  ///< of each ray: shares of the block's columns and rows
+    Lanes<double> area_px2_{};                 ///< of the image, that each ray stands for
+    Lanes<Vec3> light_{};                      ///< of each pixel
     Lanes<double> covered_{}, variance_{};
     Lanes<double> body_sum_{}, body_squares_{};  ///< of one body's samples
 };
@@ -96,12 +117,10 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
     const Vec3 chief = f_.lens != nullptr ? normalized(chief_direction(*f_.lens, seen, from)) : seen;
     const auto image = f_.model->project(chief);
     if (!image) return;
-    const std::size_t pixel = block_.holding(image->x, image->y);
-    if (pixel == block_.n) return;
-
-    const std::size_t i = batch_.rays.n++;
+    const std::size_t i = batch_.rays.n;
+    if (!share_out(*image, i)) return;
+    ++batch_.rays.n;
     const double solid_angle = at.area * std::abs(dot(cross(disc.right, disc.up), direction)) / (range * range);
-    pixel_[i] = pixel;
     const double tilt = chief.z / seen.z;  // solid angles of the two rays on the plane of focus
     area_px2_[i] = solid_angle * f_.model->pixels_per_sr(chief) * (tilt * tilt * tilt);
     batch_.rays.put(i, {f_.T_world_camera.t + start, direction});
@@ -109,6 +128,17 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
     if (!f_.sun) return;
     const SamplePoint u = numbers.point(s, 1);
     batch_.to_sun.put(i, f_.one_sample() ? f_.sun->centre() : f_.sun->sample(u[0], u[1]));
+}
+
+bool Collector::share_out(const ImagePoint& p, std::size_t i) {
+    const bool spread = f_.camera.point_spread.has_value();
+    bool any = false;
+    for (std::size_t pixel = 0; pixel < block_.n; ++pixel) {
+        columns_[i][pixel] = pixel_share(spread, block_.x[pixel] - p.x);
+        rows_[i][pixel] = pixel_share(spread, block_.y[pixel] - p.y);
+        any |= columns_[i][pixel] != 0 && rows_[i][pixel] != 0;
+    }
+    return any;
 }
 
 void Collector::trace(std::size_t body) {
@@ -119,12 +149,15 @@ void Collector::trace(std::size_t body) {
     f_.integrator.radiance(f_, batch_, radiance);
     for (std::size_t i = 0; i < batch_.rays.n; ++i) {
         if (batch_.hits.body[i] < 0) continue;
-        const std::size_t pixel = pixel_[i];
-        const Vec3 share = area_px2_[i] * vec_cast<double>(radiance[i]);
-        covered_[pixel] += area_px2_[i];
-        light_[pixel] += share;
-        body_sum_[pixel] += mean_band(share);
-        body_squares_[pixel] += mean_band(share) * mean_band(share);
+        for (std::size_t pixel = 0; pixel < block_.n; ++pixel) {
+            const double area_px2 = area_px2_[i] * columns_[i][pixel] * rows_[i][pixel];
+            if (area_px2 == 0) continue;
+            const Vec3 share = area_px2 * vec_cast<double>(radiance[i]);
+            covered_[pixel] += area_px2;
+            light_[pixel] += share;
+            body_sum_[pixel] += mean_band(share);
+            body_squares_[pixel] += mean_band(share) * mean_band(share);
+        }
     }
     batch_.rays.n = 0;
 }
@@ -142,12 +175,6 @@ void Collector::put_into(RadianceImage& out, std::vector<float>* variance) const
 }
 
 }  // namespace
-
-std::size_t PixelBlock::holding(double image_x, double image_y) const {
-    const double column = std::floor(image_x + 0.5) - x_first, row = std::floor(image_y + 0.5) - y_first;
-    if (!(column >= 0 && column < width && row >= 0 && row < height)) return n;
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
-}
 
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out,
                          std::vector<float>* variance) {

@@ -16,8 +16,6 @@ struct PixelBlock {
         return static_cast<std::size_t>(y[i]) * static_cast<std::size_t>(image_width) +
                static_cast<std::size_t>(x[i]);
     }
-    /// Index of the pixel that holds this image point; n: none.
-    [[nodiscard]] std::size_t holding(double image_x, double image_y) const;
 };
 
 /// Samples of each subpixel body's disc: spp for each pixel that its image and the lens's blur cover, within these
@@ -26,9 +24,11 @@ inline constexpr std::uint32_t kSubpixelSamplesLeast = 1024, kSubpixelSamplesMos
 
 /// Adds the light of the subpixel bodies in the block to its pixels, which hold the light from behind them, and
 /// subtracts what they cover. Their points are fixed on the disc, whatever pixels it falls on, so that the light
-/// does not change while the body moves through the image. Each point represents its part of the solid angle, is
-/// traced like a camera ray and counts if it meets the body: nearer bodies hide it. `variance` may be null; it gets
-/// the variance of independent samples, an upper bound for stratified ones.
+/// does not change while the body moves through the image. Where the camera has a point spread, a point's light is
+/// shared among pixels by cubic interpolation, so that the filtered image has its centroid where the point is. Each
+/// point represents its part of the solid angle, is traced like a camera ray and counts if it meets the body:
+/// nearer bodies hide it. `variance` may be null; it gets the variance of independent samples, an upper bound for
+/// stratified ones.
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance);
 
 }  // namespace narpa

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "renderer/integrator/subpixel_bodies.h"
+
 namespace narpa {
 namespace {
 
@@ -35,6 +37,12 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
                           BodyView(at.T_world_body[body], T_world_camera),
                           kEmbreeSlack * tracer_.bounding_radius_m(body)};
         culled.slack_m += culled.view.rounding_m;
+        if (camera_.point_spread) {
+            const auto& [c, r] = culled.bounds;
+            const auto& [x, y, z] = culled.view.axes;
+            culled.slack_m += spread_reach_m(*model, culled.view.centre_camera + c.x * x + c.y * y + c.z * z,
+                                             std::max({r.x, r.y, r.z}));
+        }
         if (const Pinhole* pinhole = model->pinhole())
             mark_by_projection(*pinhole, camera_, lens, culled, mask_);
         else

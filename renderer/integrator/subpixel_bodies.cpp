@@ -26,10 +26,24 @@ std::array<Vec3, 2> frame_about(const Vec3& z, const Vec3& towards) {
 
 }  // namespace
 
+double spread_reach_m(const CameraModel& model, const Vec3& centre, double radius_m) noexcept {
+    if (!model.project(centre)) return 0;
+    const auto& [x, y] = model.jacobian(centre);
+    const double largest_px_m = largest_stretch({x, y});
+    if (2 * radius_m * largest_px_m >= kSubpixelWidth_px) return 0;
+    const double smallest_px_m = norm(cross(x, y)) / largest_px_m;
+    return (kSpreadSampleReach_px + 0.01) / smallest_px_m;
+}
+
 SubpixelBodies::SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera,
                                const CameraModelHandle& model, const Rigid3& T_world_camera, const Lens* lens,
                                bool moving)
-    : tracer_(tracer), at_(at), model_(model), T_world_camera_(T_world_camera), lens_(lens) {
+    : tracer_(tracer),
+      at_(at),
+      model_(model),
+      T_world_camera_(T_world_camera),
+      lens_(lens),
+      sample_reach_px_(camera.point_spread ? kSpreadSampleReach_px : 0.5) {
     for (std::size_t body = 0; body < at.T_world_body.size() && !any_ && !moving; ++body)
         any_ = disc_within(static_cast<int>(body), 0, 0, camera.width - 1, camera.height - 1).has_value();
 }
@@ -65,7 +79,7 @@ std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, i
     }
     const auto [x, y] = *model_->project(centre);
     disc.x_px = x, disc.y_px = y;
-    const double margin = disc.radius_px * (1 + 1e-3) + 0.51;  // half a pixel, and what perspective bends
+    const double margin = disc.radius_px * (1 + 1e-3) + sample_reach_px_ + 0.01;  // what perspective bends
     if (x < x_first - margin || x > x_last + margin || y < y_first - margin || y > y_last + margin)
         return std::nullopt;
     span_disc(disc);

@@ -16,6 +16,10 @@ namespace narpa {
 /// Widest image of a body, across its bounds, that is treated so.
 inline constexpr double kSubpixelWidth_px = 2;
 
+/// Where the camera has a point spread, a sample's light reaches pixels whose middles are closer than this along
+/// each axis; else the pixel that it falls on.
+inline constexpr double kSpreadSampleReach_px = 2.5;
+
 /// What the camera sees of a tiny body's bounds, in world axes from the camera's centre: points
 /// centre + x right + y up with x^2 + y^2 <= 1 are met by every ray that can meet the body.
 struct SubpixelDisc {
@@ -25,6 +29,10 @@ struct SubpixelDisc {
                      ///< body its bounds; 1: all of it, or there is no Sun
     double x_px = 0, y_px = 0, radius_px = 0;  ///< circle of the image that holds it, with the lens's blur
 };
+
+/// How far from a ball the camera must look for tiles that get light of it, metres: kSpreadSampleReach_px where its
+/// image is tiny, else 0. Camera axes.
+[[nodiscard]] double spread_reach_m(const CameraModel& model, const Vec3& centre_camera, double radius_m) noexcept;
 
 class SubpixelBodies {
 public:
@@ -36,7 +44,8 @@ public:
     /// True where there is any in the image.
     [[nodiscard]] bool any() const noexcept { return any_; }
     [[nodiscard]] bool contains(int body) const noexcept;
-    /// The disc of a body, if it is tiny and its circle meets this rectangle of pixels.
+    /// The disc of a body, if it is tiny and its circle meets this rectangle of pixels, or comes within the reach
+    /// of its samples.
     [[nodiscard]] std::optional<SubpixelDisc> disc_within(int body, int x_first, int y_first, int x_last,
                                                           int y_last) const noexcept;
     /// What the ray meets that is not tiny, given that it first meets `hit`.
@@ -54,6 +63,7 @@ private:
     CameraModelHandle model_;
     Rigid3 T_world_camera_;
     const Lens* lens_;
+    double sample_reach_px_;
     bool any_ = false;
 };
 

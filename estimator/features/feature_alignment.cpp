@@ -221,7 +221,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     const ToneScale tones(frame, sensor_);
     const TonedImage toned_frame = tones.toned(frame);
     FrameSettings render_settings;
-    render_settings.spp = settings_.spp;
+    render_settings.spp = times_.exposure_s > 0 ? settings_.spp_over_time : settings_.spp;
     render_settings.seed = settings_.seed;
     PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
     double floor_px = 1;  // until there are matches

@@ -20,6 +20,7 @@ struct FeatureSettings {
     int renders_max = 10;      ///< views rendered for a frame
     double settled_px = 0.02;  ///< converged: a solution that moves the points by less (RMS)
     int spp = 4;               ///< of the views
+    int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
 };
 

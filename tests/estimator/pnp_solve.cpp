@@ -96,7 +96,7 @@ TEST_F(SolvePnp, BothMinimaOfAPlaneAreReported) {
     int wrong = 0, wrong_and_told = 0, second_is_true = 0, unsettled = 0;
     for (const double range_m : {10., 30., 100.}) {
         for (const double tilt_deg : {5., 15., 40.}) {
-            for (int trial = 0; trial < 200; ++trial) {
+            for (int trial = 0; trial < 4000; ++trial) {
                 const test::Seen seen = test::see(random_, square(8, 1), tilted(tilt_deg, range_m), 0.3);
                 const PnpSolution& s = solver_.solve(seen.input());
                 ASSERT_TRUE(s.ok() || s.status == PnpStatus::no_convergence) << in_words(s.status);
@@ -113,10 +113,10 @@ TEST_F(SolvePnp, BothMinimaOfAPlaneAreReported) {
         }
     }
     // Facing the camera, the tilt shows in second order only: a valley that is not followed to its end each time.
-    EXPECT_LE(unsettled, 5);
-    EXPECT_GT(wrong, 100);
-    EXPECT_GE(wrong_and_told, 0.97 * wrong);  // 99 %, within three standard deviations of so many
-    EXPECT_GE(second_is_true, 0.9 * wrong);
+    EXPECT_LE(unsettled, 36);  // one in a thousand
+    EXPECT_GT(wrong, 4000);
+    EXPECT_GE(wrong_and_told, 0.985 * wrong);  // measured 99.0 %; 0.15 % is a standard deviation of so many
+    EXPECT_GE(second_is_true, 0.96 * wrong);   // 97.3 %
 }
 
 TEST_F(SolvePnp, NearPlanesAreNotAmbiguous) {

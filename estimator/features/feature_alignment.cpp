@@ -230,13 +230,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         FeatureRound& round = estimate.rounds.emplace_back();
         view_.render(estimate.T_camera_target, render_settings, false);
         gather(frame, toned_frame, tones, points);
-        if (!times_.at_once()) {
-            // As if all were seen at once: where each point would have to be to be seen there in mid-exposure.
-            const Rigid3& T = estimate.T_camera_target;
-            for (std::size_t i = 0; i < points.size(); ++i)
-                points.body_m[i] =
-                    inverse(T) * (moved(T, motion, times_.at(points.pixels[i].v)) * points.body_m[i]);
-        }
+        to_mid_exposure(estimate.T_camera_target, motion, times_, points.pixels, points.body_m);
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;
             return estimate;

@@ -32,4 +32,12 @@ CameraPose camera_path(const Rigid3& T_world_target, const Rigid3& T_camera_targ
     return {T_world_camera(start_s), T_world_camera(end_s), times.row_s / (end_s - start_s)};
 }
 
+void to_mid_exposure(const Rigid3& T_camera_target, const ApparentMotion& motion, const RowTimes& times,
+                     std::span<const Pixel> pixels, std::span<Vec3> body_m) noexcept {
+    if (times.at_once()) return;
+    const Rigid3 T_target_camera = inverse(T_camera_target);
+    for (std::size_t i = 0; i < body_m.size(); ++i)
+        body_m[i] = T_target_camera * (moved(T_camera_target, motion, times.at(pixels[i].v)) * body_m[i]);
+}
+
 }  // namespace narpa

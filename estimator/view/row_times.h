@@ -1,7 +1,10 @@
 /// estimator/view/row_times.h - when the rows of a frame are exposed.
 #pragma once
 
+#include <span>
+
 #include "estimator/pose/apparent_motion.h"
+#include "estimator/pose/pnp_points.h"
 #include "renderer/camera/camera_pose.h"
 #include "renderer/scene/scene.h"
 
@@ -30,5 +33,12 @@ struct RowTimes {
 /// of the frame's exposure. The target stands still.
 [[nodiscard]] CameraPose camera_path(const Rigid3& T_world_target, const Rigid3& T_camera_target,
                                      const ApparentMotion& motion, const RowTimes& times, int rows);
+
+/// Moves points of the body, which were measured at these pixels of rows exposed one after the other, to where a
+/// camera that exposes all rows at once would have to find them to see them at the same pixels in the middle of the
+/// exposure. For solvers that know one pose a frame (pnp.h): solve, move the points with that pose, and solve
+/// again. Spans of one length.
+void to_mid_exposure(const Rigid3& T_camera_target, const ApparentMotion& motion, const RowTimes& times,
+                     std::span<const Pixel> pixels, std::span<Vec3> body_m) noexcept;
 
 }  // namespace narpa

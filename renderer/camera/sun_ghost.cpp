@@ -6,6 +6,11 @@
 #include "base/constants.h"
 
 namespace narpa {
+namespace {
+
+constexpr double kHoodShade = 0.1;  ///< the lens hood shades the aperture bit by bit over this part of its angle
+
+}  // namespace
 
 std::unique_ptr<const SunGhost> SunGhost::create(const Scene& scene, const Camera& camera) {
     if (!camera.ghost || !scene.sun) return nullptr;
@@ -27,12 +32,17 @@ std::optional<ImagePoint> SunGhost::centre(const Rigid3& T_world_camera) const n
                       principal_.y - ghost_.scale * (p->y - principal_.y)};
 }
 
+double SunGhost::share_within_hood(double angle_rad) const noexcept {
+    return std::clamp((ghost_.within_rad - angle_rad) / (kHoodShade * ghost_.within_rad), 0.0, 1.0);
+}
+
 void SunGhost::add(const Tracer& tracer, const BodyPoses& at, const CameraPose& pose,
                    RadianceImage& image) const noexcept {
     const Rigid3& T_world_camera = pose.middle();
     const std::optional<ImagePoint> middle = centre(T_world_camera);
     if (!middle || tracer.intersect(at, {T_world_camera.t, sun_.direction}, kInfinity).body >= 0) return;
-    const double irradiance = sun_.irradiance_w_m2 * (conjugate(T_world_camera.q) * sun_.direction).z;
+    const double cosine = (conjugate(T_world_camera.q) * sun_.direction).z;
+    const double irradiance = sun_.irradiance_w_m2 * cosine * share_within_hood(std::acos(std::min(cosine, 1.0)));
     // Of the disc whose edge add_row draws one pixel wide.
     const double area_px = kPi * (ghost_.radius_px * ghost_.radius_px + 1.0 / 12);
     const auto radiance =

@@ -7,8 +7,10 @@
 #include "base/constants.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
+#include "estimator/pose/pnp.h"
 #include "renderer/camera/detector.h"
 #include "renderer/projection/distortion.h"
+#include "tests/estimator/pnp_support.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -54,6 +56,44 @@ TEST(CameraPath, IsAtEachRowWhereTheMotionHasIt) {
         EXPECT_LT(norm(there.t - wanted.t), 1e-5);  // its path is taken for straight
         EXPECT_LT(angle_between(there.q, wanted.q), 1e-7);
     }
+}
+
+/// Points from a rolling shutter: two solutions and the motion give the pose of mid-exposure to its bound.
+TEST(PointsFromARollingShutter, GiveThePoseOfMidExposure) {
+    std::mt19937_64 random(3);
+    const RowTimes times{-249.5e-4, 1e-4, 2e-3};
+    PnpSolver solver(50);
+    constexpr int kTrials = 200;
+    double known = 0, ignored = 0;
+    for (int trial = 0; trial < kTrials; ++trial) {
+        const Rigid3 truth{random_attitude(random), {0.3, -0.2, 12}};
+        const ApparentMotion motion{0.5 * random_direction(random), 0.087 * random_direction(random)};  // 5 deg/s
+        Seen seen = see(random, random_points(random, 50, 1.5), truth, 0.3);
+        for (std::size_t i = 0; i < seen.pixels.size(); ++i) {
+            Pixel p = seen.pixels[i];
+            const Pixel exact = project(seen.camera, truth * seen.body_m[i]);
+            const double noise_u = p.u - exact.u, noise_v = p.v - exact.v;
+            for (int k = 0; k < 4; ++k) {  // the row depends on the time, and that on the row
+                p = project(seen.camera, moved(truth, motion, times.at(p.v)) * seen.body_m[i]);
+            }
+            seen.pixels[i] = {p.u + noise_u, p.v + noise_v};
+        }
+        const auto bound = pnp_bound(seen.input(), truth);
+        ASSERT_TRUE(bound);
+        const auto solve = [&](const std::vector<Vec3>& points) {
+            PnpInput input = seen.input();
+            input.body_m = points;
+            input.sigma_px = 0.3;
+            return solver.solve(input).fit.T_camera_body;
+        };
+        const Rigid3 first = solve(seen.body_m);
+        std::vector<Vec3> points = seen.body_m;
+        to_mid_exposure(first, motion, times, seen.pixels, points);
+        known += normalised_error_squared(error_between(truth, solve(points)), *bound) / kTrials;
+        ignored += normalised_error_squared(error_between(truth, first), *bound) / kTrials;
+    }
+    EXPECT_LT(known, 6 + 3 * std::sqrt(12.0 / kTrials));
+    EXPECT_GT(ignored, 30);
 }
 
 struct Exposing {

@@ -23,6 +23,7 @@ LidarUnit::LidarUnit(const World& world, std::size_t index)
       lidar_(world.scene().lidars[index]),
       model_(*lidar_.model),
       period_ns_(model_.packet_period_ns(lidar_.rate_hz)),
+      receiver_(lidar_.receiver, lidar_.range_max_m, world.scene().render.seed, index),
       placement_(world.scene().bodies.size()),
       shots_(model_.spec().shots_per_packet),
       hits_(shots_.size()),
@@ -48,8 +49,9 @@ void LidarUnit::fire(std::int64_t packet) noexcept {
             const Rigid3 T_world_lidar = world_.sensor_pose(lidar_.mount, lidar_.T_mount_lidar, placement_, time);
             beams.put(beams.n++, {T_world_lidar * shot.origin_m, T_world_lidar.q * shot.direction, time});
         }
-        shoot(world_.tracer(), placement_, beams, lidar_.range_max_m,
-              std::span(hits_).subspan(first, shots.size()));
+        const auto number = static_cast<std::uint64_t>(packet) * shots_.size() + first;
+        receiver_.receive(world_.tracer(), placement_, beams, number,
+                          std::span(hits_).subspan(first, shots.size()));
         first += shots.size();
     }
     for (std::size_t i = 0; i < shots_.size(); ++i) {

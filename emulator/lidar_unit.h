@@ -7,7 +7,7 @@
 
 #include "emulator/world.h"
 #include "protocols/lidar/lidar_model.h"
-#include "renderer/lidar/lidar_shot.h"
+#include "renderer/lidar/lidar_receiver.h"
 
 namespace narpa {
 
@@ -31,7 +31,7 @@ public:
     /// The packet just fired, as it goes out.
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] std::size_t returns() const noexcept { return returns_; }
-    /// The truth behind the packet: shots and what they met, ranges unquantised.
+    /// What the packet states: shots and their returns, before quantisation.
     [[nodiscard]] std::span<const LidarShot> shots() const noexcept { return shots_; }
     [[nodiscard]] std::span<const LidarReturn> hits() const noexcept { return hits_; }
 
@@ -43,6 +43,7 @@ private:
     Lidar lidar_;
     const LidarModel& model_;
     std::int64_t period_ns_;
+    LidarReceiver receiver_;
     BodyPoses placement_;
     std::size_t returns_ = 0;
     std::vector<LidarShot> shots_;

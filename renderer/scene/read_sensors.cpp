@@ -184,6 +184,29 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     return camera;
 }
 
+LidarReceiverModel read_receiver(TableReader& table) {
+    using Echo = LidarReceiverModel::Echo;
+    LidarReceiverModel r;
+    const Range length{.low = 0, .high = 1e3};
+    r.beam_divergence_rad = table.number("beam_divergence_rad", {.low = 0, .high = 0.1}).value_or(0);
+    r.sub_rays = static_cast<int>(table.integer("sub_rays", 1, LidarReceiverModel::kMostSubRays)
+                                      .value_or(r.beam_divergence_rad > 0 ? 32 : 1));
+    if (r.sub_rays > 1 && r.sub_rays < LidarReceiverModel::kLeastSubRays)
+        table.fail("sub_rays", fmt::format("{} is too few, expected 1, or {} to {}", r.sub_rays,
+                                           LidarReceiverModel::kLeastSubRays, LidarReceiverModel::kMostSubRays));
+    if (r.sub_rays > 1 && r.beam_divergence_rad == 0)
+        table.require("beam_divergence_rad", "a number > 0, as sub_rays sample the beam's cone");
+    r.pulse_length_m = table.number("pulse_length_m", length).value_or(r.pulse_length_m);
+    constexpr std::array<std::pair<std::string_view, Echo>, 2> kEchoes{
+        {{"strongest", Echo::strongest}, {"last", Echo::last}}};
+    r.echo = table.choice<Echo>("returns", kEchoes).value_or(r.echo);
+    r.range_at_10_percent_m =
+        table.number("range_at_10_percent_m", {.low = 0, .high = 1e6, .low_open = true}).value_or(0);
+    r.range_bias_m = table.number("range_bias_m", {.low = -1e3, .high = 1e3}).value_or(0);
+    r.range_noise_m = table.number("range_noise_m", length).value_or(0);
+    return r;
+}
+
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene) {
     std::vector<std::pair<std::string_view, const LidarModel*>> models;
     for (const LidarModel* model : lidar_models()) models.emplace_back(model->spec().name, model);
@@ -199,6 +222,7 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
         table.number("rate_hz", {.low = spec.rate_hz_min, .high = spec.rate_hz_max}).value_or(spec.rate_hz_default);
     lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = spec.range_m_max, .low_open = true})
                             .value_or(spec.range_m_default);
+    lidar.receiver = read_receiver(table);
     table.finish();
     return lidar;
 }

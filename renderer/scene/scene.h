@@ -197,6 +197,25 @@ struct Camera {
     std::optional<Ghost> ghost{};
 };
 
+/// What a LiDAR's receiver makes of the light that comes back. As it stands here: the exact range of the beam's
+/// axis, always detected.
+struct LidarReceiverModel {
+    enum class Echo : std::uint8_t {
+        strongest,
+        last,  ///< the farthest that is detected
+    };
+    double beam_divergence_rad = 0;    ///< full angle of the evenly lit cone of the beam
+    int sub_rays = 1;                  ///< that sample the cone: 1, or kLeastSubRays to kMostSubRays
+    double pulse_length_m = 0.9;       ///< surfaces closer in range than this make one echo: c / 2 * duration
+    Echo echo = Echo::strongest;       ///< which is reported
+    double range_at_10_percent_m = 0;  ///< where a surface of 10 %, across the beam, is just detected; 0: no limit
+    double range_bias_m = 0;
+    double range_noise_m = 0;  ///< standard deviation
+
+    static constexpr int kLeastSubRays = 8, kMostSubRays = 64;
+    friend bool operator==(const LidarReceiverModel&, const LidarReceiverModel&) = default;
+};
+
 struct Lidar {
     std::string name;
     int mount = -1;
@@ -204,6 +223,7 @@ struct Lidar {
     const LidarModel* model = nullptr;  ///< never null in a scene that was read
     double rate_hz = 10;                ///< turns a second, within the model's limits
     double range_max_m = 100;           ///< returns beyond are not reported
+    LidarReceiverModel receiver{};
 };
 
 struct RenderSettings {

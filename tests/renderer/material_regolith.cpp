@@ -49,11 +49,11 @@ double lambert_phase(double a) {
 double seeliger_phase(double a) {
     return a == 0 ? 1 : 1 + std::sin(a / 2) * std::tan(a / 2) * std::log(std::tan(a / 4));
 }
-constexpr double kPhases[] = {0, 1, 5, 20, 45, 70, 90, 120, 150, 170};
+constexpr double kPhaseAngles[] = {0, 1, 5, 20, 45, 70, 90, 120, 150, 170};
 
 TEST(DiscIntegrated, LambertSphereTo0_1PerCent) {
     const TestMaterial m = material("lambert", MaterialKind::lambert, 0.6);
-    for (const double degrees : kPhases) {
+    for (const double degrees : kPhaseAngles) {
         const double a = degrees * kPi / 180, expected = 0.6 * 2 / 3 * lambert_phase(a);
         EXPECT_NEAR(disc(m, a), expected, 1e-3 * expected) << degrees;
     }
@@ -66,7 +66,7 @@ TEST(DiscIntegrated, LommelSeeligerSphereTo0_1PerCent) {
     for (const float g : {0.0f, -0.3f, 0.2f, -0.6f}) {
         const TestMaterial m =
             material("seeliger", MaterialKind::lommel_seeliger, 0.4, [&](Material& x) { x.asymmetry = g; });
-        for (const double degrees : kPhases) {
+        for (const double degrees : kPhaseAngles) {
             const double a = degrees * kPi / 180, asymmetry = static_cast<double>(g);
             const double particle = (1 - asymmetry * asymmetry) /
                                     std::pow(1 + asymmetry * asymmetry + 2 * asymmetry * std::cos(a), 1.5);

@@ -227,6 +227,10 @@ const BadScene kBad[] = {
     {"LidarModel", LIDAR "model = \"HDL-64\"\n", 3, 9, "expected one of \"VLP-16\""},
     {"LidarWithoutModel", LIDAR, 1, 1, "[[lidar]] has no \"model\""},
     {"LidarTooFast", LIDAR "model = \"VLP-16\"\nrate_hz = 25\n", 4, 11, "got 25, expected a number in [5, 20]"},
+    {"LidarFewSubRays", LIDAR "model = \"VLP-16\"\nbeam_divergence_rad = 3e-3\nsub_rays = 4\n", 5, 12,
+     "4 is too few, expected 1, or 8 to 64"},
+    {"LidarSubRaysOfALine", LIDAR "model = \"VLP-16\"\nsub_rays = 32\n", 1, 1, "has no \"beam_divergence_rad\""},
+    {"LidarNoise", LIDAR "model = \"VLP-16\"\nrange_noise_m = -0.1\n", 4, 17, "expected a number in [0, 1000]"},
     {"LidarTooFar", LIDAR "model = \"VLP-16\"\nrange_max_m = 200\n", 4, 15, "expected a number in (0, 131.07]"},
     {"FirstInTheFileIsTold", "[render]\nspp = 0\n[sun]\ndirection = [0, 0, 0]\n", 2, 7, "spp: got 0"},
 };

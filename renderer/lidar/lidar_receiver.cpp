@@ -66,7 +66,8 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
         if (!(r.range_m > 0)) continue;
         if (light_of(r) < least_light) r = {};
         if (exact || r.body < 0) continue;
-        r.range_m += model_.range_bias_m + model_.range_noise_m * normal(random.w0[i], random.w1[i]);
+        r.range_m += model_.range_bias_m;
+        if (model_.range_noise_m > 0) r.range_m += model_.range_noise_m * normal(random.w0[i], random.w1[i]);
         if (!(r.range_m > 0 && r.range_m < range_max_m_)) r = {};
     }
 }

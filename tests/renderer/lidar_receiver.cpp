@@ -86,6 +86,13 @@ TEST(LidarReceiver, BiasAndNoiseAreThoseOfTheScene) {
     EXPECT_LT(std::abs(product / kShots), 3 * 0.03 * 0.03 / std::sqrt(kShots));
 }
 
+TEST(LidarReceiver, BiasAloneIsExact) {
+    Range range({0.5});
+    range.add(20, 0, 10);
+    for (const LidarReturn& r : range.shoot({.range_bias_m = -0.25}, 20)) EXPECT_NEAR(r.range_m, 19.75, 1e-9);
+    for (const LidarReturn& r : range.shoot({.range_bias_m = -20.5}, 20)) EXPECT_EQ(r.body, -1);
+}
+
 TEST(LidarReceiver, DrawsDependOnSeedAndShotAlone) {
     Range range({0.5});
     range.add(20, 0.4, 10);

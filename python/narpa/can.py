@@ -240,6 +240,8 @@ def open_python_can(name, fd, patience_s=0):
         settings = {"interface": "slcan", "channel": f"socket://{host or '127.0.0.1'}:{port}", "sleep_after_open": 0.1}
     elif name.startswith("udp:"):
         settings = {"interface": "udp_multicast", "channel": name.removeprefix("udp:")}
+    elif ":" in name:
+        raise ValueError(f"no bus {name!r}, expected slcan:[HOST:]PORT, udp:GROUP, or an interface like vcan0")
     else:
         settings = {"interface": "socketcan", "channel": name, "fd": fd}
     until = time.monotonic() + patience_s

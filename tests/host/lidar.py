@@ -118,7 +118,7 @@ ranges = [shot["range_m"] for shot, _, _ in sweeps[SWEEP]]
 expect(len(truth) > 4 * 28000, f"narpa scan lists {len(truth)} shots")
 expect(len(ranges) > 5000 and max(ranges) < 6.5, f"sweep {SWEEP} has {len(ranges)} hits up to {max(ranges):.2f} m")
 
-can_port, udp_port = support.free_port(), support.free_port()
+can_port, udp_port = support.free_port(), support.free_lidar_port()
 receiver = subprocess.Popen([RECEIVER, "udp", "127.0.0.1", str(udp_port), str(SWEEP + 1), "60"], stdout=subprocess.PIPE, text=True)
 expect(receiver.stdout.readline() == "ready\n", "PCL listens")
 lidar = ("--lidar", f"{support.LIDAR}=udp:127.0.0.1:{udp_port}", "--lidar", f"{support.LIDAR}={capture}")

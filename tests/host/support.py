@@ -20,6 +20,7 @@ NARPA = os.environ["NARPA_BIN"]
 SCENE = Path(__file__).resolve().parent / "scene/bench.toml"
 BODY, CAN_ID, CAMERA, LIDAR = "chaser", 0x100, "nav", "top"  # of that scene
 WIDTH, HEIGHT, PERIOD_NS = 160, 120, 100_000_000
+POSITION_PORT_OFFSET = 5940  # of a VLP-16: factory ports 2368 and 8308
 PIXEL_BYTES = {"GREY": 1, "Y16": 2, "YUYV": 2, "RGB24": 3}
 
 
@@ -49,6 +50,20 @@ def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         return s.getsockname()[1]
+
+
+def free_lidar_port():
+    """A free UDP port for data packets, with the VLP-16's position port above it free too: both below the ports that the
+    system gives to outgoing connections, so that no other program takes one in between."""
+    for data in range(20_000 + os.getpid() % 1000, 26_000):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as t:
+            try:
+                s.bind(("127.0.0.1", data))
+                t.bind(("127.0.0.1", data + POSITION_PORT_OFFSET))
+                return data
+            except OSError:
+                continue
+    raise OSError("no pair of free UDP ports on the loopback")
 
 
 def scene_with(folder, pixel_format):

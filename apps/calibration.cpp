@@ -37,7 +37,7 @@ nlohmann::json describe(const Scene& scene, const Camera& c) {
 nlohmann::json describe(const Scene& scene, const Lidar& l) {
     nlohmann::json lidar{{"name", l.name},
                          {"model", std::string(l.model->spec().name)},
-                         {"rate_hz", l.rate_hz},
+                         {"rate_hz", l.model->spec().rate_hz},
                          {"range_max_m", l.range_max_m}};
     lidar.update(mounting(scene, l.mount, l.T_mount_lidar));
     return lidar;

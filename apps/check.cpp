@@ -111,7 +111,7 @@ nlohmann::json describe(const World& world) {
                            {"detector", c.detector.has_value()},
                            {"lens", c.lens.has_value()}});
     for (const Lidar& l : s.lidars)
-        lidars.push_back({{"name", l.name}, {"model", l.model->spec().name}, {"rate_hz", l.rate_hz}});
+        lidars.push_back({{"name", l.name}, {"model", l.model->spec().name}, {"rate_hz", l.model->spec().rate_hz}});
     for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
     const std::size_t stars = s.stars ? s.stars->stars.size() : 0;
     nlohmann::json render{{"method", name_of(s.render.method, kMethods)}};
@@ -200,7 +200,8 @@ void print_scene(const World& world) {
             say(fmt::format("  camera {}: {} stars in its view at time 0", c.name, stars_in_view(world, c)));
     }
     for (const Lidar& l : s.lidars)
-        say(fmt::format("  lidar {}: {} at {} turns per second", l.name, l.model->spec().name, l.rate_hz));
+        say(fmt::format("  lidar {}: {} at {} turns per second", l.name, l.model->spec().name,
+                        l.model->spec().rate_hz));
 }
 
 Status save_dbc(const Scene& scene, const std::string& path) {
@@ -250,10 +251,11 @@ std::vector<Ray> rays_of(const Camera& c) {
 
 /// The shots of a turn.
 std::vector<Ray> rays_of(const Lidar& l) {
-    std::vector<LidarShot> shots(l.model->spec().shots_per_packet);
+    const LidarSpec& spec = l.model->spec();
+    std::vector<LidarShot> shots(spec.shots_per_packet);
     std::vector<Ray> rays;
-    for (std::int64_t p = 0; static_cast<double>(l.model->packet_start_ns(p, l.rate_hz)) < 1e9 / l.rate_hz; ++p) {
-        l.model->shots(p, l.rate_hz, shots);
+    for (std::int64_t p = 0; static_cast<double>(l.model->packet_start_ns(p)) < 1e9 / spec.rate_hz; ++p) {
+        l.model->shots(p, shots);
         for (const LidarShot& s : shots) rays.push_back({s.origin_m, s.direction});
     }
     return rays;

@@ -160,14 +160,14 @@ Result<std::vector<RangePoint>> points_of(const std::string& path, const Lidar& 
     auto datagrams = read_datagrams(path, spec.data_packet_bytes);
     if (!datagrams) return datagrams.error();
     std::vector<RangePoint> points;
-    std::vector<LidarPoint> decoded(spec.shots_per_packet);
+    std::vector<LidarPoint> decoded(spec.points_per_packet);
     std::optional<std::int64_t> first_ns;
     for (const auto& bytes : *datagrams) {
         const auto time_ns = lidar.model->packet_time(bytes, first_ns.value_or(0));
         if (!time_ns) continue;
         if (!first_ns) first_ns = time_ns;
         const std::int64_t after_ns = *time_ns - *first_ns;
-        if (after_ns < 0 || static_cast<double>(after_ns) >= 1e9 / lidar.rate_hz) break;
+        if (after_ns < 0 || static_cast<double>(after_ns) >= 1e9 / lidar.model->spec().rate_hz) break;
         append_points(std::span(decoded).first(lidar.model->points(bytes, decoded)), after_ns, points);
     }
     if (!first_ns)

@@ -1,6 +1,7 @@
 // narpa scan - what one LiDAR measures during a turn (or longer), as a point cloud, a table of shots or a capture.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -11,7 +12,6 @@
 #include "apps/scene_options.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
-#include "renderer/lidar/lidar_shot.h"
 
 namespace narpa::cli {
 namespace {
@@ -25,25 +25,35 @@ struct ScanOptions {
 /// An output file: receives every packet, then is closed.
 using Writer = std::function<void(std::int64_t packet, LidarUnit& unit)>;
 
-/// One row per shot, with or without a return: the truth behind the packets.
+constexpr const char* kColumns =
+    "t_ns,packet,block,laser,azimuth_rad,elevation_rad,range_m,x_m,y_m,z_m,reflectivity,body,incidence_rad,"
+    "velocity_m_s,reported_range_m,reported_reflectivity,reported_velocity_m_s,second_range_m,second_"
+    "reflectivity\n";
+
+/// One row per shot, with or without a return: the truth of the beam's axis, then what the packets state of it,
+/// before rounding.
 void write_shots(std::ostream& out, std::int64_t packet, const LidarUnit& unit) {
     for (std::size_t i = 0; i < unit.shots().size(); ++i) {
         const LidarShot& s = unit.shots()[i];
-        const LidarReturn& r = unit.hits()[i];
+        const LidarReturn& r = unit.truth()[i];
+        const auto [first, second] = unit.echoes()[i].reported(unit.spec().returns);
         const Vec3 p = s.origin_m + r.range_m * s.direction;
-        out << fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", unit.packet_start_ns(packet) + s.t_offset_ns,
-                           packet, s.block, s.beam, s.azimuth_rad, s.elevation_rad, r.range_m, p.x, p.y, p.z,
-                           r.reflectivity, r.range_m > 0 ? r.body : -1);
+        const double incidence_rad = std::acos(std::clamp(static_cast<double>(r.cos_incidence), 0.0, 1.0));
+        out << fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                           unit.packet_start_ns(packet) + s.t_offset_ns, packet, s.block, s.beam, s.azimuth_rad,
+                           s.elevation_rad, r.range_m, p.x, p.y, p.z, r.reflectivity, r.range_m > 0 ? r.body : -1,
+                           incidence_rad, r.velocity_m_s, first.range_m, first.reflectivity, first.velocity_m_s,
+                           second.range_m, second.reflectivity);
     }
 }
 
 /// The lines of the packet's returns: x, y, z in the LiDAR's frame, reflectivity.
 void add_points(const LidarUnit& unit, std::vector<std::string>& lines) {
-    for (std::size_t i = 0; i < unit.shots().size(); ++i) {
-        const LidarReturn& r = unit.hits()[i];
-        const Vec3f p = vec_cast<float>(unit.shots()[i].origin_m + r.range_m * unit.shots()[i].direction);
-        if (r.range_m > 0) lines.push_back(fmt::format("{} {} {} {}\n", p.x, p.y, p.z, r.reflectivity));
-    }
+    for (std::size_t i = 0; i < unit.shots().size(); ++i)
+        for (const LidarEcho& e : unit.echoes()[i].reported(unit.spec().returns)) {
+            const Vec3f p = vec_cast<float>(unit.shots()[i].origin_m + e.range_m * unit.shots()[i].direction);
+            if (e.range_m > 0) lines.push_back(fmt::format("{} {} {} {}\n", p.x, p.y, p.z, e.reflectivity));
+        }
 }
 
 /// ASCII; both formats begin with the number of points.
@@ -67,7 +77,7 @@ Status write_text(const std::string& path, const std::string& extension, const F
     std::ofstream out(path);
     if (!out) return Error{"cannot be written", path};
     if (extension == ".csv") {
-        out << "t_ns,packet,block,laser,azimuth_rad,elevation_rad,range_m,x_m,y_m,z_m,reflectivity,body\n";
+        out << kColumns;
         fire_all([&](std::int64_t packet, const LidarUnit& unit) { write_shots(out, packet, unit); });
     } else {
         std::vector<std::string> lines;
@@ -82,7 +92,7 @@ Status write_text(const std::string& path, const std::string& extension, const F
 /// The packets themselves.
 Status write_capture(const std::string& path, const LidarUnit& of, std::int64_t epoch_unix_ns,
                      const FireAll& fire_all) {
-    auto sink = open_packet_sink(path, of.lidar().model->spec().network, epoch_unix_ns, true);
+    auto sink = open_packet_sink(path, of.spec().network, epoch_unix_ns, true);
     if (!sink) return sink.error();
     fire_all([&](std::int64_t packet, LidarUnit& unit) {
         const std::int64_t t_ns = unit.t_sent_ns(packet);
@@ -108,11 +118,12 @@ Outcome scan(const ScanOptions& o) {
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
 
-    const double duration_s = o.duration_s > 0 ? o.duration_s : 1 / (*world)->scene().lidars[*index].rate_hz;
+    const double duration_s =
+        o.duration_s > 0 ? o.duration_s : 1 / (*world)->scene().lidars[*index].model->spec().rate_hz;
     const std::int64_t from_ns = std::llround(o.time_s * 1e9), to_ns = from_ns + std::llround(duration_s * 1e9);
     if (auto loaded = o.pose.load(**world, from_ns, to_ns); !loaded) return loaded.error();
     if (auto made = make_folder_of(o.out); !made) return made.error();
-    LidarUnit unit(**world, *index);
+    LidarUnit unit(**world, *index, extension == ".csv");
 
     std::size_t packets = 0, shots = 0, returns = 0;
     Progress progress("scanning to " + o.out);
@@ -155,7 +166,8 @@ Command add_scan(Parser app) {
     c.option("--duration", o->duration_s, "How long (default: one turn)").type_name("SECONDS").range(0.0, 3600.0);
     o->pose.add_to(c);
     c.option("-o,--output", o->out,
-             "FILE.ply or .pcd (the returns as points), .csv (a row for each shot, ranges unquantised), .pcap "
+             "FILE.ply or .pcd (the returns as points), .csv (a row for each shot: the truth, and what is reported "
+             "of it before rounding), .pcap "
              "(packets)")
         .type_name("FILE")
         .required();

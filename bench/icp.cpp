@@ -6,7 +6,7 @@
 
 #include "bench/statistics.h"
 #include "estimator/cloud/cloud_icp.h"
-#include "protocols/lidar/lidar_model.h"
+#include "protocols/lidar/velodyne.h"
 
 namespace narpa {
 namespace {
@@ -29,8 +29,7 @@ public:
           random_(1'000'003 + stream),
           placement_(world.scene().bodies.size()),
           shots_(model_.spec().shots_per_packet),
-          range_m_(shots_.size()),
-          reflectivity_(shots_.size()),
+          echoes_(shots_.size()),
           points_(shots_.size()),
           bytes_(model_.spec().data_packet_bytes) {}
 
@@ -67,19 +66,19 @@ public:
     void scan(const Rigid3& T_lidar_target, const ApparentMotion& motion, std::vector<RangePoint>& out) {
         const auto turn_ns = static_cast<std::int64_t>(1e9 / kRotation_hz);
         out.clear();
-        const std::int64_t period_ns = model_.packet_period_ns(kRotation_hz);
+        const std::int64_t period_ns = model_.spec().packet_period_ns;
         const std::int64_t first = turn_ns / 2 / period_ns, last = 3 * turn_ns / 2 / period_ns;
         Vector6 rate;
         rate << to_eigen(motion.rate_rad_s), to_eigen(motion.velocity_m_s);
         for (std::int64_t packet = first; packet < last; ++packet) {
-            model_.shots(packet, kRotation_hz, shots_);
+            model_.shots(packet, shots_);
             const std::int64_t after_ns = packet * period_ns - turn_ns;
             for (std::size_t i = 0; i < shots_.size(); ++i) {
                 const double t_s = 1e-9 * static_cast<double>(after_ns + shots_[i].t_offset_ns);
                 placement_.set(target_, displaced(T_lidar_target, t_s * rate));
-                range_m_[i] = range_of({shots_[i].origin_m, shots_[i].direction});
+                echoes_[i].strongest.range_m = range_of({shots_[i].origin_m, shots_[i].direction});
             }
-            model_.encode(packet, kRotation_hz, 0, range_m_, reflectivity_, bytes_);
+            model_.encode(packet, 0, echoes_, bytes_);
             append_points(std::span(points_).first(model_.points(bytes_, points_)), after_ns, out);
         }
     }
@@ -99,12 +98,12 @@ private:
 
     const World& world_;
     std::size_t target_;
-    const LidarModel& model_ = *lidar_models().front();
+    std::shared_ptr<const LidarModel> unit_ = vlp16().configure({.rate_hz = kRotation_hz});
+    const LidarModel& model_ = *unit_;
     std::mt19937_64 random_;
     BodyPoses placement_;
     std::vector<LidarShot> shots_;
-    std::vector<double> range_m_;
-    std::vector<float> reflectivity_;
+    std::vector<LidarEchoes> echoes_;
     std::vector<LidarPoint> points_;
     std::vector<std::uint8_t> bytes_;
 };
@@ -142,7 +141,7 @@ std::vector<IcpRun> run_icp(const World& world, std::size_t target, const std::v
                             const std::function<void(int, int)>& progress) {
     IcpSettings settings;
     settings.noise.range_m =
-        std::hypot(kRangeNoise_m, lidar_models().front()->spec().range_resolution_m / std::sqrt(12.0));
+        std::hypot(kRangeNoise_m, vlp16().configure_default()->spec().range_resolution_m / std::sqrt(12.0));
     CloudIcp icp(world.tracer(), target, settings);
 
     int done = 0, all = 0;

@@ -43,7 +43,7 @@ public:
     [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }
     [[nodiscard]] double sweeps() const noexcept {
         return static_cast<double>(stats_.packets) * static_cast<double>(unit_.packet_period_ns()) * 1e-9 *
-               unit_.lidar().rate_hz;
+               unit_.spec().rate_hz;
     }
     [[nodiscard]] const std::vector<std::unique_ptr<PacketSink>>& sinks() const noexcept { return sinks_; }
 

@@ -18,29 +18,28 @@ std::size_t batch_size(std::span<const LidarShot> shots) noexcept {
 
 }  // namespace
 
-LidarUnit::LidarUnit(const World& world, std::size_t index)
+LidarUnit::LidarUnit(const World& world, std::size_t index, bool truth)
     : world_(world),
       lidar_(world.scene().lidars[index]),
       model_(*lidar_.model),
-      period_ns_(model_.packet_period_ns(lidar_.rate_hz)),
-      receiver_(lidar_.receiver, lidar_.range_max_m, world.scene().render.seed, index),
+      receiver_(lidar_, world.scene().render.seed, index),
       placement_(world.scene().bodies.size()),
-      shots_(model_.spec().shots_per_packet),
-      hits_(shots_.size()),
-      ranges_m_(shots_.size()),
-      reflectivities_(shots_.size()),
-      bytes_(model_.spec().data_packet_bytes),
-      position_(model_.spec().position_packet_bytes) {
+      motions_(truth || spec().measures_velocity ? world.scene().bodies.size() : 0),
+      shots_(spec().shots_per_packet),
+      echoes_(shots_.size()),
+      truth_(truth ? shots_.size() : 0),
+      bytes_(spec().data_packet_bytes),
+      position_(spec().position_packet_bytes) {
     world_.place(0, lidar_.mount, placement_);
 }
 
 void LidarUnit::fire(std::int64_t packet) noexcept {
-    model_.shots(packet, lidar_.rate_hz, shots_);
-    returns_ = 0;
+    model_.shots(packet, shots_);
     const std::int64_t start_ns = packet_start_ns(packet);
     for (std::size_t first = 0; first < shots_.size();) {
         const auto rest = std::span(shots_).subspan(first), shots = rest.first(batch_size(rest));
         const std::int64_t begin_ns = shots.front().t_offset_ns, end_ns = shots.back().t_offset_ns;
+        if (!motions_.empty()) world_.place(start_ns + (begin_ns + end_ns) / 2, lidar_.mount, placement_, motions_);
         world_.place_moving(start_ns + begin_ns, start_ns + end_ns, placement_);
         RayBatch beams;
         for (const LidarShot& shot : shots) {
@@ -50,20 +49,25 @@ void LidarUnit::fire(std::int64_t packet) noexcept {
             beams.put(beams.n++, {T_world_lidar * shot.origin_m, T_world_lidar.q * shot.direction, time});
         }
         const auto number = static_cast<std::uint64_t>(packet) * shots_.size() + first;
-        receiver_.receive(world_.tracer(), placement_, beams, number,
-                          std::span(hits_).subspan(first, shots.size()));
+        receiver_.receive(world_.tracer(), placement_, beams, number, motions_,
+                          std::span(echoes_).subspan(first, shots.size()));
+        if (!truth_.empty())
+            shoot(world_.tracer(), placement_, beams,
+                  {.range_max_m = lidar_.range_max_m,
+                   .multipath = lidar_.receiver.multipath,
+                   .motions = motions_,
+                   .mount = lidar_.mount},
+                  std::span(truth_).subspan(first, shots.size()));
         first += shots.size();
     }
-    for (std::size_t i = 0; i < shots_.size(); ++i) {
-        ranges_m_[i] = hits_[i].range_m;
-        reflectivities_[i] = hits_[i].reflectivity;
-        returns_ += hits_[i].range_m > 0;
-    }
-    model_.encode(packet, lidar_.rate_hz, world_.scene().epoch_unix_ns, ranges_m_, reflectivities_, bytes_);
+    returns_ = 0;
+    for (const LidarEchoes& e : echoes_)
+        for (const LidarEcho& reported : e.reported(spec().returns)) returns_ += reported.range_m > 0 ? 1 : 0;
+    model_.encode(packet, world_.scene().epoch_unix_ns, echoes_, bytes_);
 }
 
 std::span<const std::uint8_t> LidarUnit::position(std::int64_t packet) noexcept {
-    if (position_.empty() || packet % model_.spec().data_packets_per_position != 0) return {};
+    if (position_.empty() || packet % spec().data_packets_per_position != 0) return {};
     model_.encode_position(world_.scene().epoch_unix_ns + t_sent_ns(packet), position_);
     return position_;
 }

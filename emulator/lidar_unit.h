@@ -13,15 +13,19 @@ namespace narpa {
 
 class LidarUnit {
 public:
-    /// `world` must outlive the unit. Allocates here and never again.
-    LidarUnit(const World& world, std::size_t index);
+    /// `world` must outlive the unit. `truth`: for each shot too, at the cost of a second ray where the beam has
+    /// sub-rays. Allocates here and never again.
+    LidarUnit(const World& world, std::size_t index, bool truth = false);
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
-    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet) const noexcept { return packet * period_ns_; }
-    [[nodiscard]] std::int64_t packet_period_ns() const noexcept { return period_ns_; }
+    [[nodiscard]] const LidarSpec& spec() const noexcept { return model_.spec(); }
+    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet) const noexcept {
+        return model_.packet_start_ns(packet);
+    }
+    [[nodiscard]] std::int64_t packet_period_ns() const noexcept { return spec().packet_period_ns; }
     /// The first packet that starts at t_ns >= 0 or later.
     [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns) const noexcept {
-        return model_.first_packet_from(t_ns, lidar_.rate_hz);
+        return model_.first_packet_from(t_ns);
     }
     /// A packet is sent when it is complete, which is when the next one starts.
     [[nodiscard]] std::int64_t t_sent_ns(std::int64_t packet) const noexcept { return packet_start_ns(packet + 1); }
@@ -31,9 +35,11 @@ public:
     /// The packet just fired, as it goes out.
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] std::size_t returns() const noexcept { return returns_; }
-    /// What the packet states: shots and their returns, before quantisation.
+    /// Of the packet: its shots, and what the unit reports of each, before rounding.
     [[nodiscard]] std::span<const LidarShot> shots() const noexcept { return shots_; }
-    [[nodiscard]] std::span<const LidarReturn> hits() const noexcept { return hits_; }
+    [[nodiscard]] std::span<const LidarEchoes> echoes() const noexcept { return echoes_; }
+    /// What the axis of each shot meets: exact ranges, bodies, velocities. Empty without `truth`.
+    [[nodiscard]] std::span<const LidarReturn> truth() const noexcept { return truth_; }
 
     /// The position packet that follows this data packet; empty where none does.
     [[nodiscard]] std::span<const std::uint8_t> position(std::int64_t packet) noexcept;
@@ -42,14 +48,13 @@ private:
     const World& world_;
     Lidar lidar_;
     const LidarModel& model_;
-    std::int64_t period_ns_;
     LidarReceiver receiver_;
     BodyPoses placement_;
+    std::vector<Motion> motions_;  ///< empty where no velocity is wanted
     std::size_t returns_ = 0;
     std::vector<LidarShot> shots_;
-    std::vector<LidarReturn> hits_;
-    std::vector<double> ranges_m_;
-    std::vector<float> reflectivities_;
+    std::vector<LidarEchoes> echoes_;
+    std::vector<LidarReturn> truth_;
     std::vector<std::uint8_t> bytes_, position_;
 };
 

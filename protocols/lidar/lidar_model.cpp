@@ -1,31 +1,29 @@
 #include "protocols/lidar/lidar_model.h"
 
-#include <vector>
-
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 
 namespace narpa {
 namespace {
 
-std::vector<const LidarModel*>& models() {
-    static std::vector<const LidarModel*> all{&vlp16()};
+std::vector<const LidarMake*>& makes() {
+    static std::vector<const LidarMake*> all{&vlp16(), &hdl32e()};
     return all;
 }
 
 }  // namespace
 
-std::span<const LidarModel* const> lidar_models() noexcept {
-    return models();
+std::span<const LidarMake* const> lidar_makes() noexcept {
+    return makes();
 }
 
-const LidarModel* find_lidar_model(std::string_view name) noexcept {
-    for (const LidarModel* model : models())
-        if (model->spec().name == name) return model;
+const LidarMake* find_lidar_make(std::string_view name) noexcept {
+    for (const LidarMake* make : makes())
+        if (make->name == name) return make;
     return nullptr;
 }
 
-void add_lidar_model(const LidarModel& model) {
-    models().push_back(&model);
+void add_lidar_make(const LidarMake& make) {
+    makes().push_back(&make);
 }
 
 }  // namespace narpa

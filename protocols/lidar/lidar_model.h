@@ -1,18 +1,22 @@
-/// protocols/lidar/lidar_model.h - the interface of a LiDAR model: when and where its beams fire, and its packets.
+/// protocols/lidar/lidar_model.h - the interface of a LiDAR: when and where its beams fire, and its packets.
 ///
-/// A model is a stateless object of static lifetime. Adding one takes a pair of files that implement LidarModel and
-/// a line in lidar_model.cpp; a program or a test may add its own at start with add_lidar_model().
+/// A LidarMake is an instrument that scenes name. `configure` makes a LidarModel of it: one unit with its settings,
+/// whose members never allocate or throw. Adding a make takes a pair of files that implement LidarModel and a line
+/// in lidar_model.cpp; a program or a test may add its own at start with add_lidar_make().
 ///
 /// Frame: x right, y forward, z up, as `look_at` in a scene assumes. Packet p = 0, 1, ... starts p periods after
-/// simulation time 0. Nothing here allocates or throws.
+/// simulation time 0.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "base/vec3.h"
 
@@ -20,7 +24,7 @@ namespace narpa {
 
 /// One laser pulse, in the LiDAR's frame.
 struct LidarShot {
-    std::int64_t t_offset_ns = 0;               ///< after the packet's first shot
+    std::int64_t t_offset_ns = 0;               ///< after the packet's start
     Vec3 origin_m{};                            ///< where the ray starts; its range counts from here
     Vec3 direction{};                           ///< unit
     double azimuth_rad = 0, elevation_rad = 0;  ///< the direction in the maker's angles
@@ -28,13 +32,42 @@ struct LidarShot {
     int block = 0;                              ///< of the packet
 };
 
+/// One echo of a shot as the receiver measures it, before a packet rounds it.
+struct LidarEcho {
+    double range_m = 0;  ///< 0, negative or NaN: no echo
+    /// Of a diffuse surface across the beam that would send as much light back from there; 1 = 100 %.
+    /// Retroreflectors are above 1.
+    float reflectivity = 0;
+    double velocity_m_s = 0;  ///< of the surface along the beam, receding is positive; 0 where it is not measured
+};
+
+enum class LidarReturns : std::uint8_t {
+    strongest,
+    last,  ///< the farthest
+    dual,  ///< both; where they are the same, the second strongest beside it
+};
+
+/// What comes back of one shot. Where there is one echo, it is `strongest` and `last`, and `second` is none.
+struct LidarEchoes {
+    LidarEcho strongest, second, last;
+
+    /// What a unit reports: first the last of two where both are wanted, the echo or none, and none.
+    [[nodiscard]] std::array<LidarEcho, 2> reported(LidarReturns returns) const noexcept {
+        if (returns == LidarReturns::strongest) return {strongest, LidarEcho{}};
+        if (returns == LidarReturns::last) return {last, LidarEcho{}};
+        return {last, strongest.range_m == last.range_m ? second : strongest};
+    }
+};
+
 /// One return, as a reader of the packet computes it.
 struct LidarPoint {
     Vec3 origin_m{}, direction{};  ///< the beam; direction is unit
     double range_m = 0;            ///< > 0
-    std::int64_t t_offset_ns = 0;  ///< after the packet's first shot
+    std::int64_t t_offset_ns = 0;  ///< after the packet's start
     int intensity = 0;             ///< on the maker's scale
     int beam = 0, shot = 0;        ///< laser number; index among the packet's shots
+    int echo = 0;                  ///< 0, and 1 for the second one that a packet states of a shot
+    double velocity_m_s = 0;       ///< as in LidarEcho
 
     [[nodiscard]] Vec3 position_m() const noexcept { return origin_m + range_m * direction; }
 };
@@ -51,71 +84,103 @@ struct LidarNetwork {
     }
 };
 
+/// State of the pulse per second that a unit takes its time from.
+enum class LidarPps : std::uint8_t { absent, synchronising, locked, error };
+
+/// A unit's own correction of one beam, as its calibration file has it.
+struct LidarBeam {
+    double elevation_rad = 0;
+    double azimuth_rad = 0;     ///< added to the rotor's; clockwise
+    double range_offset_m = 0;  ///< added by readers to the range of a packet
+    double height_m = 0;        ///< of the beam's origin above the sensor's
+};
+
+/// How a unit is set. Members that its make does not have are ignored.
+struct LidarSettings {
+    double rate_hz = 0;  ///< turns or frames a second, within the make's limits
+    LidarReturns returns = LidarReturns::strongest;
+    LidarPps pps = LidarPps::locked;
+    std::vector<LidarBeam> beams{};  ///< of this unit, by laser number; empty: those of the make
+};
+
+/// Of one configured unit.
 struct LidarSpec {
-    std::string_view name;  ///< `model` of a scene's [[lidar]]
+    std::string_view name;  ///< of the make
+    double rate_hz = 0;
+    LidarReturns returns = LidarReturns::strongest;
+    std::int64_t packet_period_ns = 0;  ///< from one packet's start to the next one's
     std::size_t shots_per_packet = 0;
+    std::size_t points_per_packet = 0;  ///< at most
     std::size_t data_packet_bytes = 0;
-    std::size_t position_packet_bytes = 0;  ///< 0: the model sends none
+    std::size_t position_packet_bytes = 0;  ///< 0: the unit sends none
     int data_packets_per_position = 0;      ///< a position packet follows every n-th data packet
-    double rate_hz_min = 0, rate_hz_max = 0, rate_hz_default = 0;  ///< turns (sweeps) a second
-    double range_m_max = 0;                                        ///< the largest range that a packet can hold
-    double range_m_default = 0;                                    ///< the maker's rated range
-    double range_resolution_m = 0;                                 ///< ranges in packets are multiples of it
-    std::int64_t time_resolution_ns = 1;  ///< of a packet's time stamp, which is rounded down
+    double range_m_max = 0;                 ///< the largest range that a packet can hold
+    double range_resolution_m = 0;          ///< ranges in packets are multiples of it
+    std::int64_t time_resolution_ns = 1;    ///< of a packet's time stamp, which is rounded down
+    bool measures_velocity = false;
     LidarNetwork network{};
 };
 
 class LidarModel {
 public:
-    explicit constexpr LidarModel(const LidarSpec& spec) noexcept : spec_(spec) {}
+    explicit LidarModel(const LidarSpec& spec) noexcept : spec_(spec) {}
     LidarModel(const LidarModel&) = delete;
     LidarModel& operator=(const LidarModel&) = delete;
+    virtual ~LidarModel() = default;
 
     [[nodiscard]] const LidarSpec& spec() const noexcept { return spec_; }
-
-    /// From one packet's first shot to the next one's. `rate_hz` is within the spec's limits, here and below.
-    [[nodiscard]] virtual std::int64_t packet_period_ns(double rate_hz) const noexcept = 0;
-    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet, double rate_hz) const noexcept {
-        return packet * packet_period_ns(rate_hz);
+    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet) const noexcept {
+        return packet * spec_.packet_period_ns;
     }
     /// The first packet that starts at t_ns >= 0 or later.
-    [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns, double rate_hz) const noexcept {
-        const std::int64_t period_ns = packet_period_ns(rate_hz);
-        return (t_ns + period_ns - 1) / period_ns;
+    [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns) const noexcept {
+        return (t_ns + spec_.packet_period_ns - 1) / spec_.packet_period_ns;
     }
 
     /// Firing pattern: the packet's shots in firing order. `out` has spec().shots_per_packet elements.
-    virtual void shots(std::int64_t packet, double rate_hz, std::span<LidarShot> out) const noexcept = 0;
+    virtual void shots(std::int64_t packet, std::span<LidarShot> out) const noexcept = 0;
 
-    /// Writes a data packet of spec().data_packet_bytes. `range_m` and `reflectivity` have an element per shot. A
-    /// range that is 0, negative, NaN or above range_m_max is no return. Reflectivity is that of a diffuse surface,
-    /// 1 = 100 %. `epoch_unix_ns`: UTC of simulation time 0, ns since 1970.
-    virtual void encode(std::int64_t packet, double rate_hz, std::int64_t epoch_unix_ns,
-                        std::span<const double> range_m, std::span<const float> reflectivity,
+    /// Writes a data packet of spec().data_packet_bytes. `echoes` has an element per shot. A range above
+    /// range_m_max is no echo. `epoch_unix_ns`: UTC of simulation time 0, ns since 1970.
+    virtual void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
                         std::span<std::uint8_t> out) const noexcept = 0;
     /// Writes the position (status) packet of this instant, of spec().position_packet_bytes.
-    virtual void encode_position(std::int64_t unix_ns, std::span<std::uint8_t> out) const noexcept = 0;
+    virtual void encode_position(std::int64_t /*unix_ns*/, std::span<std::uint8_t> /*out*/) const noexcept {}
 
-    /// UTC of a data packet's first shot, ns since 1970. Where the stamp is ambiguous: the time nearest to
-    /// `near_unix_ns`. Nothing: these bytes are not a data packet of this model.
+    /// UTC of a data packet's start, ns since 1970. Where the stamp is ambiguous: the time nearest to
+    /// `near_unix_ns`. Nothing: these bytes are not a data packet of this unit.
     [[nodiscard]] virtual std::optional<std::int64_t> packet_time(std::span<const std::uint8_t> bytes,
                                                                   std::int64_t near_unix_ns) const noexcept = 0;
     /// Decodes a data packet's returns in firing order and returns their number; 0 where it is no data packet of
-    /// this model. `out` has spec().shots_per_packet elements.
+    /// this unit. `out` has spec().points_per_packet elements.
     virtual std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept = 0;
-
-protected:
-    ~LidarModel() = default;
 
 private:
     LidarSpec spec_;
 };
 
-/// All models, the built-in ones first.
-[[nodiscard]] std::span<const LidarModel* const> lidar_models() noexcept;
-/// The model of this name; null where there is none.
-[[nodiscard]] const LidarModel* find_lidar_model(std::string_view name) noexcept;
-/// Adds a model that outlives the program's use of it. Before any scene is read and any thread is started.
-void add_lidar_model(const LidarModel& model);
+/// An instrument as its maker sells it.
+struct LidarMake {
+    std::string_view name;  ///< `model` of a scene's [[lidar]]
+    double rate_hz_min = 0, rate_hz_max = 0, rate_hz_default = 0;
+    double range_m_max = 0, range_m_default = 0;  ///< the largest that a packet can hold; the maker's rated range
+    std::size_t beams = 0;                        ///< of a calibration file; 0: takes none
+    bool dual = false;                            ///< has dual returns
+    LidarNetwork network{};
+    /// `settings` are within the limits above.
+    std::function<std::shared_ptr<const LidarModel>(const LidarSettings& settings)> configure;
+
+    /// Set as delivered.
+    [[nodiscard]] std::shared_ptr<const LidarModel> configure_default() const {
+        return configure({.rate_hz = rate_hz_default});
+    }
+};
+
+/// All makes, the built-in ones first.
+[[nodiscard]] std::span<const LidarMake* const> lidar_makes() noexcept;
+/// The make of this name; null where there is none.
+[[nodiscard]] const LidarMake* find_lidar_make(std::string_view name) noexcept;
+/// Adds a make that outlives the program's use of it. Before any scene is read and any thread is started.
+void add_lidar_make(const LidarMake& make);
 
 }  // namespace narpa

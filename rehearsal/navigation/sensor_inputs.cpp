@@ -16,13 +16,12 @@ constexpr std::int64_t kKept_ns = 3'000'000'000;
 
 SweepBuffer::SweepBuffer(const Lidar& lidar, std::int64_t epoch_unix_ns)
     : model_(lidar.model),
-      rate_hz_(lidar.rate_hz),
-      turn_ns_(std::llround(1e9 / lidar.rate_hz)),
-      period_ns_(model_->packet_period_ns(lidar.rate_hz)),
+      turn_ns_(std::llround(1e9 / model_->spec().rate_hz)),
+      period_ns_(model_->spec().packet_period_ns),
       epoch_unix_ns_(epoch_unix_ns) {}
 
 std::int64_t SweepBuffer::start_ns(std::int64_t stamp_ns) const noexcept {
-    const std::int64_t next_ns = model_->packet_start_ns(model_->first_packet_from(stamp_ns, rate_hz_), rate_hz_);
+    const std::int64_t next_ns = model_->packet_start_ns(model_->first_packet_from(stamp_ns));
     return next_ns - stamp_ns < model_->spec().time_resolution_ns ? next_ns : stamp_ns;
 }
 
@@ -44,7 +43,7 @@ bool SweepBuffer::complete_to(std::int64_t t_ns) const noexcept {
 
 void SweepBuffer::turn(std::int64_t t_ns, std::vector<RangePoint>& out) const {
     out.clear();
-    std::vector<LidarPoint> decoded(model_->spec().shots_per_packet);
+    std::vector<LidarPoint> decoded(model_->spec().points_per_packet);
     for (const Packet& p : packets_)
         if (p.t_ns >= t_ns - turn_ns_ && p.t_ns + period_ns_ <= t_ns)
             append_points(std::span(decoded).first(model_->points(p.bytes, decoded)), p.t_ns - t_ns, out);

@@ -42,8 +42,7 @@ private:
     /// The packet's exact start: its time stamp is rounded down.
     [[nodiscard]] std::int64_t start_ns(std::int64_t stamp_ns) const noexcept;
 
-    const LidarModel* model_;
-    double rate_hz_;
+    std::shared_ptr<const LidarModel> model_;
     std::int64_t turn_ns_, period_ns_, epoch_unix_ns_;
     std::deque<Packet> packets_;
     std::uint64_t received_ = 0, bad_ = 0;

@@ -15,11 +15,10 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// The last port from which every model's position port can still be reached.
+/// The last port from which every make's position port can still be reached.
 int last_data_port() {
     int offset = 0;
-    for (const LidarModel* model : lidar_models())
-        offset = std::max(offset, model->spec().network.position_port_offset());
+    for (const LidarMake* make : lidar_makes()) offset = std::max(offset, make->network.position_port_offset());
     return 65535 - offset;
 }
 

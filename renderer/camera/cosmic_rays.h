@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <span>
 
-#include "renderer/camera/counter_random.h"
+#include "base/counter_random.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "renderer/camera/counter_random.h"
+#include "base/counter_random.h"
 
 namespace narpa {
 

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "renderer/camera/counter_random.h"
+#include "base/counter_random.h"
 #include "renderer/image/radiance_image.h"
 #include "renderer/scene/scene.h"
 

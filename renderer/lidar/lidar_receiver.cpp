@@ -4,21 +4,19 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/constants.h"
+
 namespace narpa {
 namespace {
 
 /// Sub-rays whose ranges are farther apart than so many times their mean distance are of different surfaces.
 constexpr double kMeanSpacings = 4;
-constexpr std::uint32_t kStream = 0x4c000000u;  ///< of the random numbers: none of a camera's
+/// Random numbers: c2 of the counters, above those of a camera (SensorDraw). One block for each echo of a shot.
+constexpr std::uint32_t kStream = 0x4c000000u, kEchoStream = 0x10000u;
 
 /// Uniform in (0, 1).
 double uniform(std::uint32_t word) {
     return (word + 0.5) * 0x1p-32;
-}
-
-/// Standard normal (Box and Muller 1958).
-double normal(std::uint32_t a, std::uint32_t b) {
-    return std::sqrt(-2 * std::log(uniform(a))) * std::cos(2 * std::numbers::pi * uniform(b));
 }
 
 double light_of(const LidarReturn& r) {
@@ -34,46 +32,80 @@ std::array<Vec3, 2> across(const Vec3& z) {
 
 }  // namespace
 
-LidarReceiver::LidarReceiver(const LidarReceiverModel& model, double range_max_m, std::uint64_t seed,
-                             std::size_t lidar)
-    : model_(model),
-      range_max_m_(range_max_m),
+/// The random numbers of a batch, made as they are needed.
+class LidarReceiver::Draws {
+public:
+    Draws(const LidarReceiver& receiver, std::uint64_t first) : receiver_(receiver), first_(first) {}
+
+    const RandomLanes& of_echo(std::size_t number) {
+        for (; made_ <= number; ++made_)
+            blocks_[made_] = philox(receiver_.schedule_, static_cast<std::uint32_t>(first_),
+                                    static_cast<std::uint32_t>(first_ >> 32),
+                                    receiver_.stream_ + static_cast<std::uint32_t>(made_) * kEchoStream);
+        return blocks_[number];
+    }
+
+private:
+    const LidarReceiver& receiver_;
+    std::uint64_t first_;
+    std::array<RandomLanes, kMostEchoes> blocks_;
+    std::size_t made_ = 0;
+};
+
+LidarReceiver::LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index)
+    : model_(lidar.receiver),
+      range_max_m_(lidar.range_max_m),
+      mount_(lidar.mount),
+      least_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
+      random_(model_.range_noise_m > 0 || model_.range_noise_at_limit_m > 0 || model_.velocity_noise_m_s > 0),
       schedule_(seed),
-      stream_(kStream + static_cast<std::uint32_t>(lidar)),
-      met_(kLanes * static_cast<std::size_t>(model.sub_rays)) {
+      stream_(kStream + static_cast<std::uint32_t>(index)),
+      met_(kLanes * static_cast<std::size_t>(model_.sub_rays)) {
     // Evenly spread over the disc: a lattice by the golden section.
-    for (int i = 0; i < model.sub_rays && model.sub_rays > 1; ++i) {
-        radius_.push_back(std::tan(0.5 * model.beam_divergence_rad) * std::sqrt((i + 0.5) / model.sub_rays));
+    for (int i = 0; i < model_.sub_rays && model_.sub_rays > 1; ++i) {
+        radius_.push_back(std::tan(0.5 * model_.beam_divergence_rad) * std::sqrt((i + 0.5) / model_.sub_rays));
         turn_.push_back(2 * std::numbers::pi * i / std::numbers::phi);
     }
 }
 
 void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
-                            std::span<LidarReturn> returns) noexcept {
-    const bool one = model_.sub_rays == 1, exact = model_.range_noise_m == 0 && model_.range_bias_m == 0;
-    RandomLanes random;
-    if (!one || model_.range_noise_m > 0)
-        random =
-            philox(schedule_, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(first >> 32), stream_);
-    if (one)
-        shoot(tracer, at, beams, range_max_m_, returns);
+                            std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
+    const ShotSettings settings{.range_max_m = model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_,
+                                .multipath = model_.multipath,
+                                .sunlight = model_.sunlight_noise > 0,
+                                .motions = motions,
+                                .mount = mount_};
+    Draws draws(*this, first);
+    const auto sub_rays = static_cast<std::size_t>(model_.sub_rays);
+    if (sub_rays == 1)
+        shoot(tracer, at, beams, settings, met_);
     else
-        gather(tracer, at, beams, random, returns);
-    const double least_light =
-        model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0;
+        gather(tracer, at, beams, settings, draws.of_echo(0).w2);
     for (std::size_t i = 0; i < beams.n; ++i) {
-        LidarReturn& r = returns[i];
-        if (!(r.range_m > 0)) continue;
-        if (light_of(r) < least_light) r = {};
-        if (exact || r.body < 0) continue;
-        r.range_m += model_.range_bias_m;
-        if (model_.range_noise_m > 0) r.range_m += model_.range_noise_m * normal(random.w0[i], random.w1[i]);
-        if (!(r.range_m > 0 && r.range_m < range_max_m_)) r = {};
+        const auto met = std::span(met_).subspan(i * sub_rays, sub_rays);
+        const double sunlight = static_cast<double>(met.front().sunlight);
+        EchoList list;
+        const std::size_t n = part(met, list);
+        LidarEchoes& out = echoes[i] = {};
+        double most = -1, second = -1;
+        for (std::size_t k = 0; k < n; ++k) {
+            const LidarEcho echo = measure(list[k], sunlight, i, k, draws);
+            if (!(echo.range_m > 0)) continue;
+            const double light = list[k].light;
+            if (light > most) {
+                out.second = std::exchange(out.strongest, echo);
+                second = std::exchange(most, light);
+            } else if (light > second) {
+                out.second = echo;
+                second = light;
+            }
+            out.last = echo;
+        }
     }
 }
 
-void LidarReceiver::gather(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams,
-                           const RandomLanes& random, std::span<LidarReturn> returns) noexcept {
+void LidarReceiver::gather(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
+                           const Lanes<std::uint32_t>& turns) noexcept {
     const std::size_t sub_rays = radius_.size();
     Lanes<std::array<Vec3, 2>> axes;
     for (std::size_t i = 0; i < beams.n; ++i) axes[i] = across(beams.direction[i]);
@@ -82,48 +114,82 @@ void LidarReceiver::gather(const Tracer& tracer, const BodyPoses& at, const RayB
     for (std::size_t s = 0; s < sub_rays; ++s) {
         for (std::size_t i = 0; i < beams.n; ++i) {
             // Turned at random, so that no edge favours the lattice.
-            const double turn = turn_[s] + 2 * std::numbers::pi * uniform(random.w2[i]);
+            const double turn = turn_[s] + 2 * std::numbers::pi * uniform(turns[i]);
             const Vec3 aside = std::cos(turn) * axes[i][0] + std::sin(turn) * axes[i][1];
             rays.direction.put(i, normalized(beams.direction[i] + radius_[s] * aside));
         }
-        shoot(tracer, at, rays, range_max_m_, met);
+        shoot(tracer, at, rays, settings, met);
+        settings.sunlight = false;  // of the first sub-ray alone, which is the nearest to the axis
         for (std::size_t i = 0; i < beams.n; ++i) met_[i * sub_rays + s] = met[i];
     }
-    for (std::size_t i = 0; i < beams.n; ++i) returns[i] = echo_of(std::span(met_).subspan(i * sub_rays, sub_rays));
 }
 
-LidarReturn LidarReceiver::echo_of(std::span<LidarReturn> sub_rays) const noexcept {
+/// Sorts the sub-rays by range. Returns the number of echoes, the nearest first.
+std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept {
+    if (sub_rays.size() == 1) {
+        const LidarReturn& r = sub_rays.front();
+        if (!(r.range_m > 0)) return 0;
+        echoes[0] = {light_of(r), r.range_m, r.velocity_m_s};
+        return 1;
+    }
     const auto n = static_cast<double>(sub_rays.size());
-    const double least_light =
-        model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0;
+    const float sunlight = sub_rays.front().sunlight;
     const auto end =
         std::partition(sub_rays.begin(), sub_rays.end(), [](const LidarReturn& r) { return r.range_m > 0; });
-    if (end == sub_rays.begin()) return {};
+    if (end == sub_rays.begin()) return 0;
     std::sort(sub_rays.begin(), end,
               [](const LidarReturn& a, const LidarReturn& b) { return a.range_m < b.range_m; });
+    sub_rays.front().sunlight = sunlight;
     const double spacing_m = ((end - 1)->range_m - sub_rays.front().range_m) / n;
     const double gap_m = std::max(model_.pulse_length_m, kMeanSpacings * spacing_m);
-    LidarReturn reported;
-    double most_light = -1;
-    for (auto begin = sub_rays.begin(); begin != end;) {
+    std::size_t count = 0;
+    for (auto begin = sub_rays.begin(); begin != end && count < kMostEchoes; ++count) {
         auto next = begin + 1;
         while (next != end && next->range_m - (next - 1)->range_m <= gap_m) ++next;
-        double light = 0, moment = 0, brightest = -1;
-        int body = begin->body;
+        double light = 0, moment = 0, velocity = 0;
         for (auto r = begin; r != next; ++r) {
             const double l = light_of(*r) / n;
-            light += l, moment += l * (r->range_m - begin->range_m);
-            if (l > brightest) brightest = l, body = r->body;
+            light += l;
+            moment += l * (r->range_m - begin->range_m);
+            velocity += l * r->velocity_m_s;
         }
-        const double range_m = begin->range_m + (light > 0 ? moment / light : 0);
-        const bool farther = model_.echo == LidarReceiverModel::Echo::last;
-        if (farther ? light >= least_light : light > most_light) {
-            most_light = light;
-            reported = {range_m, static_cast<float>(light * range_m * range_m), body};
-        }
+        echoes[count] = {light, begin->range_m, begin->velocity_m_s};
+        if (light > 0) echoes[count] = {light, begin->range_m + moment / light, velocity / light};
         begin = next;
     }
-    return reported;
+    return count;
+}
+
+/// None where the echo is not detected.
+LidarEcho LidarReceiver::measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
+                                 Draws& draws) const noexcept {
+    LidarEcho out{echo.range_m, static_cast<float>(echo.light * echo.range_m * echo.range_m), echo.velocity_m_s};
+    double late = 0;  // of the threshold's strength over the echo's: 0 where there is no limit
+    if (least_light_ > 0) {
+        const double s = std::sqrt(1 + model_.sunlight_noise * sunlight), x = echo.light / (s * least_light_);
+        if (model_.detection_snr > 0) {
+            const double detected = 0.5 * std::erfc(model_.detection_snr * (1 - x) / std::numbers::sqrt2);
+            if (uniform(draws.of_echo(number).w3[lane]) >= detected) return {};
+        } else if (x < 1) {
+            return {};
+        }
+        late = 1 / x;
+    }
+    out.range_m += model_.range_bias_m + model_.range_walk_m * late;
+    if (random_) {
+        // Box and Muller 1958.
+        const RandomLanes& words = draws.of_echo(number);
+        const double radius = std::sqrt(-2 * std::log(uniform(words.w0[lane]))),
+                     turn = 2 * std::numbers::pi * uniform(words.w1[lane]);
+        out.range_m +=
+            std::hypot(model_.range_noise_m, model_.range_noise_at_limit_m * late) * radius * std::cos(turn);
+        out.velocity_m_s += model_.velocity_noise_m_s * radius * std::sin(turn);
+    }
+    if (model_.range_ambiguity_m > 0) out.range_m = std::fmod(out.range_m, model_.range_ambiguity_m);
+    if (model_.velocity_ambiguity_m_s > 0)
+        out.velocity_m_s = std::remainder(out.velocity_m_s, model_.velocity_ambiguity_m_s);
+    if (!(out.range_m > model_.range_min_m && out.range_m < range_max_m_)) return {};
+    return out;
 }
 
 }  // namespace narpa

@@ -1,16 +1,22 @@
-/// renderer/lidar/lidar_receiver.h - from shots to what a LiDAR reports of them: footprint, echoes, threshold,
-/// noise.
+/// renderer/lidar/lidar_receiver.h - from shots to the echoes that a LiDAR measures: footprint, detection, noise.
 ///
 /// A beam is a cone. One ray along its axis is wrong where it meets an edge, or a surface at more than 60 degrees
 /// of incidence, over which the footprint is spread by range * divergence * tan(incidence). Sub-rays sample the
 /// cone; their returns, sorted by range, part into echoes wherever the next is farther than a pulse is long. An
 /// echo is at the mean range of its light, rho / range^2 for each sub-ray.
+///
+/// The strength x of an echo is its light in units of the least that is detected in the dark, that of a diffuse
+/// surface of 10 % at LidarReceiverModel::range_at_10_percent_m. Sunlight raises the noise, and the threshold with
+/// it, by s = sqrt(1 + sunlight_noise * radiance). An echo is detected with the probability Phi(snr * (x / s - 1)),
+/// its range has the standard deviation hypot(noise, noise_at_limit * s / x), and it is late by walk / x: a pulse
+/// that rises in proportion to its strength crosses a fixed threshold after a time in proportion to 1 / x.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "renderer/camera/counter_random.h"
+#include "base/counter_random.h"
+#include "protocols/lidar/lidar_model.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
 
@@ -18,23 +24,38 @@ namespace narpa {
 
 class LidarReceiver {
 public:
-    /// `seed`: the scene's; `lidar`: index, so that LiDARs differ. Allocates here and never again.
-    LidarReceiver(const LidarReceiverModel& model, double range_max_m, std::uint64_t seed, std::size_t lidar);
+    /// More echoes of one shot than these, the nearest ones, are lost.
+    static constexpr std::size_t kMostEchoes = 4;
+
+    /// `seed`: the scene's; `index`: of the LiDAR, so that they differ. Allocates here and never again.
+    LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
     /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
-    /// draws. Writes beams.n returns: the reported echo's range with bias and noise, before quantisation; the
-    /// reflectivity that the light stands for at that range, which is less where only a part of the beam is met;
-    /// the body that sends most of it. With nothing modelled it is `shoot`.
+    /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Writes beams.n echoes: range with bias
+    /// and noise, before a packet's rounding; the reflectivity that the light stands for at that range, which is
+    /// less where only a part of the beam is met.
     void receive(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
-                 std::span<LidarReturn> returns) noexcept;
+                 std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
 
 private:
-    [[nodiscard]] LidarReturn echo_of(std::span<LidarReturn> sub_rays) const noexcept;
-    void gather(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const RandomLanes& random,
-                std::span<LidarReturn> returns) noexcept;
+    /// Light and range of what is one echo.
+    struct Echo {
+        double light = 0, range_m = 0, velocity_m_s = 0;
+    };
+    using EchoList = std::array<Echo, kMostEchoes>;
+    class Draws;
+
+    void gather(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
+                const Lanes<std::uint32_t>& turns) noexcept;
+    [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
+    [[nodiscard]] LidarEcho measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
+                                    Draws& draws) const noexcept;
 
     LidarReceiverModel model_;
     double range_max_m_;
+    int mount_;
+    double least_light_;  ///< rho / range^2; 0: all is detected
+    bool random_;
     PhiloxSchedule schedule_;
     std::uint32_t stream_;
     std::vector<double> radius_, turn_;  ///< of each sub-ray: tangent of its angle from the axis, and about it

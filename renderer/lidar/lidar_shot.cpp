@@ -1,34 +1,123 @@
 #include "renderer/lidar/lidar_shot.h"
 
+#include <limits>
 #include <numbers>
 
 #include "renderer/integrator/shading.h"
 
 namespace narpa {
+namespace {
 
-void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, double range_max_m,
+/// From mirror to mirror; a beam that meets more does not come back.
+constexpr int kMirrors = 8;
+
+double mean(const Rgb& c) {
+    return static_cast<double>(c.x + c.y + c.z) / 3;
+}
+
+/// Of a body's material point, world.
+Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point, double time) {
+    if (body < 0) return {};
+    const auto i = static_cast<std::size_t>(body);
+    const Motion& m = settings.motions[i];
+    const Rigid3 T = at.T_world_body_at(i, time);
+    return m.velocity_m_s + cross(T.q * m.rate_rad_s, point - T.t);
+}
+
+/// A shot on its way from mirror to mirror.
+struct Path {
+    double range_m = 0, throughput = 1;
+    Vec3 start{}, direction{};
+    Vec3 velocity{};  ///< of the start
+    double rate_m_s = 0;
+};
+
+float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Surface& surface,
+                  const Vec3& back) {
+    const auto& sun = tracer.scene().sun;
+    if (!sun) return 0;
+    const double cosine = dot(surface.normal, sun->direction);
+    if (cosine <= 0 || tracer.occluded(at, hit, sun->direction, std::numeric_limits<double>::infinity())) return 0;
+    return static_cast<float>(std::numbers::pi * cosine *
+                              mean(bsdf(surface, surface.normal, sun->direction, back)));
+}
+
+/// What the shot meets at the end of its path.
+LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Path& path,
+                      const ShotSettings& settings) {
+    const Vec3 back = -path.direction;
+    const Surface surface = surface_at(tracer, at, hit, path.direction, 0);
+    const double cosine = dot(surface.normal, back);
+    const double reflectivity = std::numbers::pi * mean(bsdf(surface, surface.normal, back, back)) +
+                                static_cast<double>(surface.material->retroreflectance);
+    LidarReturn r{.range_m = path.range_m,
+                  .reflectivity = static_cast<float>(path.throughput * cosine * reflectivity),
+                  .body = hit.body,
+                  .cos_incidence = static_cast<float>(cosine),
+                  .velocity_m_s = path.rate_m_s};
+    if (settings.sunlight)
+        r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hit, surface, back);
+    return r;
+}
+
+/// Takes the hit as the end of a piece of the path.
+void advance(Path& path, const BodyPoses& at, const Hit& hit, const ShotSettings& settings) {
+    // From a mirror on: rays leave it a little above, so that it does not meet itself.
+    path.range_m += path.range_m > 0 ? norm(hit.position - path.start) : hit.range_m;
+    path.start = hit.position;
+    if (settings.motions.empty()) return;
+    const Vec3 velocity = velocity_at(settings, at, hit.body, hit.position, hit.time);
+    path.rate_m_s += dot(path.direction, velocity - path.velocity);
+    path.velocity = velocity;
+}
+
+}  // namespace
+
+void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
            std::span<LidarReturn> returns) noexcept {
     HitBatch hits;
     tracer.intersect(at, beams, tracer.all_bodies(), hits);
+    Lanes<Path> paths;
     for (std::size_t i = 0; i < beams.n; ++i) {
         returns[i] = {};
-        if (!is_set(hits.met, i) || !(hits.range_m[i] < range_max_m)) continue;
-        const Vec3 direction = beams.direction[i], back = -direction;
-        const Surface surface = surface_at(tracer, at, hits[i], direction, 0);
-        const Rgb f = bsdf(surface, surface.normal, back, back);
-        const double cosine = dot(surface.normal, back);
-        returns[i] = {hits.range_m[i],
-                      static_cast<float>(std::numbers::pi * cosine * static_cast<double>(f.x + f.y + f.z) / 3),
-                      hits.body[i]};
+        paths[i].direction = beams.direction[i];
+        if (!settings.motions.empty())
+            paths[i].velocity = velocity_at(settings, at, settings.mount, beams.origin[i], beams.time[i]);
+    }
+    std::uint32_t going = lanes_below(beams.n);
+    for (int mirrors = 0;; ++mirrors) {
+        std::uint32_t mirrored = 0;
+        Vec3Lanes directions;
+        for (std::size_t i = 0; i < beams.n; ++i) {
+            if (!is_set(going & hits.met, i)) continue;
+            const Hit hit = hits[i];
+            Path& path = paths[i];
+            advance(path, at, hit, settings);
+            if (!(path.range_m < settings.range_max_m)) continue;
+            const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];
+            if (!settings.multipath || m.kind != Material::Kind::mirror) {
+                returns[i] = return_of(tracer, at, hit, path, settings);
+            } else if (mirrors < kMirrors) {
+                const Vec3 n = hit.shading_normal, d = path.direction;
+                path.direction = normalized(d - 2 * dot(d, n) * n);
+                path.throughput *= mean(m.specular) * mean(m.specular);  // there and back
+                directions.put(i, path.direction);
+                mirrored |= 1u << i;
+            }
+        }
+        if (mirrored == 0) return;
+        tracer.intersect(at, hits, directions, mirrored, hits);
+        going = mirrored;
     }
 }
 
-LidarReturn shoot(const Tracer& tracer, const BodyPoses& at, const Ray& beam, double range_max_m) noexcept {
+LidarReturn shoot(const Tracer& tracer, const BodyPoses& at, const Ray& beam,
+                  const ShotSettings& settings) noexcept {
     RayBatch beams;
     beams.n = 1;
     beams.put(0, beam);
     LidarReturn seen;
-    shoot(tracer, at, beams, range_max_m, {&seen, 1});
+    shoot(tracer, at, beams, settings, {&seen, 1});
     return seen;
 }
 

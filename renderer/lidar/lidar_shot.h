@@ -1,4 +1,4 @@
-/// renderer/lidar/lidar_shot.h - shots of a LiDAR or any other range finder, and their returns.
+/// renderer/lidar/lidar_shot.h - shots of a LiDAR or any other range finder, and what they meet.
 #pragma once
 
 #include <span>
@@ -8,15 +8,32 @@
 namespace narpa {
 
 struct LidarReturn {
-    double range_m = 0;      ///< 0: no return
-    float reflectivity = 0;  ///< diffuse reflectance seen along the beam: pi * BRDF(-d, -d) * cos(incidence), mean
-                             ///< of bands
-    int body = -1;
+    double range_m = 0;       ///< 0: no return. Along the whole path, mirrors included
+    float reflectivity = 0;   ///< seen along the beam: pi * BRDF(-d, -d) * cos(incidence), mean of bands, and the
+                              ///< retroreflectance * cos(incidence)
+    int body = -1;            ///< the last on the path
+    float cos_incidence = 0;  ///< there
+    double velocity_m_s = 0;  ///< of the material point along the line of sight; receding is positive
+    float sunlight = 0;       ///< radiance of the surface towards the LiDAR, of a white one that faces the Sun
 };
+
+/// What is wanted of shots beside range, reflectivity and body.
+struct ShotSettings {
+    double range_max_m = 0;  ///< no return from beyond
+    bool multipath = false;  ///< a beam goes on from mirrors; else it ends there with a reflectivity of 0
+    bool sunlight = false;
+    /// Of all bodies, for velocities; empty: they are not wanted.
+    std::span<const Motion> motions{};
+    int mount = -1;  ///< body that the LiDAR rides on; -1: it is at rest
+};
+
 /// A batch of shots, each at its own time. Writes the first beams.n returns.
-void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, double range_max_m,
+///
+/// The velocity is d . (v_hit - v_sensor) of the material point, which is what Doppler measures: not the rate of
+/// the range where a body turns. Light is taken as infinitely fast; relative error v / c.
+void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
            std::span<LidarReturn> returns) noexcept;
 [[nodiscard]] LidarReturn shoot(const Tracer& tracer, const BodyPoses& at, const Ray& beam,
-                                double range_max_m) noexcept;
+                                const ShotSettings& settings) noexcept;
 
 }  // namespace narpa

@@ -65,6 +65,7 @@ struct Material {
     int height_texture = -1;    ///< bumps: height in metres = bump_height_m * mean of rgb
     float normal_scale = 1;
     float bump_height_m = 0;
+    float retroreflectance = 0;  ///< towards a LiDAR, beside what the kind reflects: times a white diffuse surface
 };
 
 [[nodiscard]] inline bool is_textured(const Material& m) noexcept {

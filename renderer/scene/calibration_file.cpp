@@ -2,25 +2,18 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+
+#include "renderer/scene/yaml_file.h"
 
 namespace narpa {
 namespace {
 
-/// Wrong content of the file, at one of its lines.
-struct Fault {
-    std::string what;
-    YAML::Mark at;
-};
-
 YAML::Node part(const YAML::Node& document, const char* key, const char* expected) {
     const YAML::Node node = document[key];
-    if (!node) throw Fault{fmt::format("expected {}: {}", key, expected), YAML::Mark::null_mark()};
+    if (!node) throw YamlFault{fmt::format("expected {}: {}", key, expected), YAML::Mark::null_mark()};
     return node;
 }
 
@@ -28,7 +21,7 @@ int pixels(const YAML::Node& document, const char* key) {
     const YAML::Node node = part(document, key, "a number of pixels");
     int n = 0;
     if (!YAML::convert<int>::decode(node, n) || n < 1 || n > kMostPixelsPerSide)
-        throw Fault{fmt::format("{}: expected an integer in [1, {}]", key, kMostPixelsPerSide), node.Mark()};
+        throw YamlFault{fmt::format("{}: expected an integer in [1, {}]", key, kMostPixelsPerSide), node.Mark()};
     return n;
 }
 
@@ -36,12 +29,12 @@ std::vector<double> matrix(const YAML::Node& document, const char* key, const ch
     const YAML::Node node = part(document, key, expected);
     const YAML::Node data = node.IsMap() ? node["data"] : node;
     if (!data || !data.IsSequence())
-        throw Fault{fmt::format("{}: expected rows, cols and data: [...]", key), node.Mark()};
+        throw YamlFault{fmt::format("{}: expected rows, cols and data: [...]", key), node.Mark()};
     std::vector<double> numbers;
     for (const YAML::Node& element : data) {
         double x = 0;
         if (!YAML::convert<double>::decode(element, x) || !std::isfinite(x))
-            throw Fault{fmt::format("{}: expected finite numbers", key), element.Mark()};
+            throw YamlFault{fmt::format("{}: expected finite numbers", key), element.Mark()};
         numbers.push_back(x);
     }
     return numbers;
@@ -53,8 +46,9 @@ Pinhole read_pinhole(const YAML::Node& document) {
     const bool square = k.size() == 9 && k[1] == 0 && k[3] == 0 && k[6] == 0 && k[7] == 0 && k[8] == 1;
     if (!square || !(k[0] > 0 && k[0] <= kFar_px) || !(k[4] > 0 && k[4] <= kFar_px) ||
         std::max(std::abs(k[2]), std::abs(k[5])) > kFar_px)
-        throw Fault{"camera_matrix: expected [fx, 0, cx, 0, fy, cy, 0, 0, 1] with fx, fy > 0 and all below 1e6 px",
-                    document["camera_matrix"].Mark()};
+        throw YamlFault{
+            "camera_matrix: expected [fx, 0, cx, 0, fy, cy, 0, 0, 1] with fx, fy > 0 and all below 1e6 px",
+            document["camera_matrix"].Mark()};
     return {k[0], k[4], k[2], k[5]};
 }
 
@@ -65,10 +59,11 @@ bool is_fisheye(const YAML::Node& document) {
     const auto name = node.as<std::string>("");
     if (name == "equidistant" || name == "fisheye") return true;
     if (name == "plumb_bob" || name == "rational_polynomial" || name.empty()) return false;
-    throw Fault{fmt::format("distortion_model \"{}\" is not known here, expected plumb_bob, rational_polynomial, "
-                            "equidistant or fisheye",
-                            name),
-                node.Mark()};
+    throw YamlFault{
+        fmt::format("distortion_model \"{}\" is not known here, expected plumb_bob, rational_polynomial, "
+                    "equidistant or fisheye",
+                    name),
+        node.Mark()};
 }
 
 std::optional<Distortion> read_distortion(const YAML::Node& document, const Pinhole& pinhole) {
@@ -82,38 +77,26 @@ std::optional<Distortion> read_distortion(const YAML::Node& document, const Pinh
     const bool zero = std::ranges::all_of(d.coefficients, [](double c) { return c == 0; });
     if (zero && d.model == Distortion::Model::opencv) return std::nullopt;
     if (!distorted(pinhole, d))
-        throw Fault{fmt::format("distortion_coefficients: got {}, expected {}", d.coefficients.size(),
-                                d.model == Distortion::Model::fisheye
-                                    ? "4, as the model is a fisheye"
-                                    : "4, 5, 8 or 12 (a tilted detector is not in this version)"),
-                    document["distortion_coefficients"].Mark()};
+        throw YamlFault{fmt::format("distortion_coefficients: got {}, expected {}", d.coefficients.size(),
+                                    d.model == Distortion::Model::fisheye
+                                        ? "4, as the model is a fisheye"
+                                        : "4, 5, 8 or 12 (a tilted detector is not in this version)"),
+                        document["distortion_coefficients"].Mark()};
     return d;
 }
 
 }  // namespace
 
 Result<Calibration> read_calibration(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    std::stringstream text;
-    if (!in || !(text << in.rdbuf())) return Error{"cannot be read", file};
-    const auto at = [&](const std::string& what, const YAML::Mark& mark) {
-        const bool known = !mark.is_null();
-        return Error{what, file, known ? mark.line + 1 : 0, known ? mark.column + 1 : 0};
-    };
-    try {
-        const YAML::Node document = YAML::Load(text);
-        if (!document.IsMap()) return Error{"expected a calibration in YAML, as OpenCV and ROS write it", file};
-        Calibration c;
-        c.width = pixels(document, "image_width");
-        c.height = pixels(document, "image_height");
-        c.pinhole = read_pinhole(document);
-        c.distortion = read_distortion(document, c.pinhole);
-        return c;
-    } catch (const Fault& fault) {
-        return at(fault.what, fault.at);
-    } catch (const YAML::Exception& wrong) {
-        return at("is not YAML: " + wrong.msg, wrong.mark);
-    }
+    return read_yaml<Calibration>(file, "a calibration in YAML, as OpenCV and ROS write it",
+                                  [](const YAML::Node& document) {
+                                      Calibration c;
+                                      c.width = pixels(document, "image_width");
+                                      c.height = pixels(document, "image_height");
+                                      c.pinhole = read_pinhole(document);
+                                      c.distortion = read_distortion(document, c.pinhole);
+                                      return c;
+                                  });
 }
 
 std::string calibration_text(const std::string& camera_name, const Calibration& c) {

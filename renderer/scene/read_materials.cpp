@@ -144,6 +144,8 @@ void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
     read_fresnel(table, m);
     read_regolith(table, m);
     if (reading.problems.none()) check_energy(table, m);
+    m.retroreflectance =
+        static_cast<float>(table.number("retroreflectance", {.low = 0, .high = 1e6}).value_or(m.retroreflectance));
     m.emission = table.rgb("emission", kRadiance).value_or(Rgb{});
     read_textures(table, m, reading);
     if (m.kind == Material::Kind::phong_classic && reading.scene.render.method == RenderSettings::Method::path)

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -184,49 +183,6 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     return camera;
 }
 
-LidarReceiverModel read_receiver(TableReader& table) {
-    using Echo = LidarReceiverModel::Echo;
-    LidarReceiverModel r;
-    const Range length{.low = 0, .high = 1e3};
-    r.beam_divergence_rad = table.number("beam_divergence_rad", {.low = 0, .high = 0.1}).value_or(0);
-    r.sub_rays = static_cast<int>(table.integer("sub_rays", 1, LidarReceiverModel::kMostSubRays)
-                                      .value_or(r.beam_divergence_rad > 0 ? 32 : 1));
-    if (r.sub_rays > 1 && r.sub_rays < LidarReceiverModel::kLeastSubRays)
-        table.fail("sub_rays", fmt::format("{} is too few, expected 1, or {} to {}", r.sub_rays,
-                                           LidarReceiverModel::kLeastSubRays, LidarReceiverModel::kMostSubRays));
-    if (r.sub_rays > 1 && r.beam_divergence_rad == 0)
-        table.require("beam_divergence_rad", "a number > 0, as sub_rays sample the beam's cone");
-    r.pulse_length_m = table.number("pulse_length_m", length).value_or(r.pulse_length_m);
-    constexpr std::array<std::pair<std::string_view, Echo>, 2> kEchoes{
-        {{"strongest", Echo::strongest}, {"last", Echo::last}}};
-    r.echo = table.choice<Echo>("returns", kEchoes).value_or(r.echo);
-    r.range_at_10_percent_m =
-        table.number("range_at_10_percent_m", {.low = 0, .high = 1e6, .low_open = true}).value_or(0);
-    r.range_bias_m = table.number("range_bias_m", {.low = -1e3, .high = 1e3}).value_or(0);
-    r.range_noise_m = table.number("range_noise_m", length).value_or(0);
-    return r;
-}
-
-Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene) {
-    std::vector<std::pair<std::string_view, const LidarModel*>> models;
-    for (const LidarModel* model : lidar_models()) models.emplace_back(model->spec().name, model);
-    Lidar lidar;
-    lidar.name = read_name(table, names);
-    const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
-    lidar.mount = mounting.mount;
-    lidar.T_mount_lidar = mounting.T_mount_thing;
-    table.require("model", fmt::format("\"{}\"", models.front().first));
-    lidar.model = table.choice<const LidarModel*>("model", models).value_or(models.front().second);
-    const LidarSpec& spec = lidar.model->spec();
-    lidar.rate_hz =
-        table.number("rate_hz", {.low = spec.rate_hz_min, .high = spec.rate_hz_max}).value_or(spec.rate_hz_default);
-    lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = spec.range_m_max, .low_open = true})
-                            .value_or(spec.range_m_default);
-    lidar.receiver = read_receiver(table);
-    table.finish();
-    return lidar;
-}
-
 }  // namespace
 
 void read_sensors(TableReader& root, SceneReading& reading) {
@@ -234,7 +190,8 @@ void read_sensors(TableReader& root, SceneReading& reading) {
     std::vector<std::string> cameras, lidars;
     for (TableReader& table : root.tables("camera"))
         scene.cameras.push_back(read_camera(table, cameras, scene, reading.folder));
-    for (TableReader& table : root.tables("lidar")) scene.lidars.push_back(read_lidar(table, lidars, scene));
+    for (TableReader& table : root.tables("lidar"))
+        scene.lidars.push_back(read_lidar(table, lidars, scene, reading.folder));
     if (!root.has("camera") && !root.has("lidar")) root.require("camera", "at least one [[camera]] or [[lidar]]");
 }
 

@@ -198,19 +198,26 @@ struct Camera {
 };
 
 /// What a LiDAR's receiver makes of the light that comes back. As it stands here: the exact range of the beam's
-/// axis, always detected.
+/// axis, always detected. Strengths of echoes are relative to the least that is detected.
 struct LidarReceiverModel {
-    enum class Echo : std::uint8_t {
-        strongest,
-        last,  ///< the farthest that is detected
-    };
-    double beam_divergence_rad = 0;    ///< full angle of the evenly lit cone of the beam
-    int sub_rays = 1;                  ///< that sample the cone: 1, or kLeastSubRays to kMostSubRays
-    double pulse_length_m = 0.9;       ///< surfaces closer in range than this make one echo: c / 2 * duration
-    Echo echo = Echo::strongest;       ///< which is reported
+    double beam_divergence_rad = 0;  ///< full angle of the evenly lit cone of the beam
+    int sub_rays = 1;                ///< that sample the cone: 1, or kLeastSubRays to kMostSubRays
+    double pulse_length_m = 0.9;     ///< surfaces closer in range than this make one echo: c / 2 * duration
+    bool multipath = false;          ///< a beam goes on from mirrors
+
+    double range_min_m = 0;            ///< echoes from nearer are lost
     double range_at_10_percent_m = 0;  ///< where a surface of 10 %, across the beam, is just detected; 0: no limit
+    double detection_snr = 0;          ///< of an echo that is just detected: half of those are; 0: a sharp limit
+    double sunlight_noise = 0;  ///< variance of the receiver's noise that a white surface in full sunlight adds, of
+                                ///< that in the dark
+
     double range_bias_m = 0;
-    double range_noise_m = 0;  ///< standard deviation
+    double range_noise_m = 0;           ///< standard deviation
+    double range_noise_at_limit_m = 0;  ///< the same, of an echo that is just detected; falls with its strength
+    double range_walk_m = 0;            ///< by which an echo that is just detected is late; falls with its strength
+    double range_ambiguity_m = 0;       ///< ranges are modulo this, c / 2 * time between pulses; 0: they are not
+    double velocity_noise_m_s = 0;      ///< standard deviation
+    double velocity_ambiguity_m_s = 0;  ///< velocities are modulo this, about 0; 0: they are not
 
     static constexpr int kLeastSubRays = 8, kMostSubRays = 64;
     friend bool operator==(const LidarReceiverModel&, const LidarReceiverModel&) = default;
@@ -219,10 +226,9 @@ struct LidarReceiverModel {
 struct Lidar {
     std::string name;
     int mount = -1;
-    Rigid3 T_mount_lidar{};             ///< lidar frame: x right, y forward, z up
-    const LidarModel* model = nullptr;  ///< never null in a scene that was read
-    double rate_hz = 10;                ///< turns a second, within the model's limits
-    double range_max_m = 100;           ///< returns beyond are not reported
+    Rigid3 T_mount_lidar{};                   ///< lidar frame: x right, y forward, z up
+    std::shared_ptr<const LidarModel> model;  ///< never null in a scene that was read
+    double range_max_m = 100;                 ///< returns beyond are not reported
     LidarReceiverModel receiver{};
 };
 

@@ -54,6 +54,9 @@ void read_sensors(TableReader& root, SceneReading& reading);
 void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder);
 /// Lens, point spread, vignetting, glare and ghost of a camera, after its detector; paths start at `folder`.
 void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const std::filesystem::path& folder);
+/// A [[lidar]]; paths start at `folder`.
+Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
+                 const std::filesystem::path& folder);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);
 

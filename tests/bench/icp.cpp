@@ -44,7 +44,7 @@ TEST(SweepPoints, OfEmulatedPacketsLieOnTheStation) {
 
     const LidarModel& model = *unit.lidar().model;
     std::vector<RangePoint> points;
-    std::vector<LidarPoint> decoded(model.spec().shots_per_packet);
+    std::vector<LidarPoint> decoded(model.spec().points_per_packet);
     const std::int64_t period_ns = unit.packet_period_ns();
     for (std::int64_t packet = turn_ns / 2 / period_ns; packet < 3 * turn_ns / 2 / period_ns; ++packet) {
         unit.fire(packet);

@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "drivers/lidar/packet_sink.h"
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 #include "protocols/little_endian.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
@@ -69,12 +69,12 @@ Bytes payload(std::size_t size, std::uint64_t seed) {
 class PcapSink : public testing::Test {
 protected:
     void SetUp() override {
-        const auto probe = open_packet_sink(folder_ / "probe.pcap", vlp16().spec().network, 0, true);
+        const auto probe = open_packet_sink(folder_ / "probe.pcap", vlp16().network, 0, true);
         if (!probe && probe.error().text().find("built without captures") != std::string::npos)
             GTEST_SKIP() << "built without libpcap";
     }
     std::unique_ptr<PacketSink> opened(bool wait) {
-        auto sink = open_packet_sink(path_, vlp16().spec().network, kEpoch, wait);
+        auto sink = open_packet_sink(path_, vlp16().network, kEpoch, wait);
         EXPECT_TRUE(sink) << sink.error().text();
         return sink ? std::move(*sink) : nullptr;
     }
@@ -171,7 +171,7 @@ TEST_F(PcapSink, RefusesMoreThanAnEthernetFrameHolds) {
 
 TEST_F(PcapSink, ErrorNamesWhyItCannotWrite) {
     const std::string path = folder_ / "no/such/folder.pcap";
-    const auto sink = open_packet_sink(path, vlp16().spec().network, 0, false);
+    const auto sink = open_packet_sink(path, vlp16().network, 0, false);
     ASSERT_FALSE(sink);
     EXPECT_EQ(sink.error().kind, ErrorKind::missing);
     EXPECT_EQ(sink.error().text(), path + ": cannot write the capture: No such file or directory");

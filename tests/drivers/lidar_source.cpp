@@ -11,7 +11,7 @@
 
 #include "drivers/lidar/packet_sink.h"
 #include "drivers/lidar/packet_source.h"
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 #include "tests/drivers/video_support.h"
 
 namespace narpa {
@@ -42,7 +42,7 @@ Opened open_somewhere(const std::string& address) {
     return {};
 }
 std::unique_ptr<PacketSink> sink_to(int port) {
-    auto sink = open_packet_sink("udp:127.0.0.1:" + std::to_string(port), vlp16().spec().network, 0, false);
+    auto sink = open_packet_sink("udp:127.0.0.1:" + std::to_string(port), vlp16().network, 0, false);
     EXPECT_TRUE(sink) << sink.error().text();
     return std::move(*sink);
 }

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "drivers/lidar/packet_sink.h"
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -59,7 +59,7 @@ Bytes counted_bytes(std::size_t size, int first) {
 }
 
 std::unique_ptr<PacketSink> opened(const std::string& spec) {
-    auto sink = open_packet_sink(spec, vlp16().spec().network, 0, false);
+    auto sink = open_packet_sink(spec, vlp16().network, 0, false);
     EXPECT_TRUE(sink) << sink.error().text();
     return sink ? std::move(*sink) : nullptr;
 }
@@ -99,7 +99,7 @@ TEST(UdpSink, CountsWhatAReceiverOnThisMachineLoses) {
     for (const std::string host : {"127.0.0.1", "127.0.0.2", "[::1]"}) {
         SCOPED_TRACE(host);
         const Receiver receiver(port);
-        auto sink = open_packet_sink("udp:" + host + ":" + std::to_string(port), vlp16().spec().network, 0, false);
+        auto sink = open_packet_sink("udp:" + host + ":" + std::to_string(port), vlp16().network, 0, false);
         if (!sink) continue;  // no such address family here
         send(**sink, 754);    // a second's
         const std::uint64_t lost = (*sink)->counters().receiver_dropped;
@@ -148,7 +148,7 @@ TEST(UdpSink, CountsWhatTheFiftiethReceiverLoses) {
 
 TEST(UdpSink, SendingWithoutReceiverIsNoError) {
     for (const std::string host : {"127.0.0.1", "localhost", "[::1]"}) {
-        auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().spec().network, 0, false);
+        auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().network, 0, false);
         if (!sink) continue;  // no such address family here
         const Bytes packet = counted_bytes(1206, 0);
         for (int i = 0; i < 500; ++i) (*sink)->send(PacketKind::data, packet, 0);
@@ -189,7 +189,7 @@ TEST(PacketSink, BadSinksSayWhatIsWrong) {
         {"udp:256.1.1.1:2368", "unknown host \"256.1.1.1\""},
     };
     for (const auto& [spec, says] : cases) {
-        const auto sink = open_packet_sink(spec, vlp16().spec().network, 0, false);
+        const auto sink = open_packet_sink(spec, vlp16().network, 0, false);
         ASSERT_FALSE(sink) << spec;
         EXPECT_EQ(sink.error().kind, ErrorKind::bad_input) << spec;
         EXPECT_NE(sink.error().text().find(says), std::string::npos) << sink.error().text();

@@ -14,31 +14,30 @@
 namespace narpa {
 namespace {
 
+constexpr LidarNetwork kNetwork{.data_port = 7000, .mac = {2, 0, 0, 0, 0, 1}, .address = {10, 0, 0, 8}};
+
 /// 8 beams side by side that fire together, 25 times a turn and packet: its packet period follows its rate. A
 /// packet is its number in 8 bytes, then a range in mm (4 bytes; 0: none) and a percentage (1 byte) for each shot.
 class Fan8 final : public LidarModel {
 public:
     static constexpr int kBeams = 8, kColumns = 25, kShots = kBeams * kColumns;
 
-    Fan8()
+    explicit Fan8(const LidarSettings& settings)
         : LidarModel({.name = "FAN-8",
+                      .rate_hz = settings.rate_hz,
+                      .packet_period_ns = std::llround(1e9 / settings.rate_hz),
                       .shots_per_packet = kShots,
+                      .points_per_packet = kShots,
                       .data_packet_bytes = 8 + 5 * kShots,
-                      .rate_hz_min = 1,
-                      .rate_hz_max = 4,
-                      .rate_hz_default = 2,
                       .range_m_max = 4000,
-                      .range_m_default = 500,
                       .range_resolution_m = 1e-3,
-                      .network = {.data_port = 7000, .mac = {2, 0, 0, 0, 0, 1}, .address = {10, 0, 0, 8}}}) {}
+                      .network = kNetwork}) {}
 
-    std::int64_t packet_period_ns(double rate_hz) const noexcept override { return std::llround(1e9 / rate_hz); }
-
-    void shots(std::int64_t, double rate_hz, std::span<LidarShot> out) const noexcept override {
+    void shots(std::int64_t, std::span<LidarShot> out) const noexcept override {
         for (int i = 0; i < kShots; ++i) {
             const int beam = i % kBeams, column = i / kBeams;
             const double azimuth = 2 * std::numbers::pi * column / kColumns, elevation = 0.05 * (beam - 3.5);
-            out[i] = {.t_offset_ns = column * packet_period_ns(rate_hz) / kColumns,
+            out[i] = {.t_offset_ns = column * spec().packet_period_ns / kColumns,
                       .origin_m = {0.01 * beam, 0, 0.2},
                       .direction = {std::cos(elevation) * std::sin(azimuth),
                                     std::cos(elevation) * std::cos(azimuth), std::sin(elevation)},
@@ -48,15 +47,15 @@ public:
         }
     }
 
-    void encode(std::int64_t packet, double rate_hz, std::int64_t epoch_unix_ns, std::span<const double> range_m,
-                std::span<const float> reflectivity, std::span<std::uint8_t> out) const noexcept override {
-        put_le(out.data(), static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet, rate_hz)));
+    void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+                std::span<std::uint8_t> out) const noexcept override {
+        put_le(out.data(), static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet)));
         for (std::size_t i = 0; i < kShots; ++i) {
-            put_le(&out[8 + 5 * i], static_cast<std::uint32_t>(std::lround(1e3 * range_m[i])));
-            out[8 + 5 * i + 4] = static_cast<std::uint8_t>(std::lround(100 * reflectivity[i]));
+            const LidarEcho& echo = echoes[i].strongest;
+            put_le(&out[8 + 5 * i], static_cast<std::uint32_t>(std::lround(1e3 * echo.range_m)));
+            out[8 + 5 * i + 4] = static_cast<std::uint8_t>(std::lround(100 * echo.reflectivity));
         }
     }
-    void encode_position(std::int64_t, std::span<std::uint8_t>) const noexcept override {}
 
     std::optional<std::int64_t> packet_time(std::span<const std::uint8_t> bytes,
                                             std::int64_t) const noexcept override {
@@ -66,7 +65,7 @@ public:
     std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept override {
         if (bytes.size() != spec().data_packet_bytes) return 0;
         std::array<LidarShot, kShots> fired;
-        shots(0, spec().rate_hz_default, fired);
+        shots(0, fired);
         std::size_t count = 0;
         for (int i = 0; i < kShots; ++i) {
             const std::uint8_t* at = &bytes[static_cast<std::size_t>(8 + 5 * i)];
@@ -84,10 +83,18 @@ public:
     }
 };
 
-const LidarModel& fan8() {
-    static const Fan8 model;
-    if (!find_lidar_model("FAN-8")) add_lidar_model(model);
-    return model;
+const LidarMake& fan8() {
+    static const LidarMake make{
+        .name = "FAN-8",
+        .rate_hz_min = 1,
+        .rate_hz_max = 4,
+        .rate_hz_default = 2,
+        .range_m_max = 4000,
+        .range_m_default = 500,
+        .network = kNetwork,
+        .configure = [](const LidarSettings& settings) { return std::make_shared<const Fan8>(settings); }};
+    if (!find_lidar_make("FAN-8")) add_lidar_make(make);
+    return make;
 }
 
 /// The LiDAR is 2 m above the centre of a hollow sphere of 30 m, with the world's axes; another body is commanded.
@@ -103,13 +110,13 @@ std::string inside_a_sphere(const std::string& lidar_keys = "") {
 
 class JointLidar : public test::LoopTest {
 protected:
-    void SetUp() override { ASSERT_EQ(fan8().spec().name, "FAN-8"); }
+    void SetUp() override { ASSERT_EQ(fan8().name, "FAN-8"); }
 };
 
 TEST_F(JointLidar, SceneChecksItsKeysAgainstTheModelsLimits) {
     const Scene good = scene(inside_a_sphere());
-    EXPECT_EQ(good.lidars[0].model, &fan8());
-    EXPECT_EQ(good.lidars[0].rate_hz, 2);
+    EXPECT_EQ(good.lidars[0].model->spec().name, "FAN-8");
+    EXPECT_EQ(good.lidars[0].model->spec().rate_hz, 2);
     EXPECT_EQ(good.lidars[0].range_max_m, 500);
     const std::string path = folder_ / "bad.toml";
     std::ofstream(path) << inside_a_sphere("rate_hz = 5\n");
@@ -136,7 +143,8 @@ TEST_F(JointLidar, PacketsOfALockstepRunDecodeToTheGeometry) {
     EXPECT_EQ(lidar.sinks()[0]->counters().sent, 4U) << "no position packets";
 
     // As navigation reads them: the turn that ends at 1.5 s, from the third packet.
-    const auto datagrams = read_datagrams(folder_ / "fan.pcap", fan8().spec().data_packet_bytes);
+    const auto datagrams =
+        read_datagrams(folder_ / "fan.pcap", fan8().configure_default()->spec().data_packet_bytes);
     ASSERT_TRUE(datagrams) << datagrams.error().text();
     const Scene& s = (*emulator)->world().scene();
     rehearsal::SweepBuffer buffer(s.lidars[0], s.epoch_unix_ns);

@@ -56,15 +56,15 @@ TEST_P(RealBodies, AreSeenByCameraAndLidar) {
     EXPECT_GT(lit, covered / 10);
     EXPECT_LT(lit, covered);  // something lies in shadow
 
-    LidarUnit lidar(**world, 0);
+    LidarUnit lidar(**world, 0, true);
     std::size_t returns = 0;
     for (std::int64_t p = 0; p < 76; ++p) {
         lidar.fire(p);
         returns += lidar.returns();
         for (std::size_t i = 0; i < lidar.shots().size(); ++i) {
-            if (lidar.hits()[i].range_m <= 0) continue;
+            if (lidar.truth()[i].range_m <= 0) continue;
             const Vec3 at = (*world)->scene().lidars[0].T_mount_lidar *
-                            (lidar.shots()[i].origin_m + lidar.hits()[i].range_m * lidar.shots()[i].direction);
+                            (lidar.shots()[i].origin_m + lidar.truth()[i].range_m * lidar.shots()[i].direction);
             ASSERT_LE(norm(at), reach_m * (1 + 1e-6));
         }
     }

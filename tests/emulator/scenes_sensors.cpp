@@ -91,7 +91,8 @@ TEST_F(DockingSensors, LidarSeesTheStationAheadAndTheChaserOnlyBehind) {
             for (int azimuth = -90; azimuth < 90; ++azimuth) {
                 const double e = elevation * kRadPerDeg, a = azimuth * kRadPerDeg;
                 const Ray beam{T.t, T.q * Vec3{std::cos(e) * std::sin(a), std::cos(e) * std::cos(a), std::sin(e)}};
-                const LidarReturn seen = shoot(render_scene->tracer(), at, beam, lidar.range_max_m);
+                const LidarReturn seen =
+                    shoot(render_scene->tracer(), at, beam, {.range_max_m = lidar.range_max_m});
                 on_station += seen.body == 0;
                 if (std::abs(azimuth) <= 60) {
                     EXPECT_NE(seen.body, 1) << azimuth << " deg, " << elevation << " deg";

@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 #include "protocols/little_endian.h"
 
 namespace narpa {
@@ -17,7 +17,7 @@ using PositionBytes = std::array<std::uint8_t, 512>;
 PositionBytes encoded(std::int64_t unix_ns) {
     PositionBytes bytes;
     bytes.fill(0xAA);  // everything must be overwritten
-    vlp16().encode_position(unix_ns, bytes);
+    vlp16().configure_default()->encode_position(unix_ns, bytes);
     return bytes;
 }
 
@@ -27,7 +27,7 @@ std::string sentence(const PositionBytes& b) {
 
 // Manual 63-9243 Rev. D, table 9-3 (its offsets less the 42 bytes of header) and table 9-4.
 TEST(Vlp16Position, PacketHasTheManualsBytes) {
-    ASSERT_EQ(vlp16().spec().position_packet_bytes + 42, 554U);
+    ASSERT_EQ(vlp16().configure_default()->spec().position_packet_bytes + 42, 554U);
     const PositionBytes b = encoded(1'709'210'096'789'012'345);  // 2024-02-29T12:34:56.789012345Z
     EXPECT_TRUE(std::all_of(b.begin(), b.begin() + 198, [](auto x) { return x == 0; }));
     const std::array<std::uint8_t, 8> middle{0x14, 0x76, 0xFA, 0x7C, 2, 0, 0, 0};  // 2096789012 us, PPS locked
@@ -59,6 +59,20 @@ TEST(Vlp16Position, AnyInstantIsWrittenWithItsTimeDateAndChecksum) {
         std::array<char, 8> tail{};
         std::snprintf(tail.data(), tail.size(), "*%02X\r\n", sum);
         ASSERT_EQ(sentence(b), "$" + std::string(expected.data(), n) + tail.data()) << s;
+    }
+}
+
+// Table 9-3: 0 none, 1 synchronising, 2 locked, 3 error. The sentence is valid (A) while the time is.
+TEST(Vlp16Position, StatesThePulsePerSecond) {
+    for (const auto pps : {LidarPps::absent, LidarPps::synchronising, LidarPps::locked, LidarPps::error}) {
+        PositionBytes b;
+        vlp16().configure({.rate_hz = 10, .pps = pps})->encode_position(1'709'210'096'789'012'345, b);
+        EXPECT_EQ(b[202], static_cast<int>(pps));
+        EXPECT_EQ(sentence(b).substr(13, 3), pps == LidarPps::locked ? ",A," : ",V,");
+        unsigned sum = 0;
+        const std::string text = sentence(b);
+        for (std::size_t i = 1; text[i] != '*'; ++i) sum ^= static_cast<unsigned char>(text[i]);
+        EXPECT_EQ(std::stoul(text.substr(text.find('*') + 1, 2), nullptr, 16), sum);
     }
 }
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 #include "protocols/little_endian.h"
 
 namespace narpa {
@@ -27,10 +27,17 @@ struct Returns {
     std::array<float, kShots> reflectivity{};
 };
 
+const LidarModel& unit() {
+    static const auto model = vlp16().configure_default();
+    return *model;
+}
+
 Bytes encoded(std::int64_t packet, double hz, const Returns& r, std::int64_t epoch = kEpoch) {
     Bytes bytes;
     bytes.fill(0xAA);  // whatever stood there before must be overwritten
-    vlp16().encode(packet, hz, epoch, r.range_m, r.reflectivity, bytes);
+    std::vector<LidarEchoes> echoes(kShots);
+    for (int i = 0; i < kShots; ++i) echoes[i].strongest = {r.range_m[i], r.reflectivity[i]};
+    vlp16().configure({.rate_hz = hz})->encode(packet, epoch, echoes, bytes);
     return bytes;
 }
 
@@ -45,20 +52,20 @@ Returns random_returns(std::mt19937_64& random) {
 
 Shots shots_of(std::int64_t packet, double hz) {
     Shots out;
-    vlp16().shots(packet, hz, out);
+    vlp16().configure({.rate_hz = hz})->shots(packet, out);
     return out;
 }
 
 /// The reader's points by their shot; shots without a return have range 0.
 Points points_by_shot(std::span<const std::uint8_t> bytes) {
     Points found, out{};
-    const std::size_t n = vlp16().points(bytes, found);
+    const std::size_t n = unit().points(bytes, found);
     for (std::size_t k = 0; k < n; ++k) out[static_cast<std::size_t>(found[k].shot)] = found[k];
     return out;
 }
 
 bool is_data_packet(std::span<const std::uint8_t> bytes) {
-    return vlp16().packet_time(bytes, kEpoch).has_value();
+    return unit().packet_time(bytes, kEpoch).has_value();
 }
 
 double azimuth_of(const Vec3& direction) {
@@ -77,16 +84,16 @@ TEST(Vlp16, TimingIsTheManuals) {
     EXPECT_EQ(shot[16].t_offset_ns, 55'296);
     EXPECT_EQ(shot[32].t_offset_ns, 110'592);
     EXPECT_EQ(shot[383].t_offset_ns, 23 * 55'296 + 15 * 2'304);
-    EXPECT_EQ(vlp16().packet_period_ns(10), kPacketPeriodNs);
-    EXPECT_EQ(vlp16().packet_start_ns(1000, 10), 1'327'104'000);
-    EXPECT_EQ(vlp16().first_packet_from(1'327'104'000, 10), 1000);
-    EXPECT_EQ(vlp16().first_packet_from(1'327'104'001, 10), 1001);
+    EXPECT_EQ(unit().spec().packet_period_ns, kPacketPeriodNs);
+    EXPECT_EQ(unit().packet_start_ns(1000), 1'327'104'000);
+    EXPECT_EQ(unit().first_packet_from(1'327'104'000), 1000);
+    EXPECT_EQ(unit().first_packet_from(1'327'104'001), 1001);
 }
 
 // Offsets of figure 9-2 and tables 9-1, 9-2 of the manual, whose counts include 42 bytes of Ethernet, IP and UDP
 // header: factory bytes at 0x04DE, 0x04DF, so 1204 and 1205 here.
 TEST(Vlp16, PacketHasTheManualsBytes) {
-    ASSERT_EQ(vlp16().spec().data_packet_bytes + 42, 1248U);
+    ASSERT_EQ(unit().spec().data_packet_bytes + 42, 1248U);
     Returns r;
     r.range_m[0] = 2.0;      // 1000 units
     r.range_m[33] = 131.07;  // block 1, second return: 65535 units
@@ -119,9 +126,9 @@ TEST(Vlp16, PacketTimeIsTheOneNearestToTheReference) {
     const Bytes b = encoded(754, 10, {});  // 1'000'636'416 ns, stamped in whole microseconds
     const std::int64_t t_ns = kEpoch + 1'000'636'000;
     for (const std::int64_t off_ns : {0L, 1'000'000'000L, -1'000'000'000L, hour_ns / 2 - 1, -hour_ns / 2 + 1})
-        EXPECT_EQ(vlp16().packet_time(b, t_ns + off_ns), t_ns) << off_ns;
-    EXPECT_EQ(vlp16().packet_time(b, t_ns + hour_ns), t_ns + hour_ns);
-    EXPECT_EQ(vlp16().packet_time(b, t_ns - 5 * hour_ns), t_ns - 5 * hour_ns);
+        EXPECT_EQ(unit().packet_time(b, t_ns + off_ns), t_ns) << off_ns;
+    EXPECT_EQ(unit().packet_time(b, t_ns + hour_ns), t_ns + hour_ns);
+    EXPECT_EQ(unit().packet_time(b, t_ns - 5 * hour_ns), t_ns - 5 * hour_ns);
 }
 
 TEST(Vlp16, DirectionIsClockwiseFromForward) {
@@ -183,31 +190,32 @@ TEST(Vlp16, NoReturnWhereThereIsNoneOrItIsTooFarWhateverTheReflectivity) {
         EXPECT_EQ(at[2], i == 7 ? 50 : 255) << i;
     }
     Points found;
-    EXPECT_EQ(vlp16().points(bytes, found), 1U);
+    EXPECT_EQ(unit().points(bytes, found), 1U);
 }
 
-TEST(Vlp16, ReflectivityIsPercentAndNeverARetroReflector) {
+/// 154 codes for three decades, from 101 on.
+TEST(Vlp16, ReflectivityIsPercentAndAboveThatOfARetroreflector) {
     Returns r;
     r.range_m.fill(1);
-    const std::array<float, 6> in{-1, 0, 0.004F, 0.006F, 1, 7};
-    const std::array<int, 6> percent{0, 0, 0, 1, 100, 100};
+    const std::array<float, 11> in{-1, 0, 0.004F, 0.006F, 1, 1.0001F, 7, 31.7F, 999, 1000, 1e6F};
+    const std::array<int, 11> code{0, 0, 0, 1, 100, 101, 144, 178, 254, 255, 255};
     std::ranges::copy(in, r.reflectivity.begin());
-    r.reflectivity[6] = std::numeric_limits<float>::quiet_NaN();
+    r.reflectivity[11] = std::numeric_limits<float>::quiet_NaN();
     const Points point = points_by_shot(encoded(0, 10, r));
-    for (int i = 0; i < 6; ++i) EXPECT_EQ(point[i].intensity, percent[i]) << in[i];
-    EXPECT_EQ(point[6].intensity, 0);
+    for (int i = 0; i < 11; ++i) EXPECT_EQ(point[i].intensity, code[i]) << in[i];
+    EXPECT_EQ(point[11].intensity, 0);
 }
 
 TEST(Vlp16, DecodedPointsLieOnTheirShots) {
     std::mt19937_64 random(20260101);
-    std::uniform_real_distribution<double> rate(vlp16().spec().rate_hz_min, vlp16().spec().rate_hz_max);
+    std::uniform_real_distribution<double> rate(vlp16().rate_hz_min, vlp16().rate_hz_max);
     for (int trial = 0; trial < 200; ++trial) {
         const double hz = rate(random);
         const auto p = static_cast<std::int64_t>(random() % 1'000'000);
         const Returns r = random_returns(random);
         const Shots shot = shots_of(p, hz);
         Points point;
-        const std::size_t n = vlp16().points(encoded(p, hz, r), point);
+        const std::size_t n = unit().points(encoded(p, hz, r), point);
         EXPECT_EQ(n, static_cast<std::size_t>(std::ranges::count_if(r.range_m, [](double x) { return x > 0; })));
         int last = -1;
         for (std::size_t k = 0; k < n; ++k) {
@@ -243,14 +251,15 @@ TEST(Vlp16, DecodeRefusesWhatTheManualForbids) {
         Bytes bad = good;
         bad[at] = value;
         Points none;
-        EXPECT_EQ(vlp16().points(bad, none), 0U);
+        EXPECT_EQ(unit().points(bad, none), 0U);
         return is_data_packet(bad);
     };
     EXPECT_FALSE(with(0, 0xFE));     // flag of the first block
     EXPECT_FALSE(with(1101, 0xDD));  // flag of the last block
     EXPECT_FALSE(with(3, 0x8D));     // azimuth of 361 deg
     EXPECT_FALSE(with(1203, 0xFF));  // time stamp beyond the hour
-    EXPECT_FALSE(with(1204, 0x39));  // dual return
+    EXPECT_FALSE(with(1204, 0x39));  // dual returns, from a unit that has single ones
+    EXPECT_FALSE(with(1204, 0x36));
     EXPECT_FALSE(with(1205, 0x21));  // HDL-32E
     EXPECT_TRUE(with(1204, 0x38));   // last return: the same layout
 }
@@ -263,7 +272,7 @@ TEST(Vlp16, DecodeTakesAnyBytes) {
         Bytes bytes = encoded(trial, 10, {});
         for (int i = 0; i < 400; ++i) bytes[random() % 1200] = static_cast<std::uint8_t>(random());
         for (int block = 0; block < kBlocks; ++block) bytes[100 * block] = 0xFF, bytes[100 * block + 1] = 0xEE;
-        const std::size_t n = vlp16().points(bytes, point);
+        const std::size_t n = unit().points(bytes, point);
         if (!is_data_packet(bytes)) {
             EXPECT_EQ(n, 0U);
             continue;

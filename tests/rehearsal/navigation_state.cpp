@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "protocols/lidar/vlp16.h"
+#include "protocols/lidar/velodyne.h"
 #include "rehearsal/navigation/sensor_inputs.h"
 #include "rehearsal/navigation/state_estimator.h"
 #include "tests/rehearsal/navigation_plant.h"
@@ -181,19 +181,20 @@ TEST(AttitudeTrack, InterpolatesBetweenReportsAndExtrapolatesAfterThem) {
 }
 
 std::vector<std::uint8_t> packet(std::int64_t number, std::int64_t epoch_unix_ns) {
-    const std::vector<double> range_m(vlp16().spec().shots_per_packet, 5);
-    const std::vector<float> reflectivity(range_m.size());
-    std::vector<std::uint8_t> bytes(vlp16().spec().data_packet_bytes);
-    vlp16().encode(number, 10, epoch_unix_ns, range_m, reflectivity, bytes);
+    const auto unit = vlp16().configure_default();
+    LidarEchoes echo;
+    echo.strongest.range_m = 5;
+    const std::vector<LidarEchoes> echoes(unit->spec().shots_per_packet, echo);
+    std::vector<std::uint8_t> bytes(unit->spec().data_packet_bytes);
+    unit->encode(number, epoch_unix_ns, echoes, bytes);
     return bytes;
 }
 
 TEST(SweepBuffer, HasTheLastTurnEvenAcrossTheHour) {
     Lidar lidar;
-    lidar.model = &vlp16();
-    lidar.rate_hz = 10;
-    const std::int64_t period_ns = vlp16().packet_period_ns(10);
-    const std::size_t shots = vlp16().spec().shots_per_packet;
+    lidar.model = vlp16().configure_default();
+    const std::int64_t period_ns = lidar.model->spec().packet_period_ns;
+    const std::size_t shots = lidar.model->spec().shots_per_packet;
     const std::int64_t epoch = 1'772'366'399'500'000'000;  // half a second before the hour
     SweepBuffer buffer(lidar, epoch);
     const std::int64_t t_ns = 1'000'000'000, last = t_ns / period_ns - 1;
@@ -216,9 +217,9 @@ TEST(SweepBuffer, HasTheLastTurnEvenAcrossTheHour) {
 
 TEST(SweepBuffer, CountsWhatIsNoPacket) {
     Lidar lidar;
-    lidar.model = &vlp16();
+    lidar.model = vlp16().configure_default();
     SweepBuffer buffer(lidar, 0);
-    const std::vector<std::uint8_t> noise(vlp16().spec().data_packet_bytes, 0x5a), empty;
+    const std::vector<std::uint8_t> noise(lidar.model->spec().data_packet_bytes, 0x5a), empty;
     EXPECT_FALSE(buffer.take(noise, 0));
     EXPECT_FALSE(buffer.take(empty, 0));
     EXPECT_EQ(buffer.bad(), 2u);

@@ -42,28 +42,28 @@ inline std::vector<std::uint8_t> frame(SceneModel& model, const Plant& plant, st
 /// `packet` is the number of the first.
 inline std::vector<std::vector<std::uint8_t>> turn(SceneModel& model, Plant& plant, std::int64_t epoch_unix_ns) {
     const Lidar& lidar = model.scene().lidars[model.lidars()[0]];
-    const auto from_ns = std::llround(1e9 * plant.t_s), turn_ns = std::llround(1e9 / lidar.rate_hz);
-    std::vector<std::vector<std::uint8_t>> out;
     const LidarModel& lidar_model = *lidar.model;
+    const auto from_ns = std::llround(1e9 * plant.t_s), turn_ns = std::llround(1e9 / lidar_model.spec().rate_hz);
+    std::vector<std::vector<std::uint8_t>> out;
     std::vector<LidarShot> shots(lidar_model.spec().shots_per_packet);
-    std::vector<double> range_m(shots.size());
-    std::vector<float> reflectivity(shots.size());
-    const auto start_ns = [&](std::int64_t packet) { return lidar_model.packet_start_ns(packet, lidar.rate_hz); };
-    const std::int64_t first = lidar_model.first_packet_from(from_ns, lidar.rate_hz);
+    std::vector<LidarEchoes> echoes(shots.size());
+    const auto start_ns = [&](std::int64_t packet) { return lidar_model.packet_start_ns(packet); };
+    const std::int64_t first = lidar_model.first_packet_from(from_ns);
     for (std::int64_t packet = first; start_ns(packet + 1) <= from_ns + turn_ns; ++packet) {
-        lidar_model.shots(packet, lidar.rate_hz, shots);
+        lidar_model.shots(packet, shots);
         for (std::size_t i = 0; i < shots.size(); ++i) {
             const double t_s = 1e-9 * static_cast<double>(start_ns(packet) + shots[i].t_offset_ns);
             if (t_s > plant.t_s) plant.step({}, {}, t_s - plant.t_s);
             const BodyPoses& at =
                 model.place(plant.t_s, plant.motion.q_world_target, inverse(chaser_target(plant)));
             const Rigid3 T = at.T_world_body[model.chaser()] * lidar.T_mount_lidar;
-            range_m[i] =
-                shoot(model.tracer(), at, {T * shots[i].origin_m, T.q * shots[i].direction}, lidar.range_max_m)
+            echoes[i].strongest.range_m =
+                shoot(model.tracer(), at, {T * shots[i].origin_m, T.q * shots[i].direction},
+                      {.range_max_m = lidar.range_max_m})
                     .range_m;
         }
         std::vector<std::uint8_t> bytes(lidar_model.spec().data_packet_bytes);
-        lidar_model.encode(packet, lidar.rate_hz, epoch_unix_ns, range_m, reflectivity, bytes);
+        lidar_model.encode(packet, epoch_unix_ns, echoes, bytes);
         out.push_back(std::move(bytes));
     }
     plant.step({}, {}, 1e-9 * static_cast<double>(from_ns + turn_ns) - plant.t_s);

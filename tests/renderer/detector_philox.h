@@ -1,7 +1,7 @@
 /// tests/renderer/detector_philox.h - the detector's random numbers, one counter at a time.
 #pragma once
 
-#include "renderer/camera/counter_random.h"
+#include "base/counter_random.h"
 
 namespace narpa::test {
 

@@ -108,7 +108,7 @@ TEST(ShapeJoint, RangesOfAnAddedShapeAreExact) {
             beams.put(beams.n, {o, normalized(to - o)});
         }
         std::array<LidarReturn, kLanes> seen;
-        shoot(*s.tracer, s.at, beams, 100, seen);
+        shoot(*s.tracer, s.at, beams, {.range_max_m = 100}, seen);
         for (std::size_t i = 0; i < kLanes; ++i) {
             const Vec3 o = beams.origin[i], d = beams.direction[i];
             const double range_m = s.range_m(o, d);

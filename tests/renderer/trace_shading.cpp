@@ -333,12 +333,12 @@ TEST(Lidar, PlateReturnsItsRangeBodyAndReflectance) {
     const BodyPoses at = placed(s);
     const double tilt = 0.7;
     const Ray beam{20.0 * Vec3{std::sin(tilt), 0, std::cos(tilt)}, {-std::sin(tilt), 0, -std::cos(tilt)}};
-    const LidarReturn hit = shoot(render_scene->tracer(), at, beam, 100);
+    const LidarReturn hit = shoot(render_scene->tracer(), at, beam, {.range_max_m = 100});
     EXPECT_NEAR(hit.range_m, 20, 1e-9);
     EXPECT_EQ(hit.body, 1);
     EXPECT_NEAR(hit.reflectivity, 0.6 * std::cos(tilt), 1e-6);
-    EXPECT_EQ(shoot(render_scene->tracer(), at, beam, 19.99).range_m, 0);
-    EXPECT_EQ(shoot(render_scene->tracer(), at, {beam.origin, -beam.direction}, 100).body, -1);
+    EXPECT_EQ(shoot(render_scene->tracer(), at, beam, {.range_max_m = 19.99}).range_m, 0);
+    EXPECT_EQ(shoot(render_scene->tracer(), at, {beam.origin, -beam.direction}, {.range_max_m = 100}).body, -1);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
-// A data packet of a VLP-16, as a navigation program receives it.
-#include "protocols/lidar/vlp16.h"
+// A data packet of a VLP-16, in single or dual return mode, as a navigation program receives it.
+#include "protocols/lidar/velodyne.h"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -8,11 +9,13 @@
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace narpa;
-    const LidarModel& model = vlp16();
-    std::vector<LidarPoint> points(model.spec().shots_per_packet);
+    static const std::array units{vlp16().configure_default(),
+                                  vlp16().configure({.rate_hz = 10, .returns = LidarReturns::dual})};
+    const LidarModel& model = *units[size > 1204 && data[1204] == 0x39 ? 1 : 0];
+    std::vector<LidarPoint> points(model.spec().points_per_packet);
     const std::size_t count = model.points({data, size}, points);
     (void)fuzz::count(count > 0);
-    fuzz::require(count <= points.size(), "no more points than shots");
+    fuzz::require(count <= points.size(), "no more points than the packet holds");
     for (std::size_t i = 0; i < count; ++i) {
         const LidarPoint& p = points[i];
         fuzz::require(p.range_m > 0 && p.range_m <= model.spec().range_m_max, "a range is one that packets hold");

@@ -1,5 +1,5 @@
 #include <narpa/protocols/can/dbc.h>
-#include <narpa/protocols/lidar/vlp16.h>
+#include <narpa/protocols/lidar/velodyne.h>
 #include <cstdio>
 
 int main() {

@@ -1,4 +1,4 @@
-/// renderer/camera/counter_random.h - a counter-based random number generator: a pixel's noise depends on its index
+/// base/counter_random.h - a counter-based random number generator: a pixel's noise depends on its index
 /// alone, not on the order or the thread in which pixels are processed.
 #pragma once
 

@@ -36,16 +36,18 @@ Status write_bytes(const std::string& path, const std::string& head, const void*
     return Ok{};
 }
 
-Status write_pfm(const std::string& path, const RadianceImage& image) {
-    static_assert(std::endian::native == std::endian::little && sizeof(Rgb) == 12);
-    const std::size_t width = static_cast<std::size_t>(image.width),
-                      height = static_cast<std::size_t>(image.height);
-    std::vector<Rgb> from_bottom(image.pixels.size());
+/// `kind`: "PF" colour or "Pf" grey. `pixels`: row by row from the top.
+template <class Pixel>
+Status write_pfm(const std::string& path, const std::string& kind, int width_px, int height_px,
+                 const std::vector<Pixel>& pixels) {
+    static_assert(std::endian::native == std::endian::little && sizeof(Pixel) % sizeof(float) == 0);
+    const auto width = static_cast<std::size_t>(width_px), height = static_cast<std::size_t>(height_px);
+    std::vector<Pixel> from_bottom(pixels.size());
     for (std::size_t y = 0; y < height; ++y)
-        std::copy_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(y * width), width,
+        std::copy_n(pixels.begin() + static_cast<std::ptrdiff_t>(y * width), width,
                     from_bottom.begin() + static_cast<std::ptrdiff_t>((height - 1 - y) * width));
-    return write_bytes(path, "PF\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n",
-                       from_bottom.data(), from_bottom.size() * sizeof(Rgb));
+    return write_bytes(path, kind + "\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n",
+                       from_bottom.data(), from_bottom.size() * sizeof(Pixel));
 }
 
 /// Named 32-bit float planes of one size.
@@ -151,7 +153,8 @@ Status write_image(const std::string& path, const RenderedFrame& frame) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (extension == ".exr") return write_exr(path, frame);
-    if (extension == ".pfm") return write_pfm(path, frame.radiance);
+    if (extension == ".pfm")
+        return write_pfm(path, "PF", frame.radiance.width, frame.radiance.height, frame.radiance.pixels);
     if (extension != ".png" && extension != ".raw")
         return Error{"unknown image format \"" + extension + "\": expected .exr, .pfm, .png or .raw", path};
     const std::size_t expected = frame_bytes({frame.radiance.width, frame.radiance.height, frame.camera.format, 0});
@@ -161,6 +164,10 @@ Status write_image(const std::string& path, const RenderedFrame& frame) {
                      path};
     return extension == ".png" ? write_png(path, frame)
                                : write_bytes(path, "", frame.bytes.data(), frame.bytes.size());
+}
+
+Status write_pfm(const std::string& path, int width, int height, std::span<const double> values) {
+    return write_pfm(path, "Pf", width, height, std::vector<float>(values.begin(), values.end()));
 }
 
 }  // namespace narpa

@@ -32,4 +32,8 @@ struct RenderedFrame {
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);
 
+/// Writes one 32-bit float a pixel as a grey PFM, little-endian, rows from the bottom. `values`: row by row from
+/// the top. Error: a path that cannot be written.
+Status write_pfm(const std::string& path, int width, int height, std::span<const double> values);
+
 }  // namespace narpa

@@ -127,6 +127,21 @@ TEST(ImageFile, PfmIsReadByOpenCv) {
         }
 }
 
+TEST(ImageFile, GreyPfmIsReadByOpenCv) {
+    const std::string path = scratch("depth.pfm");
+    const std::vector<double> values{1.5, -2, 3, NAN, 1e6, 0.25};
+    ASSERT_TRUE(write_pfm(path, 3, 2, values));
+    const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(image.type(), CV_32FC1);
+    ASSERT_EQ(image.size(), cv::Size(3, 2));
+    for (int i = 0; i < 6; ++i) {
+        const double value = values[static_cast<std::size_t>(i)],
+                     read = static_cast<double>(image.at<float>(i / 3, i % 3));
+        EXPECT_TRUE(std::isnan(value) ? std::isnan(read) : read == value) << i;
+    }
+    EXPECT_FALSE(write_pfm("/nowhere/at/all.pfm", 3, 2, values));
+}
+
 TEST(ImageFile, PngIsTheCamerasOwnOutput) {
     for (const PixelFormat format : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::yuyv,
                                      PixelFormat::gbrg8, PixelFormat::rggb16}) {

@@ -27,6 +27,7 @@ Command add_check(Parser app);
 Command add_run(Parser app);
 Command add_fly(Parser app);
 Command add_render(Parser app);
+Command add_map(Parser app);
 Command add_scan(Parser app);
 Command add_replay(Parser app);
 Command add_estimate(Parser app);

@@ -14,6 +14,7 @@ SUBCOMMANDS = {
     "run": ["--can", "--video", "--lidar", "--lockstep", "--duration", "--log", "--spp", "--budget-ms", "--budget-rays"],
     "fly": ["--can", "--lockstep"],
     "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o"],
+    "map": ["--camera", "--of", "--body", "--interval", "--datum", "--up", "--time", "--pose", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
 }
 BUILD = Path(os.environ["NARPA_BUILD_DIR"])

@@ -10,6 +10,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from xml.etree import ElementTree
 
 import needs
 
@@ -146,9 +147,19 @@ def campaign(runs=40):
     return {"limits": limits, "runs": [one(k) for k in range(runs)]}
 
 
+def surface_map(interval=1.0):
+    values = np.float32(np.hypot(*np.mgrid[-20:20, -30:30]))
+    values[:5, :5] = np.nan
+    circle = [[30 + 10 * np.cos(t), 20 + 10 * np.sin(t)] for t in np.linspace(0, 2 * np.pi, 40)]
+    return {"of": "height", "datum_m": 1.5, "lowest_m": 0.0, "highest_m": 36.1, "width": 60, "height": 40,
+            "values_m": base64.b64encode(values.tobytes()).decode(), "shade": image(60, 40), "interval_m": interval,
+            "levels_m": [interval * k for k in range(1, 37)],
+            "lines": [{"level_m": 10.0, "closed": True, "px": circle, "position_m": [[0, 0, 0]] * 40}] if interval == 1 else []}  # fmt: skip
+
+
 DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "approach": approach,
              "approach_frames": approach_frames, "stereo": stereo, "icp": icp, "filter": filter_, "estimators": estimators,
-             "replay": replay, "rehearsal": rehearsal, "campaign": campaign}  # fmt: skip
+             "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map}  # fmt: skip
 
 
 class Plots(unittest.TestCase):
@@ -176,7 +187,7 @@ class Plots(unittest.TestCase):
                         self.assertIn("</svg>", file.read_text())
 
     def test_documents_of_nothing_become_pictures_too(self):
-        nothing = {"ladder": {"scenes": []}, "loop": {"runs": []}, "estimates": {"frames": []}, "campaign": campaign(0),
+        nothing = {"ladder": {"scenes": []}, "loop": {"runs": []}, "estimates": {"frames": []}, "campaign": campaign(0), "map": surface_map(100.0),
                    "rehearsal": rehearsal(lockstep=True, flown=False)}  # fmt: skip
         for kind, document in nothing.items():
             with self.subTest(kind):
@@ -188,6 +199,14 @@ class Plots(unittest.TestCase):
                                  "attitude_x", "attitude_y", "attitude_z", "latency", "impulses", "delta_v"})  # fmt: skip
         lockstep = {file.stem for file in self.draw("rehearsal", rehearsal(lockstep=True), "lockstep")}
         self.assertEqual(names - lockstep, {"latency"})
+
+    def test_a_map_labels_its_lines(self):
+        file = self.folder / "map.svg"
+        plots.draw({"plot": "map", "title": "a < b", **surface_map()}, file)
+        texts = [text.text for text in ElementTree.parse(file).iter("{http://www.w3.org/2000/svg}text")]
+        self.assertIn("10", texts)
+        self.assertIn("height, m above 1.5", texts)
+        self.assertIn("a < b", texts)
 
     def test_null_stands_for_numbers_that_are_not_finite(self):
         document = estimates()

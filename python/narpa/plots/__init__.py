@@ -7,6 +7,7 @@ matplotlib figure, or several by name. It stands in one of the modules of this p
     estimation   estimates, approach, approach_frames, stereo, icp, filter, estimators: `narpa estimate`, `bench estimate`
     replay       replay: `narpa replay --reference`
     rehearsal    rehearsal, campaign: the charts of a rehearsal's page
+    surface      map: `narpa map`
 """
 import argparse
 import json
@@ -18,9 +19,9 @@ MATPLOTLIB_MISSING = 3  # exit status: a dependency is missing, as narpa's own
 
 
 def drawers():
-    from narpa.plots import bench, estimation, rehearsal, replay
+    from narpa.plots import bench, estimation, rehearsal, replay, surface
 
-    return {name: function for module in (bench, estimation, replay, rehearsal) for name, function in module.KINDS.items()}
+    return {name: function for module in (bench, estimation, replay, rehearsal, surface) for name, function in module.KINDS.items()}
 
 
 def draw(document, output, picture_format=None):

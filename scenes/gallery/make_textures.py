@@ -1,7 +1,7 @@
-"""The textures of the gallery's scenes.
+"""The textures and the terrain of the gallery's scenes.
 
 Maps come from a folder of real ones (earth-blue-marble.jpg, 2k_mars.jpg, lunar_surface_4096x2048.jpg; longitude across,
-latitude up); a missing map is generated.
+latitude up; missionDEM.tif: heights in metres, 1 m apart, north up); a missing map is generated.
 """
 from pathlib import Path
 
@@ -22,6 +22,9 @@ def make_all(folder, assets=None):
     heights = craters()
     cv2.imwrite(str(folder / "craters.png"), np.uint16(np.round(65535 * heights)))
     cv2.imwrite(str(folder / "crater_normals.png"), sphere_normals(heights, radius_m=1.0, height_m=0.06))
+    dem = Path(assets) / "missionDEM.tif" if assets else None
+    ground = cv2.imread(str(dem), cv2.IMREAD_UNCHANGED) if dem and dem.exists() else 35 * heights[90:427, 300:648] - 4475
+    write_terrain(folder / "gale.obj", np.float64(ground) + 4460)
 
 
 def checker(squares):
@@ -107,3 +110,15 @@ def sphere_normals(heights, radius_m, height_m):
     normals = np.stack([np.ones_like(east), -north, -east], -1)  # blue, green, red
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.uint16(np.round(65535 * (normals + 1) / 2))
+
+
+def write_terrain(file, heights):
+    """A mesh of the heights, 1 m apart: x along rows, y up the columns, origin in the middle."""
+    rows, columns = heights.shape
+    y, x = np.indices(heights.shape)
+    corner = (y * columns + x + 1)[:-1, :-1].ravel()
+    below, right = corner + columns, corner + 1
+    with open(file, "w") as out:
+        np.savetxt(out, np.stack([x.ravel() - (columns - 1) / 2, (rows - 1) / 2 - y.ravel(), heights.ravel()], 1), "v %.1f %.1f %.4f")
+        np.savetxt(out, np.stack([corner, below, below + 1], 1), "f %d %d %d")
+        np.savetxt(out, np.stack([corner, below + 1, right], 1), "f %d %d %d")

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "renderer/camera/point_response.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/projection/distortion.h"
 #include "tests/renderer/camera_support.h"
@@ -52,20 +53,20 @@ TEST(Handover, LightIsThatOfAPointFromATwentiethOfAPixelToFivePixels) {
     }
 }
 
-struct Spread {
+struct LightSpread {
     PointSpreadFunction function;
     double form;  ///< largest difference from a star, in units of the star's brightest pixel; measured: 85 % of it
 };
-const std::array kSpreads{Spread{{.sigma_px = 0.3}, 0.33}, Spread{{.sigma_px = 0.5}, 0.2},
-                          Spread{{.sigma_px = 0.8}, 0.065}, Spread{{.sigma_px = 1.5}, 0.013},
-                          Spread{{.sigma_px = 0.3, .cutoff_per_px = 1.5}, 0.23}};
+const std::array kSpreads{LightSpread{{.sigma_px = 0.3}, 0.33}, LightSpread{{.sigma_px = 0.5}, 0.2},
+                          LightSpread{{.sigma_px = 0.8}, 0.065}, LightSpread{{.sigma_px = 1.5}, 0.013},
+                          LightSpread{{.sigma_px = 0.3, .cutoff_per_px = 1.5}, 0.23}};
 
 /// Brightness and its centroid.
-struct Blob {
+struct LightSpot {
     double light = 0, x = 0, y = 0;
 };
-Blob blob(const RadianceImage& image) {
-    Blob b;
+LightSpot blob(const RadianceImage& image) {
+    LightSpot b;
     for (int v = 0; v < image.height; ++v)
         for (int u = 0; u < image.width; ++u) {
             const auto l = static_cast<double>(image.pixels[static_cast<std::size_t>(v * image.width + u)].y);
@@ -76,7 +77,7 @@ Blob blob(const RadianceImage& image) {
 }
 
 /// Largest difference from the image of a star with this light, over the star's brightest pixel.
-double difference_from_star(const RadianceImage& image, const PointResponse& response, const Blob& star) {
+double difference_from_star(const RadianceImage& image, const PointResponse& response, const LightSpot& star) {
     double brightest = 0, worst = 0;
     std::vector<Rgb> row;
     for (int v = 0; v < image.height; ++v) {
@@ -121,7 +122,7 @@ TEST(Handover, PlaceAndFormAreThoseOfAPointBetweenThePixels) {
                     BodyPoses at(1);
                     at.set(0, {{}, distance_m * CameraModelHandle(c)->direction(p)});
                     renderer.render(at, {}, {.spp = 16}, image);
-                    const Blob seen = blob(image);
+                    const LightSpot seen = blob(image);
                     EXPECT_NEAR(seen.x, p.x, 0.01) << diameter_px << " px";
                     EXPECT_NEAR(seen.y, p.y, 0.01) << diameter_px << " px";
                     if (diameter_px > 0.2) continue;  // larger ones are wider than a star

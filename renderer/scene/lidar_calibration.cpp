@@ -35,7 +35,8 @@ Result<std::vector<LidarBeam>> read_lidar_calibration(const std::string& file, s
         file, "a LiDAR's calibration in YAML, as ROS has it: lasers: [...]", [&](const YAML::Node& document) {
             const YAML::Node lasers = document["lasers"];
             if (!lasers || !lasers.IsSequence() || lasers.size() != beams)
-                throw YamlFault{fmt::format("expected lasers: a list of {}", beams), lasers.Mark()};
+                throw YamlFault{fmt::format("expected lasers: a list of {}", beams),
+                                lasers ? lasers.Mark() : YAML::Mark::null_mark()};
             std::vector<LidarBeam> out(beams);
             std::vector<bool> seen(beams);
             for (const YAML::Node& laser : lasers) {

@@ -5,6 +5,7 @@
 
 #include "renderer/camera/scene_camera.h"
 #include "renderer/scene/calibration_file.h"
+#include "renderer/scene/lidar_calibration.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
 
@@ -153,6 +154,45 @@ TEST(SceneDistortion, FieldsOfViewAreThoseOfTheDistortedImage) {
                    b = model->direction({639.5, diagonal ? 479.5 : 239.5});
         EXPECT_NEAR(std::acos(dot(a, b)) * 180 / 3.14159265358979, diagonal ? 130 : 100, 1e-6);
     }
+}
+
+/// As velodyne_pointcloud of ROS has it: by laser_id, in any order.
+TEST(LidarCalibrationFile, OfRosIsRead) {
+    const TemporaryFolder folder;
+    const auto beams =
+        read_lidar_calibration(folder.write("unit.yaml",
+                                            "lasers:\n- {laser_id: 1, vert_correction: 0.2, rot_correction: 0.03}\n"
+                                            "- {laser_id: 0, vert_correction: -0.1, dist_correction: 0.004, "
+                                            "vert_offset_correction: 0.011}\nnum_lasers: 2\n"),
+                               2);
+    ASSERT_TRUE(beams) << beams.error().text();
+    ASSERT_EQ(beams->size(), 2u);
+    EXPECT_EQ((*beams)[0].elevation_rad, -0.1);
+    EXPECT_EQ((*beams)[0].range_offset_m, 0.004);
+    EXPECT_EQ((*beams)[0].height_m, 0.011);
+    EXPECT_EQ((*beams)[1].elevation_rad, 0.2);
+    EXPECT_EQ((*beams)[1].azimuth_rad, -0.03);
+}
+
+TEST(LidarCalibrationFile, SaysWhereAndWhatIsWrong) {
+    const TemporaryFolder folder;
+    const std::pair<const char*, const char*> cases[]{
+        {"beams: 3\n", "expected lasers: a list of 2"},
+        {"lasers: 3\n", "expected lasers: a list of 2"},
+        {"lasers:\n- {laser_id: 0}\n", "expected lasers: a list of 2"},
+        {"lasers:\n- {laser_id: 0}\n- {laser_id: 0}\n", "bad.yaml:3:3: laser_id: expected each of 0 to 1 once"},
+        {"lasers:\n- {laser_id: 0}\n- {laser_id: 2}\n", "bad.yaml:3:3: laser_id"},
+        {"lasers:\n- {laser_id: 0, vert_correction: up}\n- {laser_id: 1}\n", "vert_correction: expected a number"},
+        {"lasers:\n- {laser_id: 0, horiz_offset_correction: 0.026}\n- {laser_id: 1}\n", "expected 0"},
+        {"- 1\n", "expected a LiDAR's calibration in YAML"},
+        {"lasers: [\n", "is not YAML"},
+    };
+    for (const auto& [text, expected] : cases) {
+        const auto beams = read_lidar_calibration(folder.write("bad.yaml", text), 2);
+        ASSERT_FALSE(beams) << text;
+        EXPECT_NE(beams.error().text().find(expected), std::string::npos) << beams.error().text();
+    }
+    EXPECT_FALSE(read_lidar_calibration(folder.write("gone", "") + ".yaml", 2));
 }
 
 }  // namespace

@@ -1,11 +1,17 @@
-// A camera's calibration in YAML.
+// A camera's or a LiDAR's calibration in YAML.
 #include "renderer/scene/calibration_file.h"
+#include "renderer/scene/lidar_calibration.h"
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace narpa;
     static const fuzz::InputFolder folder;
-    const auto calibration = read_calibration(folder.write("c.yaml", fuzz::text_of(data, size)));
+    const std::string file = folder.write("c.yaml", fuzz::text_of(data, size));
+    if (const auto beams = read_lidar_calibration(file, 2)) {
+        for (const LidarBeam& beam : *beams) fuzz::require(std::abs(beam.elevation_rad) < 1.7, "an elevation");
+        return fuzz::count(true), 0;
+    }
+    const auto calibration = read_calibration(file);
     if (!fuzz::count(bool(calibration)))
         return fuzz::require(!calibration.error().what.empty(), "an error has words"), 0;
     fuzz::require(calibration->width > 0 && calibration->height > 0 && calibration->pinhole.is_valid(),

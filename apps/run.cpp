@@ -117,9 +117,16 @@ Command add_run(Parser app) {
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         .type_name("SECONDS")
         .range(0.0, 9e9);
-    c.option("--log", o->run.log_folder,
+    const Option log =
+        c.option(
+             "--log", o->run.log_folder,
              "Folder for run.json, truth, ledger, CAN log and contact sheet; those of an earlier run are replaced")
-        .type_name("DIR");
+            .type_name("DIR");
+    c.flag(
+         "--log-shots", o->run.log_shots,
+         "Log every LiDAR shot too: time, exact range, body, incidence, velocity, and what is reported of it (some "
+         "40 MB a second for 16 beams)")
+        .needs(log);
     const Option estimate =
         c.option(
              "--estimate", o->run.estimate_camera,

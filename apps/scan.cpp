@@ -1,7 +1,7 @@
 // narpa scan - what one LiDAR measures during a turn (or longer), as a point cloud, a table of shots or a capture.
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -12,6 +12,7 @@
 #include "apps/scene_options.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
+#include "emulator/log/sweep_log.h"
 
 namespace narpa::cli {
 namespace {
@@ -24,28 +25,6 @@ struct ScanOptions {
 
 /// An output file: receives every packet, then is closed.
 using Writer = std::function<void(std::int64_t packet, LidarUnit& unit)>;
-
-constexpr const char* kColumns =
-    "t_ns,packet,block,laser,azimuth_rad,elevation_rad,range_m,x_m,y_m,z_m,reflectivity,body,incidence_rad,"
-    "velocity_m_s,reported_range_m,reported_reflectivity,reported_velocity_m_s,second_range_m,second_"
-    "reflectivity\n";
-
-/// One row per shot, with or without a return: the truth of the beam's axis, then what the packets state of it,
-/// before rounding.
-void write_shots(std::ostream& out, std::int64_t packet, const LidarUnit& unit) {
-    for (std::size_t i = 0; i < unit.shots().size(); ++i) {
-        const LidarShot& s = unit.shots()[i];
-        const LidarReturn& r = unit.truth()[i];
-        const auto [first, second] = unit.echoes()[i].reported(unit.spec().returns);
-        const Vec3 p = s.origin_m + r.range_m * s.direction;
-        const double incidence_rad = std::acos(std::clamp(static_cast<double>(r.cos_incidence), 0.0, 1.0));
-        out << fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                           unit.packet_start_ns(packet) + s.t_offset_ns, packet, s.block, s.beam, s.azimuth_rad,
-                           s.elevation_rad, r.range_m, p.x, p.y, p.z, r.reflectivity, r.range_m > 0 ? r.body : -1,
-                           incidence_rad, r.velocity_m_s, first.range_m, first.reflectivity, first.velocity_m_s,
-                           second.range_m, second.reflectivity);
-    }
-}
 
 /// The lines of the packet's returns: x, y, z in the LiDAR's frame, reflectivity.
 void add_points(const LidarUnit& unit, std::vector<std::string>& lines) {
@@ -77,8 +56,12 @@ Status write_text(const std::string& path, const std::string& extension, const F
     std::ofstream out(path);
     if (!out) return Error{"cannot be written", path};
     if (extension == ".csv") {
-        out << kColumns;
-        fire_all([&](std::int64_t packet, const LidarUnit& unit) { write_shots(out, packet, unit); });
+        out << kShotHeader;
+        std::array<char, RowLog::kMaxLine> row;
+        fire_all([&](std::int64_t packet, const LidarUnit& unit) {
+            for (std::size_t i = 0; i < unit.shots().size(); ++i)
+                out << std::string_view(row.data(), format_shot_row(row, unit, packet, i));
+        });
     } else {
         std::vector<std::string> lines;
         fire_all([&](std::int64_t, const LidarUnit& unit) { add_points(unit, lines); });

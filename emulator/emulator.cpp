@@ -78,7 +78,10 @@ Result<std::unique_ptr<Sensor>> open_lidar(const World& world, std::size_t index
         });
     if (!sinks) return sinks.error();
     if (sinks->empty()) return std::unique_ptr<Sensor>();
-    return std::unique_ptr<Sensor>(std::make_unique<LidarSensor>(world, index, *std::move(sinks)));
+    auto lidar = std::make_unique<LidarSensor>(world, index, *std::move(sinks), o.log_shots);
+    if (!o.log_folder.empty())
+        if (auto logs = lidar->log_to(o.log_folder, o.lockstep); !logs) return logs.error();
+    return std::unique_ptr<Sensor>(std::move(lidar));
 }
 
 /// The sensors for which the options name sinks; a new kind is opened here. `telemetry`: they keep ledgers for the

@@ -26,6 +26,7 @@ struct RunOptions {
     bool lockstep = false;
     double duration_s = 0;   ///< of simulation time; 0: until stopped or until a recorded bus ends
     std::string log_folder;  ///< empty: no log
+    bool log_shots = false;  ///< logs the truth of every LiDAR shot too, at the cost of a second ray for each
     int threads = 0;         ///< tracing threads; 0: one per core, or one per entry of `cpus`
     std::vector<int> cpus;   ///< processors that tracing threads are bound to in real time; empty: any
     std::optional<TrackerOptions> estimate{};              ///< estimate a target's pose during the run

@@ -8,6 +8,7 @@
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
 #include "emulator/log/histogram.h"
+#include "emulator/log/sweep_log.h"
 #include "emulator/sensor.h"
 
 namespace narpa {
@@ -15,13 +16,18 @@ namespace narpa {
 struct LidarStats {
     std::uint64_t packets = 0;
     std::uint64_t skipped = 0;  ///< never fired: the sensor was more than kMaxLagNs behind
+    std::uint64_t late = 0;     ///< sent after the next packet was complete
     std::uint64_t shots = 0, returns = 0;
     Histogram wake_late, fire, hand_over;  ///< after it was due; duration; from due to sent
 };
 
 class LidarSensor final : public Sensor {
 public:
-    LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks);
+    /// `truth`: for the log, of each shot.
+    LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
+                bool truth = false);
+    /// Logs sweeps, and shots where it was made with `truth`, to files of its name in the folder.
+    Status log_to(const std::string& folder, bool wait_when_full);
 
     [[nodiscard]] std::string_view kind() const noexcept override { return "lidar"; }
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.lidar().name; }
@@ -52,8 +58,11 @@ public:
 private:
     LidarUnit unit_;
     std::vector<std::unique_ptr<PacketSink>> sinks_;
+    [[nodiscard]] std::uint64_t lost() const noexcept;
+
     std::int64_t next_ = 0;
     LidarStats stats_;
+    std::unique_ptr<SweepLog> log_;  ///< null without a log
 };
 
 }  // namespace narpa

@@ -126,6 +126,7 @@ json LidarSensor::report() const {
             {"skipped", s.skipped},
             {"shots", s.shots},
             {"returns", s.returns},
+            {"packets_late", s.late},
             {"wake_late_ms", percentiles(s.wake_late, 1e-6)},
             {"fire_ms", percentiles(s.fire, 1e-6)},
             {"due_to_sent_ms", percentiles(s.hand_over, 1e-6)},

@@ -1,0 +1,99 @@
+#include "emulator/log/sweep_log.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace narpa {
+namespace {
+
+/// Of the quickest instrument, for a quarter of a second.
+constexpr std::size_t kShotLines = 1 << 17;
+
+std::int64_t sweep_of(const LidarUnit& unit, std::int64_t packet) noexcept {
+    return std::llround(std::floor(static_cast<double>(unit.packet_start_ns(packet)) * 1e-9 * unit.spec().rate_hz));
+}
+
+template <class... Args>
+std::size_t format_row(std::span<char> out, fmt::format_string<Args...> format, Args&&... args) noexcept {
+    return std::min(out.size(), fmt::format_to_n(out.data(), out.size(), format, std::forward<Args>(args)...).size);
+}
+
+}  // namespace
+
+std::size_t format_shot_row(std::span<char> out, const LidarUnit& unit, std::int64_t packet,
+                            std::size_t i) noexcept {
+    const LidarShot& s = unit.shots()[i];
+    const LidarReturn& r = unit.truth()[i];
+    const auto [first, second] = unit.echoes()[i].reported(unit.spec().returns);
+    const Vec3 p = s.origin_m + r.range_m * s.direction;
+    const double incidence_rad = std::acos(std::clamp(static_cast<double>(r.cos_incidence), 0.0, 1.0));
+    return format_row(out, "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                      unit.packet_start_ns(packet) + s.t_offset_ns, packet, s.block, s.beam, s.azimuth_rad,
+                      s.elevation_rad, r.range_m, p.x, p.y, p.z, r.reflectivity, r.range_m > 0 ? r.body : -1,
+                      incidence_rad, r.velocity_m_s, first.range_m, first.reflectivity, first.velocity_m_s,
+                      second.range_m, second.reflectivity);
+}
+
+Result<std::unique_ptr<SweepLog>> SweepLog::create(const std::string& folder, const std::string& lidar, bool shots,
+                                                   bool wait_when_full) {
+    auto log = std::make_unique<SweepLog>();
+    auto sweeps = RowLog::create(folder + "/" + lidar + ".sweeps.csv", kSweepHeader, wait_when_full);
+    if (!sweeps) return sweeps.error();
+    log->sweeps_ = *std::move(sweeps);
+    if (shots) {
+        auto rows = RowLog::create(folder + "/" + lidar + ".shots.csv", kShotHeader, wait_when_full, kShotLines);
+        if (!rows) return rows.error();
+        log->shots_ = *std::move(rows);
+    }
+    return log;
+}
+
+void SweepLog::add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_due_ns, std::int64_t t_sent_ns,
+                   bool late, std::uint64_t lost) noexcept {
+    const std::int64_t sweep = sweep_of(unit, packet), start_ns = unit.packet_start_ns(packet);
+    if (sweep_.packets > 0 && sweep != sweep_.sweep) write_sweep(lost);
+    if (sweep_.packets == 0) {
+        sweep_ = {};
+        sweep_.sweep = sweep;
+        sweep_.t_first_shot_ns = start_ns + unit.shots().front().t_offset_ns;
+    }
+    ++sweep_.packets;
+    sweep_.late += late ? 1 : 0;
+    sweep_.shots += unit.shots().size();
+    sweep_.returns += unit.returns();
+    sweep_.t_last_shot_ns = start_ns + unit.shots().back().t_offset_ns;
+    sweep_.t_complete_ns = t_due_ns;
+    sweep_.t_hand_over_ns = t_sent_ns;
+    sweep_.hand_over_max_ns = std::max(sweep_.hand_over_max_ns, t_sent_ns - t_due_ns);
+    sweep_.packets_crc32 = static_cast<std::uint32_t>(
+        ::crc32(sweep_.packets_crc32, unit.bytes().data(), static_cast<uInt>(unit.bytes().size())));
+    if (!shots_) return;
+    std::array<char, RowLog::kMaxLine> row;
+    for (std::size_t i = 0; i < unit.shots().size(); ++i)
+        shots_->append({row.data(), format_shot_row(row, unit, packet, i)});
+}
+
+void SweepLog::write_sweep(std::uint64_t lost) noexcept {
+    sweep_.lost = lost - std::exchange(lost_before_, lost);
+    const SweepLedger& s = sweep_;
+    std::array<char, RowLog::kMaxLine> row;
+    sweeps_->append(
+        {row.data(), format_row(row, "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", s.sweep, s.t_first_shot_ns,
+                                s.t_last_shot_ns, s.packets, s.late, s.skipped, s.shots, s.returns, s.t_complete_ns,
+                                s.t_hand_over_ns, s.hand_over_max_ns, s.packets_crc32, s.lost)});
+    sweep_ = {};
+}
+
+Status SweepLog::close(std::uint64_t lost) {
+    if (sweep_.packets > 0) write_sweep(lost);
+    Status sweeps = sweeps_->close();
+    const Status shots = shots_ ? shots_->close() : Status{Ok{}};
+    return sweeps ? shots : sweeps;
+}
+
+}  // namespace narpa

@@ -2,7 +2,7 @@
 set(NARPA_PUBLIC_HEADERS
   base/pose.h base/result.h base/stop.h
   protocols/can/messages.h protocols/can/dbc.h protocols/can/candump.h protocols/ledger.h protocols/estimate.h
-  protocols/lidar/lidar_model.h protocols/lidar/velodyne.h protocols/video/embedded_line.h protocols/video/y4m.h
+  protocols/lidar/lidar_model.h protocols/lidar/pattern_lidar.h protocols/lidar/velodyne.h protocols/video/embedded_line.h protocols/video/y4m.h
   drivers/can/can_bus.h drivers/lidar/packet_sink.h drivers/lidar/packet_source.h drivers/video/video_sink.h
   drivers/video/video_source.h
   renderer/scene/scene.h renderer/scene/scene_file.h renderer/geometry/tracer.h renderer/film/camera_image.h

@@ -27,8 +27,12 @@ public:
     [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns) const noexcept {
         return model_.first_packet_from(t_ns);
     }
-    /// A packet is sent when it is complete, which is when the next one starts.
-    [[nodiscard]] std::int64_t t_sent_ns(std::int64_t packet) const noexcept { return packet_start_ns(packet + 1); }
+    [[nodiscard]] std::int64_t sweep(std::int64_t packet) const noexcept { return model_.sweep(packet); }
+    /// A packet is sent when it is complete.
+    [[nodiscard]] std::int64_t t_sent_ns(std::int64_t packet) const noexcept {
+        return packet_start_ns(packet) +
+               (spec().packet_complete_ns > 0 ? spec().packet_complete_ns : packet_period_ns());
+    }
 
     /// Fires a packet's shots, every body where it is at each shot's own time.
     void fire(std::int64_t packet) noexcept;

@@ -14,10 +14,6 @@ namespace {
 /// Of the quickest instrument, for a quarter of a second.
 constexpr std::size_t kShotLines = 1 << 17;
 
-std::int64_t sweep_of(const LidarUnit& unit, std::int64_t packet) noexcept {
-    return std::llround(std::floor(static_cast<double>(unit.packet_start_ns(packet)) * 1e-9 * unit.spec().rate_hz));
-}
-
 template <class... Args>
 std::size_t format_row(std::span<char> out, fmt::format_string<Args...> format, Args&&... args) noexcept {
     return std::min(out.size(), fmt::format_to_n(out.data(), out.size(), format, std::forward<Args>(args)...).size);
@@ -55,7 +51,7 @@ Result<std::unique_ptr<SweepLog>> SweepLog::create(const std::string& folder, co
 
 void SweepLog::add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_due_ns, std::int64_t t_sent_ns,
                    bool late, std::uint64_t lost) noexcept {
-    const std::int64_t sweep = sweep_of(unit, packet), start_ns = unit.packet_start_ns(packet);
+    const std::int64_t sweep = unit.sweep(packet), start_ns = unit.packet_start_ns(packet);
     if (sweep_.packets > 0 && sweep != sweep_.sweep) write_sweep(lost);
     if (sweep_.packets == 0) {
         sweep_ = {};

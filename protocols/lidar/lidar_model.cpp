@@ -1,5 +1,7 @@
 #include "protocols/lidar/lidar_model.h"
 
+#include <cmath>
+
 #include "protocols/lidar/velodyne.h"
 
 namespace narpa {
@@ -24,6 +26,10 @@ const LidarMake* find_lidar_make(std::string_view name) noexcept {
 
 void add_lidar_make(const LidarMake& make) {
     makes().push_back(&make);
+}
+
+std::int64_t LidarModel::sweep(std::int64_t packet) const noexcept {
+    return std::llround(std::floor(static_cast<double>(packet_start_ns(packet)) * 1e-9 * spec_.rate_hz));
 }
 
 }  // namespace narpa

@@ -4,8 +4,7 @@
 /// whose members never allocate or throw. Adding a make takes a pair of files that implement LidarModel and a line
 /// in lidar_model.cpp; a program or a test may add its own at start with add_lidar_make().
 ///
-/// Frame: x right, y forward, z up, as `look_at` in a scene assumes. Packet p = 0, 1, ... starts p periods after
-/// simulation time 0.
+/// Frame: x right, y forward, z up, as `look_at` in a scene assumes. Packet 0 starts at simulation time 0.
 #pragma once
 
 #include <array>
@@ -108,7 +107,8 @@ struct LidarSpec {
     std::string_view name;  ///< of the make
     double rate_hz = 0;
     LidarReturns returns = LidarReturns::strongest;
-    std::int64_t packet_period_ns = 0;  ///< from one packet's start to the next one's
+    std::int64_t packet_period_ns = 0;    ///< from one packet's start to the next one's; rounded down
+    std::int64_t packet_complete_ns = 0;  ///< after its start, when it is sent; 0: when the next one starts
     std::size_t shots_per_packet = 0;
     std::size_t points_per_packet = 0;  ///< at most
     std::size_t data_packet_bytes = 0;
@@ -129,15 +129,19 @@ public:
     virtual ~LidarModel() = default;
 
     [[nodiscard]] const LidarSpec& spec() const noexcept { return spec_; }
-    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet) const noexcept {
+    [[nodiscard]] virtual std::int64_t packet_start_ns(std::int64_t packet) const noexcept {
         return packet * spec_.packet_period_ns;
     }
     /// The first packet that starts at t_ns >= 0 or later.
-    [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns) const noexcept {
+    [[nodiscard]] virtual std::int64_t first_packet_from(std::int64_t t_ns) const noexcept {
         return (t_ns + spec_.packet_period_ns - 1) / spec_.packet_period_ns;
     }
 
-    /// Firing pattern: the packet's shots in firing order. `out` has spec().shots_per_packet elements.
+    /// The turn or frame in which the packet starts: 0, 1, ... since simulation time 0.
+    [[nodiscard]] virtual std::int64_t sweep(std::int64_t packet) const noexcept;
+
+    /// Firing pattern: the packet's shots in firing order; they may be before its start. `out` has
+    /// spec().shots_per_packet elements.
     virtual void shots(std::int64_t packet, std::span<LidarShot> out) const noexcept = 0;
 
     /// Writes a data packet of spec().data_packet_bytes. `echoes` has an element per shot. A range above

@@ -7,6 +7,8 @@ import struct
 
 import numpy as np
 
+from narpa import pcap
+
 PORT, PACKET_BYTES = 2368, 1206
 BUFFER_BYTES, SO_RCVBUFFORCE = 4 << 20, 33  # asm-generic/socket.h; the socket module has no name for it
 BLOCKS, LASERS = 12, 16
@@ -85,23 +87,5 @@ def receive(port=PORT, host="", timeout_s=None):
 
 
 def read_pcap(path):
-    """The data packets of a capture of Ethernet frames, as `--lidar LIDAR=FILE.pcap` and tcpdump write it."""
-    with open(path, "rb") as file:
-        magic = file.read(4)
-        order = {b"\xd4\xc3\xb2\xa1": "<", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4": ">", b"\xa1\xb2\x3c\x4d": ">"}.get(magic)
-        if order is None:
-            raise ValueError(f"{path}: not a pcap file")
-        file.read(20)
-        while len(header := file.read(16)) == 16:
-            frame = file.read(struct.unpack(order + "4I", header)[2])
-            payload = udp_payload(frame)
-            if payload is not None and len(payload) == PACKET_BYTES:
-                yield payload
-
-
-def udp_payload(frame):
-    """Of an Ethernet frame with IPv4; None for other frames."""
-    if frame[12:14] != b"\x08\x00" or len(frame) < 42 or frame[23] != 17:
-        return None
-    start = 14 + 4 * (frame[14] & 15)
-    return frame[start + 8 : start + struct.unpack_from(">H", frame, start + 4)[0]]
+    """The data packets of a capture, as `--lidar LIDAR=FILE.pcap` and tcpdump write it."""
+    return (payload for payload in pcap.udp_payloads(path) if len(payload) == PACKET_BYTES)

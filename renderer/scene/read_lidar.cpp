@@ -5,6 +5,7 @@
 #include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/lidar_calibration.h"
+#include "renderer/scene/lidar_description.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -51,6 +52,21 @@ LidarReceiverModel read_receiver(TableReader& table) {
     return r;
 }
 
+/// One of those that narpa knows, or one that a file describes.
+LidarMake read_make(TableReader& table, const std::filesystem::path& folder) {
+    std::vector<std::pair<std::string_view, const LidarMake*>> makes;
+    for (const LidarMake* make : lidar_makes()) makes.emplace_back(make->name, make);
+    const LidarMake& first = *makes.front().second;
+    table.require("model", fmt::format("\"{}\"", first.name));
+    const toml::node* node = table.find("model");
+    const auto name = node ? node->value<std::string>() : std::nullopt;
+    if (!name || !name->ends_with(".toml")) return *table.choice<const LidarMake*>("model", makes).value_or(&first);
+    auto described = read_lidar_description((folder / *name).string());
+    if (described) return *std::move(described);
+    table.fail("model", described.error().text());
+    return first;
+}
+
 LidarReturns read_returns(TableReader& table, const LidarMake& make) {
     using enum LidarReturns;
     static constexpr std::array<std::pair<std::string_view, LidarReturns>, 3> kReturns{
@@ -86,15 +102,12 @@ LidarSettings read_settings(TableReader& table, const LidarMake& make, const std
 
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder) {
-    std::vector<std::pair<std::string_view, const LidarMake*>> makes;
-    for (const LidarMake* make : lidar_makes()) makes.emplace_back(make->name, make);
     Lidar lidar;
     lidar.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
     lidar.mount = mounting.mount;
     lidar.T_mount_lidar = mounting.T_mount_thing;
-    table.require("model", fmt::format("\"{}\"", makes.front().first));
-    const LidarMake& make = *table.choice<const LidarMake*>("model", makes).value_or(makes.front().second);
+    const LidarMake make = read_make(table, folder);
     lidar.model = make.configure(read_settings(table, make, folder));
     lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = make.range_m_max, .low_open = true})
                             .value_or(make.range_m_default);

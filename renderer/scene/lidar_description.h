@@ -1,0 +1,14 @@
+/// renderer/scene/lidar_description.h - instruments that a TOML file describes: docs/lidar-description.md.
+#pragma once
+
+#include <string>
+
+#include "base/result.h"
+#include "protocols/lidar/lidar_model.h"
+
+namespace narpa {
+
+/// Errors name the file and the line, and what was expected.
+[[nodiscard]] Result<LidarMake> read_lidar_description(const std::string& file);
+
+}  // namespace narpa

@@ -10,8 +10,8 @@
 namespace narpa {
 namespace {
 
-constexpr std::array<std::uint8_t, 4> kMagic{'N', 'L', 'P', 'P'};
-constexpr std::uint8_t kVersion = 1, kDual = 1;
+constexpr std::array<std::uint8_t, 4> kPointMagic{'N', 'L', 'P', 'P'};
+constexpr std::uint8_t kPointVersion = 1, kDualFlag = 1;
 
 enum Offset : std::size_t {
     kVersionAt = 4,
@@ -62,9 +62,9 @@ PointRecord PointPacket::record(std::span<const std::uint8_t> packet, std::size_
 }
 
 void PointPacket::write(std::span<std::uint8_t> packet) const noexcept {
-    std::ranges::copy(kMagic, packet.begin());
-    packet[kVersionAt] = kVersion;
-    packet[kFlagsAt] = dual ? kDual : 0;
+    std::ranges::copy(kPointMagic, packet.begin());
+    packet[kVersionAt] = kPointVersion;
+    packet[kFlagsAt] = dual ? kDualFlag : 0;
     put_le(&packet[kRecordsAt], records);
     put_le(&packet[kFrameAt], frame);
     put_le(&packet[kFirstShotAt], first_shot);
@@ -76,11 +76,11 @@ void PointPacket::write(std::span<std::uint8_t> packet) const noexcept {
 }
 
 std::optional<PointPacket> PointPacket::read(std::span<const std::uint8_t> packet) noexcept {
-    if (packet.size() < kHeaderBytes || !std::ranges::equal(packet.first(kMagic.size()), kMagic) ||
-        packet[kVersionAt] != kVersion || packet[kFlagsAt] > kDual)
+    if (packet.size() < kHeaderBytes || !std::ranges::equal(packet.first(kPointMagic.size()), kPointMagic) ||
+        packet[kVersionAt] != kPointVersion || packet[kFlagsAt] > kDualFlag)
         return std::nullopt;
     PointPacket p;
-    p.dual = packet[kFlagsAt] == kDual;
+    p.dual = packet[kFlagsAt] == kDualFlag;
     p.records = get_le<std::uint16_t>(&packet[kRecordsAt]);
     if (packet.size() != bytes(p.records) || get_le<std::uint32_t>(&packet[kChecksumAt]) != checksum(packet))
         return std::nullopt;

@@ -151,6 +151,11 @@ void CanNode::send(const CameraState& state, std::int64_t t_now_ns) noexcept {
     for (const CanFrame& frame : encode(state, bus_.carries_fd())) put(frame, t_now_ns);
 }
 
+void CanNode::send(LidarBeamReport report, std::int64_t t_now_ns) noexcept {
+    report.counter = beam_counter_++;
+    for (const CanFrame& frame : encode(report, bus_.carries_fd())) put(frame, t_now_ns);
+}
+
 void CanNode::send(const CameraReply& reply, std::int64_t t_now_ns) noexcept {
     for (const CanFrame& frame : encode(reply, bus_.carries_fd())) put(frame, t_now_ns);
 }

@@ -58,6 +58,8 @@ public:
     void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
     void send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept;
     void send(const CameraState& state, std::int64_t t_now_ns) noexcept;
+    /// Sets the report's counter.
+    void send(LidarBeamReport report, std::int64_t t_now_ns) noexcept;
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
     /// Commands and triggers go to this camera too, which outlives the run. Before it.
     void operate(CameraControl& camera) { cameras_.push_back(&camera); }
@@ -103,7 +105,7 @@ private:
     MessageDecoder<CameraCommand> camera_commands_;
     MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
-    std::uint8_t heartbeat_counter_ = 0;
+    std::uint8_t heartbeat_counter_ = 0, beam_counter_ = 0;
     std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged
     std::uint64_t logged_others_ = 0;
     std::uint32_t left_out_ = 0;  ///< since the last line that states it

@@ -68,17 +68,39 @@ Result<std::unique_ptr<Sensor>> open_camera(const World& world, std::size_t inde
     return std::unique_ptr<Sensor>(std::move(camera));
 }
 
+Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
+    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
+    const LidarSpec& spec = lidar.model->spec();
+    const double shots_hz =
+        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
+    if (shots_hz <= LidarSensor::kMostBeams_hz) return Ok{};
+    return Error{
+        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
+                    "frames)",
+                    lidar.name, shots_hz, LidarSensor::kMostBeams_hz),
+        file};
+}
+
 Result<std::unique_ptr<Sensor>> open_lidar(const World& world, std::size_t index, const RunOptions& o,
                                            bool /*telemetry*/) {
     const Scene& scene = world.scene();
+    auto packets = o.lidar;
+    const auto to_can = [&](const auto& output) {
+        return output.second == "can" && output.first == scene.lidars[index].name;
+    };
+    const bool beams = std::erase_if(packets, to_can) > 0;
+    if (beams)
+        if (auto good = check_beams_on_can(scene.lidars[index], !o.bus.empty(), scene.file); !good)
+            return good.error();
     auto sinks =
-        open_sinks<PacketSink>(o.lidar, index, scene.lidars, "LiDAR", scene.file, [&](const std::string& spec) {
+        open_sinks<PacketSink>(packets, index, scene.lidars, "LiDAR", scene.file, [&](const std::string& spec) {
             return open_packet_sink(spec, scene.lidars[index].model->spec().network, scene.epoch_unix_ns,
                                     o.lockstep);
         });
     if (!sinks) return sinks.error();
-    if (sinks->empty()) return std::unique_ptr<Sensor>();
+    if (sinks->empty() && !beams) return std::unique_ptr<Sensor>();
     auto lidar = std::make_unique<LidarSensor>(world, index, *std::move(sinks), o.log_shots);
+    if (beams) lidar->keep_beams();
     if (!o.log_folder.empty())
         if (auto logs = lidar->log_to(o.log_folder, o.lockstep); !logs) return logs.error();
     return std::unique_ptr<Sensor>(std::move(lidar));

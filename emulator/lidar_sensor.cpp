@@ -1,12 +1,15 @@
 #include "emulator/lidar_sensor.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "emulator/can_node.h"
 
 namespace narpa {
 
 LidarSensor::LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
                          bool truth)
-    : unit_(world, lidar, truth), sinks_(std::move(sinks)) {}
+    : lidar_(static_cast<std::uint8_t>(lidar)), unit_(world, lidar, truth), sinks_(std::move(sinks)) {}
 
 Status LidarSensor::log_to(const std::string& folder, bool wait_when_full) {
     auto log = SweepLog::create(folder, unit_.lidar().name, !unit_.truth().empty(), wait_when_full);
@@ -39,6 +42,7 @@ void LidarSensor::make_next(const Clock& clock) {
     stats_.hand_over.add(now - due);
     const bool late = now > due + unit_.packet_period_ns();
     stats_.late += late ? 1 : 0;
+    if (keeps_beams_) report_beams();
     if (log_) log_->add(unit_, next_, due, now, late, lost());
     ++next_;
     if (due_ns() + kMaxLagNs < now) {  // skip what is long overdue rather than send it in a burst
@@ -50,6 +54,34 @@ void LidarSensor::make_next(const Clock& clock) {
     }
 }
 
+std::vector<std::string> LidarSensor::outputs() const {
+    auto texts = descriptions(sinks_);
+    if (keeps_beams_) texts.emplace_back("CAN");
+    return texts;
+}
+
+void LidarSensor::report_beams() noexcept {
+    const std::int64_t start_ns = unit_.packet_start_ns(next_);
+    const LidarSpec& spec = unit_.spec();
+    for (std::size_t i = 0; i < unit_.shots().size(); ++i) {
+        const LidarEcho echo = unit_.echoes()[i].reported(spec.returns)[0];
+        LidarBeamReport report{.lidar = lidar_,
+                               .beam = static_cast<std::uint16_t>(unit_.shots()[i].beam),
+                               .t_ns = start_ns + unit_.shots()[i].t_offset_ns};
+        if (echo.range_m > 0) {
+            report.range_m = spec.range_resolution_m * std::round(echo.range_m / spec.range_resolution_m);
+            if (spec.measures_velocity)
+                report.velocity_m_s =
+                    spec.velocity_resolution_m_s * std::round(echo.velocity_m_s / spec.velocity_resolution_m_s);
+        }
+        beams_lost_ += beams_.push(report) ? 0 : 1;
+    }
+}
+
+void LidarSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& /*faults*/) noexcept {
+    for (LidarBeamReport report; beams_.pop(report);) can.send(report, t_ns);
+}
+
 std::uint64_t LidarSensor::drops() const noexcept {
     std::uint64_t n = 0;
     for (const auto& sink : sinks_) n += sink->counters().dropped;
@@ -57,7 +89,7 @@ std::uint64_t LidarSensor::drops() const noexcept {
 }
 
 std::uint64_t LidarSensor::lost() const noexcept {
-    std::uint64_t n = 0;
+    std::uint64_t n = beams_lost_;
     for (const auto& sink : sinks_) n += sink->counters().dropped + sink->counters().receiver_dropped;
     return n;
 }

@@ -10,6 +10,8 @@
 #include "emulator/log/histogram.h"
 #include "emulator/log/sweep_log.h"
 #include "emulator/sensor.h"
+#include "emulator/spsc_ring.h"
+#include "protocols/lidar_beam.h"
 
 namespace narpa {
 
@@ -29,10 +31,14 @@ public:
     /// Logs sweeps, and shots where it was made with `truth`, to files of its name in the folder.
     Status log_to(const std::string& folder, bool wait_when_full);
 
+    /// Keeps each shot's report for send_telemetry. At most kMostBeams_hz shots a second.
+    void keep_beams() noexcept { keeps_beams_ = true; }
+    static constexpr double kMostBeams_hz = 1000;
+
     [[nodiscard]] std::string_view kind() const noexcept override { return "lidar"; }
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.lidar().name; }
     [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-lidar", 55, false}; }
-    [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
+    [[nodiscard]] std::vector<std::string> outputs() const override;
     void start_at(std::int64_t t_ns) noexcept override;
     /// All shots of the packet come before it is complete.
     [[nodiscard]] std::int64_t last_pose_ns() const noexcept override { return due_ns() - 1; }
@@ -40,6 +46,7 @@ public:
     [[nodiscard]] std::int64_t due_ns() const noexcept override { return unit_.t_sent_ns(next_); }
     void warm_up() override { unit_.fire(next_); }
     void make_next(const Clock& clock) override;
+    void send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept override;
     [[nodiscard]] std::uint64_t drops() const noexcept override;
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
@@ -56,13 +63,18 @@ public:
     static constexpr std::int64_t kMaxLagNs = 100'000'000;
 
 private:
+    std::uint8_t lidar_;  ///< index in the scene
     LidarUnit unit_;
     std::vector<std::unique_ptr<PacketSink>> sinks_;
     [[nodiscard]] std::uint64_t lost() const noexcept;
+    void report_beams() noexcept;
 
     std::int64_t next_ = 0;
     LidarStats stats_;
     std::unique_ptr<SweepLog> log_;  ///< null without a log
+    bool keeps_beams_ = false;
+    SpscRing<LidarBeamReport, 1024> beams_;
+    std::uint64_t beams_lost_ = 0;  ///< the CAN thread did not keep up
 };
 
 }  // namespace narpa

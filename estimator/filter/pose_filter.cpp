@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 namespace narpa {
 namespace {
@@ -31,6 +33,16 @@ const char* fault(const PoseMeasurement& m) {
     return nullptr;
 }
 
+const char* fault(const BeamVelocity& m) {
+    if (!is_finite(m.origin_m) || !is_finite(m.point_m) || !is_finite(m.chaser_rate_rad_s))
+        return "expected finite positions and rates";
+    if (!is_unit(m.q_frame_chaser) || !(std::abs(norm(m.direction) - 1) < 1e-6))
+        return "expected a quaternion and a direction of length 1";
+    if (!std::isfinite(m.velocity_m_s) || !(m.sigma_m_s > 0 && std::isfinite(m.sigma_m_s)))
+        return "expected a finite velocity with a standard deviation > 0";
+    return nullptr;
+}
+
 /// Where the sensor's axes are in the frame.
 Quat q_frame_sensor(const PoseMeasurement& m) {
     return m.q_frame_chaser * m.T_chaser_sensor.q;
@@ -50,31 +62,71 @@ Matrix6x12 pose_jacobian(const Quat& q_frame_axes, const RelativeState& state) {
     return H;
 }
 
-/// The innovation of a measurement, and the factor of its covariance.
+/// The velocity that the state expects along the beam, and how it depends on the state's error.
+///
+/// With w the frame's rate, W the target's, V the chaser's, L from the target's centre of mass to the point, all in
+/// frame axes: u . (v + w x r + W x L - V x o).
+std::pair<double, Eigen::Matrix<double, 1, 12>> expected_velocity(const RelativeState& state,
+                                                                  double orbit_rate_rad_s, const BeamVelocity& m) {
+    const Vec3 u = m.q_frame_chaser * m.direction, lever = m.q_frame_chaser * m.point_m - state.position_m;
+    const Vec3 frame_rate{0, 0, orbit_rate_rad_s}, target_rate = state.q_frame_target * state.rate_rad_s;
+    const Vec3 of_sensor = m.q_frame_chaser * cross(m.chaser_rate_rad_s, m.origin_m);
+    const double velocity =
+        dot(u, state.velocity_m_s + cross(frame_rate, state.position_m) + cross(target_rate, lever) - of_sensor);
+    const Vec3 by_position = cross(u, frame_rate - target_rate);
+    const Vec3 by_rate = conjugate(state.q_frame_target) * cross(lever, u);
+    const Vec3 by_attitude = cross(state.rate_rad_s, by_rate);
+    Eigen::Matrix<double, 1, 12> H;
+    H << to_eigen(by_position).transpose(), to_eigen(u).transpose(), to_eigen(by_attitude).transpose(),
+        to_eigen(by_rate).transpose();
+    return {velocity, H};
+}
+
+/// The innovation of a measurement of N numbers, and the factor of its covariance.
+template <int N>
 struct Innovation {
-    Matrix6x12 H;
-    Vector6 z;
-    Eigen::LLT<Matrix6> S;
+    Eigen::Matrix<double, N, 12> H;
+    Eigen::Matrix<double, N, 1> z;
+    Eigen::Matrix<double, N, N> R;  ///< of the measurement
+    Eigen::LLT<Eigen::Matrix<double, N, N>> S{};
     double nis = 0;
 
-    Innovation(const RelativeState& state, const Matrix12& P, const PoseMeasurement& m)
-        : H(pose_jacobian(q_frame_sensor(m), state)),
-          z(error_between(expected_pose(state, m), m.T_sensor_target)),
-          S(H * P * H.transpose() + m.covariance),
-          nis(S.matrixL().solve(z).squaredNorm()) {}
+    void form(const Matrix12& P) {
+        S.compute(H * P * H.transpose() + R);
+        nis = S.matrixL().solve(z).squaredNorm();
+    }
 };
 
-void correct(const Innovation& innovation, const Matrix6& measurement_covariance, RelativeState& state,
-             Matrix12& P) {
-    const Matrix6x12& H = innovation.H;
-    const Eigen::Matrix<double, 12, 6> K = innovation.S.solve(H * P).transpose();
+Innovation<6> innovation_of(const MotionModel&, const RelativeState& state, const Matrix12& P,
+                            const PoseMeasurement& m) {
+    Innovation<6> i{.H = pose_jacobian(q_frame_sensor(m), state),
+                    .z = error_between(expected_pose(state, m), m.T_sensor_target),
+                    .R = m.covariance};
+    i.form(P);
+    return i;
+}
+
+Innovation<1> innovation_of(const MotionModel& motion, const RelativeState& state, const Matrix12& P,
+                            const BeamVelocity& m) {
+    const auto [velocity_m_s, H] = expected_velocity(state, motion.orbit_rate_rad_s, m);
+    Innovation<1> i{.H = H, .z{}, .R{}};
+    i.z(0) = m.velocity_m_s - velocity_m_s;
+    i.R(0) = m.sigma_m_s * m.sigma_m_s;
+    i.form(P);
+    return i;
+}
+
+template <int N>
+void correct(const Innovation<N>& innovation, RelativeState& state, Matrix12& P) {
+    const auto& H = innovation.H;
+    const Eigen::Matrix<double, 12, N> K = innovation.S.solve(H * P).transpose();
     const Vector12 step = K * innovation.z;
     state = displaced(state, step);
     const Matrix12 rest = Matrix12::Identity() - K * H;
-    P = (rest * P * rest.transpose() + K * measurement_covariance * K.transpose()).eval();
+    P = (rest * P * rest.transpose() + K * innovation.R * K.transpose()).eval();
     // Reset: errors now refer to the corrected attitude, to first order a rotation by half the step.
     Matrix12 reset = Matrix12::Identity();
-    const Eigen::Vector3d a = 0.5 * step.segment<3>(6);
+    const Eigen::Vector3d a = 0.5 * step.template segment<3>(6);
     reset.block<3, 3>(6, 6) << 1, a.z(), -a.y(), -a.z(), 1, a.x(), a.y(), -a.x(), 1;
     P = (reset * P * reset.transpose()).eval();
     P = (0.5 * (P + P.transpose())).eval();
@@ -82,7 +134,8 @@ void correct(const Innovation& innovation, const Matrix6& measurement_covariance
 
 Status check(const FilterSettings& s) {
     if (auto good = check(s.motion); !good) return good.error();
-    if (!(s.gate > 0)) return Error{"gate = " + std::to_string(s.gate) + ": expected > 0"};
+    for (const auto& [name, gate] : {std::pair{"gate", s.gate}, std::pair{"beam_gate", s.beam_gate}})
+        if (!(gate > 0)) return Error{std::string(name) + " = " + std::to_string(gate) + ": expected > 0"};
     if (s.history < 2) return Error{"history = " + std::to_string(s.history) + ": expected 2 events or more"};
     return Ok{};
 }
@@ -101,7 +154,7 @@ Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, std::int64
     filter.t_ns_ = t_ns;
     filter.now_ = {state, covariance};
     filter.history_.reserve(settings.history);
-    filter.history_.push_back({t_ns, filter.now_, {}, false, {}});
+    filter.history_.push_back({t_ns, filter.now_, {}, {}});
     return filter;
 }
 
@@ -154,11 +207,13 @@ bool PoseFilter::accelerate(const Vec3& acceleration_m_s2, double psd) {
     if (!is_finite(acceleration_m_s2) || !(psd >= 0 && std::isfinite(psd))) return false;
     const Thrust thrust{acceleration_m_s2, psd};
     if (history_.back().thrust == thrust) return true;
-    insert(history_.size(), {t_ns_, now_, thrust, false, {}});
+    insert(history_.size(), {t_ns_, now_, thrust, {}});
     return true;
 }
 
-UpdateResult PoseFilter::update(const PoseMeasurement& m) {
+template <class Measurement>
+UpdateResult PoseFilter::take(const Measurement& m, double gate) {
+    constexpr bool kPose = std::is_same_v<Measurement, PoseMeasurement>;
     if (const char* why = fault(m)) {
         ++counts_.bad;
         return {UpdateOutcome::bad, 0, why};
@@ -170,32 +225,43 @@ UpdateResult PoseFilter::update(const PoseMeasurement& m) {
     const auto later = std::upper_bound(history_.begin(), history_.end(), m.t_ns,
                                         [](std::int64_t t, const Event& e) { return t < e.t_ns; });
     const Event& before = *std::prev(later);
-    Event event{m.t_ns, after(before, m.t_ns), before.thrust, true, m};
-    const Innovation innovation(event.after.state, event.after.covariance, m);
-    if (!(innovation.nis <= settings_.gate)) {
+    Event event{m.t_ns, after(before, m.t_ns), before.thrust, m};
+    const auto innovation = innovation_of(settings_.motion, event.after.state, event.after.covariance, m);
+    if (!(innovation.nis <= gate)) {
         ++counts_.gated;
-        ++counts_.gated_in_a_row;
+        counts_.gated_in_a_row += kPose ? 1 : 0;
         predict(m.t_ns);
         return {UpdateOutcome::gated, innovation.nis, "it contradicts what the filter knows"};
     }
-    correct(innovation, m.covariance, event.after.state, event.after.covariance);
+    correct(innovation, event.after.state, event.after.covariance);
 
     std::size_t place = static_cast<std::size_t>(later - history_.begin());
     counts_.late += m.t_ns < t_ns_;
     ++counts_.taken;
-    counts_.gated_in_a_row = 0;
+    if (kPose) counts_.gated_in_a_row = 0;
     if (history_.size() == settings_.history) --place;  // the first one goes
     insert(static_cast<std::size_t>(later - history_.begin()), event);
     for (std::size_t i = place + 1; i < history_.size(); ++i) {
         Event& e = history_[i];
         e.after = after(history_[i - 1], e.t_ns);
-        if (e.measured)
-            correct(Innovation(e.after.state, e.after.covariance, e.measurement), e.measurement.covariance,
-                    e.after.state, e.after.covariance);
+        const auto repeat = [&](const auto& measured) {
+            if constexpr (!std::is_same_v<std::decay_t<decltype(measured)>, std::monostate>)
+                correct(innovation_of(settings_.motion, e.after.state, e.after.covariance, measured), e.after.state,
+                        e.after.covariance);
+        };
+        std::visit(repeat, e.measurement);
     }
     t_ns_ = std::max(t_ns_, m.t_ns);
     now_ = after(history_.back(), t_ns_);
     return {UpdateOutcome::taken, innovation.nis, ""};
+}
+
+UpdateResult PoseFilter::update(const PoseMeasurement& m) {
+    return take(m, settings_.gate);
+}
+
+UpdateResult PoseFilter::update(const BeamVelocity& m) {
+    return take(m, settings_.beam_gate);
 }
 
 PoseFilter::Pose PoseFilter::pose(const Quat& q_frame_chaser) const {
@@ -227,6 +293,11 @@ UpdateResult PoseTracker::update(const PoseMeasurement& measurement) {
     restarts_ += filter_ ? 1 : 0;
     filter_ = *std::move(made);
     return {UpdateOutcome::taken, 0, ""};
+}
+
+UpdateResult PoseTracker::update(const BeamVelocity& measurement) {
+    if (filter_) return filter_->update(measurement);
+    return {UpdateOutcome::bad, 0, "a velocity cannot start a filter"};
 }
 
 }  // namespace narpa

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <variant>
 #include <vector>
 
 #include "estimator/filter/motion_model.h"
@@ -20,6 +21,8 @@ struct FilterSettings {
     /// Gate of the normalised innovation squared (NIS): the 0.9999 quantile of chi-square with six degrees of
     /// freedom.
     double gate = 27.86;
+    /// The same for the velocity along a beam, one degree of freedom.
+    double beam_gate = 15.14;
     /// Measurements and changes of the known acceleration that are kept for late measurements; >= 2.
     std::size_t history = 32;
 };
@@ -33,6 +36,19 @@ struct PoseMeasurement {
     Quat q_frame_chaser{};                 ///< the chaser's attitude then, taken as exact
 };
 
+/// A Doppler instrument's measurement of the target's velocity along a beam.
+struct BeamVelocity {
+    std::int64_t t_ns = 0;
+    /// Chaser axes, from its centre of mass: where the beam starts, its unit direction, and where it meets the
+    /// target (origin + range * direction).
+    Vec3 origin_m{}, direction{}, point_m{};
+    /// Of the target's material point there minus that of the beam's origin, along the beam: receding is positive.
+    double velocity_m_s = 0;
+    double sigma_m_s = 0;      ///< standard deviation, > 0
+    Quat q_frame_chaser{};     ///< the chaser's attitude then, taken as exact
+    Vec3 chaser_rate_rad_s{};  ///< against inertial space, chaser axes, taken as exact
+};
+
 enum class UpdateOutcome : std::uint8_t {
     taken,
     gated,     ///< its NIS exceeds the gate
@@ -42,13 +58,13 @@ enum class UpdateOutcome : std::uint8_t {
 
 struct UpdateResult {
     UpdateOutcome outcome = UpdateOutcome::taken;
-    double nis = 0;        ///< normalised innovation squared, six degrees of freedom; 0 where it was not formed
+    double nis = 0;  ///< normalised innovation squared, six degrees of freedom or one; 0 where it was not formed
     const char* why = "";  ///< what is wrong and what was expected, where the outcome is not `taken`
 };
 
 struct UpdateCounts {
     std::uint64_t taken = 0, late = 0, gated = 0, too_late = 0, bad = 0;  ///< late: of those taken, into the past
-    std::uint64_t gated_in_a_row = 0;  ///< since the last that was taken: many mean that the filter is lost
+    std::uint64_t gated_in_a_row = 0;  ///< poses since the last that was taken: many mean that the filter is lost
 };
 
 class PoseFilter {
@@ -73,6 +89,7 @@ public:
     bool accelerate(const Vec3& acceleration_m_s2, double psd = 0);
     /// Updates with a measurement; propagates to its time where that is later.
     UpdateResult update(const PoseMeasurement& measurement);
+    UpdateResult update(const BeamVelocity& measurement);
 
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_; }
     [[nodiscard]] const RelativeState& state() const noexcept { return now_.state; }
@@ -101,9 +118,8 @@ private:
     struct Event {
         std::int64_t t_ns = 0;
         Estimate after;
-        Thrust thrust;  ///< from then on
-        bool measured = false;
-        PoseMeasurement measurement;
+        Thrust thrust;                                                            ///< from then on
+        std::variant<std::monostate, PoseMeasurement, BeamVelocity> measurement;  ///< none: a change of thrust
     };
     explicit PoseFilter(const FilterSettings& settings) : settings_(settings) {}
 
@@ -112,6 +128,8 @@ private:
         return propagated(event.after, event.thrust, t_ns - event.t_ns);
     }
     void insert(std::size_t place, const Event& event);
+    template <class Measurement>
+    UpdateResult take(const Measurement& measurement, double gate);
 
     FilterSettings settings_;
     std::int64_t t_ns_ = 0;
@@ -136,6 +154,8 @@ public:
     Status start(std::int64_t t_ns, const RelativeState& state, const Matrix12& covariance);
     /// Updates the filter; starts it, or starts it again, from this measurement. Only a start allocates.
     UpdateResult update(const PoseMeasurement& measurement);
+    /// Bad before the filter has started.
+    UpdateResult update(const BeamVelocity& measurement);
     /// The next measurement starts the filter.
     void stop() noexcept { filter_.reset(); }
 

@@ -101,6 +101,7 @@ std::string write_dbc(std::span<const CanBody> bodies, int cameras) {
     write_set(out, kCameraTriggerLayout, "", kCameraTriggerBaseId, command);
     write_set(out, kCameraReplyLayout, "", kCameraReplyBaseId, telemetry);
     write_set(out, kCameraStateLayout, "", kCameraStateBaseId, telemetry);
+    write_set(out, kLidarBeamLayout, "", kLidarBeamBaseId, telemetry);
     write_set(out, kActuatorLayout, "", kActuatorBaseId, navigation);
     write_set(out, kNavigationLayout, "", kNavigationBaseId, navigation);
     write_set(out, kAttitudeLayout, "", kAttitudeBaseId, dynamics);

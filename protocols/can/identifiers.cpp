@@ -29,6 +29,7 @@ std::string message_name(std::uint32_t id, std::span<const CanBody> bodies) {
     if (base == kCameraTriggerBaseId) name = "camera trigger";
     if (base == kCameraReplyBaseId) name = "camera reply";
     if (base == kCameraStateBaseId) name = "camera state";
+    if (base == kLidarBeamBaseId) name = "LiDAR beam";
     for (const CanBody& body : bodies)
         if (base == body.base_id) name = "pose of " + body.name;
     return name.empty() ? "frame" : name + ", part " + std::to_string(id % kBaseIdStep);

@@ -24,6 +24,7 @@ inline constexpr std::uint32_t kActuatorBaseId = 0x720, kNavigationBaseId = 0x73
 inline constexpr std::uint32_t kAttitudeBaseId = 0x740, kDynamicsBaseId = 0x750;            ///< from dynamics
 inline constexpr std::uint32_t kCameraCommandBaseId = 0x760, kCameraTriggerBaseId = 0x770;  ///< to cameras
 inline constexpr std::uint32_t kCameraReplyBaseId = 0x780, kCameraStateBaseId = 0x790;      ///< from cameras
+inline constexpr std::uint32_t kLidarBeamBaseId = 0x7A0;                                    ///< from LiDARs
 inline constexpr std::uint32_t kSyncId = 0x080;  ///< CiA 301: the SYNC object
 
 /// Of a message between navigation and dynamics.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <optional>
 #include <tuple>
 #include <type_traits>
@@ -78,6 +79,12 @@ struct RawReader {
         return q;
     }
     void get(std::int64_t& t_ns) noexcept { t_ns = time_of(raw[i++], t_reference_ns); }
+    /// Not a number where it is not available.
+    void get(double& value) noexcept {
+        const bool known = raw[i] != kNotAvailable;
+        value = number();
+        if (!known) value = std::numeric_limits<double>::quiet_NaN();
+    }
     void get(Vec3& v) noexcept { v.x = number(), v.y = number(), v.z = number(); }
     void get(Quat& q) noexcept { q = normalized(attitude()); }
     void get(Rigid3& T) noexcept { get(T.t), get(T.q); }
@@ -245,6 +252,17 @@ template <>
 struct Codec<DynamicsReport>
     : MemberCodec<DynamicsReport, kDynamicsLayout, kDynamicsBaseId, &DynamicsReport::counter, &DynamicsReport::t_ns,
                   &DynamicsReport::t_start_ns, &DynamicsReport::phase> {};
+
+// --- LiDAR beams: range and velocity may be missing --------------------------------------------------------------
+
+using B = LidarBeamReport;
+using BeamMembers = MemberCodec<B, kLidarBeamLayout, kLidarBeamBaseId, &B::counter, &B::lidar, &B::beam, &B::t_ns,
+                                &B::range_m, &B::velocity_m_s>;
+
+template <>
+struct Codec<LidarBeamReport> : BeamMembers {
+    static DecodeStatus check(const RawSignals&) noexcept { return DecodeStatus::complete; }
+};
 
 // --- Cameras that are operated while they run -------------------------------------------------------------------
 
@@ -495,6 +513,7 @@ NARPA_CAN_MESSAGE(CameraCommand);
 NARPA_CAN_MESSAGE(CameraTrigger);
 NARPA_CAN_MESSAGE(CameraReply);
 NARPA_CAN_MESSAGE(CameraState);
+NARPA_CAN_MESSAGE(LidarBeamReport);
 #undef NARPA_CAN_MESSAGE
 
 }  // namespace narpa

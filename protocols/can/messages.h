@@ -17,6 +17,7 @@
 #include "protocols/closed_loop.h"
 #include "protocols/estimate.h"
 #include "protocols/ledger_fields.h"
+#include "protocols/lidar_beam.h"
 
 namespace narpa {
 
@@ -85,9 +86,9 @@ struct Heartbeat {
 [[nodiscard]] DecodeStatus decode(const CanFrame& frame, std::int64_t t_reference_ns, Heartbeat& out) noexcept;
 
 /// Message: FrameLedger, EstimateReport; of operated cameras CameraCommand, CameraTrigger, CameraReply,
-/// CameraState; and of the closed loop ActuatorCommand, NavigationEstimate, AttitudeReport, DynamicsReport. The
-/// counter of a set is the message's own, or the low 8 bits of its frame or cycle number. Values beyond a signal's
-/// range saturate; numbers that are not finite are "not available".
+/// CameraState; LidarBeamReport; and of the closed loop ActuatorCommand, NavigationEstimate, AttitudeReport,
+/// DynamicsReport. The counter of a set is the message's own, or the low 8 bits of its frame or cycle number.
+/// Values beyond a signal's range saturate; numbers that are not finite are "not available".
 ///
 /// Ledger: times other than exposure mid and pose time travel as whole microseconds after exposure mid. Of the
 /// passes their number travels, not what each took: that is in the log. Estimate: in state `lost`, pose and

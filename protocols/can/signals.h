@@ -338,4 +338,18 @@ inline constexpr auto kCameraStateSignals =
 inline constexpr SetLayout kCameraStateLayout{"CameraState", "What a frame was taken with", kCameraStateFrames,
                                               kCameraStateSignals, 288};
 
+// --- LiDARs whose shots go over CAN: velocimeters, altimeters ---------------------------------------------------
+
+inline constexpr std::array<std::string_view, 4> kLidarBeamFrames{"LidarBeamNumber", "LidarBeamTime",
+                                                                  "LidarBeamRange", "LidarBeamVelocity"};
+inline constexpr auto kLidarBeamSignals = laid_out(std::to_array<Signal>({
+    {"Lidar", "", "Index of the LiDAR in the scene", 1, false, {0, 0, 8}},
+    {"Beam", "", "Number of the beam", 1, false, {0, 8, 16}},
+    {"Time", "ns", "Of the shot: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
+    {"Range", "m", "Along the beam; not available: no echo", 1e6, true, {2, 0, 48}},
+    {"Velocity", "m/s", "Along the beam, receding is positive; not available: none", 1e6, true, {3, 0, 48}},
+}));
+inline constexpr SetLayout kLidarBeamLayout{"LidarBeam", "What one shot of a LiDAR measured", kLidarBeamFrames,
+                                            kLidarBeamSignals, 168};
+
 }  // namespace narpa

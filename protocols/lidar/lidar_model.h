@@ -118,6 +118,7 @@ struct LidarSpec {
     double range_resolution_m = 0;          ///< ranges in packets are multiples of it
     std::int64_t time_resolution_ns = 1;    ///< of a packet's time stamp, which is rounded down
     bool measures_velocity = false;
+    double velocity_resolution_m_s = 0;  ///< of those in packets
     LidarNetwork network{};
 };
 

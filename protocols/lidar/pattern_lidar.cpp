@@ -152,6 +152,7 @@ private:
                 .range_m_max = pattern.range_resolution_m * UINT32_MAX,
                 .range_resolution_m = pattern.range_resolution_m,
                 .measures_velocity = pattern.velocity_resolution_m_s > 0,
+                .velocity_resolution_m_s = pattern.velocity_resolution_m_s,
                 .network = network_of(pattern)};
     }
 

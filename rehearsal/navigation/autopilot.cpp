@@ -3,8 +3,6 @@
 #include <cmath>
 
 namespace narpa::rehearsal {
-namespace {}  // namespace
-
 Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, std::uint64_t seed) {
     std::unique_ptr<Autopilot> a(new Autopilot);
     a->scenario_ = scenario;
@@ -13,6 +11,7 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     a->model_ = *std::move(model);
     for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
     for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
+    for (const std::size_t lidar : a->model_->velocimeters()) a->velocimeters_.emplace_back(*a->model_, lidar);
     return a;
 }
 
@@ -64,6 +63,19 @@ void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const
     take(estimator.lidar().name, t_ns,
          estimator.measure(points, t_ns, p.motion, p.T_chaser_target, p.position_sigma_m, p.rotation_sigma_rad),
          sweeps_);
+}
+
+void Autopilot::take_beam(const LidarBeamReport& report) {
+    for (const Velocimeter& velocimeter : velocimeters_) {
+        if (velocimeter.index() != report.lidar) continue;
+        const std::lock_guard lock(mutex_);
+        const auto shot = velocimeter.measure(report, estimator_->predicted(report.t_ns));
+        if (!shot) return;
+        const UpdateResult result = estimator_->take(*shot);
+        measurements_.push_back({velocimeter.lidar().name, report.t_ns,
+                                 static_cast<MeasurementRecord::Outcome>(result.outcome), result.nis, result.why, 1,
+                                 0});
+    }
 }
 
 void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,

@@ -12,6 +12,7 @@
 
 #include "rehearsal/navigation/guidance.h"
 #include "rehearsal/navigation/measurements.h"
+#include "rehearsal/navigation/velocimeter.h"
 
 namespace narpa::rehearsal {
 
@@ -61,6 +62,9 @@ public:
     /// their times count from t_ns, its end.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
     void take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points);
+    /// A shot that a LiDAR reports on CAN; nothing where the scenario does not navigate by it, or it met nothing
+    /// near the target.
+    void take_beam(const LidarBeamReport& report);
     /// A measurement of any other sensor; counts as a frame.
     void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement) {
         take(sensor, t_ns, measurement, frames_);
@@ -88,6 +92,7 @@ private:
     std::unique_ptr<SceneModel> model_;
     std::deque<CameraPoseEstimator> cameras_;  ///< a deque: elements stay in place
     std::vector<LidarPoseEstimator> lidars_;
+    std::vector<Velocimeter> velocimeters_;
 
     std::mutex mutex_;  ///< guards what follows
     std::optional<StateEstimator> estimator_;

@@ -1,5 +1,6 @@
 #include "rehearsal/navigation/bus_link.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace narpa::rehearsal {
@@ -19,6 +20,8 @@ void BusLink::receive(std::int64_t timeout_ns) {
         if (dynamics_decoder_.accept(frame, now_ns, dynamics) == DecodeStatus::complete) dynamics_ = dynamics;
         AttitudeReport attitude;
         if (attitude_decoder_.accept(frame, now_ns, attitude) == DecodeStatus::complete) attitude_ = attitude;
+        LidarBeamReport beam;
+        if (beam_decoder_.accept(frame, now_ns, beam) == DecodeStatus::complete) beams_.push_back(beam);
         for (LedgerDecoder& decoder : ledger_decoders_) {
             FrameLedger l;
             if (decoder.accept(frame, now_ns, l) == DecodeStatus::complete)
@@ -29,6 +32,14 @@ void BusLink::receive(std::int64_t timeout_ns) {
 
 std::vector<FrameNotice> BusLink::take_notices() {
     return std::exchange(notices_, {});
+}
+
+std::vector<LidarBeamReport> BusLink::take_beams(std::int64_t t_ns) {
+    const auto later =
+        std::stable_partition(beams_.begin(), beams_.end(), [&](const auto& b) { return b.t_ns <= t_ns; });
+    std::vector<LidarBeamReport> taken(beams_.begin(), later);
+    beams_.erase(beams_.begin(), later);
+    return taken;
 }
 
 template <class Message>
@@ -45,7 +56,7 @@ std::uint64_t BusLink::bad_messages() const noexcept {
     for (const DecodeStatus status :
          {DecodeStatus::too_short, DecodeStatus::too_long, DecodeStatus::wrong_kind, DecodeStatus::bad_checksum,
           DecodeStatus::incomplete_set, DecodeStatus::not_a_number, DecodeStatus::not_unit}) {
-        n += dynamics_decoder_.count(status) + attitude_decoder_.count(status);
+        n += dynamics_decoder_.count(status) + attitude_decoder_.count(status) + beam_decoder_.count(status);
         for (const LedgerDecoder& decoder : ledger_decoders_) n += decoder.count(status);
     }
     return n;

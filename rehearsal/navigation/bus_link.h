@@ -35,6 +35,9 @@ public:
     /// Frames handed over since the last call, in the order of the bus.
     [[nodiscard]] std::vector<FrameNotice> take_notices();
 
+    /// Shots of LiDARs on CAN that fired by t_ns, since the last call, in the order of the bus.
+    [[nodiscard]] std::vector<LidarBeamReport> take_beams(std::int64_t t_ns);
+
     /// False: dropped, in part or as a whole.
     template <class Message>
     bool send(const Message& message);
@@ -49,10 +52,12 @@ private:
     RemoteClock clock_;
     MessageDecoder<DynamicsReport> dynamics_decoder_;
     MessageDecoder<AttitudeReport> attitude_decoder_;
+    MessageDecoder<LidarBeamReport> beam_decoder_;
     std::vector<LedgerDecoder> ledger_decoders_;
     std::optional<DynamicsReport> dynamics_;
     std::optional<AttitudeReport> attitude_;
     std::vector<FrameNotice> notices_;
+    std::vector<LidarBeamReport> beams_;
 };
 
 }  // namespace narpa::rehearsal

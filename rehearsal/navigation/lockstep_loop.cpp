@@ -83,6 +83,7 @@ private:
     void cycle(std::int64_t t_ns, bool first) {
         loop_.autopilot.take(*loop_.link.attitude());
         loop_.autopilot.take(loop_.link.dynamics()->phase, t_ns);
+        loop_.take_beams(t_ns);
         for (std::size_t i = 0; i < newest_.size(); ++i) {
             if (!newest_[i]) continue;  // none since the last cycle
             loop_.take_frame(i, newest_[i]->t_mid_ns, newest_[i]->bytes);

@@ -26,6 +26,10 @@ struct Loop {
         if (log) log->frame(autopilot.model().scene().cameras[inputs.cameras[i].camera], bytes);
         autopilot.take_frame(i, t_mid_ns, bytes);
     }
+    /// Those that have come over CAN and fired by t_ns.
+    void take_beams(std::int64_t t_ns) const {
+        for (const LidarBeamReport& beam : link.take_beams(t_ns)) autopilot.take_beam(beam);
+    }
     /// Sends and logs the results of a cycle.
     void publish(const CycleRecord& record) const {
         link.send(record.estimate);

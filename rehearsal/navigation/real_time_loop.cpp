@@ -211,6 +211,7 @@ private:
             } else if (late_ns > kReportWait_ns + period_ns_ / 10) {
                 ++loop_.counts.cycles_late;
             }
+            loop_.take_beams(t_ns);
             loop_.publish(loop_.autopilot.cycle(t_ns));
         }
     }

@@ -24,6 +24,8 @@ Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario)
         m->cameras_.push_back(index_of(m->scene_.cameras, name));
     for (const std::string& name : scenario.navigation.lidars)
         m->lidars_.push_back(index_of(m->scene_.lidars, name));
+    for (const std::string& name : scenario.navigation.velocimeters)
+        m->velocimeters_.push_back(index_of(m->scene_.lidars, name));
     auto render_scene = RenderScene::create(m->scene_);
     if (!render_scene) return render_scene.error();
     m->render_scene_.emplace(*std::move(render_scene));

@@ -24,6 +24,7 @@ public:
     /// Indices in the scene of the sensors that the scenario navigates by, in its order.
     [[nodiscard]] const std::vector<std::size_t>& cameras() const noexcept { return cameras_; }
     [[nodiscard]] const std::vector<std::size_t>& lidars() const noexcept { return lidars_; }
+    [[nodiscard]] const std::vector<std::size_t>& velocimeters() const noexcept { return velocimeters_; }
 
     /// Poses at t_s: the target's centre of mass at the world's origin, the attractor at the orbit's radius below
     /// it, the chaser at `T_target_chaser` (body axes of both). Other bodies stay as the scene has them at time 0.
@@ -38,7 +39,7 @@ private:
     Vec3 target_centre_of_mass_m_{};
     std::size_t target_ = 0, chaser_ = 0;
     std::optional<std::size_t> attractor_;
-    std::vector<std::size_t> cameras_, lidars_;
+    std::vector<std::size_t> cameras_, lidars_, velocimeters_;
     BodyPoses at_;
 };
 

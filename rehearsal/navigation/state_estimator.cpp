@@ -186,6 +186,20 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     return result;
 }
 
+UpdateResult StateEstimator::take(const TargetVelocity& v) {
+    if (v.t_ns > t_ns()) advance(v.t_ns);
+    const AttitudeTrack::At chaser = attitude_.at(v.t_ns);
+    const Vec3 origin = v.origin_m - scenario_.chaser.centre_of_mass_m;
+    return tracker_.update(BeamVelocity{.t_ns = v.t_ns,
+                                        .origin_m = origin,
+                                        .direction = v.direction,
+                                        .point_m = origin + v.range_m * v.direction,
+                                        .velocity_m_s = v.velocity_m_s,
+                                        .sigma_m_s = v.sigma_m_s,
+                                        .q_frame_chaser = q_frame_chaser(v.t_ns),
+                                        .chaser_rate_rad_s = chaser.rate_rad_s});
+}
+
 RelativeMotion StateEstimator::motion() const {
     const AttitudeTrack::At now = attitude_.at(t_ns());
     return in_world(filter().state(), scenario_.orbit, t_s(t_ns()), now.q_world_chaser, now.rate_rad_s);

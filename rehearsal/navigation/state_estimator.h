@@ -42,6 +42,13 @@ struct TargetMeasurement {
     Rigid3 T_chaser_sensor{};  ///< body axes
 };
 
+/// Velocity of the target's surface along a beam of the chaser (estimator/filter/pose_filter.h).
+struct TargetVelocity {
+    std::int64_t t_ns = 0;
+    Vec3 origin_m{}, direction{};  ///< of the beam, body axes
+    double range_m = 0, velocity_m_s = 0, sigma_m_s = 0;
+};
+
 /// Pose of the target in the chaser's axes, body axes of both as in the scene; covariance in chaser axes.
 struct TargetEstimate {
     Rigid3 T_chaser_target{};
@@ -69,6 +76,8 @@ public:
     /// Late measurements are inserted at their own time. After several gated ones in a row the filter
     /// restarts from the last of them.
     UpdateResult take(const TargetMeasurement& measurement);
+    /// Counts neither for restarts nor as a measurement of the pose.
+    UpdateResult take(const TargetVelocity& velocity);
     /// The ports touched shortly before t_ns. `held`: captured, the ports rest in one plane; otherwise they
     /// separate at an unknown speed.
     void on_contact(std::int64_t t_ns, bool held);

@@ -157,6 +157,7 @@ private:
             lidar_sinks_.push_back(fmt::format("{}=udp:127.0.0.1:{}", lidar, *port));
             lidar_sources_.push_back(fmt::format("{}=udp:{}", lidar, *port));
         }
+        for (const std::string& lidar : scenario_.navigation.velocimeters) lidar_sinks_.push_back(lidar + "=can");
         return Ok{};
     }
 

@@ -94,6 +94,7 @@ struct Leg {
 
 struct Navigation {
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
+    std::vector<std::string> velocimeters;     ///< LiDARs whose velocities come over CAN, beside the others
     double period_s = 1;                       ///< of measurements and of control
     double acceleration_psd = 1e-6,
            angular_acceleration_psd = 1e-9;  ///< m^2 s^-3, rad^2 s^-3: process noise

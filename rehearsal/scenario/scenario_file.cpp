@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/scene/based_on.h"
 #include "renderer/scene/scene_file.h"
@@ -192,6 +193,16 @@ std::vector<std::string> read_sensors(TableReader& table, const char* key, const
     return names;
 }
 
+std::vector<std::string> read_velocimeters(TableReader& table, const Scene& scene, const std::string& chaser) {
+    constexpr const char* kKey = "velocimeters";
+    auto names = read_sensors(table, kKey, scene.lidars, scene, chaser);
+    for (const Lidar& lidar : scene.lidars)
+        if (std::ranges::find(names, lidar.name) != names.end() &&
+            !(lidar.model->spec().measures_velocity && lidar.receiver.velocity_noise_m_s > 0))
+            table.fail(kKey, fmt::format("\"{}\" measures no velocity or has no velocity_noise_m_s", lidar.name));
+    return names;
+}
+
 void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     root.require("navigation", "a table [navigation]");
     auto table = root.table("navigation");
@@ -199,6 +210,7 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     Navigation& n = s.navigation;
     n.cameras = read_sensors(*table, "cameras", scene.cameras, scene, s.chaser.body);
     n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
+    n.velocimeters = read_velocimeters(*table, scene, s.chaser.body);
     if (n.cameras.empty() && n.lidars.empty())
         table->require("cameras", "`cameras` or `lidars`: what it navigates by");
     read(*table, "period_s", n.period_s, {.low = 0.01, .high = 100});

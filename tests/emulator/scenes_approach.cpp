@@ -125,14 +125,14 @@ struct Box {
         return true;
     }
 };
-using Triangle = std::array<Vec3, 3>;
-Box box_of(const Triangle& t) {
+using Corners = std::array<Vec3, 3>;
+Box box_of(const Corners& t) {
     Box box;
     for (const Vec3& p : t) box.add(p);
     return box;
 }
 /// Does the segment from p to q pass through the triangle? (Möller and Trumbore 1997)
-bool pierces(const Vec3& p, const Vec3& q, const Triangle& t) {
+bool pierces(const Vec3& p, const Vec3& q, const Corners& t) {
     const Vec3 d = q - p, e1 = t[1] - t[0], e2 = t[2] - t[0], h = cross(d, e2);
     const double det = dot(e1, h);
     if (std::abs(det) < 1e-15) return false;
@@ -140,13 +140,13 @@ bool pierces(const Vec3& p, const Vec3& q, const Triangle& t) {
     const double u = dot(s, h) / det, v = dot(d, r) / det, f = dot(e2, r) / det;
     return u >= 0 && v >= 0 && u + v <= 1 && f >= 0 && f <= 1;
 }
-bool intersect(const Triangle& a, const Triangle& b) {
+bool intersect(const Corners& a, const Corners& b) {
     for (std::size_t i = 0; i < 3; ++i)
         if (pierces(a[i], a[(i + 1) % 3], b) || pierces(b[i], b[(i + 1) % 3], a)) return true;
     return false;
 }
-std::vector<Triangle> triangles(const Mesh& mesh, const Rigid3& T) {
-    std::vector<Triangle> out;
+std::vector<Corners> triangles(const Mesh& mesh, const Rigid3& T) {
+    std::vector<Corners> out;
     for (const auto& f : mesh.faces)
         out.push_back({T * vec_cast<double>(mesh.positions[f[0]]), T * vec_cast<double>(mesh.positions[f[1]]),
                        T * vec_cast<double>(mesh.positions[f[2]])});
@@ -156,20 +156,20 @@ std::vector<Triangle> triangles(const Mesh& mesh, const Rigid3& T) {
 /// Triangles of the two meshes that cut each other.
 std::size_t collisions(const Mesh& station, const Mesh& chaser, const Rigid3& T_station_chaser) {
     Box chaser_box;
-    const std::vector<Triangle> ours = triangles(chaser, T_station_chaser);
-    for (const Triangle& t : ours)
+    const std::vector<Corners> ours = triangles(chaser, T_station_chaser);
+    for (const Corners& t : ours)
         for (const Vec3& p : t) chaser_box.add(p);
-    std::vector<Triangle> near;
+    std::vector<Corners> near;
     Box station_box;
-    for (const Triangle& t : triangles(station, {}))
+    for (const Corners& t : triangles(station, {}))
         if (box_of(t).meets(chaser_box)) {
             near.push_back(t);
             for (const Vec3& p : t) station_box.add(p);
         }
     std::size_t count = 0;
-    for (const Triangle& a : ours)
+    for (const Corners& a : ours)
         if (const Box box = box_of(a); box.meets(station_box))
-            for (const Triangle& b : near)
+            for (const Corners& b : near)
                 if (box.meets(box_of(b)) && intersect(a, b)) ++count;
     return count;
 }

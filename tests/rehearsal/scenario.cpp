@@ -29,6 +29,20 @@ TEST(Orbit, LvlhRotatesAboutTheMomentum) {
     EXPECT_NEAR(norm(orbit.q_world_lvlh(quarter_s) * Vec3{0, 1, 0} + orbit.up), 0, 1e-12);
 }
 
+TEST(Scenario, NavigatesByVelocimetersThatMeasureVelocities) {
+    const auto good = read_scenario(kScenarios + "docking-doppler.toml");
+    ASSERT_TRUE(good) << good.error().text();
+    EXPECT_EQ(good->navigation.velocimeters, std::vector<std::string>{"doppler"});
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "s.toml") << "[scenario]\nbased_on = \"" + kScenarios +
+                                            "docking-lidar.toml\"\n[navigation]\nvelocimeters = [\"top\"]\n";
+    const auto wrong = read_scenario(folder / "s.toml");
+    ASSERT_FALSE(wrong);
+    EXPECT_NE(wrong.error().text().find("s.toml:4:16: velocimeters: \"top\" measures no velocity"),
+              std::string::npos)
+        << wrong.error().text();
+}
+
 TEST(Scenario, ReadsTheDocking) {
     const auto s = read_scenario(kScenarios + "docking.toml");
     ASSERT_TRUE(s) << s.error().text();

@@ -1,0 +1,33 @@
+/// rehearsal/navigation/velocimeter.h - velocities along the beams of a Doppler LiDAR, which come over CAN.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "protocols/lidar_beam.h"
+#include "rehearsal/navigation/scene_model.h"
+#include "rehearsal/navigation/state_estimator.h"
+
+namespace narpa::rehearsal {
+
+class Velocimeter {
+public:
+    /// `lidar`: index in the scene.
+    Velocimeter(const SceneModel& model, std::size_t lidar);
+
+    [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
+    [[nodiscard]] std::size_t index() const noexcept { return index_; }
+    /// The velocity with its beam; none where the shot has none, or where it ends outside of the sphere around the
+    /// target at `T_chaser_target` (predicted, body axes).
+    [[nodiscard]] std::optional<TargetVelocity> measure(const LidarBeamReport& report,
+                                                        const Rigid3& T_chaser_target) const;
+
+private:
+    Lidar lidar_;
+    std::size_t index_;
+    std::vector<LidarShot> beams_;  ///< by their number
+    Vec3 target_centre_m_;
+    double target_radius_m_;
+};
+
+}  // namespace narpa::rehearsal

@@ -218,8 +218,21 @@ std::string Emulator::refusal() const {
         world_->scene().render.command_ahead_max_s, can_->too_far_ahead());
 }
 
+std::string Emulator::bodies_without_a_pose() const {
+    std::string text;
+    const std::vector<Body>& bodies = world_->scene().bodies;
+    for (std::size_t i = 0; can_ && i < bodies.size(); ++i)
+        if (const PoseTrack* track = std::as_const(*world_).track(i); track && !track->commanded())
+            text +=
+                fmt::format("{}\"{}\" (can_id {:#x})", text.empty() ? "" : ", ", bodies[i].name, *bodies[i].can_id);
+    return text;
+}
+
 void Emulator::note_losses() {
     if (!can_) return;
+    if (const std::string bodies = bodies_without_a_pose(); !bodies.empty() && !options_.lockstep)
+        notices_.push_back(
+            fmt::format("no pose command was accepted for {}; such a body moves as the scene states", bodies));
     if (can_->too_far_ahead() > 0) notices_.push_back(refusal());
     if (const std::uint64_t n = can_->counters().not_logged; n > 0)
         notices_.push_back(
@@ -230,6 +243,7 @@ void Emulator::note_losses() {
 
 Status Emulator::run(const StopFlag& stop) {
     options_.lockstep ? run_lockstep(stop) : run_real_time(stop);
+    stopped_ = stop.load(std::memory_order_relaxed);
     if (no_priority_ || threads_->refused())
         notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
     note_losses();

@@ -68,6 +68,11 @@ public:
     /// What the user should know of the run: what the kernel did not permit, what was refused or left out. Filled
     /// by `run`.
     [[nodiscard]] const std::vector<std::string>& notices() const noexcept { return notices_; }
+    /// `run` was stopped by its flag: it did not end by itself.
+    [[nodiscard]] bool stopped() const noexcept { return stopped_; }
+    /// The bodies with a can_id for which no command was accepted, by name and identifier; empty: none. After
+    /// `run`.
+    [[nodiscard]] std::string bodies_without_a_pose() const;
 
 private:
     struct RealTimeRun;
@@ -106,6 +111,7 @@ private:
     std::atomic<std::int64_t> t_ns_{0};
     std::atomic<bool> no_priority_{false};
     PageFaults page_faults_{};
+    bool stopped_ = false;
     std::vector<std::string> notices_;
 };
 

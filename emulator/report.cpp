@@ -145,7 +145,8 @@ json report(const Emulator& emulator) {
         {"page_faults", {{"minor", emulator.page_faults().minor}, {"major", emulator.page_faults().major}}},
         {"notices", emulator.notices()},
         {"advice", advice(emulator)},
-        {"passed", kept_up(emulator)},
+        {"failures", failures(emulator)},
+        {"passed", failures(emulator).empty()},
         {"log", emulator.options().log_folder}};
     for (const auto& sensor : emulator.sensors())
         document[std::string(sensor->kind()) + "s"].push_back(sensor->report());
@@ -183,9 +184,9 @@ std::string bus_in_words(const CanNode& node) {
     const CanCounters& b = node.bus().counters();
     return fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", node.bus().description(), c.taken,
                        c.missed, non_zero(c.rejected())) +
-           fmt::format("    {} frames received ({} foreign), {} sent, {} dropped; trouble: {}\n", b.received,
-                       c.foreign, b.sent, b.send_drops,
-                       non_zero({{"receive overflow", b.receive_overflow},
+           fmt::format("    {} frames received ({} foreign), {} sent; faults: {}\n", b.received, c.foreign, b.sent,
+                       non_zero({{"not sent (no client, full queue or interface down)", b.send_drops},
+                                 {"receive overflow", b.receive_overflow},
                                  {"malformed", b.malformed},
                                  {"error frames", b.error_frames},
                                  {"bus-off", b.bus_off},
@@ -307,12 +308,54 @@ std::string advice(const CameraSensor& camera, const Camera& settings, std::int6
                       needs_ms, period_ms, 0.6 * period_ms, std::max(0.1, 800 / std::max(needs_ms, 1e-3)));
 }
 
-}  // namespace
+/// The share of a camera's frames that a run may skip.
+constexpr double kSkippedShareMost = 0.5;
 
 bool kept_up(const Emulator& emulator) {
     for (const CameraSensor* c : emulator.sensors_of<CameraSensor>())
         if (share(c->stats().skipped, c->stats().frames + c->stats().skipped) > kSkippedShareMost) return false;
     return true;
+}
+
+/// False where a sensor of another kind may have made something.
+bool made_nothing(const Emulator& emulator) {
+    const auto cameras = emulator.sensors_of<CameraSensor>();
+    const auto lidars = emulator.sensors_of<LidarSensor>();
+    return cameras.size() + lidars.size() == emulator.sensors().size() &&
+           std::ranges::all_of(cameras, [](const auto* c) { return c->stats().frames == 0; }) &&
+           std::ranges::all_of(lidars, [](const auto* l) { return l->stats().packets == 0; });
+}
+
+/// Whoever stops a run that waits for its first command has not failed. One that others have commanded, but not all
+/// of its bodies, cannot have begun.
+bool stopped_while_waiting(const Emulator& emulator) {
+    return emulator.stopped() &&
+           (emulator.bodies_without_a_pose().empty() || emulator.can()->bus().counters().received == 0);
+}
+
+/// Of a lockstep run that made no item.
+std::string why_nothing(const Emulator& emulator) {
+    const std::string bodies = emulator.bodies_without_a_pose();
+    if (bodies.empty())
+        return fmt::format(
+            "no frame and no packet was made: none was due by {:.6f} s, where the commands or the duration end",
+            static_cast<double>(emulator.t_ns()) * 1e-9);
+    const std::uint64_t foreign = emulator.can()->counters().foreign;
+    return fmt::format(
+        "no pose command was accepted for {}{}; a lockstep run begins when every body with a can_id has "
+        "a pose",
+        bodies, foreign > 0 ? fmt::format("; {} frames had other identifiers", foreign) : "");
+}
+
+}  // namespace
+
+std::vector<std::string> failures(const Emulator& emulator) {
+    std::vector<std::string> all;
+    if (!kept_up(emulator))
+        all.push_back(fmt::format("a camera skipped more than {:g} % of its frames", 100 * kSkippedShareMost));
+    if (emulator.options().lockstep && made_nothing(emulator) && !stopped_while_waiting(emulator))
+        all.push_back(why_nothing(emulator));
+    return all;
 }
 
 std::vector<std::string> advice(const Emulator& emulator) {
@@ -340,8 +383,7 @@ std::string in_words(const Emulator& emulator) {
                            emulator.page_faults().major);
     for (const std::string& notice : emulator.notices()) out += "  note: " + notice + "\n";
     for (const std::string& text : advice(emulator)) out += "  advice: " + text + "\n";
-    if (!kept_up(emulator))
-        out += fmt::format("  failed: a camera skipped more than {:g} % of its frames\n", 100 * kSkippedShareMost);
+    for (const std::string& text : failures(emulator)) out += "  failed: " + text + "\n";
     if (!emulator.options().log_folder.empty()) out += "  log: " + emulator.options().log_folder + "\n";
     return out;
 }

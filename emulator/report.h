@@ -24,9 +24,9 @@ inline constexpr std::array<std::pair<const char*, double>, 5> kPercentiles{
 template <class H>
 [[nodiscard]] nlohmann::json percentiles(const H& histogram, double unit);
 
-/// The share of a camera's frames that a run may skip. Beyond it the run has failed (exit status 1).
-inline constexpr double kSkippedShareMost = 0.5;
-[[nodiscard]] bool kept_up(const Emulator& emulator);
+/// Why a run has failed, a sentence each: a camera skipped more than half of its frames, or a lockstep run made no
+/// frame and no packet. Empty: it has passed.
+[[nodiscard]] std::vector<std::string> failures(const Emulator& emulator);
 /// For each camera that skipped frames or was late: how much, and which budget or rate to change.
 [[nodiscard]] std::vector<std::string> advice(const Emulator& emulator);
 

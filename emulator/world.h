@@ -32,6 +32,7 @@ public:
     [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_->tracer(); }
     /// The track of body i; null when the scene gives it no can_id.
     [[nodiscard]] PoseTrack* track(std::size_t body) noexcept { return tracks_[body].get(); }
+    [[nodiscard]] const PoseTrack* track(std::size_t body) const noexcept { return tracks_[body].get(); }
     [[nodiscard]] bool has_commanded_bodies() const noexcept { return commanded_ > 0; }
 
     /// For a single image or scan: takes the rows of a trajectory that matter between two times as commands.

@@ -70,7 +70,7 @@ public:
     Status play(const std::vector<TrajectoryRow>& rows) {
         Progress progress("playing " + options_.trajectory);
         progress.show(fmt::format("waiting at most {:g} s for the emulator's clock", options_.wait_s));
-        synchronise();
+        if (auto ready = synchronise(); !ready) return ready;
         std::size_t k = 0;
         for (const TrajectoryRow& row : rows) {
             if (stop_flag()) break;
@@ -79,6 +79,7 @@ public:
             ++k;
             const std::int64_t t = row.t_ns + start_ns_;
             if (!options_.lockstep) wait_for(t - std::llround(options_.lead_s * 1e9));
+            if (auto fits = check_mode(); !fits) return fits;
             if (auto sent = send(row, t); !sent) return sent;
             if (options_.lockstep)
                 if (auto reached = wait_in_lockstep(); !reached) return reached;
@@ -91,15 +92,21 @@ public:
 
 private:
     /// Real time: the trajectory's time 0 is a round tenth of a second ahead, unless --start is given.
-    void synchronise() {
+    Status synchronise() {
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
         if (!options_.lockstep) {
-            while (!clock_.synchronized() && monotonic_ns() < deadline && !stop_flag()) {
+            while (!bus_.ended() && !clock_.synchronized() && monotonic_ns() < deadline && !stop_flag()) {
                 bus_.wait(50 * kMs);
                 clock_.listen(bus_);
             }
+            if (auto fits = check_mode(); !fits) return fits;
             if (!clock_.synchronized()) {
-                say(fmt::format("no heartbeat in {} s: time 0 is now", options_.wait_s));
+                if (!bus_.ended() && options_.wait_s > 0 && !stop_flag())
+                    return Error{
+                        fmt::format("no heartbeat in {:g} s: is `narpa run` there? If it runs in lockstep, "
+                                    "expected --lockstep here too. --wait 0 plays without heartbeats",
+                                    options_.wait_s),
+                        options_.bus, 0, 0, ErrorKind::failed};
                 clock_.start_here();
             }
         }
@@ -108,6 +115,18 @@ private:
         } else if (!options_.lockstep) {
             start_ns_ = (clock_.now_ns() + 300 * kMs) / (100 * kMs) * (100 * kMs);
         }
+        return Ok{};
+    }
+
+    /// An emulator in lockstep starts with heartbeats in the state `starting`; one in real time does not.
+    Status check_mode() const {
+        if (!clock_.synchronized()) return Ok{};
+        const RunState state = clock_.newest().state;
+        if (!options_.lockstep && (state == RunState::starting || state == RunState::lockstep))
+            return Error{"the emulator runs in lockstep, expected --lockstep here too", options_.bus};
+        if (options_.lockstep && state == RunState::running)
+            return Error{"the emulator runs in real time, expected no --lockstep", options_.bus};
+        return Ok{};
     }
 
     void wait_for(std::int64_t t_ns) {
@@ -140,6 +159,7 @@ private:
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
         while (!clock_.reached(granted)) {
             clock_.listen(bus_);
+            if (auto fits = check_mode(); !fits) return fits;
             if (clock_.reached(granted)) break;
             if (stop_flag()) return Ok{};
             if (monotonic_ns() > deadline)
@@ -211,7 +231,7 @@ Command add_fly(Parser app) {
         .type_name("SECONDS")
         .range(0.0, 1.0)
         .shows_default();
-    c.option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats")
+    c.option("--wait", o->wait_s, "Seconds to wait for the bus and for heartbeats; 0 plays without heartbeats")
         .type_name("SECONDS")
         .range(0.0, 3600.0)
         .shows_default();

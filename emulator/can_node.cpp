@@ -162,8 +162,13 @@ void CanNode::send(const CameraReply& reply, std::int64_t t_now_ns) noexcept {
 
 void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
     heartbeat.counter = heartbeat_counter_++;
-    put(encode(heartbeat), t_now_ns);
+    heartbeat_ = encode(heartbeat);
+    put(heartbeat_, t_now_ns);
     log_left_out(t_now_ns);
+}
+
+void CanNode::repeat_heartbeat() noexcept {
+    if (!bus_.recorded() && (!hub_ || hub_->has_clients())) bus_.send(heartbeat_);
 }
 
 void CanNode::put(const CanFrame& frame, std::int64_t t_now_ns) noexcept {

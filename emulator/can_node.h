@@ -61,6 +61,9 @@ public:
     /// Sets the report's counter.
     void send(LidarBeamReport report, std::int64_t t_now_ns) noexcept;
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
+    /// Sends the last heartbeat again, for clients that have joined since; not where the bus knows that there are
+    /// none. It is not logged: a log in lockstep does not depend on wall time.
+    void repeat_heartbeat() noexcept;
     /// Commands and triggers go to this camera too, which outlives the run. Before it.
     void operate(CameraControl& camera) { cameras_.push_back(&camera); }
 
@@ -106,6 +109,7 @@ private:
     MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
     std::uint8_t heartbeat_counter_ = 0, beam_counter_ = 0;
+    CanFrame heartbeat_{};  ///< the last
     std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged
     std::uint64_t logged_others_ = 0;
     std::uint32_t left_out_ = 0;  ///< since the last line that states it

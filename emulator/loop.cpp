@@ -7,6 +7,7 @@
 #include <barrier>
 #include <thread>
 
+#include "base/time.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/threads.h"
@@ -18,6 +19,7 @@ namespace {
 constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
+constexpr std::int64_t kStartingPeriodNs = 500'000'000;  // of heartbeats until a lockstep run begins, wall time
 constexpr int kWaitsAlone = 10;                          // so many, for a commander that comes back
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
@@ -159,7 +161,12 @@ void Emulator::run_lockstep(const StopFlag& stop) {
     bool started = false, moved = false, refused = false;
     int waits_alone = 0;
     send_heartbeat(0, RunState::starting);
+    std::int64_t repeated_ns = monotonic_ns();
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
+        if (!started && monotonic_ns() - repeated_ns > kStartingPeriodNs) {
+            can_->repeat_heartbeat();
+            repeated_ns = monotonic_ns();
+        }
         if (!can_->receive(t_ns(), moved)) {
             if (can_->bus().ended()) break;
             const bool left = can_->hub() && can_->hub()->commanders_left();

@@ -13,6 +13,8 @@ public:
     virtual void note_commander() noexcept = 0;
     /// There were commanders, and all of them have left the bus.
     [[nodiscard]] virtual bool commanders_left() const noexcept = 0;
+    /// A frame that is sent reaches someone.
+    [[nodiscard]] virtual bool has_clients() const noexcept = 0;
     /// Clients that have come and ended since the bus was opened: no fault.
     [[nodiscard]] virtual std::uint64_t clients_left() const noexcept = 0;
 };

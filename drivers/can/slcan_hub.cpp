@@ -88,6 +88,9 @@ public:
         return had_commander_ && queue_.empty() &&
                std::none_of(clients_.begin(), clients_.end(), [](const Client& c) { return c.open && c.commands; });
     }
+    [[nodiscard]] bool has_clients() const noexcept override {
+        return std::any_of(clients_.begin(), clients_.end(), [](const Client& c) { return c.open; });
+    }
     [[nodiscard]] std::uint64_t clients_left() const noexcept override { return clients_left_; }
 
     bool send(const CanFrame& frame) noexcept override {

@@ -167,6 +167,7 @@ TEST_F(SlcanHub, EightClientsAndNotNine) {
 
 TEST_F(SlcanHub, KnowsWhenAllThatCommandedHaveLeft) {
     auto& hub = dynamic_cast<ClientHub&>(*hub_);
+    EXPECT_FALSE(hub.has_clients());
     std::optional<Wire> one(std::in_place, port_), two(std::in_place, port_);
     Wire listener(port_);
     for (Wire* w : {&*one, &*two, &listener}) w->say("O\r"), w->hear(*hub_, "\r");
@@ -188,6 +189,7 @@ TEST_F(SlcanHub, KnowsWhenAllThatCommandedHaveLeft) {
     hub.note_commander();
     ASSERT_TRUE(turn_until(*hub_, [&] { return hub_->receive(out) || hub.clients_left() == 2; }));
     EXPECT_TRUE(hub.commanders_left()) << "the listener does not count";
+    EXPECT_TRUE(hub.has_clients()) << "but a frame that is sent reaches it";
     EXPECT_EQ(hub_->counters().interface_down, 0u) << "that clients end is no fault";
     command(listener);
     EXPECT_FALSE(hub.commanders_left()) << "it may be commanded again";

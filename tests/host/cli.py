@@ -1,9 +1,12 @@
 #!/usr/bin/python3
 """The command line for scripts: --help, one JSON document on standard output, exit codes, errors with file and line."""
+import contextlib
 import json
 import os
 import re
+import socketserver
 import subprocess
+import threading
 from pathlib import Path
 
 import support
@@ -179,6 +182,45 @@ def check_silence():
     expect(re.search(r"running: t = .+ s of 4 s, \d+ %", said), f"run tells where it is: {said[:200]}")
 
 
+def check_modes():
+    """`fly` in another mode than the emulator says so as soon as a heartbeat tells, and plays nothing."""
+    flight = folder / "modes.csv"
+    flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
+                      + "".join(f"{0.1 * k:.1f},chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(5)))  # fmt: skip
+    for mode, words in ((["--lockstep"], "the emulator runs in lockstep, expected --lockstep"),
+                        ([], "the emulator runs in real time, expected no --lockstep")):  # fmt: skip
+        bus = f"slcan:{support.free_port()}"
+        with support.Run(support.SCENE, "--can", bus, "--video", f"{support.CAMERA}=none", *mode) as run:
+            run.wait_for("commands: ")
+            other = [] if mode else ["--lockstep"]
+            expect_refusal(2, words, "fly", flight, "--can", bus, *other)
+            if mode:
+                narpa("fly", flight, "--can", bus, *mode)
+                summary = json.loads(run.process.communicate(timeout=60)[0])
+                taken, drops = summary["can"]["commands_taken"], summary["can"]["send_drops"]
+                expect(taken == 5 and drops <= 2, f"fly --lockstep then commands it; at most the first and the last heartbeat had no client: {taken}, {drops}")
+    with silent_hub() as bus:
+        expect_refusal(1, r"no heartbeat in 1 s: .*--lockstep", "fly", flight, "--can", bus, "--wait", "1")
+        narpa("fly", flight, "--can", bus, "--wait", "0")
+        expect(True, "--wait 0 plays without heartbeats")
+
+
+@contextlib.contextmanager
+def silent_hub():
+    """An slcan hub that answers requests and sends no frame."""
+
+    class Client(socketserver.BaseRequestHandler):
+        def handle(self):
+            while data := self.request.recv(4096):
+                self.request.sendall(b"".join({b"V": b"V1013\r", b"t": b"z\r", b"": b""}.get(line[:1], b"\r") for line in data.split(b"\r")))
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Client) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"slcan:{server.server_address[1]}"
+        server.shutdown()
+
+
 def check_folders():
     """One run to a folder at a time."""
     log = folder / "one-log"
@@ -188,5 +230,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_output, check_sensors, check_silence, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_output, check_sensors, check_silence, check_modes, check_folders):
     check()

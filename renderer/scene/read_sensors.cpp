@@ -154,6 +154,21 @@ double white_radiance(const Scene& scene) {
     return std::max({scene.ambient.x, scene.ambient.y, scene.ambient.z});
 }
 
+/// Keys of the detector that are easily put beside it.
+void refuse_keys_of_detector(TableReader& camera) {
+    for (const char* key :
+         {"exposure_s", "exposure_stops", "pixel_pitch_m", "f_number", "quantum_efficiency", "full_well_e",
+          "gain_e_per_dn", "read_noise_e", "shot_noise", "bits", "black_level_dn", "dark_current_e_s"})
+        camera.refuse(key, "belongs to the camera's detector, expected it in [camera.detector]");
+}
+
+/// Tables of a camera that stand alone.
+void refuse_tables_of_camera(TableReader& root) {
+    for (const char* key :
+         {"detector", "shutter", "control", "intrinsics", "distortion", "lens", "psf", "vignetting", "ghost"})
+        root.refuse(key, fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key));
+}
+
 Camera read_camera(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                    const std::filesystem::path& folder) {
     Camera camera;
@@ -177,6 +192,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.control = read_control(table, camera);
     read_optics(table, camera, scene.sun.has_value(), folder);
     camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
+    refuse_keys_of_detector(table);
     if (!camera.detector && !(camera.white_radiance > 0))
         table.require("white_radiance", "a number > 0, as there is neither [sun] nor [ambient] to take it from");
     table.finish();
@@ -192,6 +208,7 @@ void read_sensors(TableReader& root, SceneReading& reading) {
         scene.cameras.push_back(read_camera(table, cameras, scene, reading.folder));
     for (TableReader& table : root.tables("lidar"))
         scene.lidars.push_back(read_lidar(table, lidars, scene, reading.folder));
+    refuse_tables_of_camera(root);
     if (!root.has("camera") && !root.has("lidar")) root.require("camera", "at least one [[camera]] or [[lidar]]");
 }
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/nearest_name.h"
+#include "renderer/scene/other_names.h"
 
 namespace narpa {
 
@@ -292,7 +292,7 @@ void TableReader::finish() {
     for (const auto& [key, value] : *table_)
         if (std::find(asked_.begin(), asked_.end(), key.str()) == asked_.end())
             problems_->add(key.source(), fmt::format("unknown key \"{}\" in {}{}", key.str(), name_,
-                                                     did_you_mean(key.str(), asked_)));
+                                                     key_meant(key.str(), asked_)));
 }
 
 }  // namespace narpa

@@ -57,9 +57,10 @@ double cubic_integral(double t) {
 }
 
 /// The share of a sample's light that a pixel gets along one axis, by its distance from the sample, px. Without a
-/// point spread it is the sample's pixel that gets all. The filter of a point spread, which comes later, takes the
-/// image for a smooth function: a body then has to be where it is between the pixels, neither in the middle of one
-/// nor wider than it is. The share is that of the pixel's area in cubic interpolation; below zero at the edges.
+/// point spread function it is the sample's pixel that gets all. Its filter, which comes later,
+/// takes the image for a smooth function: a body then has to be where it is between the pixels, neither in the
+/// middle of one nor wider than it is. The share is that of the pixel's area in cubic interpolation; below zero at
+/// the edges.
 double pixel_share(bool spread, double distance_px) {
     if (!spread) return distance_px > -0.5 && distance_px <= 0.5 ? 1 : 0;
     return cubic_integral(distance_px + 0.5) - cubic_integral(distance_px - 0.5);

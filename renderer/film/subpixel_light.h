@@ -24,11 +24,11 @@ inline constexpr std::uint32_t kSubpixelSamplesLeast = 1024, kSubpixelSamplesMos
 
 /// Adds the light of the subpixel bodies in the block to its pixels, which hold the light from behind them, and
 /// subtracts what they cover. Their points are fixed on the disc, whatever pixels it falls on, so that the light
-/// does not change while the body moves through the image. Where the camera has a point spread, a point's light is
-/// shared among pixels by cubic interpolation, so that the filtered image has its centroid where the point is. Each
-/// point represents its part of the solid angle, is traced like a camera ray and counts if it meets the body:
-/// nearer bodies hide it. `variance` may be null; it gets the variance of independent samples, an upper bound for
-/// stratified ones.
+/// does not change while the body moves through the image. Where the camera has a point spread function, a point's
+/// light is shared among pixels by cubic interpolation, so that the filtered image has its centroid where the point
+/// is. Each point represents its part of the solid angle, is traced like a camera ray and counts if it meets the
+/// body: nearer bodies hide it. `variance` may be null; it gets the variance of independent samples, an upper bound
+/// for stratified ones.
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance);
 
 }  // namespace narpa

@@ -16,8 +16,8 @@ namespace narpa {
 /// Widest image of a body, across its bounds, that is treated so.
 inline constexpr double kSubpixelWidth_px = 2;
 
-/// Where the camera has a point spread, a sample's light reaches pixels whose middles are closer than this along
-/// each axis; else the pixel that it falls on.
+/// Where the camera has a point spread function, a sample's light reaches pixels whose middles are closer than this
+/// along each axis; else the pixel that it falls on.
 inline constexpr double kSpreadSampleReach_px = 2.5;
 
 /// What the camera sees of a tiny body's bounds, in world axes from the camera's centre: points

@@ -138,7 +138,7 @@ struct CameraControlLimits {
     double level = 0.3;          ///< that auto-exposure aims at: mean of the image, share of full scale
 };
 
-/// Pixels from a point that the filter of a point spread reaches at most.
+/// Pixels from a point that the filter of a point spread function reaches at most.
 inline constexpr int kPointSpreadReach_px = 31;
 
 /// What a lens makes of a point, as samples that sum to 1, row by row.

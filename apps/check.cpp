@@ -14,10 +14,12 @@
 
 #include "apps/calibration.h"
 #include "apps/cli.h"
+#include "apps/exposure_advice.h"
 #include "apps/shipped.h"
 #include "base/constants.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/video/video_sink.h"
+#include "emulator/camera_unit.h"
 #include "emulator/world.h"
 #include "protocols/can/dbc.h"
 #include "protocols/lidar/lidar_model.h"
@@ -291,6 +293,46 @@ void check_own_hulls(const World& world, nlohmann::json& document) {
                        s.lidars[i].T_mount_lidar, rays_of(s.lidars[i]), document["lidars"][i]);
 }
 
+/// Of a frame at time 0, where the scene itself places its bodies.
+SignalLevels first_levels(const World& world, const Camera& camera) {
+    const Scene& s = world.scene();
+    BodyPoses at(s.bodies.size());
+    std::vector<Motion> motions(s.bodies.size());
+    world.place(0, camera.mount, at, motions);
+    const std::int64_t half_ns = exposure_ns(camera) / 2;
+    const CameraPose pose = camera_pose(world, camera, at, -half_ns, half_ns, motions);
+    FrameSettings settings;
+    settings.method = s.render.method;
+    settings.max_depth = s.render.max_depth;
+    settings.seed = s.render.seed;
+    settings.spp = s.render.method == RenderSettings::Method::path ? 4 : 1;  // paths are noisy
+    RadianceImage radiance(camera.width, camera.height);
+    render_radiance(world.render_scene(), at, camera, pose, settings, radiance);
+    return signal_levels(camera, radiance);
+}
+
+/// How the light fits each camera's scale.
+void check_exposures(const World& world, nlohmann::json& document) {
+    const Scene& s = world.scene();
+    for (std::size_t i = 0; i < s.cameras.size(); ++i) {
+        const SignalLevels levels = [&] {
+            const Progress progress("exposing camera " + s.cameras[i].name);
+            return first_levels(world, s.cameras[i]);
+        }();
+        document["cameras"][i]["signal"] = signal_json(levels);
+        const std::string camera = "camera " + s.cameras[i].name + ": ";
+        if (const std::string advice = exposure_advice(s.cameras[i], levels); !advice.empty())
+            say("warning: " + camera + "at time 0 " + advice);
+        else if (!(levels.brightest > 0))
+            say("  " + camera + "sees no light at time 0, where the scene places its bodies");
+        else
+            say(fmt::format(
+                "  {}at time 0 {} of its pixels have light, {} are saturated; the bright ones have {} of full "
+                "scale",
+                camera, percent(levels.lit_share), percent(levels.saturated_share), percent(levels.bright)));
+    }
+}
+
 /// Whether it is written like a CAN bus: with a prefix, or the name of an interface.
 bool is_bus(const std::string& spec) {
     std::error_code none;
@@ -359,6 +401,7 @@ Outcome check(const CheckOptions& o) {
     print_scene(**world);
     nlohmann::json scene_document = describe(**world);
     check_own_hulls(**world, scene_document);
+    check_exposures(**world, scene_document);
     if (!o.calibration.empty()) {
         if (auto written = write_calibration((*world)->scene(), o.calibration); !written) return written.error();
         say("wrote " + o.calibration + "/calibration.json and CAMERA.yaml of each camera");

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "apps/cli.h"
+#include "apps/exposure_advice.h"
 #include "apps/scene_options.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
@@ -77,10 +78,6 @@ void keep_only(const std::set<std::string>& names, Aovs& a) {
     if (!names.contains("variance")) a.variance.clear();
 }
 
-bool is_black(const RadianceImage& image) {
-    return std::all_of(image.pixels.begin(), image.pixels.end(), [](const Rgb& p) { return p == Rgb{}; });
-}
-
 std::string_view name(Method m) {
     return m == Method::path ? "path" : "direct";
 }
@@ -139,7 +136,10 @@ Outcome render(const RenderOptions& o) {
     auto written = write_image(o.out, {unit.camera(), unit.radiance(), aovs, unit.bytes()});
     if (!written) return written.error();
     const RenderSettings& settings = (*world)->scene().render;
-    if (is_black(unit.radiance()))
+    const SignalLevels levels = signal_levels(unit.camera(), unit.radiance());
+    if (const std::string advice = exposure_advice(unit.camera(), levels); !advice.empty())
+        say(fmt::format("warning: camera {}: {}", unit.camera().name, advice));
+    if (!(levels.brightest > 0))
         say(
             fmt::format("warning: every pixel is black: camera {} sees no lit surface from where it is; see its "
                         "position_m, look_at or attitude_wxyz, its mount, --pose, --time and the light",
@@ -163,7 +163,8 @@ Outcome render(const RenderOptions& o) {
                             {"passes", ledger.passes},
                             {"step", kStepNames[ledger.step]},
                             {"triangles", (*world)->tracer().triangle_count()},
-                            {"render_s", seconds}};
+                            {"render_s", seconds},
+                            {"signal", signal_json(levels)}};
     if (ledger.expected_error >= 0) document["expected_error"] = ledger.expected_error;
     if (settings.method == Method::path) document["max_depth"] = settings.max_depth;
     return document;

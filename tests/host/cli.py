@@ -172,6 +172,27 @@ def check_sensors():
     expect("camera_matrix:" in info and f"image_width: {camera['width']}" in info, "and nav.yaml is a camera_info")
 
 
+def check_exposure():
+    """What saturates or stays black, and the key to set to what: set so, it is good."""
+    scene = folder / "exposure.toml"
+    text = ('[scene]\nname = "exposure"\n[sun]\ndirection = [-1.0, 0.0, 0.0]\n[[body]]\nname = "ball"\nsphere = {radius_m = 1.0}\n'
+            '[[camera]]\nname = "eye"\nposition_m = [-5.0, 0.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\n')  # fmt: skip
+    scene.write_text(text + "[camera.detector]\nexposure_s = 0.002\n")
+    for exposure_s, words in ((0.002, r"% of the pixels are saturated \(\d+ % have light\)"), (1e-9, "the image is black")):
+        scene.write_text(text + f"[camera.detector]\nexposure_s = {exposure_s}\n")
+        for arguments in (["render", scene, "-o", folder / "exposure.png"], ["check", scene]):
+            said = narpa(*arguments).stderr.decode()
+            advice = re.search(rf"warning: camera eye: .*{words}.*; expected exposure_s of about (\S+) ", said)
+            expect(advice, f"{arguments[0]} with {exposure_s} s: {said.splitlines()[0] if advice is None else advice[0]}")
+        scene.write_text(text + f"[camera.detector]\nexposure_s = {float(advice[1])}\n")
+        done = narpa("render", scene, "-o", folder / "exposure.png", "--json")
+        signal = json.loads(done.stdout)["signal"]
+        expect(0.6 < signal["bright"] < 0.8 and "warning" not in done.stderr.decode(), f"with {advice[1]} s the exposure is good: {signal}")
+    scene.write_text(text + "white_radiance = 10.0\n")
+    said = narpa("render", scene, "-o", folder / "exposure.png").stderr.decode()
+    expect(re.search(r"are saturated .*; expected white_radiance of about ", said), "without a detector it is white_radiance")
+
+
 def check_silence():
     """What takes long says how far it is, and what it waits for."""
     flight = folder / "alone.csv"
@@ -230,5 +251,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_output, check_sensors, check_silence, check_modes, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_output, check_sensors, check_exposure, check_silence, check_modes, check_folders):
     check()

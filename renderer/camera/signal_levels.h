@@ -1,0 +1,32 @@
+/// renderer/camera/signal_levels.h - how a frame's light fits the scale of the camera's digital numbers.
+#pragma once
+
+#include "renderer/image/radiance_image.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// Of the mean signal of light, before noise, dark current and what makes pixels differ. In fractions of full
+/// scale: the full well or the end of the converter, whichever comes first; without a detector, white_radiance. A
+/// pixel with several bands counts by its brightest; one of a mosaic by the band of its place.
+struct SignalLevels {
+    static constexpr double kLit = 0.01;
+
+    double saturated_share = 0;  ///< of all pixels: at full scale or above
+    double lit_share = 0;        ///< of all pixels: above kLit times the lesser of full scale and `brightest`
+    double bright = 0;           ///< 99 % of the lit pixels are at most so bright; may exceed 1
+    double brightest = 0;        ///< of any pixel; may exceed 1
+    double darkest_step = 0;     ///< less than this is 0 in the bytes of the camera's format
+
+    [[nodiscard]] bool is_black() const noexcept { return brightest < darkest_step; }
+    /// More than 1 % of all pixels are saturated, or more than a quarter of the lit ones where they are more than
+    /// 0.1 % of all (a few stars are no mistake).
+    [[nodiscard]] bool is_overexposed() const noexcept {
+        return saturated_share > 0.01 || (saturated_share > 1e-3 && saturated_share > 0.25 * lit_share);
+    }
+};
+
+/// `radiance`: of the camera's size.
+[[nodiscard]] SignalLevels signal_levels(const Camera& camera, const RadianceImage& radiance);
+
+}  // namespace narpa

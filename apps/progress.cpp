@@ -39,7 +39,9 @@ std::string progress_line(const std::string& what, const Step& step, double seco
     const double share = std::min(step.share, 1.0);
     line += fmt::format("{:.0f} %", 100 * share);
     // Of the first hundredth and the first second too little is known.
-    if (share >= 0.01 && seconds >= 1)
+    if (step.left_s >= 0)
+        line += fmt::format(", about {} to go", duration(step.left_s));
+    else if (share >= 0.01 && seconds >= 1)
         line += fmt::format(", about {} to go", duration(seconds * (1 - share) / share));
     return line;
 }
@@ -55,9 +57,9 @@ Progress::~Progress() {
     if (on_terminal()) fmt::print(stderr, "\r\033[K");
 }
 
-void Progress::show(double share, std::string text) {
+void Progress::show(Step step) {
     const std::scoped_lock lock(mutex_);
-    step_ = {share, std::move(text)};
+    step_ = std::move(step);
 }
 
 void Progress::print(const std::stop_token& stop) {

@@ -13,6 +13,7 @@ namespace narpa::cli {
 struct Step {
     double share = -1;   ///< of the whole, 0 to 1; negative: unknown
     std::string text{};  ///< "frame 3 of 10"; may be empty
+    double left_s = -1;  ///< wall time to the end; negative: as the share and the time so far have it
 };
 
 /// "rendering: frame 3 of 10, 30 %, about 35 s left", or with the time so far where no share is known.
@@ -28,7 +29,8 @@ public:
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
 
-    void show(double share, std::string text = {});
+    void show(Step step);
+    void show(double share, std::string text = {}) { show({share, std::move(text)}); }
     void show(std::string text) { show(-1, std::move(text)); }
 
 private:

@@ -31,7 +31,10 @@ bool line_on_stdin() {
 }
 
 rehearsal::Console console(Progress& progress) {
-    return {say, [&](double share, std::string_view text) { progress.show(share, std::string(text)); },
+    return {say,
+            [&](double share, double left_s, std::string_view text) {
+                progress.show({share, std::string(text), left_s});
+            },
             line_on_stdin};
 }
 

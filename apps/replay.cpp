@@ -168,9 +168,12 @@ Outcome replay_any(const ReplayOptions& o) {
     }
     stop_on_signals();
     Progress progress("running " + o.folder + " again");
-    return rehearsal::rerun(
-        {o.folder, o.dynamics, o.navigation, o.threads, NARPA_VERSION, {}},
-        {say, [&](double share, std::string_view text) { progress.show(share, std::string(text)); }}, stop_flag());
+    return rehearsal::rerun({o.folder, o.dynamics, o.navigation, o.threads, NARPA_VERSION, {}},
+                            {say,
+                             [&](double share, double left_s, std::string_view text) {
+                                 progress.show({share, std::string(text), left_s});
+                             }},
+                            stop_flag());
 }
 
 }  // namespace

@@ -84,6 +84,10 @@ GateResult pose_gate(const char* name, std::string asked, const Scenario& scenar
     gate.reason = first_and_worst(scenario, bus, monitor, words);
     return gate;
 }
+/// " (limit 0.5 m)"; empty: there is none.
+std::string limit_text(double limit, const char* unit) {
+    return std::isfinite(limit) ? fmt::format(" (limit {:g} {})", limit, unit) : std::string();
+}
 constexpr const char* kNoPoses = "no poses of both bodies were on the bus";
 
 }  // namespace
@@ -159,18 +163,23 @@ GateResult Judge::navigation() const {
     for (const auto* monitor : {&position_, &attitude_})
         if (monitor->first && (!gate.t_first_s || bus_.seconds(monitor->first->t_ns) < *gate.t_first_s))
             gate.t_first_s = bus_.seconds(monitor->first->t_ns);
-    gate.reason = fmt::format("{:.2f} % of {} estimates are within {:g} standard deviations", s.share_within * 100,
-                              s.estimates, limits.sigmas);
+    gate.reason = fmt::format("{:.2f} % of {} estimates are within {:g} standard deviations (asked {:g} %)",
+                              s.share_within * 100, s.estimates, limits.sigmas, limits.share * 100);
     if (!enough && sigmas_.first) {
         if (!gate.t_first_s) gate.t_first_s = bus_.seconds(sigmas_.first->t_ns);
         gate.reason += ", first beyond " + first_and_worst(scenario_, bus_, sigmas_, sigmas);
     } else {
         gate.reason += ", most " + when(scenario_, bus_, sigmas_.worst->t_ns) + ": " + sigmas(*sigmas_.worst);
     }
-    if (position_.first) gate.reason += "; position " + first_and_worst(scenario_, bus_, position_, position);
-    if (attitude_.first) gate.reason += "; attitude " + first_and_worst(scenario_, bus_, attitude_, attitude);
+    const std::string limit_m = limit_text(limits.position_m, "m"),
+                      limit_deg = limit_text(limits.attitude_deg, "deg");
+    if (position_.first)
+        gate.reason += "; position" + limit_m + " " + first_and_worst(scenario_, bus_, position_, position);
+    if (attitude_.first)
+        gate.reason += "; attitude" + limit_deg + " " + first_and_worst(scenario_, bus_, attitude_, attitude);
     if (good)
-        gate.reason += fmt::format("; largest errors {:.3f} m, {:.3f} deg", s.position_m.max, s.attitude_deg.max);
+        gate.reason += fmt::format("; largest errors {:.3f} m{}, {:.3f} deg{}", s.position_m.max, limit_m,
+                                   s.attitude_deg.max, limit_deg);
     return gate;
 }
 

@@ -82,14 +82,23 @@ Quat looking_at_origin(const Vec3& position_m) {
     return quat_from_columns(x, y, cross(x, y));
 }
 
+/// Over a way that begins at rest and ends at `speed_m_s` or before.
+double from_rest_s(double way_m, double speed_m_s, double acceleration_m_s2) {
+    const double faster_m = 0.5 * speed_m_s * speed_m_s / acceleration_m_s2;
+    if (way_m < faster_m) return std::sqrt(2 * way_m / acceleration_m_s2);
+    return way_m / speed_m_s + 0.5 * speed_m_s / acceleration_m_s2;
+}
+
 }  // namespace
 
 double Scenario::nominal_duration_s() const {
     double t_s = 0;
     Vec3 at = start.position_m;
     for (const Leg& leg : legs) {
-        const LegPath path = LegPath::along(leg, at, kShareOfThrust * thrusters.force_n / chaser.mass_kg);
-        t_s += leg.contact ? norm(at) / leg.speed_m_s : path.duration_s() + leg.hold_s;
+        const double acceleration_m_s2 = kShareOfThrust * thrusters.force_n / chaser.mass_kg;
+        const LegPath path = LegPath::along(leg, at, acceleration_m_s2);
+        t_s +=
+            leg.contact ? from_rest_s(norm(at), leg.speed_m_s, acceleration_m_s2) : path.duration_s() + leg.hold_s;
         if (!leg.contact) at = path.end_m();
     }
     return std::min(t_s, duration_s);

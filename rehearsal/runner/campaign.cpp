@@ -110,7 +110,7 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
             finished += p.share;
             text += fmt::format(", run {}: {}", r.run, p.text.empty() ? "starting" : p.text);
         }
-        console.progress(finished / static_cast<double>(runs.size()), text);
+        console.progress(finished / static_cast<double>(runs.size()), -1, text);
     };
     auto shown = std::chrono::steady_clock::now() - kShowPeriod;
     while ((next < runs.size() && !stop) || !running.empty()) {

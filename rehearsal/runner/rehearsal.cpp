@@ -28,6 +28,8 @@ using Clock = std::chrono::steady_clock;
 using Ready = ChildProcess::Ready;
 
 constexpr double kStartPatience_s = 120, kCommandPatience_s = 10, kEndPatience_s = 20;
+constexpr double kSpeedWindow_s = 5;
+constexpr double kEnding_s = 2;  // to end the programs and to draw charts and page, typically
 constexpr std::int64_t kBusWait_ns = 20'000'000;
 
 double seconds_since(Clock::time_point t) {
@@ -59,7 +61,9 @@ public:
         std::error_code failed;
         fs::remove_all(in_folder(kEarlier), failed);
         fly();
+        show_ending("ending the programs");
         stop_programs();
+        show_ending("drawing charts and page");
         return write_results();
     }
 
@@ -324,10 +328,11 @@ private:
         return stalled_s > options_.patience_s ? fmt::format("nothing moved for {:g} s", options_.patience_s) : "";
     }
 
-    void show_progress() const {
+    void show_progress() {
         const BusRecord& bus = judge_.bus();
-        if (bus.truth.empty()) return console_.progress(-1, "waiting for the first poses");
+        if (bus.truth.empty()) return console_.progress(-1, -1, "waiting for the first poses");
         const double t_s = bus.seconds(bus.truth.back().t_ns);
+        mark_time(t_s);
         const bool overdue = t_s > nominal_s_;
         std::string text = fmt::format("t = {:.1f} s of {} {:.0f} s, {:.2f} m", t_s, overdue ? "at most" : "about",
                                        overdue ? scenario_.duration_s : nominal_s_, bus.truth.back().range_m());
@@ -335,7 +340,27 @@ private:
             text += fmt::format(", {}, {}", leg_text(scenario_, bus.commands.back().leg),
                                 kGuidancePhases[static_cast<std::size_t>(bus.commands.back().phase)]);
         text += judge_.failures() == 0 ? ", gates good" : fmt::format(", {} gate(s) FAILED", judge_.failures());
-        console_.progress(overdue ? -1 : t_s / nominal_s_, text);
+        console_.progress(overdue ? -1 : t_s / nominal_s_, overdue ? -1 : left_s(t_s), text);
+    }
+
+    /// The speed changes as the target fills the frames: that of the last kSpeedWindow_s to twice that counts.
+    void mark_time(double t_s) {
+        if (marks_.empty() || seconds_since(marks_.back().first) > kSpeedWindow_s)
+            marks_.emplace_back(Clock::now(), t_s);
+        if (marks_.size() > 2) marks_.erase(marks_.begin());
+    }
+    /// Of wall time; negative: too little is known.
+    double left_s(double t_s) const {
+        const auto& [then, t_then_s] = marks_.front();
+        const double passed_s = seconds_since(then), speed = (t_s - t_then_s) / passed_s;
+        return passed_s < 1 || !(speed > 0) ? -1 : (nominal_s_ - t_s) / speed + kEnding_s;
+    }
+
+    void show_ending(const char* what) {
+        const BusRecord& bus = judge_.bus();
+        if (bus.truth.empty()) return console_.progress(-1, -1, what);
+        const double t_s = bus.seconds(bus.truth.back().t_ns);
+        console_.progress(-1, -1, fmt::format("t = {:.1f} s of about {:.0f} s, {}", t_s, t_s, what));
     }
 
     /// Dynamics and navigation end by themselves after a good run; the emulator writes its logs at SIGTERM.
@@ -391,7 +416,8 @@ private:
                  [this](const GateResult& g) { console_.print(fmt::format("gate {}: {}", g.name, g.reason)); }};
     const double nominal_s_ = scenario_.nominal_duration_s();
     const Clock::time_point began_ = Clock::now();
-    Descriptor lock_;  ///< on the folder
+    std::vector<std::pair<Clock::time_point, double>> marks_;  ///< when the simulation was at which time
+    Descriptor lock_;                                          ///< on the folder
     std::string hash_, bus_name_, trouble_;
     std::vector<std::string> video_, lidar_sinks_, lidar_sources_;  ///< NAME=SINK, NAME=SOURCE
     std::vector<std::string> fifos_;

@@ -41,8 +41,9 @@ struct RehearsalResult {
 /// Where messages for people go.
 struct Console {
     std::function<void(std::string_view)> print;
-    /// How far it is: the share of the whole that is done, or a negative number, and a text.
-    std::function<void(double share, std::string_view)> progress;
+    /// How far it is: the share of the whole that is done, the seconds of wall time left (each negative where it is
+    /// not known), and a text.
+    std::function<void(double share, double left_s, std::string_view)> progress;
     /// Polled where the user starts the navigation ("none"): whether it is ready. Empty: it is after ten seconds.
     std::function<bool()> navigation_ready{};
 };

@@ -135,14 +135,15 @@ std::string ledger(const Run& run) {
                              : "");
     if (run.verdict.lockstep || l.frames == 0) return out;
     HtmlTable table{"[ms]", "#p50", "#p90", "#p99", "#p99.9", "#max"};
-    const auto row = [&](const char* name, const Distribution& d) {
-        const auto text = [](double v) { return fmt::format("{:.2f}", v); };
+    const auto row = [&](const char* name, const Distribution& d, const auto& text) {
         if (d.count > 0) table.row({name, text(d.p50), text(d.p90), text(d.p99), text(d.p999), text(d.max)});
     };
-    row("pose command to hand-over", l.latency_ms);
-    row("middle of the exposure to hand-over", l.exposure_to_hand_over_ms);
-    row("rendering", l.render_ms);
-    row("hand-over after its deadline (negative: before)", l.late_ms);
+    const auto plain = [](double v) { return fmt::format("{:.2f}", v); };
+    row("pose command to hand-over", l.latency_ms, plain);
+    row("middle of the exposure to hand-over", l.exposure_to_hand_over_ms, plain);
+    row("rendering", l.render_ms, plain);
+    row("hand-over, from its deadline", l.late_ms,
+        [](double v) { return fmt::format("{:.2f} {}", std::abs(v), v > 0 ? "after" : "before"); });
     return out + table.html() + charts_of(run.folder, {{"latency", "Pose command to hand-over, for each frame"}});
 }
 

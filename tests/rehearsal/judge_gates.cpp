@@ -170,13 +170,21 @@ TEST(Judge, EstimatesAreJudgedByTheirStandardDeviations) {
     const Verdict one = flown(0.5, 0);  // one of four is beyond: that is what is allowed
     EXPECT_EQ(gate(one, "navigation").state, State::passed) << gate(one, "navigation").reason;
     EXPECT_DOUBLE_EQ(one.navigation.share_within, 0.75);
-    EXPECT_NEAR(one.navigation.nees, (25 + 3 * 1) / 4.0, 0.01);
+    const auto says = [](const Verdict& v, const char* words) {
+        return gate(v, "navigation").reason.find(words) != std::string::npos;
+    };
+    for (const char* words : {"75.00 % of 4 estimates are within 3 standard deviations (asked 75 %)",
+                              "largest errors 0.500 m (limit 5 m), 0.000 deg (limit 3 deg)"})
+        EXPECT_TRUE(says(one, words)) << words << ": " << gate(one, "navigation").reason;
     const Verdict two = flown(0.5, 0.035);
     EXPECT_EQ(gate(two, "navigation").state, State::failed);
     EXPECT_NE(gate(two, "navigation").reason.find("50.00 % of 4 estimates"), std::string::npos);
     const Verdict far = flown(6, 0);
     EXPECT_EQ(gate(far, "navigation").state, State::failed);
     EXPECT_EQ(gate(far, "navigation").t_first_s, 2) << gate(far, "navigation").reason;
+    EXPECT_TRUE(says(far, "; position (limit 5 m) at t = 2.00 s")) << gate(far, "navigation").reason;
+    s.gates.navigation = Gates::NavigationError{.sigmas = 30, .share = 0};
+    EXPECT_TRUE(says(flown(0.5, 0), "largest errors 0.500 m, 0.000 deg")) << "there is no limit";
 }
 
 TEST(Judge, LargestErrorsCountFromTheFirstMeasurementOn) {

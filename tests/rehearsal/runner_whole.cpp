@@ -41,7 +41,7 @@ RehearsalOptions options(const TemporaryFolder& folder) {
     return o;
 }
 
-const Console kSilent{[](std::string_view) {}, [](double, std::string_view) {}};
+const Console kSilent{[](std::string_view) {}, [](double, double, std::string_view) {}};
 
 TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
     const TemporaryFolder folder;
@@ -253,6 +253,8 @@ TEST(Whole, ACampaignShowsHowFarARunIs) {
     ASSERT_TRUE(write_text(log, "rehearsing: t = 100.0 s of at most 400 s, 7.78 m, 60 s so far\n"));
     EXPECT_EQ(progress_of(log).text, "t = 100.0 s of at most 400 s");
     EXPECT_DOUBLE_EQ(progress_of(log).share, 0.25);
+    ASSERT_TRUE(write_text(log, "rehearsing: t = 99.0 s of about 99 s, drawing charts and page, 20 s so far\n"));
+    EXPECT_DOUBLE_EQ(progress_of(log).share, 1);
     ASSERT_TRUE(write_text(log, "narpa: interrupted\n"));
     EXPECT_EQ(progress_of(log).text, "");
 }

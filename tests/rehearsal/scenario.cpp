@@ -62,6 +62,15 @@ TEST(Scenario, ReadsTheDocking) {
     EXPECT_EQ(s->chaser.inertia_kg_m2(1, 1), 31000);
 }
 
+/// Against the flights of docs/rehearsal.md, Measured.
+TEST(Scenario, NominalDurationIsThatOfAFlight) {
+    for (const auto& [name, flown_s] : {std::pair{"docking", 209.5}, {"dispersions", 98.1}}) {
+        const auto s = read_scenario(kScenarios + name + ".toml");
+        ASSERT_TRUE(s) << s.error().text();
+        EXPECT_NEAR(s->nominal_duration_s(), flown_s, 1.5) << name;
+    }
+}
+
 TEST(Scenario, NamesAMissingScene) {
     const test::TemporaryFolder folder;
     std::ofstream(folder / "lost.toml") << "[scenario]\nname = \"lost\"\nscene = \"none.toml\"\n";

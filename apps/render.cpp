@@ -12,6 +12,7 @@
 #include "apps/scene_options.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
+#include "emulator/report.h"
 #include "emulator/threads.h"
 #include "renderer/image/image_file.h"
 
@@ -145,11 +146,11 @@ Outcome render(const RenderOptions& o) {
                         "position_m, look_at or attitude_wxyz, its mount, --pose, --time and the light",
                         unit.camera().name));
     say(
-        fmt::format("wrote {}: {} x {}, {}, {:.6g} samples per pixel on average, {}, frame {} at {:.6f} s, {} "
+        fmt::format("wrote {}: {} x {}, {}, {:.6g} samples per pixel on average ({}), {}, frame {} at {:.6f} s, {} "
                     "triangles, {:.1f} ms",
                     o.out, unit.camera().width, unit.camera().height, name(settings.method),
-                    ledger.samples_per_pixel, kStepNames[ledger.step], frame, static_cast<double>(t_ns) * 1e-9,
-                    (*world)->tracer().triangle_count(), 1e3 * seconds));
+                    ledger.samples_per_pixel, kSamplesPerPixelNote, kStepNames[ledger.step], frame,
+                    static_cast<double>(t_ns) * 1e-9, (*world)->tracer().triangle_count(), 1e3 * seconds));
     nlohmann::json document{{"file", o.out},
                             {"camera", unit.camera().name},
                             {"frame", frame},

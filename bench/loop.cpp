@@ -60,8 +60,8 @@ std::string frames_in_words(const CameraStats& s) {
     for (std::size_t i = 0; i < kStepNames.size(); ++i)
         if (s.steps[i] > 0) steps += fmt::format("{}{} {}", steps.empty() ? "" : ", ", s.steps[i], kStepNames[i]);
     std::string out =
-        fmt::format("radiance {}; sensor {}; sinks {}; samples per pixel p50 {:.2f}; {}", ms(s.radiance),
-                    ms(s.sensor), ms(s.send), s.samples_1e3.percentile_ns(0.5) * 1e-3, steps);
+        fmt::format("radiance {}; sensor {}; sinks {}; samples per pixel p50 {:.2f} ({}); {}", ms(s.radiance),
+                    ms(s.sensor), ms(s.send), s.samples_1e3.percentile_ns(0.5) * 1e-3, kSamplesPerPixelNote, steps);
     if (s.error_1e9.count() > 0)
         out += fmt::format("; expected error p50 {:.3g} % of scale", s.error_1e9.percentile_ns(0.5) * 1e-7);
     return out;
@@ -151,10 +151,10 @@ json to_json(const LoopRun& run) {
 }
 
 std::string in_words(const std::vector<LoopRun>& runs) {
-    std::string out = "times in ms: p50 / p99.9 / max\n";
+    std::string out = "times in ms: p50 / p99.9 / max; from the deadline: negative is before\n";
     out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>8}\n", "run", "sensor",
                        "frames", "late", "lost", "part", "woken late", "render", "mid-exposure to out",
-                       "out after the deadline", "used p50");
+                       "out, from the deadline", "used p50");
     for (const LoopRun& run : runs) {
         for (const CameraRun& c : run.cameras) {
             const CameraStats& s = c.stats;

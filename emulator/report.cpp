@@ -211,6 +211,10 @@ std::vector<LatenessBin> lateness_bins(const SignedHistogram& late) {
     return bins;
 }
 
+std::string against_deadline(double late_ms) {
+    return fmt::format("{:.2f} ms {}", std::abs(late_ms), late_ms > 0 ? "after" : "before");
+}
+
 std::string lateness_in_words(const SignedHistogram& late) {
     std::string text;
     for (const auto& [from, to, frames] : lateness_bins(late)) {
@@ -226,7 +230,7 @@ std::string lateness_in_words(const SignedHistogram& late) {
 
 std::string CameraSensor::in_words(bool lockstep) const {
     const CameraStats& s = stats_;
-    const auto late_ms = [&](double p) { return s.late.percentile_ns(p) * 1e-6; };
+    const auto late = [&](double p) { return against_deadline(s.late.percentile_ns(p) * 1e-6); };
     Counts steps;
     for (std::size_t i = 0; i < kStepNames.size(); ++i) steps.emplace_back(kStepNames[i], s.steps[i]);
     std::string out = fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {}{} stale\n", name(),
@@ -237,14 +241,16 @@ std::string CameraSensor::in_words(bool lockstep) const {
         out += fmt::format("; mid-exposure to hand-over {}; wake-up latency {}", latency(s.hand_over),
                            latency(s.wake_late));
         out += fmt::format(
-            "\n    hand-over after the deadline: p50 {:.2f}, p90 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f} ms; "
-            "repeated {}, blank {}\n    frames: {}",
-            late_ms(0.5), late_ms(0.9), late_ms(0.99), late_ms(0.999), s.late.max_ns() * 1e-6, s.repeated,
-            s.blanked, lateness_in_words(s.late));
+            "\n    hand-over, from the deadline: p50 {}, p90 {}, p99 {}, p99.9 {}, latest {}; repeated {}, blank "
+            "{}\n"
+            "    frames: {}",
+            late(0.5), late(0.9), late(0.99), late(0.999), late(1), s.repeated, s.blanked,
+            lateness_in_words(s.late));
     }
     out += "\n";
-    out += fmt::format("    steps: {}; samples per pixel p50 {:.2f}, max {:.2f}", non_zero(steps),
-                       s.samples_1e3.percentile_ns(0.5) * 1e-3, s.samples_1e3.max_ns() * 1e-3);
+    out +=
+        fmt::format("    steps: {}; samples per pixel p50 {:.2f}, max {:.2f} ({})", non_zero(steps),
+                    s.samples_1e3.percentile_ns(0.5) * 1e-3, s.samples_1e3.max_ns() * 1e-3, kSamplesPerPixelNote);
     if (s.error_1e9.count() > 0)
         out += fmt::format("; expected error p50 {:.3g}, p99 {:.3g}, max {:.3g} of full scale",
                            s.error_1e9.percentile_ns(0.5) * 1e-9, s.error_1e9.percentile_ns(0.99) * 1e-9,

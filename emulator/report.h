@@ -38,7 +38,12 @@ struct LatenessBin {
 [[nodiscard]] std::vector<LatenessBin> lateness_bins(const SignedHistogram& late);
 /// Percentiles and bins.
 [[nodiscard]] nlohmann::json lateness(const SignedHistogram& late);
+/// "1.69 ms before", "0.30 ms after".
+[[nodiscard]] std::string against_deadline(double late_ms);
 /// "598 1 to 3 ms early, 2 0.3 to 1 ms late": the bins that are not empty.
 [[nodiscard]] std::string lateness_in_words(const SignedHistogram& late);
+
+/// Beside a number of samples per pixel: what it counts.
+inline constexpr const char* kSamplesPerPixelNote = "mean of all pixels; tiles without a body take none";
 
 }  // namespace narpa

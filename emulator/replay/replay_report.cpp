@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "emulator/report.h"
 #include "plot/plot.h"
 
 namespace narpa {
@@ -151,6 +152,7 @@ std::string in_words(std::span<const ReplayedFrame> frames, const BudgetCost& co
     };
     constexpr const char* kHead = "{:>7} {:>9} {:>12} {:>7} {:>9} {:>9} {:>10} {:>8} {:>18} {:>9}\n";
     std::string out =
+        fmt::format("spp: samples per pixel, {}\n", kSamplesPerPixelNote) +
         fmt::format(kHead, "frame", "t [s]", "step", "spp", "RMSE [%]", "bias [%]", "predicted", "SSIM",
                     "edges [px]", "bodies") +
         fmt::format(kHead, "", "", "", "", "of scale", "of scale", "/ measured", "", "mean / rms", "[px]");

@@ -219,6 +219,8 @@ TEST(Report, CountsFramesByLateness) {
     EXPECT_NEAR(told["p50"].get<double>(), -2, 0.07);
     EXPECT_EQ(told["max"], 0.5);
     EXPECT_EQ(lateness_in_words({}), "none");
+    EXPECT_EQ(against_deadline(-1.69), "1.69 ms before");
+    EXPECT_EQ(against_deadline(0.3), "0.30 ms after");
 }
 
 /// In real time: how far each frame gets is up to the machine, what is said of it must fit together.

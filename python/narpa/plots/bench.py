@@ -114,7 +114,7 @@ def ladder_bars(axes, scene):
 
 
 LOOP_PANELS = (("wake_late_ms", "wake-up latency, ms", True), ("hand_over_ms", "mid-exposure to hand-over, ms", True),
-               ("late_ms", "hand-over after the deadline, ms", False))  # fmt: skip
+               ("late_ms", "hand-over after the deadline, ms (negative: before)", False))  # fmt: skip
 
 
 def loop(document):

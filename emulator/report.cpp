@@ -278,7 +278,7 @@ std::string LidarSensor::in_words(bool lockstep) const {
     out += "\n";
     for (const auto& sink : sinks_) {
         const PacketCounters c = sink->counters();
-        out += fmt::format("    -> {}: {} sent, {} dropped", sink->description(), c.sent, c.dropped);
+        out += fmt::format("    -> {}: {} {}, {} dropped", sink->description(), c.sent, sink->fate(), c.dropped);
         if (c.receiver_dropped > 0)
             out += fmt::format(
                 "; {} lost at a receiver on this machine: its socket's buffer was full, expected a larger "

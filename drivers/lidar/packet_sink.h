@@ -36,6 +36,8 @@ public:
     /// An Error when the sink is a file that did not take every packet; final after a flush.
     [[nodiscard]] virtual Status failure() const { return Ok{}; }
     [[nodiscard]] virtual std::string description() const = 0;
+    /// What became of the packets that `sent` counts, for messages: "sent", "written".
+    [[nodiscard]] virtual std::string_view fate() const { return "sent"; }
 };
 
 /// SINK: `udp:HOST:PORT` | `FILE.pcap` | `none`. A capture shows the packets as `network` sends them by default;

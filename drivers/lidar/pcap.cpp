@@ -147,6 +147,7 @@ public:
     void flush() noexcept override { queue_.flush(); }
     PacketCounters counters() const noexcept override { return {writer_.sent, queue_.dropped() + writer_.lost}; }
     std::string description() const override { return description_; }
+    std::string_view fate() const override { return "written"; }
     Status failure() const override {
         const int reason = writer_.error;
         if (reason == 0) return Ok{};

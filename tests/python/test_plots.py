@@ -238,6 +238,16 @@ class Program(unittest.TestCase):
             self.assertIn(what, done.stderr)
             self.assertNotIn("Traceback", done.stderr)
 
+    def test_several_charts_need_a_folder(self):
+        text = json.dumps({"plot": "rehearsal", "title": "", **rehearsal()})
+        for name in ("x.png", "x.svg"):
+            done = self.run_with(text, "-o", str(self.folder / name))
+            self.assertEqual(done.returncode, 1)
+            self.assertRegex(done.stderr, rf"a.json: has \d+ charts, expected a folder for them, not the file .*{name}")
+            self.assertFalse((self.folder / name).exists())
+        self.assertEqual(self.run_with(text, "-o", str(self.folder / "charts.of.one")).returncode, 0)
+        self.assertTrue((self.folder / "charts.of.one/above.svg").exists())
+
     def test_without_matplotlib_says_how_to_get_it(self):
         (self.folder / "matplotlib.py").write_text("raise ImportError\n")
         done = self.run_with(json.dumps({"plot": "replay", **replay()}), environment={"PYTHONPATH": str(self.folder)})

@@ -15,6 +15,7 @@ import logging
 import sys
 from pathlib import Path
 
+PICTURES = (".png", ".svg", ".pdf")  # how names of pictures end
 MATPLOTLIB_MISSING = 3  # exit status: a dependency is missing, as narpa's own
 
 
@@ -37,6 +38,8 @@ def draw(document, output, picture_format=None):
         if not isinstance(drawn, dict):
             drawn.savefig(output, format=picture_format)
             return [Path(output)]
+        if Path(output).suffix in PICTURES:
+            raise ValueError(f"has {len(drawn)} charts, expected a folder for them, not the file {output}")
         Path(output).mkdir(exist_ok=True)
         files = [Path(output) / f"{name}.{picture_format or 'svg'}" for name in drawn]
         for file, figure in zip(files, drawn.values()):

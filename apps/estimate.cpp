@@ -129,10 +129,11 @@ nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& cov
     say(
         fmt::format("{}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})\n"
                     "  off the truth by {:.4f} deg and {:.3g} m; standard deviations {:.4f} deg, {:.3g} m; bound "
-                    "{:.4f} deg, {:.3g} m; NEES {:.2f} (6 expected)",
+                    "{:.4f} deg, {:.3g} m; NEES {:.2f}, 6 expected, 95 % band {:g} to {:g}; {}",
                     what, T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z, error.head<3>().norm() / kDegree,
                     error.tail<3>().norm(), rotation_sigma(covariance) / kDegree, position_sigma(covariance),
-                    rotation_sigma(bound) / kDegree, position_sigma(bound), nees));
+                    rotation_sigma(bound) / kDegree, position_sigma(bound), nees, kNeesLow, kNeesHigh,
+                    nees_verdict(nees, kNeesLow, kNeesHigh)));
     std::array<std::array<double, 6>, 6> rows{};
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) rows[std::size_t(i)][std::size_t(j)] = covariance(i, j);

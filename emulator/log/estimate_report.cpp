@@ -56,6 +56,13 @@ std::string estimate_row(const TrackedFrame& f) {
     return row + fmt::format("{},{},{:.3f},{}\n", f.matches, f.renders, f.ms, why);
 }
 
+std::string nees_verdict(double nees, double low, double high) {
+    if (!std::isfinite(nees)) return "not known: the covariance is singular";
+    if (nees < low) return "below: the covariances are too cautious, the errors are smaller than they say";
+    if (nees > high) return "above: the covariances are too small, the errors are larger than they say";
+    return "inside: the errors are as the covariances say";
+}
+
 EstimateSummary summarise(std::span<const TrackedFrame> frames) {
     EstimateSummary s;
     s.frames = frames.size();
@@ -107,6 +114,8 @@ nlohmann::json to_json(const EstimateSummary& s) {
             {"filtered_position_rms_m", s.filtered_position_rms_m},
             {"nees_mean", s.nees_mean},
             {"nees_95", {s.nees_low, s.nees_high}},
+            {"nees_verdict", s.nees_high > 0 ? nlohmann::json(nees_verdict(s.nees_mean, s.nees_low, s.nees_high))
+                                             : nlohmann::json(nullptr)},
             {"nis_mean", s.nis_mean},
             {"rotation_of_bound", s.rotation_of_bound},
             {"position_of_bound", s.position_of_bound},
@@ -123,8 +132,10 @@ std::string in_words(const EstimateSummary& s) {
         s.position_of_bound);
     out += fmt::format("    filtered: RMS {:.4f} deg, {:.3g} m\n", s.filtered_rotation_rms_rad / kDegree,
                        s.filtered_position_rms_m);
-    out += fmt::format("    NEES {:.2f} (95 % band {:.2f} to {:.2f}), NIS {:.2f}; expected 6\n", s.nees_mean,
-                       s.nees_low, s.nees_high, s.nis_mean);
+    if (s.nees_high > 0)
+        out += fmt::format("    NEES {:.2f}, 6 expected, 95 % band {:.2f} to {:.2f}; {}\n", s.nees_mean, s.nees_low,
+                           s.nees_high, nees_verdict(s.nees_mean, s.nees_low, s.nees_high));
+    if (s.nis_mean > 0) out += fmt::format("    NIS {:.2f}, 6 expected\n", s.nis_mean);
     return out + fmt::format("    {:.0f} ms per frame (median; max {:.0f})\n", s.ms_median, s.ms_most);
 }
 

@@ -29,6 +29,10 @@ struct EstimateSummary {
     double rotation_of_bound = 0, position_of_bound = 0;  ///< RMS of error / Cramer-Rao bound; 0: no bound
     double ms_median = 0, ms_most = 0;
 };
+/// 95 % of the NEES of one pose lie between (chi-square with 6 degrees of freedom), where the covariance is right.
+inline constexpr double kNeesLow = 1.237, kNeesHigh = 14.449;
+/// Where a NEES lies, and what follows: "inside: the errors are as the covariances say".
+[[nodiscard]] std::string nees_verdict(double nees, double low, double high);
 [[nodiscard]] EstimateSummary summarise(std::span<const TrackedFrame> frames);
 [[nodiscard]] nlohmann::json to_json(const EstimateSummary& summary);
 [[nodiscard]] std::string in_words(const EstimateSummary& summary);

@@ -243,6 +243,22 @@ TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     refuses(folder_ / "nowhere", "nowhere");
 }
 
+TEST(EstimateSummary, TheBandOfOneNeesHas95Percent) {
+    const auto share_below = [](double x) {
+        return 1 - std::exp(-x / 2) * (1 + x / 2 + x * x / 8);
+    };  // chi-square, 6
+    EXPECT_NEAR(share_below(kNeesLow), 0.025, 1e-4);
+    EXPECT_NEAR(share_below(kNeesHigh), 0.975, 1e-4);
+}
+
+TEST(EstimateSummary, SaysWhereTheNeesLies) {
+    const auto begins = [](double nees, const char* words) { return nees_verdict(nees, 5, 7).starts_with(words); };
+    EXPECT_TRUE(begins(4.9, "below: the covariances are too cautious"));
+    EXPECT_TRUE(begins(7.1, "above: the covariances are too small"));
+    EXPECT_TRUE(begins(5, "inside") && begins(7, "inside"));
+    EXPECT_TRUE(begins(std::numeric_limits<double>::infinity(), "not known"));
+}
+
 TEST(EstimateSummary, CoversTheFramesWithAPose) {
     std::vector<TrackedFrame> frames(3);
     for (std::size_t i = 0; i < 2; ++i) {
@@ -259,6 +275,8 @@ TEST(EstimateSummary, CoversTheFramesWithAPose) {
     EXPECT_NEAR(s.rotation_rms_rad, 0.01, 1e-12);
     EXPECT_NEAR(s.position_rms_of_range, 0.02, 1e-12);
     EXPECT_NEAR(s.nees_mean, 2, 1e-9);
+    EXPECT_NE(in_words(s).find("NEES 2.00, 6 expected, 95 % band 1.20 to 10.80; inside: "), std::string::npos)
+        << in_words(s);
     EXPECT_NEAR(s.position_of_bound, 1 / std::sqrt(3.0), 1e-9);
     EXPECT_EQ(estimate_row(frames[2]).substr(0, 9), "0,0,lost,");
     frames[2].why = "bad, and worse";

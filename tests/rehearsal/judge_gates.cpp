@@ -176,6 +176,7 @@ TEST(Judge, EstimatesAreJudgedByTheirStandardDeviations) {
     for (const char* words : {"75.00 % of 4 estimates are within 3 standard deviations (asked 75 %)",
                               "largest errors 0.500 m (limit 5 m), 0.000 deg (limit 3 deg)"})
         EXPECT_TRUE(says(one, words)) << words << ": " << gate(one, "navigation").reason;
+    EXPECT_NEAR(one.navigation.nees, (25 + 3 * 1) / 4.0, 0.01);
     const Verdict two = flown(0.5, 0.035);
     EXPECT_EQ(gate(two, "navigation").state, State::failed);
     EXPECT_NE(gate(two, "navigation").reason.find("50.00 % of 4 estimates"), std::string::npos);

@@ -19,10 +19,10 @@ struct SignalLevels {
     double darkest_step = 0;     ///< less than this is 0 in the bytes of the camera's format
 
     [[nodiscard]] bool is_black() const noexcept { return brightest < darkest_step; }
-    /// More than 1 % of all pixels are saturated, or more than a quarter of the lit ones where they are more than
-    /// 0.1 % of all (a few stars are no mistake).
+    /// More than a tenth of the lit pixels are saturated, and more than 0.1 % of all: glints and a few bright stars
+    /// are no mistake.
     [[nodiscard]] bool is_overexposed() const noexcept {
-        return saturated_share > 0.01 || (saturated_share > 1e-3 && saturated_share > 0.25 * lit_share);
+        return saturated_share > 1e-3 && saturated_share > 0.1 * lit_share;
     }
 };
 

@@ -84,9 +84,9 @@ TEST(SignalLevels, CountOnlyPixelsWithLight) {
     EXPECT_NEAR(levels.lit_share, 0.04, 1e-12);
     EXPECT_NEAR(levels.saturated_share, 0.0005, 1e-12);
     EXPECT_FALSE(levels.is_overexposed()) << "a few stars";
-    fill(90, 40);
-    EXPECT_FALSE(signal_levels(c, image).is_overexposed()) << "less than a quarter of the body";
-    fill(101, 40);
+    fill(39, 40);
+    EXPECT_FALSE(signal_levels(c, image).is_overexposed()) << "glints on a body";
+    fill(41, 40);
     levels = signal_levels(c, image);
     EXPECT_TRUE(levels.is_overexposed());
     EXPECT_FLOAT_EQ(static_cast<float>(levels.bright), 40);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -326,10 +327,11 @@ void check_exposures(const World& world, nlohmann::json& document) {
         else if (!(levels.brightest > 0))
             say("  " + camera + "sees no light at time 0, where the scene places its bodies");
         else
-            say(fmt::format(
-                "  {}at time 0 {} of its pixels have light, {} are saturated; the bright ones have {} of full "
-                "scale",
-                camera, percent(levels.lit_share), percent(levels.saturated_share), percent(levels.bright)));
+            say(
+                fmt::format("  {}at time 0 {} of its pixels have light, {} are saturated; the bright ones have {} "
+                            "of full scale",
+                            camera, percent(levels.lit_share), percent(levels.saturated_share),
+                            levels.bright > 1 ? "more than 100 %" : percent(levels.bright)));
     }
 }
 
@@ -372,15 +374,25 @@ nlohmann::json describe(const rehearsal::Scenario& s) {
         return out;
     };
     const auto& n = s.navigation;
-    say(fmt::format("scenario \"{}\": {}, at most {:g} s, of which its legs take about {:.0f} s", s.name, s.title,
-                    s.duration_s, s.nominal_duration_s()));
+    say(fmt::format("scenario \"{}\": {}, at most {:g} s; its legs take about {:.0f} s", s.name, s.title,
+                    s.duration_s, s.legs_duration_s()));
+    if (s.legs_duration_s() > s.duration_s)
+        say(fmt::format(
+            "warning: the run ends before its legs are flown: expected duration_s of [scenario] above {:.0f}",
+            std::ceil(s.legs_duration_s())));
     say(fmt::format("  scene: {}", s.scene));
     std::vector<std::string> sensors = n.cameras;
     sensors.insert(sensors.end(), n.lidars.begin(), n.lidars.end());
     say(fmt::format("  {} flies to {}, by {}", s.chaser.body, s.target.body, fmt::join(sensors, ", ")));
     say(fmt::format("  legs: {}", fmt::join(names(s.legs), ", ")));
-    return {{"file", s.file},     {"name", s.name},        {"scene", s.scene},          {"cameras", n.cameras},
-            {"lidars", n.lidars}, {"legs", names(s.legs)}, {"duration_s", s.duration_s}};
+    return {{"file", s.file},
+            {"name", s.name},
+            {"scene", s.scene},
+            {"cameras", n.cameras},
+            {"lidars", n.lidars},
+            {"legs", names(s.legs)},
+            {"duration_s", s.duration_s},
+            {"legs_s", s.legs_duration_s()}};
 }
 
 Outcome check(const CheckOptions& o) {

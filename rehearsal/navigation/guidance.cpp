@@ -91,7 +91,7 @@ double from_rest_s(double way_m, double speed_m_s, double acceleration_m_s2) {
 
 }  // namespace
 
-double Scenario::nominal_duration_s() const {
+double Scenario::legs_duration_s() const {
     double t_s = 0;
     Vec3 at = start.position_m;
     for (const Leg& leg : legs) {
@@ -101,7 +101,7 @@ double Scenario::nominal_duration_s() const {
             leg.contact ? from_rest_s(norm(at), leg.speed_m_s, acceleration_m_s2) : path.duration_s() + leg.hold_s;
         if (!leg.contact) at = path.end_m();
     }
-    return std::min(t_s, duration_s);
+    return t_s;
 }
 
 Guidance::Guidance(const Scenario& scenario, double t_s)

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -171,8 +172,10 @@ struct Scenario {
 
     [[nodiscard]] std::int64_t period_ns() const;  ///< of navigation and control
     [[nodiscard]] std::int64_t pose_period_ns() const;
-    /// The time that the legs and their holds take at their speeds, at most duration_s: for a progress display.
-    [[nodiscard]] double nominal_duration_s() const;
+    /// The time that the legs and their holds take at their speeds; may exceed duration_s.
+    [[nodiscard]] double legs_duration_s() const;
+    /// The same, at most duration_s: for a progress display.
+    [[nodiscard]] double nominal_duration_s() const { return std::min(legs_duration_s(), duration_s); }
 };
 
 /// Errors name file, line, column, what is wrong and what was expected.

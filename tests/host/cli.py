@@ -86,6 +86,12 @@ def check_names():
     expect(by_name == by_file, "check docking is check of docking.toml")
     scenario = json.loads(narpa("check", "rbar", "--json").stdout)
     expect(scenario["scenario"]["name"] == "rbar" and scenario["scene"]["cameras"], "check takes a scenario, and its scene")
+    legs_s = json.loads(narpa("check", "dispersions", "--json").stdout)["scenario"]["legs_s"]
+    expect(90 < legs_s < 110, f"check states how long its legs take: {legs_s} s")
+    short = folder / "short.toml"
+    short.write_text(f'[scenario]\nbased_on = "{BUILD}/scenes/rehearsal/dispersions.toml"\nname = "short"\nscene = "{BUILD}/scenes/rehearsal/scene.toml"\nduration_s = 50.0\n')
+    said = narpa("check", short).stderr.decode()
+    expect(re.search(r"at most 50 s; its legs take about (\d+) s\nwarning: the run ends before its legs are flown: expected duration_s of \[scenario\] above \d+", said), f"check warns of legs that the duration cuts: {said[:300]}")
     expect_refusal(2, r"docking\.toml: is a scene, expected a scenario", "rehearse", BUILD / "scenes/docking/docking.toml")
     expect_refusal(2, r"rbar\.toml: is a scenario, expected a scene", "render", BUILD / "scenes/rehearsal/rbar.toml", "-o", folder / "a.png")
     expect_refusal(2, r"^narpa: rbar: is a scenario, expected a scene: `narpa rehearse rbar` flies it", "render", "rbar", "-o", folder / "a.png")

@@ -109,7 +109,7 @@ private:
     MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
     std::uint8_t heartbeat_counter_ = 0, beam_counter_ = 0;
-    CanFrame heartbeat_{};  ///< the last
+    CanFrame heartbeat_{};         ///< the last
     std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged
     std::uint64_t logged_others_ = 0;
     std::uint32_t left_out_ = 0;  ///< since the last line that states it

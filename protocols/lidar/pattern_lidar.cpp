@@ -1,11 +1,9 @@
 #include "protocols/lidar/pattern_lidar.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <ranges>
+#include <sstream>
 
 #include "protocols/lidar/point_packet.h"
 
@@ -199,16 +197,24 @@ private:
     std::vector<Vec3> directions_;
 };
 
+/// The parts one after the other.
+template <class... Part>
+Error fault(const Part&... parts) {
+    std::ostringstream text;
+    (text << ... << parts);
+    return Error{text.str()};
+}
+
 bool whole_micro(double x) {
     return x >= 1e-6 && x <= 1e3 && std::abs(1e6 * x - std::round(1e6 * x)) < 1e-6;
 }
 
 Status check_shots(const std::vector<PatternShot>& shots) {
     if (shots.empty() || shots.size() > LidarPattern::kMostShots)
-        return Error{fmt::format("{} shots a frame, expected 1 to {}", shots.size(), LidarPattern::kMostShots)};
+        return fault(shots.size(), " shots a frame, expected 1 to ", LidarPattern::kMostShots);
     for (std::size_t i = 0; i < shots.size(); ++i) {
         const PatternShot& s = shots[i];
-        const auto wrong = [&](const char* what) { return Error{fmt::format("shot {}: {}", i, what)}; };
+        const auto wrong = [&](const char* what) { return fault("shot ", i, ": ", what); };
         if (!(std::abs(s.azimuth_rad) <= 4 * std::numbers::pi)) return wrong("azimuth, expected at most 720 deg");
         if (!(std::abs(s.elevation_rad) <= 0.5 * std::numbers::pi))
             return wrong("elevation, expected at most 90 deg");
@@ -228,16 +234,16 @@ Status check(const LidarPattern& p) {
     if (!(p.rate_hz_min > 0 && p.rate_hz_min <= p.rate_hz_default && p.rate_hz_default <= p.rate_hz_max))
         return Error{"rate_hz: expected 0 < rate_hz_min <= rate_hz <= rate_hz_max"};
     if (!(p.latency_s >= 0 && 1 / p.rate_hz_min + p.latency_s <= LidarPattern::kLongest_s))
-        return Error{fmt::format("a frame at {} Hz and the latency of {} s: expected at most {} s together",
-                                 p.rate_hz_min, p.latency_s, LidarPattern::kLongest_s)};
+        return fault("a frame at ", p.rate_hz_min, " Hz and the latency of ", p.latency_s, " s: expected at most ",
+                     LidarPattern::kLongest_s, " s together");
     const auto packets = static_cast<double>(p.shots.size() / shots_per_packet(p.shots.size(), p.dual));
     constexpr double kMostPackets_hz = 1e5;
     if (!(packets * p.rate_hz_max <= kMostPackets_hz))
-        return Error{fmt::format("{} packets a frame at {} Hz, expected at most {:g} a second{}", packets,
-                                 p.rate_hz_max, kMostPackets_hz,
-                                 packets * 8 > static_cast<double>(p.shots.size())
-                                     ? "; a number of shots that has a large divisor up to 59 makes fewer"
-                                     : "")};
+        return fault(packets, " packets a frame at ", p.rate_hz_max, " Hz, expected at most ", kMostPackets_hz,
+                     " a second",
+                     packets * 8 > static_cast<double>(p.shots.size())
+                         ? "; a number of shots that has a large divisor up to 59 makes fewer"
+                         : "");
     return Ok{};
 }
 

@@ -71,10 +71,10 @@ void Autopilot::take_beam(const LidarBeamReport& report) {
         const std::lock_guard lock(mutex_);
         const auto shot = velocimeter.measure(report, estimator_->predicted(report.t_ns));
         if (!shot) return;
-        const UpdateResult result = estimator_->take(*shot);
-        measurements_.push_back({velocimeter.lidar().name, report.t_ns,
-                                 static_cast<MeasurementRecord::Outcome>(result.outcome), result.nis, result.why, 1,
-                                 0});
+        if (const auto result = estimator_->take(*shot))
+            measurements_.push_back({velocimeter.lidar().name, report.t_ns,
+                                     static_cast<MeasurementRecord::Outcome>(result->outcome), result->nis,
+                                     result->why, 1, 0});
     }
 }
 

@@ -29,6 +29,12 @@ AttitudeTrack::At AttitudeTrack::at(std::int64_t t_ns) const noexcept {
     return {normalized(nearest.q_world_chaser * exp_rotation(off_s * nearest.rate_rad_s)), nearest.rate_rad_s};
 }
 
+bool AttitudeTrack::has(std::int64_t t_ns) const noexcept {
+    return std::ranges::any_of(std::span(reports_).first(count_), [&](const AttitudeReport& report) {
+        return std::abs(report.t_ns - t_ns) <= 1'000'000;
+    });
+}
+
 namespace {
 
 /// A minute of measurements and pulse edges.
@@ -186,18 +192,20 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     return result;
 }
 
-UpdateResult StateEstimator::take(const TargetVelocity& v) {
+std::optional<UpdateResult> StateEstimator::take(const TargetVelocity& v) {
+    if (!attitude_.has(v.t_ns)) return std::nullopt;
     if (v.t_ns > t_ns()) advance(v.t_ns);
     const AttitudeTrack::At chaser = attitude_.at(v.t_ns);
     const Vec3 origin = v.origin_m - scenario_.chaser.centre_of_mass_m;
-    return tracker_.update(BeamVelocity{.t_ns = v.t_ns,
-                                        .origin_m = origin,
-                                        .direction = v.direction,
-                                        .point_m = origin + v.range_m * v.direction,
-                                        .velocity_m_s = v.velocity_m_s,
-                                        .sigma_m_s = v.sigma_m_s,
-                                        .q_frame_chaser = q_frame_chaser(v.t_ns),
-                                        .chaser_rate_rad_s = chaser.rate_rad_s});
+    return tracker_.update(BeamVelocity{
+        .t_ns = v.t_ns,
+        .origin_m = origin,
+        .direction = v.direction,
+        .point_m = origin + v.range_m * v.direction,
+        .velocity_m_s = v.velocity_m_s,
+        .sigma_m_s = std::hypot(v.sigma_m_s, kDegree * scenario_.attitude_sensor.rate_sigma_deg_s * norm(origin)),
+        .q_frame_chaser = q_frame_chaser(v.t_ns),
+        .chaser_rate_rad_s = chaser.rate_rad_s});
 }
 
 RelativeMotion StateEstimator::motion() const {

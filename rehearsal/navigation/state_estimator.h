@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <deque>
+#include <optional>
 
 #include "estimator/cloud/range_points.h"
 #include "estimator/filter/pose_filter.h"
@@ -20,6 +21,9 @@ public:
     bool take(const AttitudeReport& report) noexcept;
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
     [[nodiscard]] const AttitudeReport& newest() const noexcept { return reports_[count_ - 1]; }
+
+    /// A report of this time, to a millisecond, is kept.
+    [[nodiscard]] bool has(std::int64_t t_ns) const noexcept;
 
     struct At {
         Quat q_world_chaser{};
@@ -76,8 +80,9 @@ public:
     /// Late measurements are inserted at their own time. After several gated ones in a row the filter
     /// restarts from the last of them.
     UpdateResult take(const TargetMeasurement& measurement);
-    /// Counts neither for restarts nor as a measurement of the pose.
-    UpdateResult take(const TargetVelocity& velocity);
+    /// Counts neither for restarts nor as a measurement of the pose. None, and nothing is done, unless the chaser
+    /// reported its rate at that time: between reports thrusters change it, and with the beam's lever the velocity.
+    std::optional<UpdateResult> take(const TargetVelocity& velocity);
     /// The ports touched shortly before t_ns. `held`: captured, the ports rest in one plane; otherwise they
     /// separate at an unknown speed.
     void on_contact(std::int64_t t_ns, bool held);

@@ -294,19 +294,23 @@ void check_own_hulls(const World& world, nlohmann::json& document) {
                        s.lidars[i].T_mount_lidar, rays_of(s.lidars[i]), document["lidars"][i]);
 }
 
-/// Of a frame at time 0, where the scene itself places its bodies.
+/// Of a frame at time 0, where the scene itself places its bodies, with few rays: a second or less.
 SignalLevels first_levels(const World& world, const Camera& camera) {
+    constexpr std::uint64_t kLeastRays = 2'000'000;
     const Scene& s = world.scene();
     BodyPoses at(s.bodies.size());
     std::vector<Motion> motions(s.bodies.size());
     world.place(0, camera.mount, at, motions);
     const std::int64_t half_ns = exposure_ns(camera) / 2;
     const CameraPose pose = camera_pose(world, camera, at, -half_ns, half_ns, motions);
+    const std::uint64_t pixels =
+        static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
     FrameSettings settings;
     settings.method = s.render.method;
     settings.max_depth = s.render.max_depth;
     settings.seed = s.render.seed;
-    settings.spp = s.render.method == RenderSettings::Method::path ? 4 : 1;  // paths are noisy
+    settings.budget.kind = FrameBudget::Kind::rays;
+    settings.budget.rays = std::max<std::uint64_t>(kLeastRays, 2 * pixels);
     RadianceImage radiance(camera.width, camera.height);
     render_radiance(world.render_scene(), at, camera, pose, settings, radiance);
     return signal_levels(camera, radiance);

@@ -94,8 +94,8 @@ Result<std::unique_ptr<Sensor>> open_lidar(const World& world, std::size_t index
             return good.error();
     auto sinks =
         open_sinks<PacketSink>(packets, index, scene.lidars, "LiDAR", scene.file, [&](const std::string& spec) {
-            return open_packet_sink(spec, scene.lidars[index].model->spec().network, scene.epoch_unix_ns,
-                                    o.lockstep);
+            const LidarModel& model = *scene.lidars[index].model;
+            return open_packet_sink(spec, model.spec().network, scene.epoch_unix_ns, o.lockstep, model.metadata());
         });
     if (!sinks) return sinks.error();
     if (sinks->empty() && !beams) return std::unique_ptr<Sensor>();

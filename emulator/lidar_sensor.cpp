@@ -31,7 +31,7 @@ void LidarSensor::make_next(const Clock& clock) {
 
     const std::span<const std::uint8_t> position = unit_.position(next_);
     for (const auto& sink : sinks_) {
-        sink->send(PacketKind::data, unit_.bytes(), due);
+        if (!unit_.bytes().empty()) sink->send(PacketKind::data, unit_.bytes(), due);
         if (!position.empty()) sink->send(PacketKind::position, position, due);
     }
 

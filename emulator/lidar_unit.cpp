@@ -10,6 +10,16 @@ namespace {
 /// rates, which is off by acceleration * span^2 / 8: 1e-9 m at 1 m/s^2. A VLP-16 fires 16 shots in 35 us.
 constexpr std::int64_t kBatchSpan_ns = 100'000;
 
+/// A laser that is off.
+void put_out(std::span<const LidarShot> shots, std::span<LidarEchoes> echoes,
+             std::span<LidarReturn> truth) noexcept {
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+        if (shots[i].fires) continue;
+        echoes[i] = {};
+        if (!truth.empty()) truth[i] = {};
+    }
+}
+
 std::size_t batch_size(std::span<const LidarShot> shots) noexcept {
     std::size_t n = 1;
     while (n < std::min(kLanes, shots.size()) && shots[n].t_offset_ns - shots[0].t_offset_ns <= kBatchSpan_ns) ++n;
@@ -36,7 +46,8 @@ LidarUnit::LidarUnit(const World& world, std::size_t index, bool truth)
 void LidarUnit::fire(std::int64_t packet) noexcept {
     model_.shots(packet, shots_);
     const std::int64_t start_ns = packet_start_ns(packet);
-    for (std::size_t first = 0; first < shots_.size();) {
+    fires_ = std::ranges::any_of(shots_, &LidarShot::fires);
+    for (std::size_t first = 0; fires_ && first < shots_.size();) {
         const auto rest = std::span(shots_).subspan(first), shots = rest.first(batch_size(rest));
         const std::int64_t begin_ns = shots.front().t_offset_ns, end_ns = shots.back().t_offset_ns;
         if (!motions_.empty()) world_.place(start_ns + (begin_ns + end_ns) / 2, lidar_.mount, placement_, motions_);
@@ -60,6 +71,7 @@ void LidarUnit::fire(std::int64_t packet) noexcept {
                   std::span(truth_).subspan(first, shots.size()));
         first += shots.size();
     }
+    put_out(shots_, echoes_, truth_);
     returns_ = 0;
     for (const LidarEchoes& e : echoes_)
         for (const LidarEcho& reported : e.reported(spec().returns)) returns_ += reported.range_m > 0 ? 1 : 0;

@@ -36,8 +36,10 @@ public:
 
     /// Fires a packet's shots, every body where it is at each shot's own time.
     void fire(std::int64_t packet) noexcept;
-    /// The packet just fired, as it goes out.
-    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
+    /// The packet just fired, as it goes out. Empty where none does: all shots fall outside of the unit's window.
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
+        return fires_ ? std::span<const std::uint8_t>(bytes_) : std::span<const std::uint8_t>();
+    }
     [[nodiscard]] std::size_t returns() const noexcept { return returns_; }
     /// Of the packet: its shots, and what the unit reports of each, before rounding.
     [[nodiscard]] std::span<const LidarShot> shots() const noexcept { return shots_; }
@@ -56,6 +58,7 @@ private:
     BodyPoses placement_;
     std::vector<Motion> motions_;  ///< empty where no velocity is wanted
     std::size_t returns_ = 0;
+    bool fires_ = true;
     std::vector<LidarShot> shots_;
     std::vector<LidarEchoes> echoes_;
     std::vector<LidarReturn> truth_;

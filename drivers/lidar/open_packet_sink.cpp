@@ -1,5 +1,8 @@
 #include <atomic>
 #include <exception>
+#include <filesystem>
+#include <fstream>
+#include <utility>
 
 #include "drivers/lidar/backends.h"
 
@@ -17,16 +20,32 @@ private:
     std::atomic<std::uint64_t> sent_{0};
 };
 
+/// FILE.json of FILE.pcap.
+Status write_beside(const std::string& capture, std::string_view metadata) {
+    const std::string path = std::filesystem::path(capture).replace_extension(".json");
+    std::ofstream out(path);
+    out << metadata;
+    out.close();
+    if (!out) return Error{"the LiDAR's metadata cannot be written", path, 0, 0, ErrorKind::missing};
+    return Ok{};
+}
+
 }  // namespace
 
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
-                                                     std::int64_t epoch_unix_ns, bool wait_when_full) {
+                                                     std::int64_t epoch_unix_ns, bool wait_when_full,
+                                                     std::string_view metadata) {
     constexpr std::string_view udp = "udp:";
     const std::string text(spec);
     try {
         if (text == "none") return std::unique_ptr<PacketSink>(new NullPacketSink);
         if (text.starts_with(udp)) return open_udp_sink(text.substr(udp.size()), network);
-        if (text.ends_with(".pcap")) return open_pcap_sink(text, network, epoch_unix_ns, wait_when_full);
+        if (text.ends_with(".pcap")) {
+            auto sink = open_pcap_sink(text, network, epoch_unix_ns, wait_when_full);
+            if (!sink || metadata.empty()) return sink;
+            const Status written = write_beside(text, metadata);
+            return written ? std::move(sink) : Result<std::unique_ptr<PacketSink>>(written.error());
+        }
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
         return Error{"packet sink \"" + text + "\": " + e.what(), {}, 0, 0, ErrorKind::missing};
     }

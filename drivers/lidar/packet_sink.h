@@ -43,7 +43,9 @@ public:
 /// SINK: `udp:HOST:PORT` | `FILE.pcap` | `none`. A capture shows the packets as `network` sends them by default;
 /// `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps.
 /// `wait_when_full`: a lockstep run waits for the disk where a real-time run drops.
+/// `metadata`: LidarModel::metadata(); where there are some, FILE.json beside a capture gets them.
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
-                                                     std::int64_t epoch_unix_ns, bool wait_when_full);
+                                                     std::int64_t epoch_unix_ns, bool wait_when_full,
+                                                     std::string_view metadata = {});
 
 }  // namespace narpa

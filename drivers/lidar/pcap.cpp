@@ -8,6 +8,7 @@
 #include <stdio_ext.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -24,12 +25,12 @@ constexpr std::size_t kEthernetBytes = 14, kIpBytes = 20, kUdpBytes = 8;
 constexpr std::uint8_t kUdpProtocol = 17;
 constexpr std::size_t kIpv4 = 0x0800;                                        // of Ethernet
 constexpr std::size_t kHeaderBytes = kEthernetBytes + kIpBytes + kUdpBytes;  // 42
-constexpr std::size_t kPayloadMax = 1500 - kIpBytes - kUdpBytes;
-constexpr std::size_t kRecordSlots = 2048;  // 2.7 s of data packets: a disk may pause
+constexpr std::size_t kEthernetPayload = 1500 - kIpBytes - kUdpBytes;
+// A disk may pause: 2.7 s of a VLP-16's data packets, 0.8 s of the longest ones of an OS1-128.
+constexpr std::size_t kRecordSlotsMost = 2048, kQueueBytes = 32 << 20;
 
 // A record of the ring: when, then the Ethernet frame.
 constexpr std::size_t kStampBytes = sizeof(std::int64_t);
-using Record = std::array<std::uint8_t, kStampBytes + kHeaderBytes + kPayloadMax>;
 
 void put_be16(std::uint8_t* at, std::size_t value) noexcept {
     at[0] = static_cast<std::uint8_t>(value >> 8);
@@ -61,8 +62,8 @@ std::size_t put_frame(std::uint8_t* frame, const LidarNetwork& from, int port,
     std::memset(ip, 0, kIpBytes);
     ip[0] = 0x45;  // version 4, five words
     put_be16(ip + 2, kIpBytes + udp_length);
-    put_be16(ip + 6, 0x4000);  // do not fragment
-    ip[8] = 255;               // time to live
+    if (payload.size() <= kEthernetPayload) put_be16(ip + 6, 0x4000);  // do not fragment
+    ip[8] = 255;                                                       // time to live
     ip[9] = kUdpProtocol;
     std::memcpy(ip + 12, addresses.data(), addresses.size());
     put_be16(ip + 10, checksum(add_words(ip, kIpBytes, 0)));
@@ -129,20 +130,21 @@ public:
         : description_("capture " + path),
           network_(network),
           epoch_unix_ns_(epoch_unix_ns),
+          record_(kStampBytes + kHeaderBytes + network.datagram_bytes_max),
           writer_(pcap, dumper),
-          queue_(writer_, kRecordSlots, sizeof(Record), wait_when_full) {}
+          queue_(writer_, std::min(kRecordSlotsMost, kQueueBytes / record_.size()), record_.size(),
+                 wait_when_full) {}
 
     bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept override {
-        if (payload.size() > kPayloadMax) {
+        if (payload.size() > network_.datagram_bytes_max) {
             writer_.abandon(payload);
             return false;
         }
-        Record record;
         const std::int64_t unix_ns = epoch_unix_ns_ + t_ns;
-        std::memcpy(record.data(), &unix_ns, kStampBytes);
+        std::memcpy(record_.data(), &unix_ns, kStampBytes);
         const int port = kind == PacketKind::data ? network_.data_port : network_.position_port;
-        const std::size_t size = kStampBytes + put_frame(record.data() + kStampBytes, network_, port, payload);
-        return queue_.push(std::span(record).first(size));
+        const std::size_t size = kStampBytes + put_frame(record_.data() + kStampBytes, network_, port, payload);
+        return queue_.push(std::span(record_).first(size));
     }
     void flush() noexcept override { queue_.flush(); }
     PacketCounters counters() const noexcept override { return {writer_.sent, queue_.dropped() + writer_.lost}; }
@@ -163,6 +165,7 @@ private:
     std::string description_;
     LidarNetwork network_;
     std::int64_t epoch_unix_ns_;
+    std::vector<std::uint8_t> record_;  ///< the one being made
     PcapWriter writer_;
     WriteQueue queue_;
 };

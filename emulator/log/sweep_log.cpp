@@ -11,7 +11,7 @@
 namespace narpa {
 namespace {
 
-/// Of the quickest instrument, for a quarter of a second.
+/// Of a VLP-16 for 0.4 s, of an OS1-128 for 0.05 to 0.1 s.
 constexpr std::size_t kShotLines = 1 << 17;
 
 template <class... Args>

@@ -1,14 +1,21 @@
 #include "protocols/lidar/lidar_model.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "protocols/lidar/ouster.h"
 #include "protocols/lidar/velodyne.h"
 
 namespace narpa {
 namespace {
 
 std::vector<const LidarMake*>& makes() {
-    static std::vector<const LidarMake*> all{&vlp16(), &hdl32e()};
+    static std::vector<const LidarMake*> all = [] {
+        std::vector<const LidarMake*> built_in{&vlp16(), &hdl32e()};
+        std::ranges::copy(ouster_makes(), std::back_inserter(built_in));
+        return built_in;
+    }();
     return all;
 }
 

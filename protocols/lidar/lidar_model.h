@@ -14,9 +14,11 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/result.h"
 #include "base/vec3.h"
 
 namespace narpa {
@@ -29,6 +31,7 @@ struct LidarShot {
     double azimuth_rad = 0, elevation_rad = 0;  ///< the direction in the maker's angles
     int beam = 0;                               ///< laser number
     int block = 0;                              ///< of the packet
+    bool fires = true;                          ///< false: the laser is off, as outside of a unit's window
 };
 
 /// One echo of a shot as the receiver measures it, before a packet rounds it.
@@ -44,16 +47,20 @@ enum class LidarReturns : std::uint8_t {
     strongest,
     last,  ///< the farthest
     dual,  ///< both; where they are the same, the second strongest beside it
+    strongest_two,
 };
 
 /// What comes back of one shot. Where there is one echo, it is `strongest` and `last`, and `second` is none.
 struct LidarEchoes {
     LidarEcho strongest, second, last;
+    /// Of the surface that the axis meets, of a white one that faces the Sun; 0 where no one asks for it.
+    float sunlight = 0;
 
-    /// What a unit reports: first the last of two where both are wanted, the echo or none, and none.
+    /// What a unit reports, in its packets' order; the second is none where there is one echo, or one is wanted.
     [[nodiscard]] std::array<LidarEcho, 2> reported(LidarReturns returns) const noexcept {
         if (returns == LidarReturns::strongest) return {strongest, LidarEcho{}};
         if (returns == LidarReturns::last) return {last, LidarEcho{}};
+        if (returns == LidarReturns::strongest_two) return {strongest, second};
         return {last, strongest.range_m == last.range_m ? second : strongest};
     }
 };
@@ -76,6 +83,7 @@ struct LidarNetwork {
     std::uint16_t data_port = 0, position_port = 0;
     std::array<std::uint8_t, 6> mac{};
     std::array<std::uint8_t, 4> address{};
+    std::size_t datagram_bytes_max = 1472;  ///< of UDP payload; more than 1472 travel in several Ethernet frames
 
     /// Position packets keep this distance from the data port wherever that is moved to; 0: there are none.
     [[nodiscard]] constexpr int position_port_offset() const noexcept {
@@ -100,6 +108,9 @@ struct LidarSettings {
     LidarReturns returns = LidarReturns::strongest;
     LidarPps pps = LidarPps::locked;
     std::vector<LidarBeam> beams{};  ///< of this unit, by laser number; empty: those of the make
+    std::string profile{};           ///< format of the packets, one of the make's; empty: its default
+    int columns = 0;                 ///< a turn, one of the make's; 0: its default
+    std::string calibration{};       ///< text of the unit's file in the maker's own format; empty: as designed
 };
 
 /// Of one configured unit.
@@ -119,6 +130,7 @@ struct LidarSpec {
     std::int64_t time_resolution_ns = 1;    ///< of a packet's time stamp, which is rounded down
     bool measures_velocity = false;
     double velocity_resolution_m_s = 0;  ///< of those in packets
+    bool measures_sunlight = false;
     LidarNetwork network{};
 };
 
@@ -160,6 +172,10 @@ public:
     /// this unit. `out` has spec().points_per_packet elements.
     virtual std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept = 0;
 
+    /// What the unit states of itself beside its packets, as a file of the maker's: JSON. Empty: nothing. May
+    /// allocate.
+    [[nodiscard]] virtual std::string metadata() const { return {}; }
+
 private:
     LidarSpec spec_;
 };
@@ -171,7 +187,13 @@ struct LidarMake {
     double range_m_max = 0, range_m_default = 0;  ///< the largest that a packet can hold; the maker's rated range
     std::size_t beams = 0;                        ///< of a calibration file; 0: takes none
     bool dual = false;                            ///< has dual returns
+    std::span<const std::string_view>
+        profiles{};                  ///< formats of packets to choose from, which decide on the returns
+    std::span<const int> columns{};  ///< of a turn, to choose from
     LidarNetwork network{};
+    /// Takes what `settings` leaves open (0, empty) from its calibration text or the make's defaults. Errors: the
+    /// text, with a line; a combination that the make does not have, without. Null: nothing is left open.
+    std::function<Status(LidarSettings& settings)> complete{};
     /// `settings` are within the limits above.
     std::function<std::shared_ptr<const LidarModel>(const LidarSettings& settings)> configure;
 

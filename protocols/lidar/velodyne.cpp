@@ -8,6 +8,7 @@
 
 #include "base/constants.h"
 #include "base/time.h"
+#include "protocols/lidar/reflectivity_code.h"
 #include "protocols/lidar/velodyne_packet.h"
 #include "protocols/little_endian.h"
 
@@ -90,15 +91,6 @@ std::uint16_t to_azimuth_cdeg(double revolutions) {
 std::uint16_t to_range_2mm(double range_m) {
     if (!(range_m > 0 && range_m <= kRangeMaxM)) return 0;  // NaN too
     return static_cast<std::uint16_t>(std::lround(range_m / kRangeQuantumM));
-}
-
-/// Diffuse surfaces to 100; above, retroreflectors from 101 to 255 as the logarithm of 1 to 1000 times white. The
-/// manual gives the codes and no scale.
-std::uint8_t to_reflectivity_code(float reflectivity) {
-    if (!(reflectivity > 0)) return 0;
-    if (reflectivity <= 1) return static_cast<std::uint8_t>(std::lround(100 * reflectivity));
-    const double code = 101 + 154 * std::log10(static_cast<double>(reflectivity)) / 3;
-    return static_cast<std::uint8_t>(std::min(255.0, std::floor(code)));
 }
 
 std::uint32_t past_hour_us(std::int64_t unix_ns) {
@@ -252,6 +244,7 @@ private:
             case LidarReturns::strongest: return VelodynePacket::strongest;
             case LidarReturns::last: return VelodynePacket::last;
             case LidarReturns::dual: return VelodynePacket::dual;
+            case LidarReturns::strongest_two: break;  // not of this maker
         }
         return VelodynePacket::strongest;
     }
@@ -273,7 +266,7 @@ private:
 
     [[nodiscard]] static VelodynePacket::Return to_return(const LidarEcho& echo, double range_offset_m) noexcept {
         const std::uint16_t range_2mm = to_range_2mm(echo.range_m - (echo.range_m > 0 ? range_offset_m : 0));
-        return {range_2mm, range_2mm == 0 ? kNoReflectivity : to_reflectivity_code(echo.reflectivity)};
+        return {range_2mm, range_2mm == 0 ? kNoReflectivity : reflectivity_code(echo.reflectivity)};
     }
 
     /// From this block's azimuth to that of the next firing; the last has no next and takes the gap before it.

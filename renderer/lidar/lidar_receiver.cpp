@@ -56,6 +56,7 @@ LidarReceiver::LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t
     : model_(lidar.receiver),
       range_max_m_(lidar.range_max_m),
       mount_(lidar.mount),
+      sunlight_(model_.sunlight_noise > 0 || (lidar.model && lidar.model->spec().measures_sunlight)),
       least_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
       random_(model_.range_noise_m > 0 || model_.range_noise_at_limit_m > 0 || model_.velocity_noise_m_s > 0),
       schedule_(seed),
@@ -72,7 +73,7 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
                             std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
     const ShotSettings settings{.range_max_m = model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_,
                                 .multipath = model_.multipath,
-                                .sunlight = model_.sunlight_noise > 0,
+                                .sunlight = sunlight_,
                                 .motions = motions,
                                 .mount = mount_};
     Draws draws(*this, first);
@@ -87,6 +88,7 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
         EchoList list;
         const std::size_t n = part(met, list);
         LidarEchoes& out = echoes[i] = {};
+        out.sunlight = met.front().sunlight;
         double most = -1, second = -1;
         for (std::size_t k = 0; k < n; ++k) {
             const LidarEcho echo = measure(list[k], sunlight, i, k, draws);

@@ -54,6 +54,7 @@ private:
     LidarReceiverModel model_;
     double range_max_m_;
     int mount_;
+    bool sunlight_;       ///< is wanted
     double least_light_;  ///< rho / range^2; 0: all is detected
     bool random_;
     PhiloxSchedule schedule_;

@@ -4,6 +4,7 @@
 
 #include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/scene/file_bytes.h"
 #include "renderer/scene/lidar_calibration.h"
 #include "renderer/scene/lidar_description.h"
 #include "renderer/scene/scene_parts.h"
@@ -81,12 +82,41 @@ LidarPps read_pps(TableReader& table) {
     return table.choice<LidarPps>("pps", kStates).value_or(locked);
 }
 
+/// Formats of packets, columns, the maker's own calibration file: for makes that have them.
+void read_mode(TableReader& table, const LidarMake& make, const std::filesystem::path& folder,
+               LidarSettings& settings) {
+    if (!table.has("rate_hz")) settings.rate_hz = 0;
+    std::vector<std::pair<std::string_view, std::string_view>> profiles;
+    for (const std::string_view profile : make.profiles) profiles.emplace_back(profile, profile);
+    settings.profile = table.choice<std::string_view>("profile", profiles).value_or("");
+    if (const auto columns = table.integer("columns", make.columns.front(), make.columns.back()))
+        settings.columns = static_cast<int>(*columns);
+    table.refuse("returns", "the profile decides on them");
+    std::string file;
+    if (const auto name = table.text("calibration")) {
+        file = (folder / *name).string();
+        auto text = read_file(file);
+        if (!text) return table.fail("calibration", text.error().text());
+        settings.calibration = *std::move(text);
+        if (settings.calibration.empty()) return table.fail("calibration", Error{"is empty", file}.text());
+    }
+    const Status completed = make.complete(settings);
+    if (completed) return;
+    Error error = completed.error();
+    if (error.line > 0) error.file = file;
+    table.fail(error.line > 0 ? "calibration" : table.has("columns") ? "columns" : "rate_hz", error.text());
+}
+
 LidarSettings read_settings(TableReader& table, const LidarMake& make, const std::filesystem::path& folder) {
     LidarSettings settings;
     settings.rate_hz =
         table.number("rate_hz", {.low = make.rate_hz_min, .high = make.rate_hz_max}).value_or(make.rate_hz_default);
-    settings.returns = read_returns(table, make);
     settings.pps = read_pps(table);
+    if (make.complete) {
+        read_mode(table, make, folder, settings);
+        return settings;
+    }
+    settings.returns = read_returns(table, make);
     if (make.beams == 0) table.refuse("calibration", fmt::format("a {} takes none", make.name));
     if (const auto file = table.text("calibration")) {
         auto beams = read_lidar_calibration((folder / *file).string(), make.beams);
@@ -109,10 +139,11 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
     lidar.T_mount_lidar = mounting.T_mount_thing;
     const LidarMake make = read_make(table, folder);
     lidar.model = make.configure(read_settings(table, make, folder));
-    lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = make.range_m_max, .low_open = true})
+    const double range_m_most = lidar.model->spec().range_m_max;
+    lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = range_m_most, .low_open = true})
                             .value_or(make.range_m_default);
     lidar.receiver = read_receiver(table);
-    lidar.receiver.range_min_m = table.number("range_min_m", {.low = 0, .high = make.range_m_max}).value_or(0);
+    lidar.receiver.range_min_m = table.number("range_min_m", {.low = 0, .high = range_m_most}).value_or(0);
     table.finish();
     return lidar;
 }

@@ -1,0 +1,122 @@
+"""Lidar packets of Ouster's sensors (Firmware User Manual, "Lidar Data Packet Format"), as narpa sends and records them.
+
+A sensor's metadata JSON states its beams and the format of its packets. A packet has 16 columns; the shots of a column are at
+one instant. Positions are in the maker's sensor frame: x forward, y left, z up. (narpa's LiDAR frame: x right, y forward, z up.)
+"""
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from narpa.pcap import udp_payloads
+
+PORT, COLUMNS = 7502, 16
+# profile: bytes of packet header, column header, pixel, column footer, packet footer; fields of a pixel as (first bit, bits,
+# power of two of the unit). Ranges are in mm; the fields of the second return end in 2.
+PROFILES = {
+    "LEGACY": ((0, 16, 12, 4, 0), {"range": (0, 20, 0), "flags": (28, 4, 0), "reflectivity": (32, 8, 0), "signal": (48, 16, 0), "near_ir": (64, 16, 0)}),
+    "RNG19_RFL8_SIG16_NIR16": (
+        (32, 12, 12, 0, 32),
+        {"range": (0, 19, 0), "flags": (19, 5, 0), "reflectivity": (32, 8, 0), "signal": (48, 16, 0), "near_ir": (64, 16, 0)}),
+    "RNG19_RFL8_SIG16_NIR16_DUAL": (
+        (32, 12, 16, 0, 32),
+        {"range": (0, 19, 0), "flags": (19, 5, 0), "reflectivity": (24, 8, 0), "range2": (32, 19, 0), "flags2": (51, 5, 0),
+         "reflectivity2": (56, 8, 0), "signal": (64, 16, 0), "signal2": (80, 16, 0), "near_ir": (96, 16, 0)}),
+    "RNG15_RFL8_NIR8": ((32, 12, 4, 0, 32), {"range": (0, 15, 3), "flags": (15, 1, 0), "reflectivity": (16, 8, 0), "near_ir": (24, 8, 4)}),
+}  # fmt: skip
+LIDAR_PACKET = 1
+
+POINT = np.dtype([("position_m", float, 3), ("range_m", float), ("reflectivity", np.uint8), ("signal", np.uint16),
+                  ("near_ir", np.uint16), ("beam", np.uint8), ("echo", np.uint8), ("column", np.uint16), ("t_ns", np.uint64)])  # fmt: skip
+
+
+class Packet:
+    """The numbers of a packet: `frame_id`, `init_id` and `serial` (0 in LEGACY); `t_ns`, `column` and `valid` of each column;
+    `fields`, arrays of columns x beams."""
+
+    def __init__(self, data, profile, beams):
+        (header, column_header, pixel, column_footer, footer), fields = PROFILES[profile]
+        column_bytes = column_header + beams * pixel + column_footer
+        expected = header + COLUMNS * column_bytes + footer
+        if len(data) != expected:
+            raise ValueError(f"a packet of {len(data)} bytes, expected {expected} of profile {profile} with {beams} beams")
+        self.frame_id = self.init_id = self.serial = 0
+        self.header, self.footer = data[:header], data[len(data) - footer :]
+        if header:
+            kind, self.frame_id = struct.unpack_from("<HH", data)
+            if kind != LIDAR_PACKET:
+                raise ValueError(f"a packet of type {kind}, expected {LIDAR_PACKET}, the lidar's")
+            self.init_id, self.serial = int.from_bytes(data[4:7], "little"), int.from_bytes(data[7:12], "little")
+        columns = np.frombuffer(data, np.uint8, COLUMNS * column_bytes, header).reshape(COLUMNS, column_bytes)
+        part = lambda first, kind: np.ascontiguousarray(columns[:, first : first + np.dtype(kind).itemsize]).view(kind)[:, 0]  # noqa: E731
+        self.t_ns, self.column = part(0, "<u8"), part(8, "<u2")
+        if profile == "LEGACY":
+            self.frame_id, self.encoder = int(part(10, "<u2")[0]), part(12, "<u4")
+            self.valid = part(column_bytes - 4, "<u4") == 0xFFFFFFFF
+        else:
+            self.valid = part(10, "<u2") & 1 == 1
+        pixels = columns[:, column_header : column_header + beams * pixel].reshape(COLUMNS, beams, pixel).astype(np.uint64)
+        self.fields = {}
+        for name, (first, bits, power) in fields.items():
+            first_byte, last_byte = first // 8, (first + bits - 1) // 8
+            value = sum(pixels[:, :, i] << np.uint64(8 * (i - first_byte)) for i in range(first_byte, last_byte + 1))
+            value = value >> np.uint64(first % 8) & np.uint64((1 << bits) - 1)
+            self.fields[name] = (value << np.uint64(power)).astype(np.int64)
+
+
+class Sensor:
+    """A sensor as its metadata describe it: a dictionary, or the path of a JSON file."""
+
+    def __init__(self, metadata):
+        document = metadata if isinstance(metadata, dict) else json.loads(Path(metadata).read_text())
+        flat = dict(document)
+        for section in document.values():  # firmware 2.4 and later keeps the keys in sections
+            if isinstance(section, dict):
+                flat.update(section)
+        self.altitude, self.azimuth = (np.radians(flat[f"beam_{a}_angles"]) for a in ("altitude", "azimuth"))
+        columns, self.rate_hz = (int(n) for n in flat["lidar_mode"].split("x"))
+        self.columns, self.profile = flat.get("columns_per_frame", columns), flat.get("udp_profile_lidar", "LEGACY")
+        self.n_m = 1e-3 * flat["lidar_origin_to_beam_origin_mm"]
+        out_mm, up_mm = (flat["beam_to_lidar_transform"][i] for i in (3, 11)) if "beam_to_lidar_transform" in flat else (1e3 * self.n_m, 0)
+        self.out_m, self.up_m = 1e-3 * out_mm, 1e-3 * up_mm
+        self.lidar_to_sensor = np.array(flat["lidar_to_sensor_transform"], float).reshape(4, 4)
+        self.init_id, self.serial = flat.get("initialization_id", 0), int(flat.get("prod_sn") or 0)
+
+    def packet(self, data):
+        """The numbers of a packet."""
+        return Packet(data, self.profile, len(self.altitude))
+
+    def positions(self, columns, range_mm):
+        """In the sensor frame, metres; `range_mm`: columns x beams, as a packet has it."""
+        encoder = 2 * np.pi * (1 - columns[:, None] / self.columns)
+        azimuth, out = encoder - self.azimuth, 1e-3 * range_mm - self.n_m
+        lidar = np.stack([out * np.cos(azimuth) * np.cos(self.altitude) + self.out_m * np.cos(encoder),
+                          out * np.sin(azimuth) * np.cos(self.altitude) + self.out_m * np.sin(encoder),
+                          out * np.sin(self.altitude) + self.up_m], -1)  # fmt: skip
+        return lidar @ self.lidar_to_sensor[:3, :3].T + 1e-3 * self.lidar_to_sensor[:3, 3]
+
+    def decode(self, data):
+        """The returns of a packet as an array of POINT, in firing order; of each shot the strongest first."""
+        packet = self.packet(data)
+        echoes = 2 if "range2" in packet.fields else 1
+        points = np.zeros((COLUMNS, len(self.altitude), echoes), POINT)
+        none = np.zeros((COLUMNS, len(self.altitude)), int)
+        for echo, suffix in enumerate(("", "2")[:echoes]):
+            range_mm = packet.fields["range" + suffix] * packet.valid[:, None]
+            points["position_m"][:, :, echo] = self.positions(packet.column, range_mm)
+            points["range_m"][:, :, echo] = 1e-3 * range_mm
+            for name in ("reflectivity", "signal"):
+                points[name][:, :, echo] = packet.fields.get(name + suffix, none)
+            points["echo"][:, :, echo] = echo
+        points["near_ir"] = packet.fields["near_ir"][:, :, None]
+        points["beam"] = np.arange(len(self.altitude))[:, None]
+        points["column"], points["t_ns"] = packet.column[:, None, None], packet.t_ns[:, None, None]
+        points = points.reshape(-1)
+        return points[points["range_m"] > 0]
+
+    def read_pcap(self, path):
+        """The lidar packets of a capture of Ethernet frames."""
+        (header, column_header, pixel, column_footer, footer), _ = PROFILES[self.profile]
+        size = header + COLUMNS * (column_header + len(self.altitude) * pixel + column_footer) + footer
+        return (payload for payload in udp_payloads(path) if len(payload) == size)

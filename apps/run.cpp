@@ -110,7 +110,8 @@ Command add_run(Parser app) {
         .type_name("CAMERA=SINK")
         .repeatable();
     c.option("--lidar", o->lidar,
-             "udp:HOST:PORT | FILE.pcap | can (each shot on the CAN bus) | none; may be given many times")
+             "udp:HOST:PORT | FILE.pcap | ouster:[ADDRESS:]PORT (an Ouster sensor's HTTP server) | can (each shot on "
+             "the CAN bus) | none; may be given many times")
         .type_name("LIDAR=SINK")
         .repeatable();
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,

@@ -35,11 +35,12 @@ Status write_beside(const std::string& capture, std::string_view metadata) {
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
                                                      std::int64_t epoch_unix_ns, bool wait_when_full,
                                                      std::string_view metadata) {
-    constexpr std::string_view udp = "udp:";
+    constexpr std::string_view udp = "udp:", ouster = "ouster:";
     const std::string text(spec);
     try {
         if (text == "none") return std::unique_ptr<PacketSink>(new NullPacketSink);
         if (text.starts_with(udp)) return open_udp_sink(text.substr(udp.size()), network);
+        if (text.starts_with(ouster)) return open_ouster_sink(text.substr(ouster.size()), metadata);
         if (text.ends_with(".pcap")) {
             auto sink = open_pcap_sink(text, network, epoch_unix_ns, wait_when_full);
             if (!sink || metadata.empty()) return sink;
@@ -49,7 +50,7 @@ Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, cons
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
         return Error{"packet sink \"" + text + "\": " + e.what(), {}, 0, 0, ErrorKind::missing};
     }
-    return Error{"packet sink \"" + text + "\": expected udp:HOST:PORT, FILE.pcap, or none"};
+    return Error{"packet sink \"" + text + "\": expected udp:HOST:PORT, FILE.pcap, ouster:PORT, or none"};
 }
 
 }  // namespace narpa

@@ -18,11 +18,11 @@ namespace {
 
 using test::Bytes, test::noise_frame;
 
-constexpr VideoFormat kGrey{64, 48, PixelFormat::grey, 100'000'000};
-constexpr VideoFormat kBig{640, 480, PixelFormat::y16, 100'000'000};
+constexpr VideoFormat kGreySource{64, 48, PixelFormat::grey, 100'000'000};
+constexpr VideoFormat kBigSource{640, 480, PixelFormat::y16, 100'000'000};
 constexpr std::int64_t kFramePatience_ns = 30'000'000'000;  // for what must come
 
-std::string make_fifo(const test::TemporaryFolder& folder) {
+std::string make_source_fifo(const test::TemporaryFolder& folder) {
     const std::string path = folder / "fifo";
     EXPECT_EQ(::mkfifo(path.c_str(), 0600), 0);
     return path;
@@ -56,7 +56,7 @@ void write_all(const std::string& path, std::string_view text) {
 TEST(Y4mSource, FramesOfAFifoComeWholeInOrderInEveryFormat) {
     for (const PixelFormat pixel : {PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv}) {
         const test::TemporaryFolder folder;
-        const std::string fifo = make_fifo(folder);
+        const std::string fifo = make_source_fifo(folder);
         const VideoFormat format{640, 480, pixel, 100'000'000};
         const auto source = source_of(fifo, format);  // before there is a writer: does not wait for one
         EXPECT_TRUE(nothing_comes(*source, format));
@@ -75,21 +75,21 @@ TEST(Y4mSource, FramesOfAFifoComeWholeInOrderInEveryFormat) {
 
 TEST(Y4mSource, TheNextWriterBeginsANewStream) {
     const test::TemporaryFolder folder;
-    const std::string fifo = make_fifo(folder);
-    const auto source = source_of(fifo, kGrey);
-    const std::string header = *y4m_stream_header(kGrey);
+    const std::string fifo = make_source_fifo(folder);
+    const auto source = source_of(fifo, kGreySource);
+    const std::string header = *y4m_stream_header(kGreySource);
     write_all(fifo, header + "FRAME\n" + std::string(1000, 'x'));  // leaves in the middle of a frame
-    EXPECT_TRUE(nothing_comes(*source, kGrey));
+    EXPECT_TRUE(nothing_comes(*source, kGreySource));
     EXPECT_EQ(source->counters().truncated, 1U);
     for (std::uint64_t visit = 0; visit < 3; ++visit) {
-        const auto sink = sink_to(fifo, kGrey);
+        const auto sink = sink_to(fifo, kGreySource);
         for (std::uint64_t i = 0; i < 2; ++i) {
-            sink->send(noise_frame(kGrey, 10 * visit + i));
-            expect_frame(*source, kGrey, 10 * visit + i);
+            sink->send(noise_frame(kGreySource, 10 * visit + i));
+            expect_frame(*source, kGreySource, 10 * visit + i);
         }
     }
     write_all(fifo, header + "FRA");  // leaves in the middle of a line
-    EXPECT_TRUE(nothing_comes(*source, kGrey));
+    EXPECT_TRUE(nothing_comes(*source, kGreySource));
     EXPECT_EQ(source->counters().truncated, 2U);
     EXPECT_EQ(source->counters().received, 6U);
     EXPECT_TRUE(source->status());
@@ -97,11 +97,11 @@ TEST(Y4mSource, TheNextWriterBeginsANewStream) {
 
 TEST(Y4mSource, AFrameMayComeInPieces) {
     const test::TemporaryFolder folder;
-    const std::string fifo = make_fifo(folder);
-    const auto source = source_of(fifo, kGrey);
-    const Bytes frame = noise_frame(kGrey, 3);
+    const std::string fifo = make_source_fifo(folder);
+    const auto source = source_of(fifo, kGreySource);
+    const Bytes frame = noise_frame(kGreySource, 3);
     const std::string stream =
-        *y4m_stream_header(kGrey) + "FRAME Ip\n" + std::string(frame.begin(), frame.end()) + "FRAME\n";
+        *y4m_stream_header(kGreySource) + "FRAME Ip\n" + std::string(frame.begin(), frame.end()) + "FRAME\n";
     const int fd = ::open(fifo.c_str(), O_WRONLY);
     for (std::size_t at = 0; at < stream.size(); at += 37) {
         const std::string piece = stream.substr(at, 37);
@@ -121,25 +121,25 @@ TEST(Y4mSource, AFrameMayComeInPieces) {
 TEST(Y4mSource, AFileIsFollowedAsItGrows) {
     const test::TemporaryFolder folder;
     const std::string path = folder / "out.y4m";
-    const auto sink = sink_to(path, kBig);
-    const auto source = source_of(path, kBig);
-    EXPECT_TRUE(nothing_comes(*source, kBig));
+    const auto sink = sink_to(path, kBigSource);
+    const auto source = source_of(path, kBigSource);
+    EXPECT_TRUE(nothing_comes(*source, kBigSource));
     for (std::uint64_t i = 0; i < 6; ++i) {
-        sink->send(noise_frame(kBig, i));
-        expect_frame(*source, kBig, i);
+        sink->send(noise_frame(kBigSource, i));
+        expect_frame(*source, kBigSource, i);
     }
-    const auto later = source_of(path, kBig);
-    for (std::uint64_t i = 0; i < 6; ++i) expect_frame(*later, kBig, i);
-    EXPECT_TRUE(nothing_comes(*later, kBig));
+    const auto later = source_of(path, kBigSource);
+    for (std::uint64_t i = 0; i < 6; ++i) expect_frame(*later, kBigSource, i);
+    EXPECT_TRUE(nothing_comes(*later, kBigSource));
 }
 
 TEST(Y4mSource, AnotherFormatIsNamed) {
     const test::TemporaryFolder folder;
-    const std::string fifo = make_fifo(folder);
+    const std::string fifo = make_source_fifo(folder);
     const auto sink = sink_to(fifo, {64, 48, PixelFormat::y16, 1});
-    const auto source = source_of(fifo, kGrey);
+    const auto source = source_of(fifo, kGreySource);
     sink->send(noise_frame({64, 48, PixelFormat::y16, 1}, 0));
-    Bytes frame(frame_bytes(kGrey));
+    Bytes frame(frame_bytes(kGreySource));
     EXPECT_FALSE(source->receive(frame, kFramePatience_ns));
     ASSERT_FALSE(source->status());
     EXPECT_EQ(source->status().error().text(),
@@ -153,13 +153,13 @@ TEST(Y4mSource, WhatIsNoVideoIsNamed) {
         {std::string(300, 'a'), "not a Y4M stream: a line of more than 256 bytes"},
         {"YUV4MPEG2 W64 H48 F10:1\n", "the stream has 64x48 C420 frames, expected 64x48 Cmono"},
         {"YUV4MPEG2 W640 Cmono\n", "the stream has 640x Cmono frames, expected 64x48 Cmono"},
-        {*y4m_stream_header(kGrey) + "FRAMES\n", "not a Y4M stream: FRAME expected, \"FRAMES\" found"},
+        {*y4m_stream_header(kGreySource) + "FRAMES\n", "not a Y4M stream: FRAME expected, \"FRAMES\" found"},
     };
     for (const auto& [text, says] : cases) {
         const test::TemporaryFolder folder;
         write_all(folder / "bad.y4m", text);
-        const auto source = source_of(folder / "bad.y4m", kGrey);
-        EXPECT_TRUE(nothing_comes(*source, kGrey));
+        const auto source = source_of(folder / "bad.y4m", kGreySource);
+        EXPECT_TRUE(nothing_comes(*source, kGreySource));
         ASSERT_FALSE(source->status()) << text;
         EXPECT_NE(source->status().error().text().find(says), std::string::npos) << source->status().error().text();
     }
@@ -198,14 +198,14 @@ TEST(VideoSource, BadSourcesSayWhatIsWrong) {
         ErrorKind kind;
         std::string says;
     } cases[] = {
-        {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN, FILE.y4m, or an existing FIFO"},
-        {folder / "frames.bin", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
-        {folder / "fifo", kGrey, ErrorKind::missing, "try: mkfifo " + (folder / "fifo")},
+        {"", kGreySource, ErrorKind::bad_input, "expected /dev/videoN, FILE.y4m, or an existing FIFO"},
+        {folder / "frames.bin", kGreySource, ErrorKind::bad_input, "expected /dev/videoN"},
+        {folder / "fifo", kGreySource, ErrorKind::missing, "try: mkfifo " + (folder / "fifo")},
         {folder / "colour.y4m", {8, 8, PixelFormat::rgb24, 1}, ErrorKind::bad_input, "it holds GREY, Y16 and YUYV"},
         {folder / "fifo", {0, 8, PixelFormat::grey, 1}, ErrorKind::bad_input, "must be positive"},
-        {"/dev/video417", kGrey, ErrorKind::missing,
+        {"/dev/video417", kGreySource, ErrorKind::missing,
          "sudo modprobe v4l2loopback video_nr=417 exclusive_caps=1 max_buffers=8"},
-        {"/dev/null", kGrey, ErrorKind::missing, "/dev/null: not a V4L2 device"},
+        {"/dev/null", kGreySource, ErrorKind::missing, "/dev/null: not a V4L2 device"},
     };
     for (const auto& c : cases) {
         const auto source = open_video_source(c.spec, c.format);

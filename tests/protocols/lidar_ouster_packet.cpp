@@ -13,7 +13,7 @@
 namespace narpa {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
+using PacketBytes = std::vector<std::uint8_t>;
 
 // Firmware manual, "Lidar Data Packet Format", with 32 beams; README.md, "Ouster".
 TEST(OusterFormat, SizesOfThePackets) {
@@ -34,7 +34,7 @@ std::vector<unsigned> bits_set_by(OusterProfile profile, const Set& set) {
     const std::size_t size = pixel_bytes[static_cast<std::size_t>(profile)], header = legacy ? 0 : 32,
                       column_header = legacy ? 16 : 12, column = column_header + 16 * size + (legacy ? 4 : 0);
     const std::size_t at = header + 2 * column + column_header + 5 * size;  // beam 5 of column 2
-    Bytes packet(format.bytes());
+    PacketBytes packet(format.bytes());
     OusterPixel pixel;
     set(pixel);
     format.put(pixel, packet, 2, 5);
@@ -86,10 +86,10 @@ TEST(OusterFormat, FieldsAreAtTheBitsThatTheMakerDocuments) {
 }
 
 /// UDP payloads of this size in a capture of Ethernet frames.
-std::vector<Bytes> ouster_payloads(const std::filesystem::path& path, std::size_t payload_bytes) {
+std::vector<PacketBytes> ouster_payloads(const std::filesystem::path& path, std::size_t payload_bytes) {
     std::ifstream in(path, std::ios::binary);
-    const Bytes file{std::istreambuf_iterator<char>(in), {}};
-    std::vector<Bytes> out;
+    const PacketBytes file{std::istreambuf_iterator<char>(in), {}};
+    std::vector<PacketBytes> out;
     constexpr std::size_t kFileHeader = 24, kRecordHeader = 16, kFrameHeader = 42;
     for (std::size_t at = kFileHeader; at + kRecordHeader <= file.size();) {
         const auto length = get_le<std::uint32_t>(&file[at + 8]);
@@ -126,8 +126,8 @@ TEST_P(OusterRecording, IsReadAndWrittenByteForByte) {
     ASSERT_EQ(packets.size(), r.packets);
     std::size_t returns = 0;
     unsigned measurement = 0;
-    for (const Bytes& bytes : packets) {
-        Bytes again(bytes.size(), 0xAA);
+    for (const PacketBytes& bytes : packets) {
+        PacketBytes again(bytes.size(), 0xAA);
         const OusterHeader header = format.header(bytes);
         EXPECT_EQ(header.packet_type, OusterHeader::kLidar);
         EXPECT_EQ(header.init_id, r.init_id);

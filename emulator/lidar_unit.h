@@ -51,6 +51,18 @@ public:
     [[nodiscard]] std::span<const std::uint8_t> position(std::int64_t packet) noexcept;
 
 private:
+    /// Shots of a packet for which bodies are placed together, and when the first and the last is fired.
+    struct Span {
+        std::size_t first, n;
+        std::int64_t begin_ns, end_ns;
+    };
+    /// Calls `work(Span)` for the packet's shots; longer spans have no velocities.
+    template <class Work>
+    void over_spans(std::int64_t start_ns, std::int64_t span_ns, const Work& work) noexcept;
+    [[nodiscard]] Ray beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) const noexcept;
+    void trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcept;
+    void trace_truth(std::int64_t start_ns) noexcept;
+
     const World& world_;
     Lidar lidar_;
     const LidarModel& model_;
@@ -63,6 +75,7 @@ private:
     std::vector<LidarEchoes> echoes_;
     std::vector<LidarReturn> truth_;
     std::vector<std::uint8_t> bytes_, position_;
+    std::vector<std::uint32_t> by_laser_;  ///< shots of a packet that is one span; else empty
 };
 
 }  // namespace narpa

@@ -19,6 +19,7 @@ struct WorldRays {
     const Vec3Lanes& base;    ///< world: the ray's origin, or that of the body that it leaves
     const Vec3Lanes& offset;  ///< from there to the start
     const Lanes<double>& time;
+    bool one_moment;                       ///< all have the same time
     const Lanes<int>* own = nullptr;       ///< the bodies that they leave; null: none
     const Vec3Lanes* own_start = nullptr;  ///< in the frame of that body
     std::uint32_t inside = 0;              ///< those that leave an inner side
@@ -49,6 +50,12 @@ Lanes<double> for_all(double value) {
 }
 const Lanes<double> kNoEnd = for_all(kInfinity);
 const Vec3Lanes kZero{};
+
+bool is_one_moment(const Lanes<double>& time) {
+    int other = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) other |= static_cast<int>(time[i] != time[0]);
+    return other == 0;
+}
 
 /// Lanes by body.
 class BodyGroups {
@@ -98,7 +105,7 @@ NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid
         local.origin.put(i, choose(own[i] != 0, (*rays.own_start)[i], local.origin[i]));
 }
 
-/// The same two for a body that moves within the exposure: each ray meets it at its own moment.
+/// The same two for a body that moves within the exposure, where each ray meets it at its own moment.
 void enter_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, double bound_m,
                   Lanes<double>& entry_m) {
     for (std::size_t i = 0; i < kLanes; ++i) {
@@ -108,8 +115,9 @@ void enter_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, 
 }
 void turn_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave,
                  ShapeRays& local) {
+    Rigid3 T;
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const Rigid3 T = at.T_world_body_at(body, rays.time[i]);
+        if (i == 0 || rays.time[i] != rays.time[i - 1]) T = at.T_world_body_at(body, rays.time[i]);
         const auto [x, y, z] = columns(T.q);
         const Vec3 o = rays.origin_from(T.t, i), d = rays.direction[i];
         local.origin.put(i, is_set(leave, i) ? (*rays.own_start)[i] : Vec3{dot(x, o), dot(y, o), dot(z, o)});
@@ -119,10 +127,10 @@ void turn_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, s
 
 /// Into the frame of a body, at each ray's moment.
 void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, ShapeRays& local) {
-    if (at.moves(body))
+    if (at.moves(body) && !rays.one_moment)
         turn_moving(at, body, rays, leave, local);
     else
-        turn(rays, leave, at.T_world_body[body], local);
+        turn(rays, leave, at.T_world_body_at(body, rays.time[0]), local);
     local.leaving = leave;
     local.inside = rays.inside & leave;
     local.coherent = rays.coherent;
@@ -131,10 +139,12 @@ void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::
 /// Poses of a body at the moments of these lanes.
 void put_poses(const BodyPoses& at, std::size_t body, const Lanes<double>& time, std::uint32_t lanes,
                PoseLanes& T_world_body) {
-    if (at.moves(body))
-        for_each_lane(lanes, [&](std::size_t i) { T_world_body.put(i, at.T_world_body_at(body, time[i])); });
-    else
-        for_each_lane(lanes, [&, &T = at.T_world_body[body]](std::size_t i) { T_world_body.put(i, T); });
+    Rigid3 T = at.T_world_body[body];
+    double moment = kMidExposure;  // of T
+    for_each_lane(lanes, [&](std::size_t i) {
+        if (time[i] != moment && at.moves(body)) T = at.T_world_body_at(body, moment = time[i]);
+        T_world_body.put(i, T);
+    });
 }
 
 /// Starts in the world's axes; and directions and times, but for lanes that are not wanted some that are finite.
@@ -203,7 +213,7 @@ public:
         set_out(own_at_, from, start_, directions, wanted, offset_, direction_, time_);
     }
     [[nodiscard]] WorldRays rays(bool coherent) const noexcept {
-        return {coherent, direction_, own_at_.t, offset_, time_, &own_, &start_, inside_};
+        return {coherent, direction_, own_at_.t, offset_, time_, is_one_moment(time_), &own_, &start_, inside_};
     }
 
 private:
@@ -231,10 +241,10 @@ void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::u
                               Lanes<double>& entry_m) const noexcept {
     const std::uint32_t leave = rays.that_leave(body);
     const double bound_m = shapes[body]->properties().bound_m;
-    if (at.moves(body))
+    if (at.moves(body) && !rays.one_moment)
         enter_moving(at, body, rays, leave, bound_m, entry_m);
     else
-        enter(rays, leave, at.T_world_body[body].t, bound_m, entry_m);
+        enter(rays, leave, at.position_at(body, rays.time[0]), bound_m, entry_m);
 }
 
 void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,
@@ -310,7 +320,8 @@ void Tracer::Impl::finish(const BodyPoses& at, const WorldRays& rays, const Near
     const auto& [first, firsts] = *groups.begin();
     shapes[first]->surface(nearest.at, firsts, hits);
     hits.outside &= nearest.met;
-    if (firsts == nearest.met && !at.moves(first)) return to_world(at.T_world_body[first], hits);
+    if (firsts == nearest.met && (rays.one_moment || !at.moves(first)))
+        return to_world(at.T_world_body_at(first, rays.time[0]), hits);
 
     PoseLanes T_world_body;
     HitBatch others;
@@ -328,7 +339,7 @@ void Tracer::intersect(const BodyPoses& at, const RayBatch& rays, std::span<cons
     if (bodies.empty() || rays.n == 0) return hits.clear();
     NearestHits nearest;
     const auto trace = [&](const RayBatch& all) {
-        const WorldRays world{true, all.direction, all.origin, kZero, all.time};
+        const WorldRays world{true, all.direction, all.origin, kZero, all.time, is_one_moment(all.time)};
         impl_->find_nearest(at, world, lanes_below(rays.n), bodies, nearest);
         impl_->finish(at, world, nearest, hits);
     };

@@ -23,11 +23,32 @@ double light_of(const LidarReturn& r) {
     return static_cast<double>(r.reflectivity) / (r.range_m * r.range_m);
 }
 
-/// Two axes that complete a unit vector.
-std::array<Vec3, 2> across(const Vec3& z) {
-    const Vec3 any = std::abs(z.x) < 0.5 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-    const Vec3 x = normalized(cross(any, z));
-    return {x, cross(z, x)};
+/// False: the beam, a cone about the ray, misses the bounds of the body. First its sphere, then its ellipsoid.
+bool may_meet(const Tracer& tracer, const BodyPoses& at, std::size_t body, const Ray& ray, double tangent) {
+    const Vec3 to = at.position_at(body, ray.time) - ray.origin;
+    const double radius_m = tracer.bounding_radius_m(body), along_m = dot(to, ray.direction), to2 = dot(to, to);
+    const double spot_m = tangent * (std::sqrt(to2) + radius_m), reach_m = radius_m + spot_m;
+    const double reach2 = reach_m * reach_m;
+    if (to2 > reach2 && (along_m < 0 || to2 - along_m * along_m > reach2)) return false;
+
+    // An ellipsoid that holds all points within spot_m of the body's: (a + s)^2 <= 1.1 a^2 + 11 s^2.
+    const BodyBounds& bounds = tracer.bounds(body);
+    const auto [x, y, z] = columns(at.T_world_body_at(body, ray.time).q);
+    const Vec3 a = bounds.semi_axes_m, d = ray.direction;
+    const auto axis = [&](double a_m) {
+        return tangent > 0 ? std::sqrt(1.1 * a_m * a_m + 11 * spot_m * spot_m) : a_m * (1 + 1e-6);
+    };
+    const Vec3 b{axis(a.x), axis(a.y), axis(a.z)};
+    const Vec3 o = (Vec3{-dot(x, to), -dot(y, to), -dot(z, to)} - bounds.centre_m) / b;
+    const Vec3 v = Vec3{dot(x, d), dot(y, d), dot(z, d)} / b;
+    const double ov = dot(o, v), vv = dot(v, v), c = dot(o, o) - 1;
+    return c <= 0 || (ov < 0 && ov * ov >= (1 - 1e-9) * vv * c);
+}
+
+bool may_meet(const Tracer& tracer, const BodyPoses& at, const Ray& ray, double tangent) {
+    for (const std::uint32_t body : tracer.all_bodies())
+        if (may_meet(tracer, at, body, ray, tangent)) return true;
+    return false;
 }
 
 }  // namespace
@@ -61,27 +82,19 @@ LidarReceiver::LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t
       random_(model_.range_noise_m > 0 || model_.range_noise_at_limit_m > 0 || model_.velocity_noise_m_s > 0),
       schedule_(seed),
       stream_(kStream + static_cast<std::uint32_t>(index)),
-      met_(kLanes * static_cast<std::size_t>(model_.sub_rays)) {
-    // Evenly spread over the disc: a lattice by the golden section.
-    for (int i = 0; i < model_.sub_rays && model_.sub_rays > 1; ++i) {
-        radius_.push_back(std::tan(0.5 * model_.beam_divergence_rad) * std::sqrt((i + 0.5) / model_.sub_rays));
-        turn_.push_back(2 * std::numbers::pi * i / std::numbers::phi);
-    }
-}
+      cone_(model_.beam_divergence_rad, model_.sub_rays),
+      met_(kLanes * cone_.size()) {}
 
 void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
                             std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
     const ShotSettings settings{.range_max_m = model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_,
                                 .multipath = model_.multipath,
-                                .sunlight = sunlight_,
+                                .sunlight = sunlight_ ? ~0u : 0u,
                                 .motions = motions,
                                 .mount = mount_};
     Draws draws(*this, first);
-    const auto sub_rays = static_cast<std::size_t>(model_.sub_rays);
-    if (sub_rays == 1)
-        shoot(tracer, at, beams, settings, met_);
-    else
-        gather(tracer, at, beams, settings, draws.of_echo(0).w2);
+    const std::size_t sub_rays = cone_.size();
+    trace(tracer, at, beams, settings, draws);
     for (std::size_t i = 0; i < beams.n; ++i) {
         const auto met = std::span(met_).subspan(i * sub_rays, sub_rays);
         const double sunlight = static_cast<double>(met.front().sunlight);
@@ -106,23 +119,38 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
     }
 }
 
-void LidarReceiver::gather(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
-                           const Lanes<std::uint32_t>& turns) noexcept {
-    const std::size_t sub_rays = radius_.size();
-    Lanes<std::array<Vec3, 2>> axes;
-    for (std::size_t i = 0; i < beams.n; ++i) axes[i] = across(beams.direction[i]);
-    RayBatch rays = beams;
+/// Sub-rays of a beam run side by side, so they are traced together, and none of a beam that meets nothing.
+void LidarReceiver::trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
+                          Draws& draws) noexcept {
+    const std::size_t sub_rays = cone_.size();
+    Lanes<std::size_t> beam;  // those that may meet a body
+    Lanes<BeamCone::Across> across{};
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < beams.n; ++i) {
+        if (!may_meet(tracer, at, beams[i], cone_.tangent())) {
+            std::fill_n(met_.begin() + static_cast<std::ptrdiff_t>(i * sub_rays), sub_rays, LidarReturn{});
+            continue;
+        }
+        beam[count++] = i;
+        if (sub_rays > 1) across[i] = BeamCone::across(beams.direction[i], draws.of_echo(0).w2[i]);
+    }
+    const bool sunlight = settings.sunlight != 0;
     std::array<LidarReturn, kLanes> met;
-    for (std::size_t s = 0; s < sub_rays; ++s) {
-        for (std::size_t i = 0; i < beams.n; ++i) {
-            // Turned at random, so that no edge favours the lattice.
-            const double turn = turn_[s] + 2 * std::numbers::pi * uniform(turns[i]);
-            const Vec3 aside = std::cos(turn) * axes[i][0] + std::sin(turn) * axes[i][1];
-            rays.direction.put(i, normalized(beams.direction[i] + radius_[s] * aside));
+    Lanes<std::size_t> target;
+    for (std::size_t k = 0; k < count * sub_rays;) {
+        RayBatch rays;
+        settings.sunlight = 0;
+        for (; rays.n < kLanes && k < count * sub_rays; ++k, ++rays.n) {
+            const std::size_t i = beam[k / sub_rays], s = k % sub_rays;
+            const Vec3 axis = beams.direction[i];
+            rays.put(rays.n,
+                     {beams.origin[i], sub_rays > 1 ? cone_.direction(axis, across[i], s) : axis, beams.time[i]});
+            target[rays.n] = i * sub_rays + s;
+            // Of the first sub-ray alone, which is the nearest to the axis.
+            if (sunlight && s == 0) settings.sunlight |= 1u << rays.n;
         }
         shoot(tracer, at, rays, settings, met);
-        settings.sunlight = false;  // of the first sub-ray alone, which is the nearest to the axis
-        for (std::size_t i = 0; i < beams.n; ++i) met_[i * sub_rays + s] = met[i];
+        for (std::size_t j = 0; j < rays.n; ++j) met_[target[j]] = met[j];
     }
 }
 

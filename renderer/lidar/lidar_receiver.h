@@ -17,6 +17,7 @@
 
 #include "base/counter_random.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/lidar/beam_cone.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
 
@@ -45,8 +46,8 @@ private:
     using EchoList = std::array<Echo, kMostEchoes>;
     class Draws;
 
-    void gather(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
-                const Lanes<std::uint32_t>& turns) noexcept;
+    void trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
+               Draws& draws) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
     [[nodiscard]] LidarEcho measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
                                     Draws& draws) const noexcept;
@@ -59,8 +60,8 @@ private:
     bool random_;
     PhiloxSchedule schedule_;
     std::uint32_t stream_;
-    std::vector<double> radius_, turn_;  ///< of each sub-ray: tangent of its angle from the axis, and about it
-    std::vector<LidarReturn> met_;       ///< of the sub-rays of one shot after the other
+    BeamCone cone_;
+    std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
 };
 
 }  // namespace narpa

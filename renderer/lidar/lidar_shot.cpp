@@ -43,8 +43,7 @@ float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, con
 }
 
 /// What the shot meets at the end of its path.
-LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Path& path,
-                      const ShotSettings& settings) {
+LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Path& path, bool sunlight) {
     const Vec3 back = -path.direction;
     const Surface surface = surface_at(tracer, at, hit, path.direction, 0);
     const double cosine = dot(surface.normal, back);
@@ -55,8 +54,7 @@ LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const Hit& hit,
                   .body = hit.body,
                   .cos_incidence = static_cast<float>(cosine),
                   .velocity_m_s = path.rate_m_s};
-    if (settings.sunlight)
-        r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hit, surface, back);
+    if (sunlight) r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hit, surface, back);
     return r;
 }
 
@@ -96,7 +94,7 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
             if (!(path.range_m < settings.range_max_m)) continue;
             const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];
             if (!settings.multipath || m.kind != Material::Kind::mirror) {
-                returns[i] = return_of(tracer, at, hit, path, settings);
+                returns[i] = return_of(tracer, at, hit, path, is_set(settings.sunlight, i));
             } else if (mirrors < kMirrors) {
                 const Vec3 n = hit.shading_normal, d = path.direction;
                 path.direction = normalized(d - 2 * dot(d, n) * n);

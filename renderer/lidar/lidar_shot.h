@@ -1,6 +1,7 @@
 /// renderer/lidar/lidar_shot.h - shots of a LiDAR or any other range finder, and what they meet.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "renderer/geometry/tracer.h"
@@ -19,9 +20,9 @@ struct LidarReturn {
 
 /// What is wanted of shots beside range, reflectivity and body.
 struct ShotSettings {
-    double range_max_m = 0;  ///< no return from beyond
-    bool multipath = false;  ///< a beam goes on from mirrors; else it ends there with a reflectivity of 0
-    bool sunlight = false;
+    double range_max_m = 0;      ///< no return from beyond
+    bool multipath = false;      ///< a beam goes on from mirrors; else it ends there with a reflectivity of 0
+    std::uint32_t sunlight = 0;  ///< a bit for each shot of the batch whose sunlight is wanted
     /// Of all bodies, for velocities; empty: they are not wanted.
     std::span<const Motion> motions{};
     int mount = -1;  ///< body that the LiDAR rides on; -1: it is at rest

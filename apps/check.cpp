@@ -294,9 +294,10 @@ void check_own_hulls(const World& world, nlohmann::json& document) {
                        s.lidars[i].T_mount_lidar, rays_of(s.lidars[i]), document["lidars"][i]);
 }
 
-/// Of a frame at time 0, where the scene itself places its bodies, with few rays: a second or less.
+/// Of a frame at time 0, where the scene itself places its bodies. Eight rays a pixel suffice for a mean level; a large
+/// image gets fewer, so that the frame takes a second or less.
 SignalLevels first_levels(const World& world, const Camera& camera) {
-    constexpr std::uint64_t kLeastRays = 2'000'000;
+    constexpr std::uint64_t kRays = 2'000'000;
     const Scene& s = world.scene();
     BodyPoses at(s.bodies.size());
     std::vector<Motion> motions(s.bodies.size());
@@ -310,7 +311,7 @@ SignalLevels first_levels(const World& world, const Camera& camera) {
     settings.max_depth = s.render.max_depth;
     settings.seed = s.render.seed;
     settings.budget.kind = FrameBudget::Kind::rays;
-    settings.budget.rays = std::max<std::uint64_t>(kLeastRays, 2 * pixels);
+    settings.budget.rays = std::max(2 * pixels, std::min(8 * pixels, kRays));
     RadianceImage radiance(camera.width, camera.height);
     render_radiance(world.render_scene(), at, camera, pose, settings, radiance);
     return signal_levels(camera, radiance);

@@ -82,7 +82,7 @@ def scene_with(folder, pixel_format):
 
 def narpa(*arguments, status=0):
     """Runs narpa to its end; fails unless it ends with `status`. Returns its CompletedProcess."""
-    done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=120)
+    done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=300)
     if done.returncode != status:
         print(done.stderr.decode(errors="replace"))
         expect(False, f"narpa {' '.join(map(str, arguments))} exits with {status}, not {done.returncode}")

@@ -29,7 +29,8 @@ Result<RawScene> RawScene::build(const Scene& scene, const BodyPoses& at) {
     std::uint32_t first = 0;
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const Mesh& mesh = scene.meshes[static_cast<std::size_t>(std::get<int>(scene.bodies[b].shape))];
-        for (const Vec3f& p : mesh.positions) *v++ = vec_cast<float>(at.T_world_body[b] * vec_cast<double>(p));
+        for (const Vec3f& p : mesh.positions)
+            *v++ = vec_cast<float>(at.T_world_body[b] * (mesh.origin_m + vec_cast<double>(p)));
         for (const auto& face : mesh.faces)
             for (const std::uint32_t corner : face) *f++ = first + corner;
         raw.face_material.insert(raw.face_material.end(), mesh.face_material.begin(), mesh.face_material.end());

@@ -118,6 +118,9 @@ function(narpa_executable name)
   if(TARGET narpa-mesh-reader AND NOT name STREQUAL "narpa-mesh-reader")
     add_dependencies(${name} narpa-mesh-reader)  # any program that reads scenes starts it
   endif()
+  if(TARGET narpa-dem-reader AND NOT name STREQUAL "narpa-dem-reader")
+    add_dependencies(${name} narpa-dem-reader)
+  endif()
   narpa_compile_options(${name})
 endfunction()
 

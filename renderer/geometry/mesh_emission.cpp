@@ -57,7 +57,7 @@ private:
         return mean_band(vec_cast<double>(scene_.materials[static_cast<std::size_t>(material)].emission));
     }
     [[nodiscard]] Vec3 corner(std::uint32_t face, std::size_t k) const noexcept {
-        return vec_cast<double>(mesh_.positions[mesh_.faces[face][k]]);
+        return mesh_.origin_m + vec_cast<double>(mesh_.positions[mesh_.faces[face][k]]);
     }
 
     const Scene& scene_;

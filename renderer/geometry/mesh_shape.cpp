@@ -39,7 +39,7 @@ BodyBounds ellipsoid_about(const Mesh& mesh) {
     Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
     const auto for_each_vertex = [&](const auto& f) {
         for (const auto& face : mesh.faces)
-            for (const std::uint32_t vertex : face) f(vec_cast<double>(mesh.positions[vertex]));
+            for (const std::uint32_t vertex : face) f(mesh.origin_m + vec_cast<double>(mesh.positions[vertex]));
     };
     for_each_vertex([&](const Vec3& p) {
         for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
@@ -66,7 +66,8 @@ Result<std::shared_ptr<const MeshShape>> MeshShape::build(RTCDevice device, cons
     return std::shared_ptr<const MeshShape>(std::move(shape));
 }
 
-MeshShape::MeshShape(const Scene& scene, const Mesh& mesh) : mesh_(mesh), closed_(is_closed(mesh)) {
+MeshShape::MeshShape(const Scene& scene, const Mesh& mesh)
+    : mesh_(mesh), closed_(!mesh.height_field && is_closed(mesh)) {
     Vec3 low{}, high{};
     if (!mesh.positions.empty()) low = high = vec_cast<double>(mesh.positions.front());
     for (const Vec3f& p : mesh.positions)
@@ -74,11 +75,12 @@ MeshShape::MeshShape(const Scene& scene, const Mesh& mesh) : mesh_(mesh), closed
             low[k] = std::min<double>(low[k], p[k]);
             high[k] = std::max<double>(high[k], p[k]);
         }
-    centre_ = 0.5 * (low + high);
+    centre_ = mesh.origin_m + 0.5 * (low + high);
     double reach_m = 0;  // about the body's origin
     for (const Vec3f& p : mesh.positions) {
-        radius_m_ = std::max(radius_m_, norm(vec_cast<double>(p) - centre_));
-        reach_m = std::max(reach_m, norm(vec_cast<double>(p)));
+        const Vec3 at = mesh.origin_m + vec_cast<double>(p);
+        radius_m_ = std::max(radius_m_, norm(at - centre_));
+        reach_m = std::max(reach_m, norm(at));
     }
     // A margin for the rounding of a ray that comes from far away.
     radius_m_ *= 1 + 1e-5;
@@ -87,6 +89,7 @@ MeshShape::MeshShape(const Scene& scene, const Mesh& mesh) : mesh_(mesh), closed
     // A mesh modelled far from its own origin is held relative to its centre, where single precision is finer.
     // Near the origin the vertices stay bit for bit as they were read.
     if (norm(centre_) > 4 * radius_m_) vertex_origin_ = vec_cast<double>(vec_cast<float>(centre_));
+    if (mesh.height_field) vertex_origin_ = mesh.origin_m;
     properties_ = {.radius_m = reach_m,
                    .bound_m = reach_m,
                    .bounds = ellipsoid_about(mesh),
@@ -113,7 +116,7 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
     vertices[0] = {};
     indices[0] = {0, 0, 0};
     for (std::size_t i = 0; i < mesh_.positions.size(); ++i)
-        vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) - vertex_origin_);
+        vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) + (mesh_.origin_m - vertex_origin_));
     std::copy(mesh_.faces.begin(), mesh_.faces.end(), indices);
     vertices_ = vertices;
 
@@ -128,7 +131,18 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
 
 std::vector<BoxNode> MeshShape::boxes() const {
     if (mesh_.faces.empty()) return {BoxNode{}};
-    return box_tree(mesh_);
+    std::vector<BoxNode> boxes = box_tree(mesh_);
+    if (mesh_.origin_m == Vec3{}) return boxes;
+    constexpr double kRounding = 0x1p-23;  // of the larger of the coordinates, both ways
+    for (BoxNode& b : boxes)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const double origin = mesh_.origin_m[static_cast<int>(k)];
+            const double low = static_cast<double>(b.low[k]) + origin,
+                         high = static_cast<double>(b.high[k]) + origin;
+            b.low[k] = static_cast<float>(low - kRounding * std::abs(low));
+            b.high[k] = static_cast<float>(high + kRounding * std::abs(high));
+        }
+    return boxes;
 }
 
 }  // namespace narpa

@@ -196,6 +196,7 @@ void load_named_files(SceneReading& reading) {
     Loader loader(reading);
     for (const NamedMesh& mesh : reading.meshes) loader.load_mesh(mesh);
     for (const NamedTexture& texture : reading.textures) loader.load_texture(texture);
+    if (reading.problems.none()) load_dems(reading);
     if (!reading.problems.none()) return;
     for (const NamedTexture& texture : reading.textures) check_coordinates(texture, reading);
     if (reading.scene.materials.size() > std::numeric_limits<std::uint16_t>::max())

@@ -240,10 +240,13 @@ Result<MeshFile> read_mesh(const std::string& path, double scale, const MeshRead
     if (const Status plain = check_plain_file(path); !plain) return plain.error();
     const std::string extension = extension_of(path);
     const bool is_obj = extension == ".obj" || extension == ".tab";
-    if (!is_obj && !is_read_in_process(extension))
+    const bool is_icq = extension == ".icq";
+    if (!is_obj && !is_icq && !is_read_in_process(extension))
         return Error{.what = fmt::format("not a mesh format that can be read, expected {}", kMeshExtensions),
                      .file = path};
-    Result<TriangleSoup> soup = is_obj ? read_obj(path) : read_soup_in_process(path, limits);
+    Result<TriangleSoup> soup = is_obj   ? read_obj(path)
+                                : is_icq ? read_icq(path)
+                                         : read_soup_in_process(path, limits);
     if (!soup) return soup.error();
     take_textures_off_bare_triangles(*soup, path);
     if (soup->triangles.empty())

@@ -34,9 +34,6 @@ struct MeshMessage {
     std::vector<PlainMaterial> materials{};
 };
 
-/// Exit status of narpa-mesh-reader when it has no memory left; others are 0, or those of a crash.
-inline constexpr int kOutOfMemory = 3;
-
 namespace mesh_message {
 
 // `stream` is a sender or a receiver: `stream.bytes(data, size)` writes or fills them, and is false when that

@@ -12,7 +12,7 @@ namespace narpa {
 
 /// The extensions that are read this way, and how they are listed in errors.
 bool is_read_in_process(const std::string& extension);
-inline constexpr const char* kMeshExtensions = ".obj, .tab, .gltf, .glb, .ply, .stl, .3ds or .dae";
+inline constexpr const char* kMeshExtensions = ".obj, .tab, .icq, .gltf, .glb, .ply, .stl, .3ds or .dae";
 
 /// Starts narpa-mesh-reader, which is beside the running program or on PATH. Every length and index that it sends
 /// is checked. Errors: those of the file; a limit that was reached; a crash of the process.

@@ -50,6 +50,10 @@ std::string texture_path(const std::string& mesh_path, std::string name);
 /// fewer than 3 corners.
 Result<TriangleSoup> read_obj(const std::string& path);
 
+/// An ICQ shape model: the number q, then six grids of (q + 1)^2 vertices, the faces of a cube, which all face away
+/// from the middle. Errors carry line and column.
+Result<TriangleSoup> read_icq(const std::string& path);
+
 /// Adds the materials of an MTL file by name (docs/scene.md has the mapping). `warnings` gets what is left out.
 Status read_mtl(const std::string& path, std::map<std::string, MeshMaterial>& materials,
                 std::vector<std::string>& warnings);

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include "renderer/scene/iau_rotation.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -47,7 +49,8 @@ void check_one_shape(TableReader& table) {
     }
     if (!first)
         table.require("mesh",
-                      "mesh = \"FILE\" or sphere = {radius_m = ...} or ellipsoid = {semi_axes_m = [a, b, c]}");
+                      "mesh = \"FILE\" or sphere = {radius_m = ...} or ellipsoid = {semi_axes_m = [a, b, c]} or "
+                      "dem = \"FILE\"");
 }
 
 void read_shape(TableReader& table, Body& body, SceneReading& reading) {
@@ -55,7 +58,6 @@ void read_shape(TableReader& table, Body& body, SceneReading& reading) {
     const auto material = [&] { return own ? *own : add_grey_material(body.name, reading.scene); };
     const auto mesh = table.text("mesh");
     auto sphere = table.table("sphere"), ellipsoid = table.table("ellipsoid");
-    table.not_in_this_version("dem", "give a mesh");
     check_one_shape(table);
     if (!table.has("mesh")) table.refuse("scale", "belongs to a mesh; other shapes have their size in metres");
     if (mesh) {
@@ -64,6 +66,8 @@ void read_shape(TableReader& table, Body& body, SceneReading& reading) {
         body.shape = read_sphere(*sphere, material());
     } else if (ellipsoid) {
         body.shape = read_ellipsoid(*ellipsoid, material());
+    } else if (table.has("dem")) {
+        read_dem(table, material(), reading);
     }
 }
 
@@ -84,6 +88,21 @@ void read_can_id(TableReader& table, Body& body, const std::vector<Body>& others
                        fmt::format("0x{:03x} is taken by body \"{}\", expected one of its own", *id, other.name));
 }
 
+/// Attitude and rate of a planet, moon or asteroid at the scene's epoch.
+void read_rotation(TableReader& table, Motion& motion, const SceneReading& reading) {
+    const auto name = table.text("rotation");
+    if (!name) return;
+    for (const char* key : {"attitude_wxyz", "rate_rad_s"}) table.refuse(key, "follows from rotation");
+    if (!reading.has_epoch) table.fail("rotation", "expected an epoch in [scene], at which the body stands");
+    if (const auto turning = turning_of(*name, reading.scene.epoch_unix_ns)) {
+        motion.T_world_body.q = turning->q_icrs_body;
+        motion.rate_rad_s = turning->rate_rad_s;
+        return;
+    }
+    table.fail("rotation", fmt::format("\"{}\" is not known here, expected one of {}", *name,
+                                       fmt::join(kRotatingBodies, ", ")));
+}
+
 void read_motion(TableReader& table, Motion& motion) {
     motion.T_world_body.t = table.vec3("position_m").value_or(Vec3{});
     motion.T_world_body.q = table.attitude("attitude_wxyz").value_or(Quat{});
@@ -100,6 +119,7 @@ void read_bodies(TableReader& root, SceneReading& reading) {
         body.name = read_name(table, names);
         read_shape(table, body, reading);
         read_motion(table, body.initial);
+        read_rotation(table, body.initial, reading);
         read_can_id(table, body, reading.scene.bodies);
         table.finish();
         reading.scene.bodies.push_back(std::move(body));

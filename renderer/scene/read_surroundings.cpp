@@ -139,7 +139,7 @@ void read_render(TableReader& root, Scene& scene) {
 }  // namespace
 
 void read_surroundings(TableReader& root, SceneReading& reading) {
-    const bool has_epoch = read_scene_table(root, reading.scene);
+    const bool has_epoch = reading.has_epoch = read_scene_table(root, reading.scene);
     read_sun(root, reading.scene, has_epoch);
     read_ambient(root, reading.scene);
     read_stars(root, reading, has_epoch ? std::optional(julian_year(reading.scene.epoch_unix_ns)) : std::nullopt);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "renderer/scene/dem_process.h"
 #include "renderer/scene/scene.h"
 #include "renderer/scene/texture_file.h"
 #include "renderer/scene/toml_reader.h"
@@ -31,6 +32,14 @@ struct NamedTexture {
     toml::source_region place;
 };
 
+/// A DEM that a body names: read when all else has been found good, as its triangles depend on the sensors.
+struct NamedDem {
+    std::size_t body = 0;
+    DemRequest request{};
+    int material = 0;  ///< index into Scene::materials
+    toml::source_region place;
+};
+
 /// State while one scene file is read.
 struct SceneReading {
     Scene scene;
@@ -38,6 +47,8 @@ struct SceneReading {
     std::filesystem::path folder;  ///< of the scene file; paths in it start here
     std::vector<NamedMesh> meshes{};
     std::vector<NamedTexture> textures{};
+    std::vector<NamedDem> dems{};
+    bool has_epoch = false;  ///< in [scene]
 };
 
 /// [scene], [sun], [ambient], [render].
@@ -57,6 +68,10 @@ void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const 
 /// A [[lidar]]; paths start at `folder`.
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder);
+/// `dem` of a body, which has one, without opening it.
+void read_dem(TableReader& body, int material, SceneReading& reading);
+/// Opens every DEM that was named; cameras and LiDARs come first.
+void load_dems(SceneReading& reading);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);
 

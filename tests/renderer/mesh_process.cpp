@@ -65,7 +65,7 @@ TEST(MeshProcess, OtherFormatsAreNotGivenToAssimp) {
         return mesh ? "" : mesh.error().what;
     };
     EXPECT_EQ(text_of("m.blend"),
-              "not a mesh format that can be read, expected .obj, .tab, .gltf, .glb, .ply, .stl, .3ds or .dae");
+              "not a mesh format that can be read, expected .obj, .tab, .icq, .gltf, .glb, .ply, .stl, .3ds or .dae");
     EXPECT_EQ(text_of("m.glb"),
               "not a mesh that can be read: No suitable reader found for the file format of file \"" +
                   (folder / "m.glb") + "\".");

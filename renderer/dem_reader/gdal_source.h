@@ -1,0 +1,22 @@
+/// renderer/dem_reader/gdal_source.h - a DEM file, by GDAL.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/result.h"
+#include "renderer/scene/dem_process.h"
+
+namespace narpa {
+
+/// An open DEM and where it lies. `spacing_m`: between posts in the middle.
+struct OpenDem {
+    std::unique_ptr<HeightSource> heights;
+    Placement placement;
+    double spacing_m = 0;
+};
+
+/// GeoTIFF, PDS3, PDS4, ISIS3 cubes and PNG; the first band. Errors say what is wrong, without the file's name.
+Result<OpenDem> open_with_gdal(const DemRequest& request);
+
+}  // namespace narpa

@@ -1,0 +1,70 @@
+// narpa-dem-reader FILE REQUEST MEMORY_BYTES SECONDS - reads a DEM with GDAL, within limits of memory and time, and
+// writes the terrain to standard output as a DemMessage. narpa starts it for each DEM of a scene.
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+
+#include "renderer/dem_reader/gdal_source.h"
+#include "renderer/scene/confined_reader.h"
+#include "renderer/scene/dem_message.h"
+
+namespace {
+
+using namespace narpa;
+
+/// On a terminal, how far it is: a line that is rewritten, once a hundredth.
+class ProgressLine {
+public:
+    ProgressLine(int terminal, const std::string& path)
+        : terminal_(terminal), name_(std::filesystem::path(path).filename().string()) {}
+    void operator()(double part) {
+        const int percent = static_cast<int>(100 * part);
+        if (terminal_ < 0 || percent == told_) return;
+        told_ = percent;
+        dprintf(terminal_, percent < 100 ? "\r%s: %d %%\x1b[K" : "\r\x1b[K", name_.c_str(), percent);
+    }
+
+private:
+    int terminal_, told_ = -1;
+    std::string name_;
+};
+
+Result<TerrainMesh> read_terrain(const DemRequest& request, int terminal) {
+    auto dem = open_with_gdal(request);
+    if (!dem) return dem.error();
+    std::unique_ptr<HeightSource> detailed;
+    const int finer = request.detail.posts_per_post;
+    if (finer > 1) {
+        if (dem->heights->columns() > (1 << 20) / finer || dem->heights->rows() > (1 << 20) / finer)
+            return Error{"it has too many posts for its detail, expected at most 2^20 along a side with it"};
+        detailed = std::make_unique<DetailedSource>(*dem->heights, dem->spacing_m, request.detail);
+        dem->placement.posts_per_post = finer;
+    }
+    ProgressLine line(terminal, request.path);
+    return build_terrain(detailed ? *detailed : *dem->heights, dem->placement, request.options,
+                         [&](double part) { line(part); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    DemRequest request;
+    if (argc != 5 || !from_argument(argv[2], request)) {
+        std::fputs("narpa-dem-reader is started by narpa for each DEM: FILE REQUEST MEMORY_BYTES SECONDS\n",
+                   stderr);
+        return 2;
+    }
+    request.path = argv[1];
+    const int terminal = isatty(STDERR_FILENO) != 0 ? dup(STDERR_FILENO) : -1;
+    confine_reader(std::strtoull(argv[3], nullptr, 10), std::strtoull(argv[4], nullptr, 10));
+    DemMessage message;
+    if (auto terrain = read_terrain(request, terminal))
+        message.terrain = std::move(*terrain);
+    else
+        message.error = terrain.error().what;
+    PipeSender out;
+    _exit(mesh_message::transfer(out, message) ? 0 : 1);
+}

@@ -1,0 +1,145 @@
+#include "renderer/terrain/detail.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace narpa {
+namespace {
+
+/// A stream of even numbers for each cell of each step of diameters (S. Vigna's splitmix64).
+class CellRandom {
+public:
+    CellRandom(std::uint64_t seed, std::uint64_t stream, std::int64_t column, std::int64_t row)
+        : state_(
+              mixed(mixed(mixed(seed + 0x9e37'79b9'7f4a'7c15ull) ^ stream) ^ static_cast<std::uint64_t>(column)) ^
+              (static_cast<std::uint64_t>(row) * 0xd134'2543'de82'ef95ull)) {}
+    double uniform() {
+        state_ += 0x9e37'79b9'7f4a'7c15ull;
+        return static_cast<double>(mixed(state_) >> 11) * 0x1p-53;
+    }
+    int poisson(double mean) {
+        int n = 0;
+        for (double p = uniform(), limit = std::exp(-mean); p > limit && n < 64; p *= uniform()) ++n;
+        return n;
+    }
+
+private:
+    static std::uint64_t mixed(std::uint64_t z) {
+        z = (z ^ (z >> 30)) * 0xbf58'476d'1ce4'e5b9ull;
+        z = (z ^ (z >> 27)) * 0x94d0'49bb'1331'11ebull;
+        return z ^ (z >> 31);
+    }
+    std::uint64_t state_;
+};
+
+constexpr double kCraterReach = 2;  ///< of the rim, in radii: there it has fallen to zero
+
+/// Height over the ground at r radii from the middle of a crater of 1 m diameter: a bowl, and a rim that falls off.
+double crater_profile(double r) {
+    constexpr double kRim = 0.036, kDepth = 0.196;  // from the rim's crest
+    if (r < 1) return kRim - kDepth * (1 - r * r);
+    const double end = 1 / (kCraterReach * kCraterReach * kCraterReach);
+    return kRim * (1 / (r * r * r) - end) / (1 - end);
+}
+
+double rock_profile(double r) {
+    return r < 1 ? 0.5 * std::sqrt(1 - r * r) : 0;
+}
+
+/// Rocks above diameter d per square metre, d from `d` to `to`: the area in each step, over that of a rock.
+double rocks_between(double k, double d, double to) {
+    const double q = 1.79 + 0.152 / k;
+    constexpr int kSteps = 32;
+    double n = 0;
+    for (int i = 0; i < kSteps; ++i) {
+        const double a = d + (to - d) * i / kSteps, b = d + (to - d) * (i + 1) / kSteps, middle = 0.5 * (a + b);
+        n += k * (std::exp(-q * a) - std::exp(-q * b)) / (0.25 * std::numbers::pi * middle * middle);
+    }
+    return n;
+}
+
+}  // namespace
+
+DetailedSource::DetailedSource(HeightSource& coarse, double spacing_m, const TerrainDetail& detail)
+    : coarse_(coarse), spacing_m_(spacing_m / detail.posts_per_post), detail_(detail) {
+    constexpr double kStep = 1.189207115002721;  // 2^(1/4): within a step, numbers fall as D^-2
+    for (double high = 2 * spacing_m; high > 2.01 * spacing_m_; high /= kStep) {
+        const double low = std::max(high / kStep, 2 * spacing_m_);
+        if (detail.craters > 0)
+            sizes_.push_back({low, high, detail.craters * (1 / (low * low) - 1 / (high * high)), false});
+        if (detail.rocks > 0) sizes_.push_back({low, high, rocks_between(detail.rocks, low, high), true});
+    }
+}
+
+int DetailedSource::columns() const {
+    return (coarse_.columns() - 1) * detail_.posts_per_post + 1;
+}
+int DetailedSource::rows() const {
+    return (coarse_.rows() - 1) * detail_.posts_per_post + 1;
+}
+
+bool DetailedSource::read_rows(int row, int count, double* heights) {
+    const int n = detail_.posts_per_post, width = columns(), coarse_width = coarse_.columns();
+    const int first = row / n, last = std::min((row + count - 1) / n + 1, coarse_.rows() - 1);
+    coarse_rows_.resize(static_cast<std::size_t>(last - first + 1) * static_cast<std::size_t>(coarse_width));
+    if (!coarse_.read_rows(first, last - first + 1, coarse_rows_.data())) return false;
+    const auto post = [&](int c, int r) {
+        return coarse_rows_[static_cast<std::size_t>(r - first) * static_cast<std::size_t>(coarse_width) +
+                            static_cast<std::size_t>(c)];
+    };
+    for (int i = 0; i < count; ++i) {
+        const int r = (row + i) / n, r1 = std::min(r + 1, last);
+        const double v = static_cast<double>((row + i) % n) / n;
+        for (int k = 0; k < width; ++k) {
+            const int c = k / n, c1 = std::min(c + 1, coarse_width - 1);
+            const double u = static_cast<double>(k % n) / n;
+            const double nw = post(c, r), se = post(c1, r1);
+            const bool at_post = k % n == 0 && (row + i) % n == 0;
+            heights[static_cast<std::size_t>(i) * static_cast<std::size_t>(width) + static_cast<std::size_t>(k)] =
+                at_post  ? nw
+                : u >= v ? nw + u * (post(c1, r) - nw) + v * (se - post(c1, r))
+                         : nw + v * (post(c, r1) - nw) + u * (se - post(c, r1));
+        }
+    }
+    for (std::size_t i = 0; i < sizes_.size(); ++i) add_features(sizes_[i], i, row, count, heights);
+    return true;
+}
+
+/// Each step of diameters has cells of eight times its diameter, and in each a number of features at random.
+void DetailedSource::add_features(const Sizes& sizes, std::uint64_t stream, int row, int count,
+                                  double* heights) const {
+    const double cell_m = 8 * sizes.high_m, reach_m = (sizes.rocks ? 0.5 : 0.5 * kCraterReach) * sizes.high_m;
+    const int width = columns();
+    const auto cell_of = [&](double m) { return static_cast<std::int64_t>(std::floor(m / cell_m)); };
+    const std::int64_t last_column = cell_of(width * spacing_m_ + reach_m),
+                       last_row = cell_of((row + count) * spacing_m_ + reach_m);
+    for (std::int64_t j = cell_of(row * spacing_m_ - reach_m); j <= last_row; ++j)
+        for (std::int64_t i = cell_of(-reach_m); i <= last_column; ++i) {
+            CellRandom random(detail_.seed, stream, i, j);
+            for (int left = random.poisson(sizes.per_m2 * cell_m * cell_m); left > 0; --left) {
+                const double x = (static_cast<double>(i) + random.uniform()) * cell_m,
+                             y = (static_cast<double>(j) + random.uniform()) * cell_m, u = random.uniform(),
+                             freshness = sizes.rocks ? 1 : random.uniform();
+                // Numbers above D as D^-2.
+                const double a = 1 / (sizes.low_m * sizes.low_m), b = 1 / (sizes.high_m * sizes.high_m);
+                const double diameter = 1 / std::sqrt(a + u * (b - a)), radius = 0.5 * diameter;
+                const double reach = sizes.rocks ? radius : kCraterReach * radius;
+                const int top = std::max(row, static_cast<int>(std::ceil((y - reach) / spacing_m_))),
+                          bottom =
+                              std::min(row + count - 1, static_cast<int>(std::floor((y + reach) / spacing_m_))),
+                          from = std::max(0, static_cast<int>(std::ceil((x - reach) / spacing_m_))),
+                          to = std::min(width - 1, static_cast<int>(std::floor((x + reach) / spacing_m_)));
+                for (int r = top; r <= bottom; ++r)
+                    for (int c = from; c <= to; ++c) {
+                        const double off = std::hypot(c * spacing_m_ - x, r * spacing_m_ - y) / radius;
+                        if (off < reach / radius)
+                            heights[static_cast<std::size_t>(r - row) * static_cast<std::size_t>(width) +
+                                    static_cast<std::size_t>(c)] +=
+                                diameter * freshness * (sizes.rocks ? rock_profile(off) : crater_profile(off));
+                    }
+            }
+        }
+}
+
+}  // namespace narpa

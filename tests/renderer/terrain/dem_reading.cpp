@@ -1,0 +1,219 @@
+// DEM files, each format the same 40 x 30 posts: heights, places, holes; scenes with a dem; damaged files.
+#include "renderer/scene/dem_process.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "base/program_beside.h"
+#include "renderer/geometry/tracer.h"
+#include "renderer/scene/scene_file.h"
+#include "tests/renderer/scene_support.h"
+#include "tests/support/shapes.h"
+
+namespace narpa {
+namespace {
+
+using test::TemporaryFolder;
+
+std::string dem_file(const std::string& name) {
+    return NARPA_SOURCE_DIR "/tests/data/dem/" + name;
+}
+
+/// The heights of tests/data/dem.
+double height(int c, int r) {
+    return std::round(4 * (10 * std::sin(c / 5.0) + 6 * std::cos(r / 4.0) + 0.3 * c)) / 4;
+}
+
+#define NEEDS_GDAL()                                                     \
+    if (!std::filesystem::exists(program_folder() / "narpa-dem-reader")) \
+    GTEST_SKIP() << "built without GDAL (NARPA_WITH_GDAL)"
+
+DemRequest request_of(const std::string& path) {
+    DemRequest r;
+    r.path = path;
+    r.options.error_px = 1e-3;
+    r.options.seen_from = {{0, 0, 0}};
+    return r;
+}
+
+struct Format {
+    const char* name;
+    const char* file;
+};
+void PrintTo(const Format& f, std::ostream* out) {
+    *out << f.name;
+}
+class DemFormats : public testing::TestWithParam<Format> {};
+
+TEST_P(DemFormats, GiveEveryPostItsHeightAndPlace) {
+    NEEDS_GDAL();
+    DemRequest r = request_of(dem_file(GetParam().file));
+    if (r.path.ends_with(".png")) r.post_spacing_m = 10, r.scale = 0.25, r.offset_m = -100;
+    const auto t = read_dem_in_process(r);
+    ASSERT_TRUE(t) << t.error().text();
+    EXPECT_EQ(t->positions.size(), 40u * 30);
+    for (const Vec3f& p : t->positions) {
+        const Vec3 at = t->origin_m + vec_cast<double>(p);
+        const int c = static_cast<int>(std::lround(at.x / 10 + 19.5)),
+                  row = static_cast<int>(std::lround(14.5 - at.y / 10));
+        EXPECT_NEAR(at.x, 10 * (c - 19.5), 1e-4);
+        EXPECT_NEAR(at.y, 10 * (14.5 - row), 1e-4);
+        EXPECT_EQ(at.z, height(c, row));
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DemFormats,
+                         testing::Values(Format{"GeoTiff", "mars.tif"}, Format{"GeoTiffInTiles", "tiled.tif"},
+                                         Format{"GeoTiffScaled", "i16.tif"}, Format{"Isis", "cube.cub"},
+                                         Format{"Pds3", "pds3.lbl"}, Format{"Pds4", "pds4.xml"},
+                                         Format{"Png", "heights.png"}),
+                         [](const auto& f) { return f.param.name; });
+
+TEST(Dem, NoDataIsAHole) {
+    NEEDS_GDAL();
+    const auto t = read_dem_in_process(request_of(dem_file("holes.tif")));
+    ASSERT_TRUE(t) << t.error().text();
+    EXPECT_EQ(t->faces.size(), 2u * (39 * 29 - 5 * 4) + 2);
+    DemRequest other = request_of(dem_file("mars.tif"));
+    other.no_data = height(0, 0);
+    EXPECT_LT(read_dem_in_process(other)->faces.size(), 2u * 39 * 29);
+}
+
+TEST(Dem, StandsOnTheEllipsoidOfItsMap) {
+    NEEDS_GDAL();
+    DemRequest r = request_of(dem_file("mars.tif"));
+    r.on = DemRequest::On::ellipsoid;
+    constexpr double kRadius = 3396190;
+    r.options.seen_from = {{kRadius, 1200, 2150}};
+    const auto t = read_dem_in_process(r);
+    ASSERT_TRUE(t) << t.error().text();
+    for (const Vec3f& p : t->positions) {
+        const Vec3 at = t->origin_m + vec_cast<double>(p);
+        // Equidistant cylindrical about (0, 0): metres are radians of longitude and latitude times the radius.
+        const double x = std::atan2(at.y, at.x) * kRadius, y = std::asin(at.z / norm(at)) * kRadius;
+        const int c = static_cast<int>(std::lround((x - 1005) / 10)),
+                  row = static_cast<int>(std::lround((2295 - y) / 10));
+        EXPECT_NEAR(x, 1005 + 10 * c, 1e-4);
+        EXPECT_NEAR(y, 2295 - 10 * row, 1e-4);
+        EXPECT_NEAR(norm(at) - kRadius, height(c, row), 1e-4);
+    }
+    r.on = DemRequest::On::tangent;
+    r.options.seen_from = {{0, 0, 0}};
+    const auto tangent = read_dem_in_process(r);
+    ASSERT_TRUE(tangent) << tangent.error().text();
+    ASSERT_EQ(tangent->positions.size(), 40u * 30);
+    for (const Vec3f& p : tangent->positions) {
+        const Vec3 at = tangent->origin_m + vec_cast<double>(p);
+        EXPECT_NEAR(norm(at + Vec3{0, 0, kRadius}) - kRadius,
+                    height(static_cast<int>(std::lround(at.x / 10 + 19.5)),
+                           static_cast<int>(std::lround(14.5 - at.y / 10))),
+                    1e-4);
+    }
+}
+
+TEST(Dem, AWholePlanetFromAMapOfIt) {
+    NEEDS_GDAL();
+    const std::string path = NARPA_SOURCE_DIR "/../shared/assets/dem/moon_lola/LDEM_4.LBL";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "needs ../shared/assets/dem/moon_lola";
+    DemRequest r = request_of(path);
+    r.on = DemRequest::On::ellipsoid;
+    r.radii = true;
+    r.options.error_px = 0.5;
+    r.options.seen_from = {{1e7, 0, 0}};
+    const auto t = read_dem_in_process(r);
+    ASSERT_TRUE(t) << t.error().text();
+    EXPECT_NEAR(t->summary.lowest_m, -0.5 * 17757, 0.5);
+    EXPECT_NEAR(t->summary.highest_m, 0.5 * 21008, 0.5);
+}
+
+TEST(Dem, ARayMeetsTheTriangleBetweenThePosts) {
+    NEEDS_GDAL();
+    const TemporaryFolder folder;
+    const auto scene = read_scene(
+        folder.write("s.toml", "[sun]\ndirection = [1, 1, 1]\n[[body]]\nname = \"mars\"\ndem = {file = \"" +
+                                   dem_file("mars.tif") +
+                                   R"(", error_px = 0.001}
+position_m = [3e8, 0, 0]
+[[camera]]
+name = "nav"
+position_m = [3e8, 0, 1000]
+look_at = [3e8, 0, 0]
+up = [0, 1, 0]
+resolution = [64, 48]
+fov_horizontal_deg = 20
+)"));
+    ASSERT_TRUE(scene) << scene.error().text();
+    const auto tracer = Tracer::create(*scene, 1);
+    ASSERT_TRUE(tracer) << tracer.error().text();
+    const BodyPoses at = test::placed(*scene);
+    std::mt19937_64 random(4);
+    std::uniform_real_distribution<double> u(0, 1);
+    for (int k = 0; k < 2000; ++k) {
+        const double c = 39 * u(random), r = 29 * u(random);
+        const Ray down{{3e8 + 10 * (c - 19.5), 10 * (14.5 - r), 1000}, {0, 0, -1}};
+        const Hit hit = tracer->intersect(at, down, 1e9);
+        ASSERT_EQ(hit.body, 0);
+        const int i = static_cast<int>(c), j = static_cast<int>(r);
+        const double f = c - i, g = r - j, nw = height(i, j), ne = height(i + 1, j), se = height(i + 1, j + 1),
+                     sw = height(i, j + 1);
+        const double h = f >= g ? nw + f * (ne - nw) + g * (se - ne) : nw + g * (sw - nw) + f * (se - sw);
+        EXPECT_NEAR(1000 - hit.range_m, h,
+                    5e-5);  // of the ray's origin at 3e8 m: 6e-8 m times the slope, and float
+    }
+}
+
+TEST(Dem, ErrorsSayWhatToDo) {
+    NEEDS_GDAL();
+    const auto error_of = [](const DemRequest& r) {
+        const auto t = read_dem_in_process(r);
+        EXPECT_FALSE(t);
+        return t ? "" : t.error().text();
+    };
+    EXPECT_EQ(error_of(request_of(dem_file("heights.png"))),
+              dem_file("heights.png") + ": it has no geo-reference, expected post_spacing_m");
+    DemRequest png = request_of(dem_file("heights.png"));
+    png.post_spacing_m = 1, png.on = DemRequest::On::tangent;
+    EXPECT_NE(error_of(png).find("it names no ellipsoid"), std::string::npos);
+    EXPECT_NE(
+        error_of(request_of(NARPA_SOURCE_DIR "/README.md")).find("not a DEM that can be read, expected GeoTIFF"),
+        std::string::npos);
+    DemRequest small = request_of(dem_file("mars.tif"));
+    small.options.budget_bytes = 100;
+    EXPECT_NE(error_of(small).find("expected a larger budget_mib"), std::string::npos);
+    DemRequest plain = request_of(dem_file("mars.tif"));
+    plain.options.budget_bytes = 1 << 20;
+    const auto limited = read_dem_in_process(plain, {.memory_bytes = 1 << 20});
+    if (!NARPA_SANITIZED) {
+        ASSERT_FALSE(limited);
+        EXPECT_NE(limited.error().what.find("the DEM reader"), std::string::npos);
+    }
+}
+
+TEST(Dem, ATruncatedFileIsAnError) {
+    NEEDS_GDAL();
+    const TemporaryFolder folder;
+    const std::string whole = test::read_text(dem_file("mars.tif"));
+    for (const std::size_t size : {8u, 100u, 400u, 700u, 3000u}) {
+        const auto t =
+            read_dem_in_process(request_of(folder.write("t.tif", std::string_view(whole).substr(0, size))));
+        EXPECT_FALSE(t) << size;
+    }
+}
+
+TEST(DemRequest, CrossesTheCommandLine) {
+    DemRequest r = request_of("x"), back;
+    r.on = DemRequest::On::tangent, r.radii = true, r.scale = 0.1, r.polar_m = 1.0 / 3;
+    r.detail = {8, 0.079, 0.1, 123456789};
+    r.options = {
+        .error_px = 0.3, .pixels_per_rad = 812.5, .seen_from = {{1, 2, 3}, {1e-9, -1e9, 0.1}}, .budget_bytes = 77};
+    ASSERT_TRUE(from_argument(to_argument(r), back));
+    EXPECT_EQ(to_argument(back), to_argument(r));
+    EXPECT_EQ(back.options.seen_from, r.options.seen_from);
+    EXPECT_FALSE(from_argument("1 2 3", back));
+    EXPECT_FALSE(from_argument("", back));
+}
+
+}  // namespace
+}  // namespace narpa

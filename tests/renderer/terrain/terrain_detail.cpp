@@ -1,0 +1,78 @@
+// Craters and rocks between the posts: as many as published, the same in every run, and none that nobody named.
+#include "renderer/terrain/detail.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/height_grid.h"
+
+namespace narpa {
+namespace {
+
+using test::HeightGrid, test::rough_ground;
+
+std::vector<double> all_of(HeightSource& source) {
+    std::vector<double> h(static_cast<std::size_t>(source.columns()) * static_cast<std::size_t>(source.rows()));
+    EXPECT_TRUE(source.read_rows(0, source.rows(), h.data()));
+    return h;
+}
+
+TEST(TerrainDetail, WithoutFeaturesItIsTheTrianglesOfTheDem) {
+    HeightGrid grid(20, 17, rough_ground);
+    DetailedSource fine(grid, 1, {.posts_per_post = 4});
+    EXPECT_EQ(fine.columns(), 19 * 4 + 1);
+    EXPECT_EQ(fine.rows(), 16 * 4 + 1);
+    const std::vector<double> h = all_of(fine);
+    for (int r = 0; r < fine.rows(); ++r)
+        for (int c = 0; c < fine.columns(); ++c) {
+            const double u = c % 4 / 4.0, v = r % 4 / 4.0;
+            const auto at = [&](int dc, int dr) {
+                return grid.at(std::min(c / 4 + dc, 19), std::min(r / 4 + dr, 16));
+            };
+            const double expected = u >= v ? at(0, 0) + u * (at(1, 0) - at(0, 0)) + v * (at(1, 1) - at(1, 0))
+                                           : at(0, 0) + v * (at(0, 1) - at(0, 0)) + u * (at(1, 1) - at(0, 1));
+            EXPECT_NEAR(h[static_cast<std::size_t>(r * fine.columns() + c)], expected, 1e-12);
+        }
+}
+
+TEST(TerrainDetail, WindowsAreTheSameHoweverTheyAreRead) {
+    HeightGrid grid(40, 40, rough_ground);
+    DetailedSource fine(grid, 1, {.posts_per_post = 8, .craters = 0.079, .rocks = 0.1, .seed = 7});
+    const std::vector<double> h = all_of(fine);
+    std::vector<double> rows(static_cast<std::size_t>(3 * fine.columns()));
+    for (int r = 0; r + 3 <= fine.rows(); r += 3) {
+        ASSERT_TRUE(fine.read_rows(r, 3, rows.data()));
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            ASSERT_EQ(rows[i], h[static_cast<std::size_t>(r * fine.columns()) + i]);
+    }
+    DetailedSource other(grid, 1, {.posts_per_post = 8, .craters = 0.079, .rocks = 0.1, .seed = 8});
+    EXPECT_NE(all_of(other), h);
+}
+
+TEST(TerrainDetail, RocksCoverThePublishedShare) {
+    HeightGrid flat(201, 201, [](int, int) { return 0.0; });
+    constexpr double kShare = 0.15;
+    DetailedSource fine(flat, 1, {.posts_per_post = 8, .rocks = kShare, .seed = 3});
+    const std::vector<double> h = all_of(fine);
+    const double covered = static_cast<double>(std::count_if(h.begin(), h.end(), [](double x) { return x > 0; })) /
+                           static_cast<double>(h.size());
+    // Golombek and Rapp: those of 0.25 to 2 m, less what lies below others.
+    const double q = 1.79 + 0.152 / kShare, sum = kShare * (std::exp(-q * 0.25) - std::exp(-q * 2));
+    EXPECT_NEAR(covered, 1 - std::exp(-sum), 0.06 * sum);
+}
+
+TEST(TerrainDetail, CratersAreAsDeepAndAsManyAsPublished) {
+    HeightGrid flat(301, 301, [](int, int) { return 0.0; });
+    constexpr double kMany = 0.005;  // few overlap
+    DetailedSource fine(flat, 1, {.posts_per_post = 8, .craters = kMany, .seed = 5});
+    const std::vector<double> h = all_of(fine);
+    double deepest = 0, below = 0;
+    for (const double x : h) deepest = std::min(deepest, x), below += x < 0;
+    EXPECT_GT(deepest, -2 * (0.196 - 0.036) * 2);
+    EXPECT_LT(deepest, -2 * (0.196 - 0.036) * 0.8);
+    // The bowl is below the ground within sqrt(1 - 0.036 / 0.196) radii; dN = 2 k D^-3 dD of area pi / 4 D^2 each.
+    const double share = (1 - 0.036 / 0.196) * 0.25 * 3.14159265 * 2 * kMany * std::log(2 / 0.25);
+    EXPECT_NEAR(below / static_cast<double>(h.size()), share, 0.1 * share);
+}
+
+}  // namespace
+}  // namespace narpa

@@ -31,6 +31,11 @@ struct NamedTexture {
     toml::source_region place;
 };
 
+/// Where an [observer] stands, and the axes of the horizon there; world.
+struct Viewpoint {
+    Vec3 position_m, zenith, north, east;
+};
+
 /// State while one scene file is read.
 struct SceneReading {
     Scene scene;
@@ -38,6 +43,7 @@ struct SceneReading {
     std::filesystem::path folder;  ///< of the scene file; paths in it start here
     std::vector<NamedMesh> meshes{};
     std::vector<NamedTexture> textures{};
+    std::optional<Viewpoint> observer{};
 };
 
 /// [scene], [sun], [ambient], [render].
@@ -57,6 +63,14 @@ void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const 
 /// A [[lidar]]; paths start at `folder`.
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder);
+/// `orbit` of a body, which gives its position and velocity.
+void read_orbit(TableReader& body, Motion& motion);
+/// [observer]: puts the bodies and the Sun where they are seen; bodies and surroundings come first.
+void read_observer(TableReader& root, SceneReading& reading);
+/// `track` or `azimuth_elevation_deg` of a camera, which put it at the observer.
+void read_tracking(TableReader& camera, const SceneReading& reading, Rigid3& T_world_camera);
+/// [atmosphere] and [sky]; bodies and surroundings come first.
+void read_atmosphere(TableReader& root, SceneReading& reading);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);
 

@@ -78,7 +78,7 @@ inline void harmonics(float z, float x, std::size_t most, Harmonics& out) noexce
 
 /// What the tables are interpolated from.
 struct Tables {
-    const float *sun_columns, *moments;
+    const float *sun_columns, *moments, *brightness;  ///< brightness: its logarithm and its inverse
     std::size_t column_heights, column_angles, heights, suns, lanes;
     float ground_m, top_m, horizon_m;  ///< radii, and the distance from the horizon to the top
     float sun_radius;
@@ -132,13 +132,23 @@ struct Corners {
     const float* at[4];
     float weight[4];
 };
+/// In twilight the light falls by orders of magnitude from one elevation of the Sun to the next: its brightness is
+/// interpolated geometrically, and what is relative to it linearly.
 inline Corners corners(const Tables& t, float horizon_m, float sun_cosine) {
     const auto [i, fi] = cell(horizon_m / t.horizon_m, t.heights);
     const auto [j, fj] = cell(sun_coordinate(sun_cosine), t.suns);
-    const std::size_t size = kHarmonics * t.lanes;
-    const float* const low = t.moments + size * (i * t.suns + j);
-    const float* const high = low + size * t.suns;
-    return {{low, low + size, high, high + size}, {(1 - fi) * (1 - fj), (1 - fi) * fj, fi * (1 - fj), fi * fj}};
+    const std::size_t size = kHarmonics * t.lanes, low = i * t.suns + j, high = low + t.suns;
+    Corners c{{t.moments + size * low, t.moments + size * (low + 1), t.moments + size * high,
+               t.moments + size * (high + 1)},
+              {(1 - fi) * (1 - fj), (1 - fi) * fj, fi * (1 - fj), fi * fj}};
+    const float* const b[4]{t.brightness + 2 * low, t.brightness + 2 * low + 2, t.brightness + 2 * high,
+                            t.brightness + 2 * high + 2};
+    float mean = 0;
+    for (std::size_t k = 0; k < 4; ++k) mean += c.weight[k] * b[k][0];
+    constexpr float kShift = 8, kExpShift = 2980.958f;
+    const float level = kExpShift * exp_of_negative(mean - kShift);
+    for (std::size_t k = 0; k < 4; ++k) c.weight[k] *= level * b[k][1];
+    return c;
 }
 
 }  // namespace
@@ -267,11 +277,12 @@ NARPA_EACH_ISA void add_again(const Tables& t, const Air& air, const AirPanel& p
 }
 
 Tables tables_of(const Air& air, const std::vector<float>& sun_columns, const std::vector<float>& moments,
-                 std::size_t column_heights, std::size_t column_angles, std::size_t heights, std::size_t suns,
-                 double sun_radius_rad) {
+                 const std::vector<float>& brightness, std::size_t column_heights, std::size_t column_angles,
+                 std::size_t heights, std::size_t suns, double sun_radius_rad) {
     const double top = air.top_radius_m(), ground = air.ground_radius_m();
     return {sun_columns.data(),
             moments.data(),
+            brightness.data(),
             column_heights,
             column_angles,
             heights,
@@ -289,8 +300,9 @@ double to_horizon(const Air& air, double height_m) {
 
 }  // namespace
 
-#define NARPA_AIR_TABLES \
-    tables_of(air_, sun_columns_, moments_, column_heights_, column_angles_, heights_, suns_, sun_radius_rad_)
+#define NARPA_AIR_TABLES                                                                                   \
+    tables_of(air_, sun_columns_, moments_, brightness_, column_heights_, column_angles_, heights_, suns_, \
+              sun_radius_rad_)
 
 ScatteredLight::ScatteredLight(const Air& air, const AirResolution& resolution, double sun_radius_rad, int threads)
     : air_(air),
@@ -350,6 +362,7 @@ void ScatteredLight::solve(const AirResolution& resolution, int threads) {
         tbb::parallel_for(std::size_t{0}, heights_,
                           [&](std::size_t i) { gather(i, resolution, true, moments_once_, ground_once_); });
         moments_ = moments_once_;
+        measure();
         ground_ = ground_once_;
         for (orders_ = 1; orders_ < resolution.most_orders;) {
             ++orders_;
@@ -371,8 +384,22 @@ double ScatteredLight::iterate(const AirResolution& resolution) {
         most = std::max(most, static_cast<double>(std::abs(moments[i])));
     }
     moments_ = std::move(moments);
+    measure();
     ground_ = std::move(ground);
     return most > 0 ? change / most : 0;
+}
+
+void ScatteredLight::measure() {
+    constexpr float kDark = 1e-25f;
+    const std::size_t size = kHarmonics * air_.lanes();
+    brightness_.resize(2 * heights_ * suns_);
+    for (std::size_t i = 0; i < heights_ * suns_; ++i) {
+        float sum = 0;
+        for (std::size_t l = 0; l < air_.lanes(); ++l) sum += moments_[size * i + l];
+        sum = std::max(sum, kDark);
+        brightness_[2 * i] = std::log(sum);
+        brightness_[2 * i + 1] = 1 / sum;
+    }
 }
 
 /// Adds to the moments at one height: `once` sunlight scattered or reflected once, else what becomes of known

@@ -22,7 +22,7 @@ namespace narpa {
 struct AirResolution {
     int steps = 12;               ///< quadrature nodes of a panel of a ray: PanelRule
     int heights = 16, suns = 32;  ///< of the table of scattered light
-    int directions = 6;           ///< above and below the horizon each, times 8 azimuths
+    int directions = 10;          ///< above and below the horizon each, times 8 azimuths
     int column_heights = 64, column_angles = 256;
     int most_orders = 40;
 };
@@ -71,6 +71,7 @@ public:
 private:
     void make_columns();
     void solve(const AirResolution& resolution, int threads);
+    void measure();
     double iterate(const AirResolution& resolution);
     void gather(std::size_t height, const AirResolution& resolution, bool once, std::vector<float>& moments,
                 std::vector<float>& ground) const;
@@ -83,6 +84,7 @@ private:
     std::size_t column_heights_, column_angles_, heights_, suns_;
     std::vector<float> sun_columns_;  ///< [height][angle][gas, aerosol, ozone, 0]
     std::vector<float> moments_;      ///< [height][sun][harmonic][lane]
+    std::vector<float> brightness_;   ///< [height][sun]: logarithm of the mean radiance's sum over lanes, inverse
     std::vector<float> ground_;       ///< [sun][lane]: irradiance
     std::vector<float> moments_once_,
         ground_once_;  ///< of light scattered once or reflected once, while it is solved

@@ -163,8 +163,15 @@ void Wavefront::shade(std::size_t i) {
             path.direction_pdf == kInfinity ? 0 : lights_.pdf(at_, path.start, group_, directions_[i], hit);
         add(path, surface.emission * static_cast<float>(power_heuristic(path.direction_pdf, light_pdf)));
     }
-    if (settings_.direct) add(path, background_.ambient() * ambient_reflectance(surface));
+    if (settings_.direct) add(path, ambient(i) * ambient_reflectance(surface));
     if (receivers_) path.start = receiver_at(at_, hit, vertices_[i].plane());
+}
+
+/// Method "direct": the even light at a vertex.
+Rgb Wavefront::ambient(std::size_t i) const {
+    if (medium_ == nullptr) return background_.ambient();
+    const Hit& hit = hits_[i];
+    return background_.ambient() + medium_->ambient(at_, hit.position, vertices_[i].surface().normal, hit.time);
 }
 
 /// Chooses the next rays, and ends paths that would bring little, or nothing.

@@ -61,6 +61,7 @@ private:
     void arrive(int vertex);
     void add_segment(std::size_t i, int vertex);
     void shade(std::size_t i);
+    [[nodiscard]] Rgb ambient(std::size_t i) const;
     [[nodiscard]] Rgb escaped(const Path& path, const Vec3& direction, int vertex) const;
 
     // Connect: wavefront_connect.cpp.

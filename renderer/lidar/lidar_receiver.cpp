@@ -91,7 +91,8 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
                                 .multipath = model_.multipath,
                                 .sunlight = sunlight_ ? ~0u : 0u,
                                 .motions = motions,
-                                .mount = mount_};
+                                .mount = mount_,
+                                .medium = medium_};
     Draws draws(*this, first);
     const std::size_t sub_rays = cone_.size();
     trace(tracer, at, beams, settings, draws);

@@ -31,6 +31,9 @@ public:
     /// `seed`: the scene's; `index`: of the LiDAR, so that they differ. Allocates here and never again.
     LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
+    /// Dims what comes back; null, as at first: a vacuum. It must outlive this.
+    void set_medium(const Medium* medium) noexcept { medium_ = medium; }
+
     /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
     /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Writes beams.n echoes: range with bias
     /// and noise, before a packet's rounding; the reflectivity that the light stands for at that range, which is
@@ -61,6 +64,7 @@ private:
     PhiloxSchedule schedule_;
     std::uint32_t stream_;
     BeamCone cone_;
+    const Medium* medium_ = nullptr;
     std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
 };
 

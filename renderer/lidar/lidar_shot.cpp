@@ -58,6 +58,13 @@ LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const Hit& hit,
     return r;
 }
 
+/// By the air on the piece of the path that ends in the hit, there and back.
+void dim(Path& path, const BodyPoses& at, const Vec3& from, const Hit& hit, const Medium& medium) {
+    const double passes =
+        medium.lidar_transmittance(at, {from, path.direction, hit.time}, norm(hit.position - from));
+    path.throughput *= passes * passes;
+}
+
 /// Takes the hit as the end of a piece of the path.
 void advance(Path& path, const BodyPoses& at, const Hit& hit, const ShotSettings& settings) {
     // From a mirror on: rays leave it a little above, so that it does not meet itself.
@@ -90,6 +97,8 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
             if (!is_set(going & hits.met, i)) continue;
             const Hit hit = hits[i];
             Path& path = paths[i];
+            if (settings.medium != nullptr)
+                dim(path, at, mirrors == 0 ? beams.origin[i] : path.start, hit, *settings.medium);
             advance(path, at, hit, settings);
             if (!(path.range_m < settings.range_max_m)) continue;
             const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "renderer/geometry/tracer.h"
+#include "renderer/light/medium.h"
 
 namespace narpa {
 
@@ -25,7 +26,8 @@ struct ShotSettings {
     std::uint32_t sunlight = 0;  ///< a bit for each shot of the batch whose sunlight is wanted
     /// Of all bodies, for velocities; empty: they are not wanted.
     std::span<const Motion> motions{};
-    int mount = -1;  ///< body that the LiDAR rides on; -1: it is at rest
+    int mount = -1;                  ///< body that the LiDAR rides on; -1: it is at rest
+    const Medium* medium = nullptr;  ///< dims the light on its way there and back; null: a vacuum
 };
 
 /// A batch of shots, each at its own time. Writes the first beams.n returns.

@@ -27,6 +27,17 @@ public:
                                               double u) const noexcept = 0;
     /// For shadow rays.
     [[nodiscard]] virtual Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept = 0;
+    /// Method "direct": radiance of an even light that a surface at this place reflects, beside
+    /// Background::ambient: what the medium scatters onto it.
+    [[nodiscard]] virtual Rgb ambient(const BodyPoses& /*at*/, const Vec3& /*position*/, const Vec3& /*normal*/,
+                                      double /*time*/) const noexcept {
+        return {};
+    }
+    /// One way, of a LiDAR's beam.
+    [[nodiscard]] virtual double lidar_transmittance(const BodyPoses& at, const Ray& ray,
+                                                     double range_m) const noexcept {
+        return static_cast<double>(mean_band(transmittance(at, ray, range_m)));
+    }
 };
 
 }  // namespace narpa

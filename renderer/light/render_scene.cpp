@@ -1,5 +1,8 @@
 #include "renderer/light/render_scene.h"
 
+#include "renderer/light/analytic_sky.h"
+#include "renderer/light/atmosphere.h"
+
 namespace narpa {
 namespace {
 
@@ -23,6 +26,11 @@ Result<RenderScene> RenderScene::create(const Scene& scene, int threads,
     if (!tracer) return tracer.error();
     for (const Light& l : scene.lights)
         if (const Status good = check_light(scene, l); !good) return good.error();
+    if (scene.sky && scene.sun && background == nullptr && medium == nullptr) {
+        background = std::make_unique<AnalyticSkyBackground>(scene);
+        medium = std::make_unique<SunThroughAir>(scene);
+    }
+    if (scene.atmosphere && medium == nullptr) medium = std::make_unique<AtmosphereMedium>(scene, threads);
     if (background == nullptr) background = std::make_unique<UniformBackground>(scene.ambient);
     return RenderScene(*std::move(tracer), std::move(background), std::move(medium));
 }

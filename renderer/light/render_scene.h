@@ -17,8 +17,8 @@ namespace narpa {
 class RenderScene {
 public:
     /// `scene` must outlive it. `threads` bounds the threads that build; 0 is all. `shapes` as in Tracer::create.
-    /// `background` null: the scene's ambient radiance; `medium` null: a vacuum. Errors: of Tracer::create; a light
-    /// that rides on a body that is not there or has no size.
+    /// `background` null: the scene's sky, or its ambient radiance; `medium` null: its atmosphere, or a vacuum.
+    /// Errors: of Tracer::create; a light that rides on a body that is not there or has no size.
     static Result<RenderScene> create(const Scene& scene, int threads = 0,
                                       const std::vector<std::shared_ptr<const Shape>>& shapes = {},
                                       std::unique_ptr<const Background> background = nullptr,

@@ -108,6 +108,7 @@ void read_motion(TableReader& table, Motion& motion) {
     motion.T_world_body.q = table.attitude("attitude_wxyz").value_or(Quat{});
     motion.velocity_m_s = table.vec3("velocity_m_s").value_or(Vec3{});
     motion.rate_rad_s = table.vec3("rate_rad_s").value_or(Vec3{});
+    read_orbit(table, motion);
 }
 
 }  // namespace

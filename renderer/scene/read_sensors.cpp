@@ -169,13 +169,15 @@ void refuse_tables_of_camera(TableReader& root) {
         root.refuse(key, fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key));
 }
 
-Camera read_camera(TableReader& table, std::vector<std::string>& names, const Scene& scene,
-                   const std::filesystem::path& folder) {
+Camera read_camera(TableReader& table, std::vector<std::string>& names, const SceneReading& reading) {
+    const Scene& scene = reading.scene;
+    const std::filesystem::path& folder = reading.folder;
     Camera camera;
     camera.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, camera_attitude);
     camera.mount = mounting.mount;
     camera.T_mount_camera = mounting.T_mount_thing;
+    read_tracking(table, reading, camera.T_mount_camera);
     read_projection(table, camera, folder);
     camera.period_ns = read_period_ns(table, camera.period_ns);
     if (scene.render.budget_ns > camera.period_ns)
@@ -204,8 +206,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
 void read_sensors(TableReader& root, SceneReading& reading) {
     Scene& scene = reading.scene;
     std::vector<std::string> cameras, lidars;
-    for (TableReader& table : root.tables("camera"))
-        scene.cameras.push_back(read_camera(table, cameras, scene, reading.folder));
+    for (TableReader& table : root.tables("camera")) scene.cameras.push_back(read_camera(table, cameras, reading));
     for (TableReader& table : root.tables("lidar"))
         scene.lidars.push_back(read_lidar(table, lidars, scene, reading.folder));
     refuse_tables_of_camera(root);

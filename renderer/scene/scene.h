@@ -18,6 +18,7 @@
 #include "protocols/camera_control.h"
 #include "renderer/material/material.h"
 #include "renderer/projection/distortion.h"
+#include "renderer/scene/atmosphere_settings.h"
 
 namespace narpa {
 
@@ -255,6 +256,8 @@ struct Scene {
     std::optional<Sun> sun;
     std::optional<StarField> stars{};
     Rgb ambient{};  ///< radiance arriving from everywhere, W m^-2 sr^-1 a band
+    std::optional<Atmosphere> atmosphere{};
+    std::optional<AnalyticSky> sky{};
     std::vector<Light> lights;
     std::vector<Body> bodies;
     std::vector<Mesh> meshes;

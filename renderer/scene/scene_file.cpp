@@ -20,9 +20,10 @@ bool allowed_in_name(char c) {
 void read_root(TableReader& root, SceneReading& reading) {
     read_surroundings(root, reading);
     read_bodies(root, reading);
+    read_observer(root, reading);
     read_lights(root, reading);
     read_sensors(root, reading);
-    root.not_in_this_version("atmosphere", "leave [atmosphere] out: scenes are in vacuum so far");
+    read_atmosphere(root, reading);
     root.finish();
     if (reading.problems.none()) load_named_files(reading);
 }

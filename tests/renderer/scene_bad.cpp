@@ -23,6 +23,7 @@ std::string completed(std::string text) {
 #define CAMERA "[[camera]]\nname = \"c\"\nresolution = [64, 48]\n"
 #define BODY "[[body]]\nname = \"x\"\n"
 #define BALL BODY "sphere = {radius_m = 1}\n"
+#define PLANET BODY "sphere = {radius_m = 6371000}\n"
 #define FIELD "fov_diagonal_deg = 9\n"
 #define LIDAR "[[lidar]]\nname = \"l\"\n"
 
@@ -64,7 +65,28 @@ const BadScene kBad[] = {
      "rate_hz: a period of 100 ms, expected at least the budget_ms of [render], 101"},
     {"TableExpected", "sun = 3\n", 1, 7, "sun: got 3, expected a table"},
     {"ArrayOfTablesExpected", "[body]\nname = \"b\"\n", 1, 1, "headed [[body]]"},
-    {"Atmosphere", "[atmosphere]\nheight_m = 1\n", 1, 1, "atmosphere: not in this version"},
+    {"AirWithoutBody", "[atmosphere]\nturbidity = 2\n", 1, 1, "[atmosphere] has no \"body\""},
+    {"AirOfNoBody", "[atmosphere]\nbody = \"earth\"\n" BALL, 2, 8, "there is no body \"earth\""},
+    {"AirOfASmallBody", "[atmosphere]\nbody = \"x\"\n" BALL, 2, 8, "expected a planet, of 1e5 to 1e9 m"},
+    {"AirOfNoPlanet", "[atmosphere]\nbody = \"x\"\nplanet = \"venus\"\n" PLANET, 3, 10,
+     "\"venus\" is not known here"},
+    {"AirTooTurbid", "[atmosphere]\nbody = \"x\"\nturbidity = 11\n" PLANET, 3, 13, "got 11, expected a number"},
+    {"AirWithMarsDust", "[atmosphere]\nbody = \"x\"\ndust_depth = 1\n" PLANET, 3, 14,
+     "belongs to planet = \"mars\""},
+    {"AirUnknownKey", "[atmosphere]\nbody = \"x\"\nheight_m = 1\n" PLANET, 3, 1, "unknown key \"height_m\""},
+    {"SkyWithoutModel", "[sky]\n[sun]\ndirection = [0, 0, 1]\n", 1, 1, "[sky] has no \"model\""},
+    {"SkyWithoutSun", "[sky]\nmodel = \"hosek-wilkie\"\n[ambient]\nradiance = 1\n", 1, 1, "expected a [sun]"},
+    {"SkyAtNight", "[sky]\nmodel = \"hosek-wilkie\"\n[sun]\ndirection = [0, 0, -1]\n", 1, 1,
+     "below this sky's horizon"},
+    {"SkyAndAmbient", "[sky]\nmodel = \"hosek-wilkie\"\n[sun]\ndirection = [0, 0, 1]\n[ambient]\nradiance = 1\n", 5,
+     1, "the scene has a [sky] too"},
+    {"ObserverWithoutTime", "[observer]\nlatitude_deg = 1\nlongitude_deg = 2\n", 1, 1, "expected an \"epoch\""},
+    {"ObserverWithoutPlace", "[scene]\nepoch = 2026-01-01T00:00:00Z\n[observer]\nlatitude_deg = 1\n", 3, 1,
+     "has no \"longitude_deg\""},
+    {"TrackWithoutObserver", CAMERA FIELD "track = \"sun\"\n", 5, 9, "expected an [observer]"},
+    {"OrbitAndPosition", BALL "position_m = [1, 2, 3]\norbit = {semi_major_axis_m = 7e6}\n", 4, 14,
+     "the body has an orbit"},
+    {"OrbitUnbound", BALL "orbit = {semi_major_axis_m = 7e6, eccentricity = 1}\n", 4, 50, "got 1"},
     {"SunWithoutDirection", "[sun]\nirradiance_w_m2 = 1\n", 1, 1, "[sun] has no \"direction\""},
     {"SunDirectionZero", "[sun]\ndirection = [0, 0, 0]\n", 2, 13, "of any length but 0"},
     {"UpZero", CAMERA "fov_diagonal_deg = 9\nlook_at = [1, 0, 4]\nup = [0, 0, 0]\n", 5, 11, "lies along up"},

@@ -1,0 +1,76 @@
+/// renderer/atmosphere/air.h - what an atmosphere is made of: gas and aerosol whose densities fall exponentially
+/// with height, and ozone in a layer; and how each attenuates light at some wavelengths.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "renderer/atmosphere/air_description.h"
+
+namespace narpa {
+
+/// At one wavelength, where the density is that at the surface (ozone: at its maximum), 1/m.
+struct AirCoefficients {
+    double gas_scattering = 0;
+    double aerosol_scattering = 0, aerosol_extinction = 0;
+    double ozone_absorption = 0;
+    double asymmetry = 0;  ///< of the aerosol: mean cosine of its scattering, a Henyey-Greenstein function
+};
+[[nodiscard]] AirCoefficients coefficients(const AirDescription& air, double wavelength_m);
+
+/// A wavelength that stands for a part of one of the camera's bands (solar_bands.h).
+struct SpectralNode {
+    double wavelength_m = 0;
+    int band = 0;       ///< 0 red, 1 green, 2 blue
+    double weight = 0;  ///< of sunlight in the band; those of a band add up to 1
+};
+/// Red 580 to 680 nm, green 490 to 580, blue 400 to 490: `per_band` Gauss points of each, weighted with sunlight as
+/// a blackbody of 5772 K.
+[[nodiscard]] std::vector<SpectralNode> spectral_nodes(int per_band);
+
+/// Densities, relative: gas and aerosol to the surface's, ozone to its maximum.
+struct AirDensities {
+    float gas = 0, aerosol = 0, ozone = 0;
+};
+
+/// An atmosphere at some wavelengths, ready for evaluation. Arrays hold `lanes` values: the nodes, and zeros up to
+/// a multiple of 8.
+class Air {
+public:
+    static constexpr std::size_t kMaxPerBand = 8, kMaxLanes = 24;
+    using Spectrum = std::array<float, kMaxLanes>;
+
+    /// `per_band` in [1, kMaxPerBand].
+    Air(const AirDescription& description, int per_band);
+    /// At one wavelength, in lane 0.
+    Air(const AirDescription& description, double wavelength_m);
+
+    [[nodiscard]] const AirDescription& description() const { return description_; }
+    [[nodiscard]] std::size_t lanes() const { return lanes_; }
+    [[nodiscard]] const std::vector<SpectralNode>& nodes() const { return nodes_; }
+    [[nodiscard]] double ground_radius_m() const { return description_.ground_radius_m; }
+    [[nodiscard]] double top_radius_m() const { return description_.ground_radius_m + description_.top_m; }
+    [[nodiscard]] AirDensities densities(double height_m) const noexcept;
+    /// Of the layer's maximum, at a height in metres.
+    [[nodiscard]] static float ozone_density(float height_m) noexcept;
+
+    /// Degree of the phase functions of light that is scattered again.
+    static constexpr std::size_t kDegree = 6;
+
+    // 1/m at reference density. For light that is scattered again the aerosol's forward peak, what is beyond
+    // kDegree, is taken as no scattering (delta-M); "scaled" is the rest.
+    Spectrum gas{}, aerosol{}, aerosol_extinction{}, ozone{}, asymmetry{};
+    Spectrum scaled_aerosol{}, scaled_extinction{};
+    std::array<Spectrum, kDegree + 1> moment{};  ///< Legendre moments of the rest
+    Spectrum red{}, green{}, blue{};             ///< weights of the lanes in the bands
+
+private:
+    void fill(std::size_t lane, const AirCoefficients& c);
+
+    AirDescription description_;
+    std::vector<SpectralNode> nodes_;
+    std::size_t lanes_ = 0;
+};
+
+}  // namespace narpa

@@ -1,0 +1,99 @@
+/// renderer/atmosphere/scattered_light.h - sunlight that the air scatters, once and many times.
+///
+/// Along a ray, light scattered once is integrated with the aerosol's own phase function. Light scattered before
+/// comes from a table: at each height and elevation of the Sun the radiance from all directions, as spherical
+/// harmonics to degree 6 about the zenith, even in azimuth from the Sun. Rayleigh's phase function asks for degree
+/// 2 alone; of the aerosol's, what is beyond counts as light that goes straight on (delta-M: W. Wiscombe, J. Atmos.
+/// Sci. 34, 1977), with light scattered once corrected for it (T. Nakajima, M. Tanaka, JQSRT 40, 1988). The table
+/// is the fixed point of the equation of transfer, found by iteration: one more order of scattering and of
+/// reflection by the ground each time. The layout, two tables of two dimensions and a march at run time, is that of
+/// S. Hillaire, EGSR 2020.
+///
+/// Positions are metres from the planet's centre, directions unit. The Sun's irradiance is 1.
+#pragma once
+
+#include <vector>
+
+#include "renderer/atmosphere/air_path.h"
+
+namespace narpa {
+
+/// How finely the tables are made, and rays are marched.
+struct AirResolution {
+    int steps = 12;               ///< quadrature nodes of a panel of a ray: PanelRule
+    int heights = 16, suns = 32;  ///< of the table of scattered light
+    int directions = 10;          ///< above and below the horizon each, times 8 azimuths
+    int column_heights = 64, column_angles = 256;
+    int most_orders = 40;
+};
+
+class ScatteredLight {
+public:
+    using Spectrum = Air::Spectrum;
+
+    /// `threads` 0: all. `sun_radius_rad`: half of its angular diameter.
+    ScatteredLight(const Air& air, const AirResolution& resolution, double sun_radius_rad, int threads = 0);
+
+    [[nodiscard]] const Air& air() const { return air_; }
+
+    struct Segment {
+        Spectrum in_scattering{};  ///< that reaches the ray's start
+        AirColumns columns{};
+    };
+    /// Along a ray as far as range_m, which may be infinite. `to_sun`: unit.
+    [[nodiscard]] Segment along(const Vec3& origin, const Vec3& direction, double range_m,
+                                const Vec3& to_sun) const noexcept;
+    /// The columns alone.
+    [[nodiscard]] AirColumns columns(const Vec3& origin, const Vec3& direction, double range_m) const noexcept;
+    /// To space, from the table: infinite where the ground is in the way.
+    [[nodiscard]] AirColumns columns_to_space(const Vec3& origin, const Vec3& direction) const noexcept;
+
+    /// Irradiance of a surface by scattered light, ground and sky, unshadowed; with what the aerosol scatters
+    /// strongly forward out of direct sunlight.
+    [[nodiscard]] Spectrum skylight(const Vec3& position, const Vec3& normal, const Vec3& to_sun) const noexcept;
+
+    /// Mean of the radiance from all directions, scattered once or more, times 4 pi: what the air absorbs is this
+    /// times its absorption. `height_m` in the air; `sun_cosine` of the Sun's zenith angle.
+    [[nodiscard]] Spectrum scalar_irradiance(double height_m, double sun_cosine) const noexcept;
+    /// Scattered light on the ground from above.
+    [[nodiscard]] Spectrum ground_irradiance(double sun_cosine) const noexcept;
+    /// Direct light on a surface that faces the Sun, with (`scaled`) or without what is scattered strongly forward.
+    [[nodiscard]] Spectrum sunlight(double height_m, double sun_cosine, bool scaled) const noexcept;
+
+    [[nodiscard]] int orders() const { return orders_; }
+    /// Bytes of the tables.
+    [[nodiscard]] std::size_t bytes() const {
+        return sizeof(float) * (moments_.size() + ground_.size() + sun_columns_.size());
+    }
+
+    struct Way;
+
+private:
+    void make_columns();
+    void solve(const AirResolution& resolution, int threads);
+    void measure();
+    double iterate(const AirResolution& resolution);
+    void gather(std::size_t height, const AirResolution& resolution, bool once, std::vector<float>& moments,
+                std::vector<float>& ground) const;
+    [[nodiscard]] double height_of(std::size_t i) const;
+    [[nodiscard]] double sun_cosine_of(std::size_t j) const;
+
+    Air air_;
+    PanelRule rule_;
+    double sun_radius_rad_;
+    std::size_t column_heights_, column_angles_, heights_, suns_;
+    std::vector<float> sun_columns_;  ///< [height][angle][gas, aerosol, ozone, 0]
+    std::vector<float> moments_;      ///< [height][sun][harmonic][lane]
+    std::vector<float> brightness_;   ///< [height][sun]: logarithm of the mean radiance's sum over lanes, inverse
+    std::vector<float> ground_;       ///< [sun][lane]: irradiance
+    std::vector<float> moments_once_,
+        ground_once_;  ///< of light scattered once or reflected once, while it is solved
+    int orders_ = 0;
+};
+
+/// Bands of a spectrum.
+[[nodiscard]] Rgb bands_of(const Air& air, const Air::Spectrum& light) noexcept;
+/// exp(-optical depth) in the bands.
+[[nodiscard]] Rgb transmittance_of(const Air& air, const AirColumns& columns) noexcept;
+
+}  // namespace narpa

@@ -1,0 +1,64 @@
+/// renderer/light/analytic_sky.h - Hosek and Wilkie's sky (renderer/atmosphere/hosek_wilkie.h) as a background and
+/// a light, over flat ground; and the air that dims the Sun in it.
+#pragma once
+
+#include <vector>
+
+#include "renderer/atmosphere/hosek_wilkie.h"
+#include "renderer/light/background.h"
+#include "renderer/light/medium.h"
+#include "renderer/material/directions.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// Below the horizon stands ground of the sky's albedo, evenly lit by sky and Sun. Sampled in proportion to a table
+/// of its radiance over 64 x 128 cells of equal solid angle.
+class AnalyticSkyBackground final : public Background {
+public:
+    /// `scene` has a sky and a Sun.
+    explicit AnalyticSkyBackground(const Scene& scene);
+
+    [[nodiscard]] Rgb radiance(const Vec3& direction) const noexcept override;
+    [[nodiscard]] bool is_sampled() const noexcept override { return true; }
+    [[nodiscard]] BackgroundSample sample(double u, double v) const noexcept override;
+    [[nodiscard]] double pdf(const Vec3& direction) const noexcept override;
+    /// Of a horizontal surface that the sky lights.
+    [[nodiscard]] Rgb ambient() const noexcept override { return ambient_; }
+
+private:
+    static constexpr std::size_t kRows = 64, kColumns = 128;
+    [[nodiscard]] Rgb sky(const Vec3& local) const noexcept;
+
+    Basis frame_;  ///< z up
+    HosekWilkieSky model_;
+    float irradiance_;
+    Vec3 to_sun_;  ///< in the frame
+    Rgb ground_{}, ambient_{};
+    std::vector<double> row_end_, column_end_;  ///< cumulative, of rows and in each row
+    std::vector<double> density_;               ///< per solid angle, by cell
+};
+
+/// Sunlight comes through the air of the sky's turbidity; nothing else is dimmed.
+class SunThroughAir final : public Medium {
+public:
+    explicit SunThroughAir(const Scene& scene);
+    [[nodiscard]] MediumSegment along(const BodyPoses&, const Ray& ray, double range_m,
+                                      double) const noexcept override {
+        return {transmittance_of_ray(ray, range_m), {}};
+    }
+    [[nodiscard]] Rgb transmittance(const BodyPoses&, const Ray& ray, double range_m) const noexcept override {
+        return transmittance_of_ray(ray, range_m);
+    }
+
+private:
+    [[nodiscard]] Rgb transmittance_of_ray(const Ray& ray, double range_m) const noexcept;
+    Vec3 to_sun_;
+    double cosine_;  ///< of the disc's edge
+    Rgb transmittance_;
+};
+
+/// Of sunlight on the ground, through the Earth's air of this turbidity.
+[[nodiscard]] Rgb sunlight_transmittance(double turbidity, double sun_elevation_rad);
+
+}  // namespace narpa

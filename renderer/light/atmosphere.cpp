@@ -1,0 +1,82 @@
+#include "renderer/light/atmosphere.h"
+
+#include <cmath>
+
+namespace narpa {
+namespace {
+
+/// Wavelength of the LiDARs' beams.
+constexpr double kLidar_m = 905e-9;
+
+AirResolution resolution_of(const Atmosphere& a) {
+    AirResolution r;
+    r.steps = a.steps;
+    return r;
+}
+
+double radius_of(const Scene& scene) {
+    return scene.sun ? 0.5 * scene.sun->angular_diameter_rad : 0;
+}
+
+}  // namespace
+
+AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)
+    : body_(static_cast<std::size_t>(scene.atmosphere->body)),
+      sun_(scene.sun),
+      light_(Air(scene.atmosphere->air, scene.atmosphere->samples_per_band), resolution_of(*scene.atmosphere),
+             radius_of(scene), threads),
+      lidar_air_(scene.atmosphere->air, kLidar_m),
+      lidar_rule_(static_cast<std::size_t>(scene.atmosphere->steps)) {
+    if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body_].shape)) {
+        const double radius = scene.atmosphere->air.ground_radius_m;
+        scale_ = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
+    }
+}
+
+AtmosphereMedium::Frame AtmosphereMedium::frame_at(const BodyPoses& at, double time) const noexcept {
+    return {at.T_world_body_at(body_, time), scale_};
+}
+
+MediumSegment AtmosphereMedium::along(const BodyPoses& at, const Ray& ray, double range_m, double) const noexcept {
+    const Frame frame = frame_at(at, ray.time);
+    const Vec3 toward = frame.direction(ray.direction);
+    const double metre = norm(toward);
+    const Vec3 origin = frame.point(ray.origin), direction = toward / metre;
+    const Air& air = light_.air();
+    if (!sun_) {
+        const AirColumns c = columns_along(air, lidar_rule_, origin, direction, range_m * metre);
+        return {transmittance_of(air, c), {}};
+    }
+    const Vec3 to_sun = normalized(frame.direction(sun_->direction));
+    const ScatteredLight::Segment s = light_.along(origin, direction, range_m * metre, to_sun);
+    return {transmittance_of(air, s.columns),
+            static_cast<float>(sun_->irradiance_w_m2) * bands_of(air, s.in_scattering)};
+}
+
+Rgb AtmosphereMedium::transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept {
+    const Frame frame = frame_at(at, ray.time);
+    const Vec3 toward = frame.direction(ray.direction);
+    const double metre = norm(toward);
+    return transmittance_of(light_.air(), light_.columns(frame.point(ray.origin), toward / metre, range_m * metre));
+}
+
+Rgb AtmosphereMedium::ambient(const BodyPoses& at, const Vec3& position, const Vec3& normal,
+                              double time) const noexcept {
+    if (!sun_) return {};
+    const Frame frame = frame_at(at, time);
+    const Vec3 up = conjugate(frame.T_world_planet.q) * normal;
+    const Vec3 to_sun = normalized(frame.direction(sun_->direction));
+    const auto light = light_.skylight(frame.point(position), up, to_sun);
+    return static_cast<float>(sun_->irradiance_w_m2 / 3.14159265358979323846) * bands_of(light_.air(), light);
+}
+
+double AtmosphereMedium::lidar_transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept {
+    const Frame frame = frame_at(at, ray.time);
+    const Vec3 toward = frame.direction(ray.direction);
+    const double metre = norm(toward);
+    const AirColumns c =
+        columns_along(lidar_air_, lidar_rule_, frame.point(ray.origin), toward / metre, range_m * metre);
+    return static_cast<double>(transmittance_of(lidar_air_, c).x);
+}
+
+}  // namespace narpa

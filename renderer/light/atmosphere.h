@@ -1,0 +1,55 @@
+/// renderer/light/atmosphere.h - a planet's air as a medium: it dims what is seen through it and the Sun, scatters
+/// sunlight towards the viewer (sky, aerial perspective, limb, twilight), and lights surfaces from all sides.
+///
+/// An ellipsoid's air follows the ellipsoid: positions are scaled to a sphere of the same volume, which changes
+/// lengths by up to the flattening, 0.3 % of them for the Earth. Rays are straight: refraction is a matter of
+/// apparent places (renderer/atmosphere/refraction.h).
+#pragma once
+
+#include <optional>
+
+#include "renderer/atmosphere/scattered_light.h"
+#include "renderer/light/medium.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+class AtmosphereMedium final : public Medium {
+public:
+    /// `scene` has an atmosphere. Makes its tables, on so many threads (0: all).
+    AtmosphereMedium(const Scene& scene, int threads);
+
+    [[nodiscard]] MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
+                                      double u) const noexcept override;
+    [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;
+    [[nodiscard]] Rgb ambient(const BodyPoses& at, const Vec3& position, const Vec3& normal,
+                              double time) const noexcept override;
+    [[nodiscard]] double lidar_transmittance(const BodyPoses& at, const Ray& ray,
+                                             double range_m) const noexcept override;
+
+    [[nodiscard]] const ScatteredLight& light() const { return light_; }
+
+private:
+    /// From world to the planet's sphere.
+    struct Frame {
+        Rigid3 T_world_planet;
+        Vec3 scale;
+        [[nodiscard]] Vec3 point(const Vec3& world) const {
+            return scale * (conjugate(T_world_planet.q) * (world - T_world_planet.t));
+        }
+        /// Not unit: its length is that of a metre.
+        [[nodiscard]] Vec3 direction(const Vec3& world) const {
+            return scale * (conjugate(T_world_planet.q) * world);
+        }
+    };
+    [[nodiscard]] Frame frame_at(const BodyPoses& at, double time) const noexcept;
+
+    std::size_t body_;
+    Vec3 scale_{1, 1, 1};
+    std::optional<Sun> sun_;
+    ScatteredLight light_;
+    Air lidar_air_;
+    PanelRule lidar_rule_;
+};
+
+}  // namespace narpa

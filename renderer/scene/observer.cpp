@@ -1,0 +1,110 @@
+#include "renderer/scene/observer.h"
+
+#include <erfa.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "renderer/atmosphere/refractive_index.h"
+#include "renderer/scene/sun_direction.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kLightSpeed = 299'792'458.0, kAu_m = 149'597'870'700.0, kDay_s = 86400;
+constexpr double kEarthRate_rad_s = 7.292115e-5, kEarthMu = 3.986004418e14;
+constexpr double kAirTop_m = 80'000;
+constexpr int kWgs84 = 1;
+
+struct Instant {
+    double utc[2], tt[2], ut1[2];
+};
+Instant instant_of(std::int64_t unix_ns, double ut1_utc_s) {
+    constexpr std::int64_t kDayNs = 86'400'000'000'000;
+    std::int64_t days = unix_ns / kDayNs, rest = unix_ns % kDayNs;
+    if (rest < 0) --days, rest += kDayNs;
+    Instant t{};
+    double tai[2];
+    t.utc[0] = 2440587.5 + static_cast<double>(days);
+    t.utc[1] = static_cast<double>(rest) / static_cast<double>(kDayNs);
+    eraUtctai(t.utc[0], t.utc[1], &tai[0], &tai[1]);
+    eraTaitt(tai[0], tai[1], &t.tt[0], &t.tt[1]);
+    eraUtcut1(t.utc[0], t.utc[1], ut1_utc_s, &t.ut1[0], &t.ut1[1]);
+    return t;
+}
+
+Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) {
+    return normalized(direction + velocity_m_s / kLightSpeed);
+}
+
+}  // namespace
+
+GroundObserver::GroundObserver(const ObserverPlace& place, std::int64_t unix_ns) : unix_ns_(unix_ns) {
+    const Instant t = instant_of(unix_ns, place.ut1_utc_s);
+    double m[3][3], fixed[3];
+    eraC2t06a(t.tt[0], t.tt[1], t.ut1[0], t.ut1[1], 0, 0, m);
+    eraGd2gc(kWgs84, place.longitude_rad, place.latitude_rad, place.height_m, fixed);
+    // Rows of m are the Earth's axes in GCRS.
+    const Vec3 x{m[0][0], m[0][1], m[0][2]}, y{m[1][0], m[1][1], m[1][2]}, z{m[2][0], m[2][1], m[2][2]};
+    q_world_earth_ = quat_from_columns(x, y, z);
+    position_m_ = fixed[0] * x + fixed[1] * y + fixed[2] * z;
+    velocity_m_s_ = cross(kEarthRate_rad_s * z, position_m_);
+    const double cos_lat = std::cos(place.latitude_rad), sin_lat = std::sin(place.latitude_rad);
+    const double cos_lon = std::cos(place.longitude_rad), sin_lon = std::sin(place.longitude_rad);
+    zenith_ = cos_lat * cos_lon * x + cos_lat * sin_lon * y + sin_lat * z;
+    east_ = -sin_lon * x + cos_lon * y;
+    north_ = cross(zenith_, east_);
+    const double n_minus_1 = 1e-6 * dry_refractivity(place.wavelength_m, place.temperature_k, place.pressure_hpa);
+    // Above the observer, with the lapse of the standard atmosphere.
+    const LapseAtmosphere air(n_minus_1, place.temperature_k, 0.0065, std::max(1000.0, 11'000 - place.height_m));
+    shells_ = shells_of(air, norm(position_m_), 0, kAirTop_m - std::min(place.height_m, 0.5 * kAirTop_m));
+}
+
+Vec3 GroundObserver::refracted(const Vec3& direction, double range_m) const {
+    const double cosine = dot(direction, zenith_);
+    const Vec3 across = direction - cosine * zenith_;
+    const double sine = norm(across), zenith = std::atan2(sine, cosine);
+    if (sine < 1e-12 || zenith > 1.6) return direction;
+    const double seen = range_m == std::numeric_limits<double>::infinity()
+                            ? apparent_zenith(shells_, zenith)
+                            : apparent_zenith(shells_, zenith, range_m);
+    return std::cos(seen) * zenith_ + std::sin(seen) / sine * across;
+}
+
+Vec3 GroundObserver::apparent_direction(const Vec3& object_m, const Vec3& object_velocity_m_s, bool refract) const {
+    Vec3 line = object_m - position_m_;
+    line = line - norm(line) / kLightSpeed * object_velocity_m_s;  // where it was when the light left
+    const Vec3 direction = aberrated(normalized(line), velocity_m_s_);
+    return refract ? refracted(direction, norm(line)) : direction;
+}
+
+Vec3 GroundObserver::apparent_sun(bool refract) const {
+    const Instant t = instant_of(unix_ns_, 0);
+    double heliocentric[2][3], barycentric[2][3];
+    eraEpv00(t.tt[0], t.tt[1], heliocentric, barycentric);
+    const Vec3 sun = -kAu_m * Vec3{heliocentric[0][0], heliocentric[0][1], heliocentric[0][2]};
+    const Vec3 earth_m_s = kAu_m / kDay_s * Vec3{barycentric[1][0], barycentric[1][1], barycentric[1][2]};
+    const Vec3 direction = aberrated(normalized(sun - position_m_), earth_m_s + velocity_m_s_);
+    return refract ? refracted(direction, std::numeric_limits<double>::infinity()) : direction;
+}
+
+OrbitalState state_of(const OrbitalElements& o, double time_s) {
+    const double a = o.semi_major_axis_m, e = o.eccentricity;
+    const double motion = std::sqrt(kEarthMu / a) / a;
+    const double mean = std::remainder(o.mean_anomaly_rad + motion * time_s, 2 * std::numbers::pi);
+    double anomaly = e < 0.8 ? mean : std::copysign(std::numbers::pi, mean);
+    for (int step = 0; step < 50; ++step) {
+        const double change = (anomaly - e * std::sin(anomaly) - mean) / (1 - e * std::cos(anomaly));
+        anomaly -= change;
+        if (std::abs(change) < 1e-14) break;
+    }
+    const double c = std::cos(anomaly), s = std::sin(anomaly), flat = std::sqrt((1 - e) * (1 + e));
+    const Quat q = exp_rotation({0, 0, o.ascending_node_rad}) * exp_rotation({o.inclination_rad, 0, 0}) *
+                   exp_rotation({0, 0, o.argument_of_perigee_rad});
+    const double speed = motion * a / (1 - e * c);
+    return {q * Vec3{a * (c - e), a * flat * s, 0}, q * Vec3{-speed * s, speed * flat * c, 0}};
+}
+
+}  // namespace narpa

@@ -1,0 +1,123 @@
+// [observer], `orbit` of a body and `track` of a camera: what is seen from the ground (docs/atmosphere.md).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/constants.h"
+#include "renderer/scene/observer.h"
+#include "renderer/scene/scene_parts.h"
+
+namespace narpa {
+namespace {
+
+constexpr Range kAngle_deg{.low = -360, .high = 360};
+
+ObserverPlace read_place(TableReader& table) {
+    ObserverPlace place;
+    table.require("latitude_deg", "the geodetic latitude, north positive");
+    table.require("longitude_deg", "the longitude, east positive");
+    place.latitude_rad = kRadPerDeg * table.number("latitude_deg", {.low = -90, .high = 90}).value_or(0);
+    place.longitude_rad = kRadPerDeg * table.number("longitude_deg", kAngle_deg).value_or(0);
+    place.height_m = table.number("height_m", {.low = -1000, .high = 20'000}).value_or(0);
+    place.ut1_utc_s = table.number("ut1_utc_s", {.low = -0.9, .high = 0.9}).value_or(0);
+    place.temperature_k = 273.15 + table.number("temperature_c", {.low = -80, .high = 60}).value_or(10);
+    place.pressure_hpa = table.number("pressure_hpa", {.low = 0, .high = 1200}).value_or(1010);
+    return place;
+}
+
+/// The Earth's ellipsoid turns with it.
+void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<Body>& bodies) {
+    const auto name = table.text("earth");
+    if (!name) return;
+    for (Body& b : bodies)
+        if (b.name == *name) {
+            b.initial.T_world_body.q = observer.q_world_earth();
+            b.initial.rate_rad_s = {0, 0, 7.292115e-5};
+            return;
+        }
+    table.fail("earth", fmt::format("there is no body \"{}\", expected the name of a [[body]]", *name));
+}
+
+}  // namespace
+
+void read_orbit(TableReader& body, Motion& motion) {
+    auto table = body.table("orbit");
+    if (!table) return;
+    for (const std::string_view key : {"position_m", "velocity_m_s"})
+        body.refuse(key, "the body has an orbit, which gives it; expected one of the two");
+    OrbitalElements o;
+    table->require("semi_major_axis_m", "a length from the Earth's centre");
+    o.semi_major_axis_m =
+        table->number("semi_major_axis_m", {.low = 6.4e6, .high = 1e9}).value_or(o.semi_major_axis_m);
+    o.eccentricity = table->number("eccentricity", {.low = 0, .high = 1, .high_open = true}).value_or(0);
+    const auto angle = [&](std::string_view key) {
+        return kRadPerDeg * table->number(key, kAngle_deg).value_or(0);
+    };
+    o.inclination_rad = angle("inclination_deg");
+    o.ascending_node_rad = angle("ascending_node_deg");
+    o.argument_of_perigee_rad = angle("argument_of_perigee_deg");
+    o.mean_anomaly_rad = angle("mean_anomaly_deg");
+    table->finish();
+    const OrbitalState state = state_of(o);
+    motion.T_world_body.t = state.position_m;
+    motion.velocity_m_s = state.velocity_m_s;
+}
+
+void read_observer(TableReader& root, SceneReading& reading) {
+    auto table = root.table("observer");
+    if (!table) return;
+    Scene& scene = reading.scene;
+    const ObserverPlace place = read_place(*table);
+    const bool refracted = table->boolean("refraction").value_or(true);
+    if (scene.epoch_unix_ns == 0) root.fail("observer", "the time is not known, expected an \"epoch\" in [scene]");
+    const GroundObserver observer(place, scene.epoch_unix_ns);
+    turn_earth(*table, observer, scene.bodies);
+    const auto apparent = table->texts("sees");
+    for (const std::string& name : apparent.value_or(std::vector<std::string>{})) {
+        bool known = false;
+        for (Body& b : scene.bodies) {
+            if (b.name != name) continue;
+            known = true;
+            Vec3& at = b.initial.T_world_body.t;
+            at = observer.position_m() + norm(at - observer.position_m()) *
+                                             observer.apparent_direction(at, b.initial.velocity_m_s, refracted);
+        }
+        if (!known) table->fail("sees", fmt::format("there is no body \"{}\", expected names of [[body]]", name));
+    }
+    if (scene.sun && table->boolean("sun").value_or(true)) scene.sun->direction = observer.apparent_sun(refracted);
+    table->finish();
+    reading.observer = Viewpoint{observer.position_m(), observer.zenith(), observer.north(), observer.east()};
+}
+
+void read_tracking(TableReader& camera, const SceneReading& reading, Rigid3& T) {
+    const auto track = camera.text("track");
+    const auto pointing = camera.pair("azimuth_elevation_deg", kAngle_deg);
+    if (!track && !pointing) return;
+    const char* const key = track ? "track" : "azimuth_elevation_deg";
+    if (track && pointing)
+        return camera.fail(key, "there is an azimuth_elevation_deg too, expected one of the two");
+    for (const std::string_view other : {"mount", "position_m", "attitude_wxyz", "look_at"})
+        camera.refuse(other, "the camera stands at the [observer] and points by itself; expected one of the two");
+    if (!reading.observer) return camera.fail(key, "is seen by an observer, expected an [observer]");
+    const Viewpoint& from = *reading.observer;
+    Vec3 forward = from.zenith;
+    if (pointing) {
+        const double azimuth = (*pointing)[0] * kRadPerDeg, elevation = (*pointing)[1] * kRadPerDeg;
+        forward = std::cos(elevation) * (std::cos(azimuth) * from.north + std::sin(azimuth) * from.east) +
+                  std::sin(elevation) * from.zenith;
+    } else if (*track == "sun" && reading.scene.sun) {
+        forward = reading.scene.sun->direction;
+    } else {
+        const auto body = std::find_if(reading.scene.bodies.begin(), reading.scene.bodies.end(),
+                                       [&](const Body& b) { return b.name == *track; });
+        if (body == reading.scene.bodies.end())
+            return camera.fail(key, fmt::format("there is no body \"{}\", expected one, or \"sun\"", *track));
+        forward = normalized(body->initial.T_world_body.t - from.position_m);
+    }
+    const Vec3 right = cross(forward, from.zenith);
+    T.t = from.position_m;
+    T.q = camera_attitude(forward, norm(right) > 1e-6 ? normalized(right) : from.east);
+}
+
+}  // namespace narpa

@@ -1,0 +1,183 @@
+// What an observer on the ground sees where, against ERFA's own chain; orbits; the range law through the air.
+#include <erfa.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/constants.h"
+#include "renderer/light/atmosphere.h"
+#include "renderer/scene/observer.h"
+#include "renderer/scene/scene_file.h"
+#include "tests/renderer/path_support.h"
+#include "tests/renderer/scene_support.h"
+
+namespace narpa {
+namespace {
+
+using namespace narpa::test;
+
+constexpr std::int64_t kMorning_ns = 1'772'349'600'000'000'000;  // 2026-03-01T07:20:00Z
+constexpr double kSkyArcsec = 3600 * kDegPerRad;
+const ObserverPlace kGreenwich{
+    .latitude_rad = 51.4778 * kRadPerDeg, .longitude_rad = -0.0014 * kRadPerDeg, .height_m = 47};
+
+/// ERFA's observed azimuth and zenith distance of a direction in GCRS.
+Vec3 observed_by_erfa(const ObserverPlace& p, const Vec3& gcrs, const GroundObserver& axes, bool refracted) {
+    double utc1 = 2440587.5, utc2 = static_cast<double>(kMorning_ns) / 86400e9, tai1, tai2, tt1, tt2;
+    eraUtctai(utc1, utc2, &tai1, &tai2);
+    eraTaitt(tai1, tai2, &tt1, &tt2);
+    double bpn[3][3], x, y, c2i[3][3], v[3] = {gcrs.x, gcrs.y, gcrs.z}, cirs[3], ri, di;
+    eraPnm06a(tt1, tt2, bpn);
+    eraBpn2xy(bpn, &x, &y);
+    eraC2ixys(x, y, eraS06(tt1, tt2, x, y), c2i);
+    eraRxp(c2i, v, cirs);
+    eraC2s(cirs, &ri, &di);
+    double azimuth, zenith, hour, declination, ascension;
+    eraAtio13(ri, di, utc1, utc2, p.ut1_utc_s, p.longitude_rad, p.latitude_rad, p.height_m, 0, 0,
+              refracted ? p.pressure_hpa : 0, p.temperature_k - 273.15, 0, 0.55, &azimuth, &zenith, &hour,
+              &declination, &ascension);
+    return std::cos(zenith) * axes.zenith() +
+           std::sin(zenith) * (std::cos(azimuth) * axes.north() + std::sin(azimuth) * axes.east());
+}
+
+double angle(const Vec3& a, const Vec3& b) {
+    return std::atan2(norm(cross(a, b)), dot(a, b));
+}
+
+TEST(GroundObserver, SeesAStationWithinAnArcsecondOfErfa) {
+    const GroundObserver observer(kGreenwich, kMorning_ns);
+    for (double zenith = 0; zenith <= 70; zenith += 10)
+        for (double azimuth = 5; azimuth < 360; azimuth += 60) {
+            const double z = zenith * kRadPerDeg, a = azimuth * kRadPerDeg;
+            const Vec3 geometric = std::cos(z) * observer.zenith() +
+                                   std::sin(z) * (std::cos(a) * observer.north() + std::sin(a) * observer.east());
+            const Vec3 station = observer.position_m() + 8e5 * geometric;
+            // At rest, so that light time does nothing; ERFA knows no parallax of refraction, so without.
+            const Vec3 ours = observer.apparent_direction(station, {}, false);
+            EXPECT_LT(angle(ours, observed_by_erfa(kGreenwich, geometric, observer, false)) * kSkyArcsec, 0.05);
+            const Vec3 raised = observer.refracted(ours, kInfinity);
+            EXPECT_LT(angle(raised, observed_by_erfa(kGreenwich, geometric, observer, true)) * kSkyArcsec, 1.0)
+                << zenith << " " << azimuth;
+            // The parallax of refraction is below 20 arcsec at 800 km and 70 degrees, and raises less.
+            const Vec3 near = observer.apparent_direction(station, {}, true);
+            EXPECT_LT(angle(near, raised) * kSkyArcsec, 20);
+        }
+}
+
+TEST(GroundObserver, SeesTheSunWhereErfaDoes) {
+    const GroundObserver observer({.latitude_rad = 0.2, .longitude_rad = 0.6}, kMorning_ns);
+    // ERFA: the astrometric Sun as a star at infinity, through annual and diurnal aberration, and refraction.
+    double utc1 = 2440587.5, utc2 = static_cast<double>(kMorning_ns) / 86400e9, tai1, tai2, tt1, tt2;
+    eraUtctai(utc1, utc2, &tai1, &tai2);
+    eraTaitt(tai1, tai2, &tt1, &tt2);
+    double heliocentric[2][3], barycentric[2][3];
+    eraEpv00(tt1, tt2, heliocentric, barycentric);
+    const Vec3 topocentric = -149'597'870'700.0 * Vec3{heliocentric[0][0], heliocentric[0][1], heliocentric[0][2]} -
+                             observer.position_m();
+    double v[3] = {topocentric.x, topocentric.y, topocentric.z}, ra, dec, az, zd, ha, d, r, eo;
+    eraC2s(v, &ra, &dec);
+    // No star stands in the Sun: eraAtco13 limits the deflection of its light there to below 1 arcsec.
+    eraAtco13(ra, dec, 0, 0, 0, 0, utc1, utc2, 0, 0.6, 0.2, 0, 0, 0, 1010, 10, 0, 0.55, &az, &zd, &ha, &d, &r, &eo);
+    const Vec3 expected = std::cos(zd) * observer.zenith() +
+                          std::sin(zd) * (std::cos(az) * observer.north() + std::sin(az) * observer.east());
+    ASSERT_LT(zd, 75 * kRadPerDeg);
+    EXPECT_LT(angle(observer.apparent_sun(), expected) * kSkyArcsec, 1.0);
+}
+
+TEST(Orbit, KeepsItsEnergyAndPeriod) {
+    for (const double e : {0.0, 0.1, 0.7}) {
+        const OrbitalElements o{
+            .semi_major_axis_m = 2e7, .eccentricity = e, .inclination_rad = 0.9, .mean_anomaly_rad = 2};
+        const double period = 2 * kPi * std::sqrt(8e21 / 3.986004418e14);
+        const OrbitalState start = state_of(o), later = state_of(o, period);
+        EXPECT_LT(norm(start.position_m - later.position_m), 1e-3);
+        for (double t = 0; t < period; t += period / 7) {
+            const OrbitalState s = state_of(o, t);
+            const double energy = 0.5 * dot(s.velocity_m_s, s.velocity_m_s) - 3.986004418e14 / norm(s.position_m);
+            EXPECT_NEAR(energy, -3.986004418e14 / 4e7, 1e-3);
+            const OrbitalState next = state_of(o, t + 1e-3);
+            EXPECT_LT(norm((next.position_m - s.position_m) / 1e-3 - s.velocity_m_s), 0.01);
+        }
+    }
+}
+
+constexpr const char* kGroundScene = R"([scene]
+epoch = 2026-03-01T07:20:00Z
+[sun]
+[atmosphere]
+body = "earth"
+turbidity = 3
+[observer]
+latitude_deg = 51.4778
+longitude_deg = -0.0014
+height_m = 47
+earth = "earth"
+sees = ["station"]
+[[body]]
+name = "earth"
+ellipsoid = {semi_axes_m = [6378137, 6378137, 6356752.3142]}
+[[body]]
+name = "station"
+sphere = {radius_m = 50}
+orbit = {semi_major_axis_m = 6791000, inclination_deg = 51.6, ascending_node_deg = 20, mean_anomaly_deg = 80}
+[[camera]]
+name = "telescope"
+resolution = [64, 64]
+fov_horizontal_deg = 0.05
+track = "station"
+)";
+
+TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
+    const TemporaryFolder folder;
+    const auto scene = read_scene(folder.write("s.toml", kGroundScene));
+    ASSERT_TRUE(scene) << scene.error().text();
+    ASSERT_TRUE(scene->atmosphere);
+    EXPECT_NEAR(scene->atmosphere->air.ground_radius_m, 6371000, 500);
+    const Camera& c = scene->cameras[0];
+    const Vec3 line = scene->bodies[1].initial.T_world_body.t - c.T_mount_camera.t;
+    EXPECT_LT(angle(c.T_mount_camera.q * Vec3{0, 0, 1}, line) * kSkyArcsec, 0.001);
+    const GroundObserver observer(kGreenwich, kMorning_ns);
+    EXPECT_LT(norm(c.T_mount_camera.t - observer.position_m()), 1e-3);
+    // On the ground of the turned ellipsoid: 47 m above it.
+    const Vec3 p = conjugate(scene->bodies[0].initial.T_world_body.q) * c.T_mount_camera.t;
+    const Vec3 k{p.x / 6378137, p.y / 6378137, p.z / 6356752.3142};
+    EXPECT_NEAR((norm(k) - 1) * 6.37e6, 47, 0.5);
+}
+
+TEST(GroundScene, AStationDimsByTheRangeLawThroughTheAir) {
+    // A white sphere overhead, at 400 km and at 1200 km: radiance less the sky's stays, so its light falls as 1 /
+    // r^2.
+    Scene s;
+    s.materials.push_back(lambert(0.3f));
+    s.materials.push_back(lambert(0.8f));
+    add_sphere(s, 6'371'000, {});
+    s.sun = Sun{};
+    s.atmosphere.emplace();
+    add_sphere(s, 50, {0, 0, 6'771'000});
+    std::get<Sphere>(s.bodies.back().shape).material = 1;
+    s.sun->direction = normalized(Vec3{1, 0, 0.3});
+    const Vec3 eye{0, 0, 6'371'002};
+    const auto through_air = RenderScene::create(s, 2);
+    Scene airless = s;
+    airless.atmosphere.reset();
+    const auto in_vacuum = RenderScene::create(airless, 2);
+    ASSERT_TRUE(through_air && in_vacuum);
+    const auto seen = [&](double height, bool air) {
+        Scene moved = s;
+        moved.bodies.back().initial.T_world_body.t.z = 6'371'000 + height;
+        const auto light = [&](double aside_m) {
+            return light_along(air ? *through_air : *in_vacuum, placed(moved),
+                               {eye, normalized(Vec3{aside_m / height, 0, 1})}, {.max_depth = 1, .direct = true}, 1)
+                .mean.y;
+        };
+        return light(40) - light(60);  // the sphere less the sky beside it
+    };
+    const double near = seen(400e3, true), far = seen(1200e3, true), vacuum = seen(400e3, false);
+    EXPECT_NEAR(far / near, 1, 2e-3);
+    const Air air(earth_air(), 8);
+    const Rgb through = transmittance_of(air, columns_along(air, PanelRule(32), eye, {0, 0, 1}, kInfinity));
+    EXPECT_NEAR(near / vacuum, static_cast<double>(through.y), 3e-3);
+}
+
+}  // namespace
+}  // namespace narpa

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/spsc_ring.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera_control.h"
 #include "emulator/camera_unit.h"
@@ -16,7 +17,6 @@
 #include "emulator/log/row_log.h"
 #include "emulator/online_estimator.h"
 #include "emulator/sensor.h"
-#include "emulator/spsc_ring.h"
 
 namespace narpa {
 

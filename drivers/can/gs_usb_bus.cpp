@@ -682,8 +682,8 @@ Result<std::vector<UsbAdapter>> find_usb_adapters() {
 namespace narpa {
 
 std::string usb_permission_remedy() {
-    return "sudo cp share/narpa/udev/70-narpa-usb.rules /etc/udev/rules.d/ && sudo udevadm control --reload && "
-           "sudo udevadm trigger   (then plug the adapter in again)";
+    return "sudo cp drivers/usb/udev/70-narpa-usb.rules /etc/udev/rules.d/ && sudo udevadm control --reload && "
+           "sudo udevadm trigger   (from the sources or from share/narpa; then plug the adapter in again)";
 }
 
 }  // namespace narpa

@@ -10,25 +10,25 @@ namespace narpa {
 namespace {
 
 // Of the identifier, as SocketCAN has them.
-constexpr std::uint32_t kExtended = 0x8000'0000, kRemote = 0x4000'0000, kError = 0x2000'0000;
-constexpr std::uint32_t kExtendedMask = 0x1fff'ffff, kStandardMask = 0x7ff;
+constexpr std::uint32_t kGsExtended = 0x8000'0000, kGsRemote = 0x4000'0000, kGsError = 0x2000'0000;
+constexpr std::uint32_t kGsExtendedMask = 0x1fff'ffff, kGsStandardMask = 0x7ff;
 // Of a frame.
-constexpr std::uint8_t kOverflow = 1, kFd = 2, kBitRateSwitch = 4, kErrorState = 8;
-constexpr std::size_t kHeaderBytes = 12, kTimeBytes = 4;
-constexpr std::array<std::uint8_t, 16> kLengths{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
+constexpr std::uint8_t kGsOverflow = 1, kGsFd = 2, kGsBitRateSwitch = 4, kGsErrorState = 8;
+constexpr std::size_t kGsHeaderBytes = 12, kGsTimeBytes = 4;
+constexpr std::array<std::uint8_t, 16> kGsLengths{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
 
-std::uint8_t length_code(std::uint8_t size) noexcept {
-    return static_cast<std::uint8_t>(std::lower_bound(kLengths.begin(), kLengths.end() - 1, size) -
-                                     kLengths.begin());
+std::uint8_t gs_length_code(std::uint8_t size) noexcept {
+    return static_cast<std::uint8_t>(std::lower_bound(kGsLengths.begin(), kGsLengths.end() - 1, size) -
+                                     kGsLengths.begin());
 }
 
-void put_words(std::uint8_t* at, std::initializer_list<std::uint32_t> words) noexcept {
+void gs_put_words(std::uint8_t* at, std::initializer_list<std::uint32_t> words) noexcept {
     for (const std::uint32_t w : words) put_le(at, w), at += 4;
 }
 
 void put_range(std::uint8_t* at, const BitTimingRange& r) noexcept {
-    put_words(at,
-              {r.tseg1_min, r.tseg1_max, r.tseg2_min, r.tseg2_max, r.sjw_max, r.brp_min, r.brp_max, r.brp_step});
+    gs_put_words(at,
+                 {r.tseg1_min, r.tseg1_max, r.tseg2_min, r.tseg2_max, r.sjw_max, r.brp_min, r.brp_max, r.brp_step});
 }
 
 BitTimingRange get_range(const std::uint8_t* at) noexcept {
@@ -50,7 +50,7 @@ bool is_sound(const BitTimingRange& r) noexcept {
 std::array<std::uint8_t, kGsUsbConfigBytes> encode_gs_usb_config(const GsUsbConfig& c) noexcept {
     std::array<std::uint8_t, kGsUsbConfigBytes> b{};
     b[3] = static_cast<std::uint8_t>(c.channels - 1);
-    put_words(&b[4], {c.software, c.hardware});
+    gs_put_words(&b[4], {c.software, c.hardware});
     return b;
 }
 
@@ -61,7 +61,7 @@ std::optional<GsUsbConfig> decode_gs_usb_config(std::span<const std::uint8_t> b)
 }
 
 std::size_t encode_gs_usb_limits(const GsUsbLimits& l, std::span<std::uint8_t, kGsUsbLimitsFdBytes> out) noexcept {
-    put_words(&out[0], {l.features, l.clock_hz});
+    gs_put_words(&out[0], {l.features, l.clock_hz});
     put_range(&out[8], l.nominal);
     if (!l.data) return kGsUsbLimitsBytes;
     put_range(&out[40], *l.data);
@@ -78,7 +78,7 @@ std::optional<GsUsbLimits> decode_gs_usb_limits(std::span<const std::uint8_t> b)
 
 std::array<std::uint8_t, kGsUsbBitTimingBytes> encode_gs_usb_bit_timing(const BitTiming& t) noexcept {
     std::array<std::uint8_t, kGsUsbBitTimingBytes> b{};
-    put_words(b.data(), {t.prop_seg, t.phase_seg1, t.phase_seg2, t.sjw, t.brp});
+    gs_put_words(b.data(), {t.prop_seg, t.phase_seg1, t.phase_seg2, t.sjw, t.brp});
     return b;
 }
 
@@ -121,7 +121,7 @@ std::optional<BitTiming> bit_timing_of(std::uint32_t bit_rate, std::uint32_t clo
 
 std::array<std::uint8_t, kGsUsbModeBytes> encode_gs_usb_mode(const GsUsbMode& m) noexcept {
     std::array<std::uint8_t, kGsUsbModeBytes> b{};
-    put_words(b.data(), {std::uint32_t{m.start}, m.features});
+    gs_put_words(b.data(), {std::uint32_t{m.start}, m.features});
     return b;
 }
 
@@ -135,40 +135,40 @@ std::size_t encode_gs_usb_frame(const GsUsbFrame& f, bool with_time,
     const CanFrame& c = f.frame;
     std::fill(out.begin(), out.end(), std::uint8_t{0});
     put_le(&out[0], f.echo);
-    put_le(&out[4], c.id | (c.extended ? kExtended : 0) | (c.remote ? kRemote : 0) | (c.error ? kError : 0));
-    out[8] = length_code(c.size);
+    put_le(&out[4], c.id | (c.extended ? kGsExtended : 0) | (c.remote ? kGsRemote : 0) | (c.error ? kGsError : 0));
+    out[8] = gs_length_code(c.size);
     out[9] = f.channel;
-    out[10] = static_cast<std::uint8_t>((f.overflow ? kOverflow : 0) | (c.fd ? kFd : 0) |
-                                        (c.fd && c.bit_rate_switch ? kBitRateSwitch : 0) |
-                                        (c.fd && f.error_state ? kErrorState : 0));
+    out[10] = static_cast<std::uint8_t>((f.overflow ? kGsOverflow : 0) | (c.fd ? kGsFd : 0) |
+                                        (c.fd && c.bit_rate_switch ? kGsBitRateSwitch : 0) |
+                                        (c.fd && f.error_state ? kGsErrorState : 0));
     const std::size_t room = c.fd ? 64 : 8, size = std::min<std::size_t>(c.size, room);
-    if (!c.remote) std::copy_n(c.data.begin(), size, &out[kHeaderBytes]);
-    if (with_time) put_le(&out[kHeaderBytes + room], f.time_us);
-    return kHeaderBytes + room + (with_time ? kTimeBytes : 0);
+    if (!c.remote) std::copy_n(c.data.begin(), size, &out[kGsHeaderBytes]);
+    if (with_time) put_le(&out[kGsHeaderBytes + room], f.time_us);
+    return kGsHeaderBytes + room + (with_time ? kGsTimeBytes : 0);
 }
 
 std::optional<GsUsbFrame> decode_gs_usb_frame(std::span<const std::uint8_t> b, bool with_time) noexcept {
-    if (b.size() < kHeaderBytes) return std::nullopt;
+    if (b.size() < kGsHeaderBytes) return std::nullopt;
     GsUsbFrame f;
     CanFrame& c = f.frame;
     f.echo = get_le<std::uint32_t>(&b[0]);
     const std::uint32_t id = get_le<std::uint32_t>(&b[4]);
     f.channel = b[9];
-    f.overflow = (b[10] & kOverflow) != 0;
-    c.fd = (b[10] & kFd) != 0;
-    c.bit_rate_switch = c.fd && (b[10] & kBitRateSwitch) != 0;
-    f.error_state = c.fd && (b[10] & kErrorState) != 0;
-    c.error = (id & kError) != 0;
-    c.extended = !c.error && (id & kExtended) != 0;
-    c.remote = !c.error && (id & kRemote) != 0;
-    c.id = id & (c.extended || c.error ? kExtendedMask : kStandardMask);
+    f.overflow = (b[10] & kGsOverflow) != 0;
+    c.fd = (b[10] & kGsFd) != 0;
+    c.bit_rate_switch = c.fd && (b[10] & kGsBitRateSwitch) != 0;
+    f.error_state = c.fd && (b[10] & kGsErrorState) != 0;
+    c.error = (id & kGsError) != 0;
+    c.extended = !c.error && (id & kGsExtended) != 0;
+    c.remote = !c.error && (id & kGsRemote) != 0;
+    c.id = id & (c.extended || c.error ? kGsExtendedMask : kGsStandardMask);
     const std::size_t room = c.fd ? 64 : 8;
-    const std::size_t least = kHeaderBytes + room + (with_time ? kTimeBytes : 0);
+    const std::size_t least = kGsHeaderBytes + room + (with_time ? kGsTimeBytes : 0);
     if (b.size() < least || b.size() > kGsUsbFrameMostBytes) return std::nullopt;
     if (b[8] > (c.fd ? 15 : 8) || (c.fd && (c.remote || c.error))) return std::nullopt;
-    c.size = kLengths[b[8]];
-    if (!c.remote) std::copy_n(&b[kHeaderBytes], c.size, c.data.begin());
-    if (with_time) f.time_us = get_le<std::uint32_t>(&b[kHeaderBytes + room]);
+    c.size = kGsLengths[b[8]];
+    if (!c.remote) std::copy_n(&b[kGsHeaderBytes], c.size, c.data.begin());
+    if (with_time) f.time_us = get_le<std::uint32_t>(&b[kGsHeaderBytes + room]);
     return f;
 }
 

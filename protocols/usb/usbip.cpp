@@ -10,14 +10,14 @@ namespace {
 constexpr std::uint32_t kSubmit = 1, kUnlink = 2, kSubmitted = 3, kUnlinked = 4;
 constexpr std::uint32_t kNoPackets = 0xffff'ffff;  // newer kernels' number of packets of what is not isochronous
 
-void put_text(std::uint8_t* at, std::size_t room, const std::string& text) noexcept {
+void put_usbip_text(std::uint8_t* at, std::size_t room, const std::string& text) noexcept {
     std::copy_n(text.begin(), std::min(text.size(), room - 1), at);
 }
 
-std::array<std::uint8_t, kUsbIpDeviceBytes> encode_device(const UsbIpDevice& d) noexcept {
+std::array<std::uint8_t, kUsbIpDeviceBytes> encode_usbip_device(const UsbIpDevice& d) noexcept {
     std::array<std::uint8_t, kUsbIpDeviceBytes> b{};
-    put_text(&b[0], 256, d.path);
-    put_text(&b[256], kUsbIpBusIdBytes, d.bus_id);
+    put_usbip_text(&b[0], 256, d.path);
+    put_usbip_text(&b[256], kUsbIpBusIdBytes, d.bus_id);
     put_be(&b[288], d.bus), put_be(&b[292], d.number), put_be(&b[296], static_cast<std::uint32_t>(d.speed));
     put_be(&b[300], d.device.vendor), put_be(&b[302], d.device.product), put_be(&b[304], d.device.release);
     b[306] = d.device.device_class, b[307] = d.device.subclass, b[308] = d.device.protocol;
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> encode_usbip_list(std::span<const UsbIpDevice> devices
     b.resize(b.size() + 4);
     put_be(&b[kUsbIpOpBytes], static_cast<std::uint32_t>(devices.size()));
     for (const UsbIpDevice& d : devices) {
-        const auto bytes = encode_device(d);
+        const auto bytes = encode_usbip_device(d);
         b.insert(b.end(), bytes.begin(), bytes.end());
         for (const UsbInterface& i : d.configuration.interfaces)
             b.insert(b.end(), {i.interface_class, i.subclass, i.protocol, 0});
@@ -65,7 +65,7 @@ std::vector<std::uint8_t> encode_usbip_list(std::span<const UsbIpDevice> devices
 
 std::vector<std::uint8_t> encode_usbip_import(const UsbIpDevice& device) {
     const auto header = encode_usbip_op({UsbIpOp::import_reply, 0});
-    const auto bytes = encode_device(device);
+    const auto bytes = encode_usbip_device(device);
     std::vector<std::uint8_t> b(header.begin(), header.end());
     b.insert(b.end(), bytes.begin(), bytes.end());
     return b;

@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-std::vector<std::uint8_t> encoded(const GsUsbFrame& f, bool with_time) {
+std::vector<std::uint8_t> gs_encoded(const GsUsbFrame& f, bool with_time) {
     std::array<std::uint8_t, kGsUsbFrameMostBytes> bytes{};
     const std::size_t n = encode_gs_usb_frame(f, with_time, bytes);
     return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)};
@@ -22,7 +22,7 @@ TEST(GsUsb, AClassicFrameHasItsBytes) {
     f.frame.data[0] = 0xde, f.frame.data[1] = 0xad;
     const std::vector<std::uint8_t> wanted{3, 0, 0,    0,    0xe5, 0x50, 0xff, 0x98, 2, 0,
                                            0, 0, 0xde, 0xad, 0,    0,    0,    0,    0, 0};
-    EXPECT_EQ(encoded(f, false), wanted);
+    EXPECT_EQ(gs_encoded(f, false), wanted);
     const auto back = decode_gs_usb_frame(wanted, false);
     ASSERT_TRUE(back);
     EXPECT_EQ(back->echo, 3u);
@@ -37,7 +37,7 @@ TEST(GsUsb, AFrameOfCanFdHasItsBytesAndItsTime) {
     f.frame.id = 0x123, f.frame.fd = f.frame.bit_rate_switch = true, f.frame.size = 13;
     f.frame.data.fill(0), f.frame.data[12] = 7;
     f.time_us = 0x01020304;
-    const auto bytes = encoded(f, true);
+    const auto bytes = gs_encoded(f, true);
     ASSERT_EQ(bytes.size(), 80u);
     EXPECT_EQ(bytes[0], 0xff);
     EXPECT_EQ(bytes[8], 10) << "the code of 16 bytes";
@@ -55,7 +55,7 @@ TEST(GsUsb, AFrameOfCanFdHasItsBytesAndItsTime) {
 TEST(GsUsb, ErrorReportsKeepTheirClass) {
     GsUsbFrame f;
     f.frame.error = true, f.frame.id = CanErrorClass::kBusOff, f.frame.size = 8;
-    const auto back = decode_gs_usb_frame(encoded(f, true), true);
+    const auto back = decode_gs_usb_frame(gs_encoded(f, true), true);
     ASSERT_TRUE(back);
     EXPECT_TRUE(back->frame.error);
     EXPECT_EQ(back->frame.id, CanErrorClass::kBusOff);
@@ -64,7 +64,7 @@ TEST(GsUsb, ErrorReportsKeepTheirClass) {
 TEST(GsUsb, MalformedFramesAreRefused) {
     GsUsbFrame f;
     f.frame.size = 8;
-    const auto good = encoded(f, false);
+    const auto good = gs_encoded(f, false);
     const auto with = [&](std::size_t at, std::uint8_t value) {
         auto bytes = good;
         bytes[at] = value;

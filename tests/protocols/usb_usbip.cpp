@@ -9,14 +9,14 @@
 namespace narpa {
 namespace {
 
-using Header = std::array<std::uint8_t, kUsbIpHeaderBytes>;
+using UsbIpHeader = std::array<std::uint8_t, kUsbIpHeaderBytes>;
 
 // The document's example: 64 bytes are asked of endpoint 1, which is interrupt in.
-constexpr Header kSubmitIn{0, 0, 0, 1, 0, 0, 0x0d, 0x05, 0, 1, 0, 0x0f, 0,    0,    0,    1,
-                           0, 0, 0, 1, 0, 0, 2,    0,    0, 0, 0, 0x40, 0xff, 0xff, 0xff, 0xff,
-                           0, 0, 0, 0, 0, 0, 0,    4,    0, 0, 0, 0,    0,    0,    0,    0};
-constexpr Header kSubmitted{0, 0, 0, 3,    0, 0, 0x0d, 0x05, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-                            0, 0, 0, 0x40, 0, 0, 0,    0,    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+constexpr UsbIpHeader kSubmitIn{0, 0, 0, 1, 0, 0, 0x0d, 0x05, 0, 1, 0, 0x0f, 0,    0,    0,    1,
+                                0, 0, 0, 1, 0, 0, 2,    0,    0, 0, 0, 0x40, 0xff, 0xff, 0xff, 0xff,
+                                0, 0, 0, 0, 0, 0, 0,    4,    0, 0, 0, 0,    0,    0,    0,    0};
+constexpr UsbIpHeader kSubmitted{0, 0, 0, 3,    0, 0, 0x0d, 0x05, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+                                 0, 0, 0, 0x40, 0, 0, 0,    0,    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
 
 TEST(UsbIp, ReadsTheExampleOfTheKernelsDocument) {
     const auto request = decode_usbip_request(kSubmitIn);
@@ -29,13 +29,13 @@ TEST(UsbIp, ReadsTheExampleOfTheKernelsDocument) {
     const auto reply = decode_usbip_reply(kSubmitted);
     ASSERT_TRUE(reply);
     EXPECT_EQ(*reply, (UsbIpReply{false, 0xd05, 0, 64}));
-    Header again{};
+    UsbIpHeader again{};
     encode_usbip_reply(*reply, again);
     EXPECT_EQ(again, kSubmitted);
 }
 
 TEST(UsbIp, WhatIsWrittenIsRead) {
-    Header bytes{};
+    UsbIpHeader bytes{};
     const UsbSetup setup{0x21, 1, 0x0200, 1, 26};
     for (const UsbIpRequest& r :
          {UsbIpRequest(UsbIpSubmit{7, 0, false, 26, setup}), UsbIpRequest(UsbIpUnlink{8, 7})}) {
@@ -50,7 +50,7 @@ TEST(UsbIp, WhatIsWrittenIsRead) {
 
 TEST(UsbIp, RefusesWhatItCannotFollow) {
     const auto with = [](std::size_t at, std::uint8_t value) {
-        Header bytes = kSubmitIn;
+        UsbIpHeader bytes = kSubmitIn;
         bytes[at] = value;
         return decode_usbip_request(bytes);
     };
@@ -61,7 +61,7 @@ TEST(UsbIp, RefusesWhatItCannotFollow) {
     EXPECT_FALSE(with(35, 3)) << "isochronous";
     std::mt19937 random(2);
     for (int n = 0; n < 20'000; ++n) {
-        Header bytes = kSubmitIn;
+        UsbIpHeader bytes = kSubmitIn;
         for (int k = 0; k < 3; ++k) bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
         const auto request = decode_usbip_request(bytes);
         if (!request || !std::holds_alternative<UsbIpSubmit>(*request)) continue;

@@ -83,8 +83,8 @@ void add_usbcan_options(UsbCanArguments& a, const cli::Parser& p) {
     p.option("--can", a.bus, "The bus behind the adapter: vcan0 | slcan:PORT | udp:239.74.163.2")
         .type_name("BUS")
         .required();
-    p.option("--listen", a.listen, "Where hosts find it (default: port 3240 of the loopback)")
-        .type_name("[ADDRESS:]PORT");
+    p.option("--listen", a.listen, "[ADDRESS:]PORT where hosts find it (default: port 3240 of the loopback)")
+        .type_name("PORT");
     p.option("--serial", a.serial, "Its serial number").shows_default();
     p.flag("--classic", a.is_classic, "An adapter without CAN FD");
     p.flag("--client", a.is_client, "Join the bus of `narpa run` (slcan) instead of being its hub");

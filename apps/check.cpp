@@ -19,6 +19,7 @@
 #include "apps/shipped.h"
 #include "base/constants.h"
 #include "drivers/can/can_bus.h"
+#include "drivers/can/usb_adapters.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera_unit.h"
 #include "emulator/world.h"
@@ -64,6 +65,22 @@ Finding video_devices() {
             "V4L2 devices", false, "no /dev/video*",
             "sudo modprobe v4l2loopback video_nr=10 exclusive_caps=1 max_buffers=8 (or --video CAMERA=FILE.y4m)"};
     return {"V4L2 devices", true, found, ""};
+}
+
+Finding usb_adapters() {
+    const auto adapters = find_usb_adapters();
+    if (!adapters) return {"USB-CAN adapters", false, adapters.error().what, adapters.error().remedy};
+    if (adapters->empty()) return {"USB-CAN adapters", false, "none is plugged in", ""};
+    Finding f{"USB-CAN adapters", true, "", ""};
+    for (const UsbAdapter& a : *adapters) {
+        f.detail +=
+            fmt::format("{}usb:{} at {}{}", f.detail.empty() ? "" : ", ", a.serial.empty() ? a.place : a.serial,
+                        a.place, a.trouble.empty() ? "" : " (" + a.trouble + ")");
+        if (a.trouble.empty()) continue;
+        f.there = false;
+        f.remedy = usb_permission_remedy();
+    }
+    return f;
 }
 
 /// A limit of this process, which root does not have; `item` is its name and value in limits.conf.
@@ -343,7 +360,7 @@ void check_exposures(const World& world, nlohmann::json& document) {
 /// Whether it is written like a CAN bus: with a prefix, or the name of an interface.
 bool is_bus(const std::string& spec) {
     std::error_code none;
-    for (const char* prefix : {"slcan:", "udp:", "log:", "can", "vcan"})
+    for (const char* prefix : {"slcan:", "udp:", "usb:", "log:", "can", "vcan"})
         if (spec.starts_with(prefix)) return true;
     return spec.find('/') == std::string::npos && std::filesystem::exists("/sys/class/net/" + spec, none);
 }
@@ -362,8 +379,8 @@ Result<Finding> try_device(const std::string& spec) {
     }
     if (!is_bus(spec))
         return Error{
-            "is neither a CAN bus nor a video device, expected vcan0, can0, slcan:PORT, udp:GROUP or "
-            "/dev/videoN",
+            "is neither a CAN bus nor a video device, expected vcan0, can0, slcan:PORT, udp:GROUP, usb:[ADAPTER] "
+            "or /dev/videoN",
             spec};
     auto bus = open_can_bus(spec, CanRole::hub);
     if (bus) return Finding{spec, true, (*bus)->description(), ""};
@@ -430,7 +447,7 @@ Outcome check(const CheckOptions& o) {
     }
 
     std::vector<Finding> findings{
-        socketcan(), video_devices(),
+        socketcan(), usb_adapters(), video_devices(),
         permission("real-time priority", RLIMIT_RTPRIO, 60, "SCHED_FIFO",
                    "SCHED_FIFO is not permitted: deadlines may slip under load", "rtprio 90"),
         permission("locked memory", RLIMIT_MEMLOCK, RLIM_INFINITY, "mlockall",

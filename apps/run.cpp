@@ -105,8 +105,13 @@ Command add_run(Parser app) {
     const Parser c =
         app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
-    c.option("--can", o->run.bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").type_name("BUS");
-    c.option("--video", o->video, "/dev/videoN | FILE.y4m | a FIFO | none; may be given many times")
+    c.option("--can", o->run.bus,
+             "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER] (a gs_usb adapter) | log:FILE")
+        .type_name("BUS");
+    c.option("--video", o->video,
+             "/dev/videoN | uvc:[ADDRESS:]PORT (a USB camera over USB/IP) | FILE.y4m | a FIFO | none; may be given "
+             "many "
+             "times")
         .type_name("CAMERA=SINK")
         .repeatable();
     c.option(

@@ -10,8 +10,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "base/spsc_ring.h"
 #include "emulator/clock.h"
-#include "emulator/spsc_ring.h"
 #include "protocols/camera_control.h"
 #include "protocols/ledger.h"
 #include "renderer/scene/scene.h"

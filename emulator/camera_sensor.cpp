@@ -153,7 +153,20 @@ void CameraSensor::skip_missed(const Clock& clock) noexcept {
     for (; missed(); advance(std::nullopt)) ++stats_.skipped;
 }
 
+/// What the reader of a sink has set is a command like those of CAN, and answered there.
+void CameraSensor::take_requests(CanNode& can, std::int64_t t_ns) noexcept {
+    for (const auto& sink : sinks_)
+        for (VideoRequest r; sink->next_request(r);) {
+            CameraCommand c;
+            c.counter = ++requests_;
+            c.camera = control_->camera();
+            c.exposure_ns = r.exposure_ns, c.gain_cdb = r.gain_cdb, c.auto_exposure = r.auto_exposure;
+            can.command(c, t_ns);
+        }
+}
+
 void CameraSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept {
+    if (control_) take_requests(can, t_ns);
     for (FrameLedger ledger; ledgers_.pop(ledger);) {
         faults.stale |= ledger.pose_stale;
         faults.deadline_missed |= !ledger.deadline_met;

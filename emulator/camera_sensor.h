@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/spsc_ring.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera_control.h"
 #include "emulator/camera_unit.h"
@@ -16,7 +17,6 @@
 #include "emulator/log/row_log.h"
 #include "emulator/online_estimator.h"
 #include "emulator/sensor.h"
-#include "emulator/spsc_ring.h"
 
 namespace narpa {
 
@@ -90,6 +90,7 @@ private:
     void advance(std::optional<double> level) noexcept;
     [[nodiscard]] Delivery deliver(bool in_time) noexcept;
     void send(std::span<const std::uint8_t> bytes) noexcept;
+    void take_requests(CanNode& can, std::int64_t t_ns) noexcept;
     void account(const FrameLedger& ledger) noexcept;
     /// Skips the frames whose successors are due already: the stream keeps step with the clock.
     void skip_missed(const Clock& clock) noexcept;
@@ -105,6 +106,7 @@ private:
     SpscRing<FrameLedger, 64> ledgers_;
     SpscRing<CameraState, 64> states_;  ///< of a camera that is operated
     bool keeps_ledgers_ = false;
+    std::uint8_t requests_ = 0;  ///< that readers have made; the CAN thread's
     OnlineEstimator* estimator_ = nullptr;
     CameraStats stats_;
 

@@ -64,6 +64,8 @@ public:
     /// Sends the last heartbeat again, for clients that have joined since; not where the bus knows that there are
     /// none. It is not logged: a log in lockstep does not depend on wall time.
     void repeat_heartbeat() noexcept;
+    /// A camera's command that came another way than over the bus; its answer goes there as well.
+    void command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
     /// Commands and triggers go to this camera too, which outlives the run. Before it.
     void operate(CameraControl& camera) { cameras_.push_back(&camera); }
 
@@ -86,7 +88,6 @@ private:
     bool next_frame(std::int64_t t_now_ns) noexcept;
     PoseStatus take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept;
     DecodeStatus take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
-    void command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
     void trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept;
     void sync(std::int64_t t_now_ns) noexcept;
     void send(const CameraReply& reply, std::int64_t t_now_ns) noexcept;

@@ -50,15 +50,29 @@ Result<std::vector<std::unique_ptr<Sink>>> open_sinks(
     return sinks;
 }
 
+/// What readers of the camera's frames may set. Requests go the way of CAN's commands, so without a bus there are
+/// none.
+std::optional<VideoControls> controls_of(const Camera& c, bool has_bus) {
+    if (!c.control || !has_bus) return std::nullopt;
+    const CameraSettings s = settings_of(c);
+    return VideoControls{c.control->exposure_min_ns,
+                         std::min(c.control->exposure_max_ns, c.period_ns - rows_ns(c) - 1),
+                         s.exposure_ns,
+                         c.control->gain_max_cdb,
+                         s.gain_cdb,
+                         s.auto_exposure};
+}
+
 Result<std::unique_ptr<Sensor>> open_camera(const World& world, std::size_t index, const RunOptions& o,
                                             bool telemetry) {
     const Scene& scene = world.scene();
     const Camera& c = scene.cameras[index];
     const VideoFormat format{c.width, c.height, c.format, c.period_ns};
     const WhenFull when_full = o.lockstep ? WhenFull::wait : WhenFull::drop;
-    auto sinks =
-        open_sinks<VideoSink>(o.video, index, scene.cameras, "camera", scene.file,
-                              [&](const std::string& spec) { return open_video_sink(spec, format, when_full); });
+    const auto controls = controls_of(c, !o.bus.empty());
+    auto sinks = open_sinks<VideoSink>(
+        o.video, index, scene.cameras, "camera", scene.file,
+        [&](const std::string& spec) { return open_video_sink(spec, format, when_full, controls); });
     if (!sinks) return sinks.error();
     if (sinks->empty()) return std::unique_ptr<Sensor>();
     auto camera = std::make_unique<CameraSensor>(world, index, *std::move(sinks));

@@ -5,12 +5,12 @@
 #include <memory>
 #include <vector>
 
+#include "base/spsc_ring.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/sweep_log.h"
 #include "emulator/sensor.h"
-#include "emulator/spsc_ring.h"
 #include "protocols/lidar_beam.h"
 
 namespace narpa {

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "base/spsc_ring.h"
 #include "base/stop.h"
 #include "emulator/frame_tracker.h"
 #include "emulator/log/row_log.h"
-#include "emulator/spsc_ring.h"
 #include "protocols/ledger.h"
 
 namespace narpa {

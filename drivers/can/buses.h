@@ -18,6 +18,9 @@ CanBusResult open_slcan_hub(std::uint16_t port);
 CanBusResult open_slcan_client(std::uint16_t port);
 /// `group`: an IPv4 multicast address.
 CanBusResult open_udp_multicast(const std::string& group);
+/// A USB-CAN adapter through libusb. `text`: drivers/can/usb_spec.h. A missing one is an error; one that is pulled
+/// out later is looked for once a second.
+CanBusResult open_gs_usb(std::string_view text);
 CanBusResult open_candump_reader(const std::string& path);
 CanBusResult open_candump_writer(const std::string& path);
 

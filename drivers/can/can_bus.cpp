@@ -25,17 +25,18 @@ CanBusResult open_can_bus(std::string_view spec, CanRole role) {
         const std::string_view rest = spec.substr(colon + 1);
         if (scheme == "slcan") return open_slcan(rest, role);
         if (scheme == "udp") return open_udp_multicast(std::string(rest));
+        if (scheme == "usb") return open_gs_usb(rest);
         if (scheme == "log") {
             if (rest.empty()) return Error{"log: expected the name of a candump log, such as log:run.log"};
             return role == CanRole::hub ? open_candump_reader(std::string(rest))
                                         : open_candump_writer(std::string(rest));
         }
-    } else if (scheme != "slcan" && scheme != "udp" && scheme != "log" && !spec.empty() && spec.size() < IFNAMSIZ &&
-               spec.find_first_of("/ \t") == std::string_view::npos) {
+    } else if (scheme != "slcan" && scheme != "udp" && scheme != "usb" && scheme != "log" && !spec.empty() &&
+               spec.size() < IFNAMSIZ && spec.find_first_of("/ \t") == std::string_view::npos) {
         return open_socketcan(std::string(spec));
     }
     return Error{"unknown CAN bus \"" + std::string(spec) +
-                 "\": expected an interface (can0, vcan0), slcan:PORT, udp:GROUP or log:FILE"};
+                 "\": expected an interface (can0, vcan0), slcan:PORT, udp:GROUP, usb:[ADAPTER] or log:FILE"};
 }
 
 }  // namespace narpa

@@ -1,4 +1,4 @@
-/// drivers/can/can_bus.h - the interface of every CAN bus: SocketCAN, slcan, UDP multicast, logs.
+/// drivers/can/can_bus.h - the interface of every CAN bus: SocketCAN, slcan, UDP multicast, USB adapters, logs.
 ///
 /// Nothing here blocks, allocates or throws after `open_can_bus`. Frames that cannot be sent or stored are dropped
 /// and counted. A bus that goes away (interface down, client gone) is reopened when it is back.
@@ -48,6 +48,8 @@ public:
     virtual bool send(const CanFrame& frame) noexcept = 0;
     /// Waits until `receive` may have a frame or the timeout; -1: no timeout. May wake early.
     virtual void wait(std::int64_t timeout_ns) noexcept = 0;
+    /// `wait` of a bus that is no log also ends while this descriptor has something to read; -1: none.
+    void wake_by(int fd) noexcept { wake_fd_ = fd; }
     /// No frame will arrive any more (the end of a log).
     [[nodiscard]] virtual bool ended() const noexcept { return false; }
     /// The frames are a recording: all can be read at once, and each is due at its `t_received_ns`.
@@ -60,6 +62,7 @@ public:
 
 protected:
     CanCounters counters_{};
+    int wake_fd_ = -1;
 };
 
 /// A reader does its other work after this many frames: a flooded bus always has a next one.
@@ -69,7 +72,8 @@ inline constexpr int kFramesPerTurn = 4096;
 /// bus has a server (slcan) or a direction (log: a hub reads it, a client writes it).
 enum class CanRole : std::uint8_t { hub, client };
 
-/// BUS: `vcan0`/`can0` (SocketCAN) | `slcan:PORT` | `udp:GROUP` | `log:FILE`.
+/// BUS: `vcan0`/`can0` (SocketCAN) | `slcan:PORT` | `udp:GROUP` |
+/// `usb:[ADAPTER][/CHANNEL][@BIT_RATE[,DATA_BIT_RATE]]` | `log:FILE`.
 Result<std::unique_ptr<CanBus>> open_can_bus(std::string_view spec, CanRole role);
 
 }  // namespace narpa

@@ -117,8 +117,9 @@ public:
     void wait(std::int64_t timeout_ns) noexcept override {
         if (stream_.unread()) return;
         const bool write_too = stream_.pending() || connecting_;
-        std::array<pollfd, 1> fds{{{stream_ ? stream_.fd() : connecting_.get(),
-                                    static_cast<short>(write_too ? POLLIN | POLLOUT : POLLIN), 0}}};
+        std::array<pollfd, 2> fds{{{stream_ ? stream_.fd() : connecting_.get(),
+                                    static_cast<short>(write_too ? POLLIN | POLLOUT : POLLIN), 0},
+                                   {wake_fd_, POLLIN, 0}}};
         wait_ready(fds, stream_ ? timeout_ns : retry_.limit(timeout_ns));
     }
 

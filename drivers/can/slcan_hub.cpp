@@ -106,8 +106,9 @@ public:
 
     void wait(std::int64_t timeout_ns) noexcept override {
         if (!queue_.empty()) return;
-        std::array<pollfd, kClients + 1> fds{};
+        std::array<pollfd, kClients + 2> fds{};
         fds[kClients] = {listener_.get(), POLLIN, 0};
+        fds[kClients + 1] = {wake_fd_, POLLIN, 0};
         bool held_up = false;
         for (std::size_t i = 0; i < kClients; ++i) {
             const SlcanStream& s = clients_[i].stream;

@@ -124,7 +124,7 @@ public:
     }
 
     void wait(std::int64_t timeout_ns) noexcept override {
-        std::array<pollfd, 1> fds{{{bound_ ? fd_.get() : -1, POLLIN, 0}}};
+        std::array<pollfd, 2> fds{{{bound_ ? fd_.get() : -1, POLLIN, 0}, {wake_fd_, POLLIN, 0}}};
         wait_ready(fds, bound_ ? timeout_ns : retry_.limit(timeout_ns));
         if (!bound_) (void)bind_again();
     }

@@ -65,7 +65,7 @@ public:
     }
 
     void wait(std::int64_t timeout_ns) noexcept override {
-        std::array<pollfd, 1> fds{{{in_.get(), POLLIN, 0}}};
+        std::array<pollfd, 2> fds{{{in_.get(), POLLIN, 0}, {wake_fd_, POLLIN, 0}}};
         wait_ready(fds, timeout_ns);
     }
 

@@ -15,6 +15,8 @@ namespace narpa {
 class VideoWriter : public QueueWriter {
 public:
     void abandon(std::span<const std::uint8_t>) noexcept override { ++failed; }
+    /// As VideoSink's.
+    virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
 
     std::atomic<std::uint64_t> written{0}, no_reader{0}, failed{0}, reconnects{0};
     std::atomic<int> file_error{0};  ///< errno of a file that did not take a frame
@@ -26,6 +28,9 @@ std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, cons
 /// Checks the device, its format and starts it; a device that vanishes later is looked for once a second.
 Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
                                                   WhenFull full);
+/// `address`: [HOST:]PORT to listen at for hosts that attach the camera.
+Result<std::unique_ptr<VideoSink>> open_uvc_sink(std::string_view address, const VideoFormat& format, WhenFull full,
+                                                 const std::optional<VideoControls>& controls);
 /// `fifo`: the path is a FIFO; else a file, made or emptied.
 Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool fifo, const VideoFormat& format,
                                                  WhenFull full);

@@ -29,6 +29,7 @@ public:
         return {writer_->written, queue_.dropped(), writer_->no_reader, writer_->failed, writer_->reconnects};
     }
     std::string description() const override { return description_; }
+    bool next_request(VideoRequest& request) noexcept override { return writer_->next_request(request); }
     Status failure() const override {
         const int reason = writer_->file_error;
         if (reason == 0) return Ok{};
@@ -64,7 +65,11 @@ private:
     std::atomic<std::uint64_t> written_{0}, failed_{0};
 };
 
-Result<std::unique_ptr<VideoSink>> open_by_kind(const std::string& spec, const VideoFormat& format, WhenFull full) {
+Result<std::unique_ptr<VideoSink>> open_by_kind(const std::string& spec, const VideoFormat& format, WhenFull full,
+                                                const std::optional<VideoControls>& controls) {
+    constexpr std::string_view kUvc = "uvc:";
+    if (spec.starts_with(kUvc))
+        return open_uvc_sink(std::string_view(spec).substr(kUvc.size()), format, full, controls);
     if (spec == "none") return std::unique_ptr<VideoSink>(new NullSink(frame_bytes(format)));
     struct stat info {};
     const bool exists = ::stat(spec.c_str(), &info) == 0;
@@ -72,7 +77,8 @@ Result<std::unique_ptr<VideoSink>> open_by_kind(const std::string& spec, const V
     if (spec.ends_with(".y4m")) return open_y4m_sink(spec, false, format, full);
     if (spec.starts_with("/dev/video") || (exists && S_ISCHR(info.st_mode)))
         return open_v4l2_sink(spec, format, full);
-    return Error{"video sink \"" + spec + "\": expected /dev/videoN, FILE.y4m, an existing FIFO, or none"};
+    return Error{"video sink \"" + spec +
+                 "\": expected /dev/videoN, uvc:PORT, FILE.y4m, an existing FIFO, or none"};
 }
 
 Error no_such_path(const std::string& spec) {
@@ -98,14 +104,14 @@ std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, cons
     return std::make_unique<QueuedSink>(std::move(writer), format, full, std::move(description));
 }
 
-Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format,
-                                                   WhenFull full) {
+Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full,
+                                                   const std::optional<VideoControls>& controls) {
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"video: width, height and frame period must be positive"};
     if (const std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())
         return Error{"video: " + what};
     try {
-        return open_by_kind(std::string(spec), format, full);
+        return open_by_kind(std::string(spec), format, full, controls);
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
         return Error{"video sink \"" + std::string(spec) + "\": " + e.what(), {}, 0, 0, ErrorKind::missing};
     }

@@ -1,4 +1,4 @@
-/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a Y4M file or FIFO, or none.
+/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera, a Y4M file or FIFO, or none.
 ///
 /// A sink owns a thread and a ring of preallocated frames, so that handing over a frame is one copy: no disk,
 /// reader or device can block the loop.
@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,6 +24,19 @@ struct VideoCounters {
     std::uint64_t reconnects = 0;  ///< times that a reader or a device was connected again
 };
 
+/// What a camera lets the reader of its frames set, where the sink is a device with controls.
+struct VideoControls {
+    std::int64_t exposure_min_ns = 0, exposure_max_ns = 0, exposure_ns = 0;
+    std::int16_t gain_max_cdb = 0, gain_cdb = 0;  ///< 0.01 dB
+    bool auto_exposure = false;
+};
+/// What the reader has set, within the limits; what is absent stays.
+struct VideoRequest {
+    std::optional<std::int64_t> exposure_ns{};
+    std::optional<std::int16_t> gain_cdb{};
+    std::optional<bool> auto_exposure{};
+};
+
 /// When the ring is full, a real-time run drops the frame and a lockstep run waits, so that no frame is lost.
 enum class WhenFull : std::uint8_t { drop, wait };
 
@@ -38,9 +52,13 @@ public:
     /// An Error when the sink is a file that did not take every frame; final after a flush.
     [[nodiscard]] virtual Status failure() const { return Ok{}; }
     [[nodiscard]] virtual std::string description() const = 0;
+    /// The next thing that the reader has set; false: nothing more. From one thread.
+    virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
 };
 
-/// SINK: `/dev/videoN` (V4L2 output) | `FILE.y4m` or an existing FIFO | `none`.
-Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full);
+/// SINK: `/dev/videoN` (V4L2 output) | `uvc:[ADDRESS:]PORT` (USB camera over USB/IP) | `FILE.y4m` or an existing
+/// FIFO | `none`. `controls`: absent where the camera has none; sinks without controls leave them out.
+Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full,
+                                                   const std::optional<VideoControls>& controls = {});
 
 }  // namespace narpa

@@ -82,10 +82,21 @@ Pair socketcan() {
     return p;
 }
 
+/// The adapter's bus is NARPA_TEST_CAN's.
+Pair usb() {
+    const char* adapter = std::getenv("NARPA_TEST_USB");
+    if (adapter == nullptr) return {nullptr, nullptr, "NARPA_TEST_USB names no USB-CAN adapter"};
+    Pair p;
+    p.hub = open_or_fail(adapter, CanRole::hub);
+    p.peer = open_or_fail(std::getenv("NARPA_TEST_CAN"), CanRole::client);
+    return p;
+}
+
 struct Kind {
     const char* name;
     Pair (*open)();
     bool reliable;
+    bool exclusive = false;  ///< one program, and one time in it
 };
 void PrintTo(const Kind& kind, std::ostream* out) {
     *out << kind.name;
@@ -106,6 +117,7 @@ protected:
     }
     CanBus& hub() { return *pair_.hub; }
     CanBus& peer() { return *pair_.peer; }
+    void close() { pair_ = {}; }
 
 private:
     Pair pair_;
@@ -229,6 +241,7 @@ TEST_P(CanBusSuite, WaitComesBackWithNothing) {
 
 TEST_P(CanBusSuite, ThePeerComesAndGoes) {
     ReceivedFrame out;
+    if (GetParam().exclusive) close();
     for (std::uint32_t i = 0; i < 5; ++i) {
         const Pair fresh = GetParam().open();
         ASSERT_TRUE(fresh.hub && fresh.peer);
@@ -240,7 +253,8 @@ TEST_P(CanBusSuite, ThePeerComesAndGoes) {
 
 INSTANTIATE_TEST_SUITE_P(Buses, CanBusSuite,
                          testing::Values(Kind{"slcan_tcp", slcan_tcp, true}, Kind{"slcan_pty", slcan_pty, true},
-                                         Kind{"udp_multicast", udp, false}, Kind{"socketcan", socketcan, true}),
+                                         Kind{"udp_multicast", udp, false}, Kind{"socketcan", socketcan, true},
+                                         Kind{"usb", usb, true, true}),
                          [](const auto& kind) { return std::string(kind.param.name); });
 
 }  // namespace

@@ -21,8 +21,9 @@ Error error_of(const std::string& spec, CanRole role = CanRole::hub) {
 }
 
 TEST(CanSpec, BadTextsAreBadInput) {
-    for (const char* spec : {"", "usb:", "vcan:0", "slcan:", "slcan:70000", "slcan:-1", "slcan:1x", "slcan:tcp",
-                             "udp:", "udp:10.0.0.1", "udp:239.1", "log:", "a/b", "a-name-far-too-long"}) {
+    for (const char* spec :
+         {"", "usb:x/300", "usb:@5", "usb:@500000,100000", "usb:a b", "vcan:0", "slcan:", "slcan:70000", "slcan:-1",
+          "slcan:1x", "slcan:tcp", "udp:", "udp:10.0.0.1", "udp:239.1", "log:", "a/b", "a-name-far-too-long"}) {
         const Error e = error_of(spec);
         EXPECT_EQ(e.kind, ErrorKind::bad_input) << spec;
         EXPECT_NE(e.what.find("expected"), std::string::npos) << e.what;

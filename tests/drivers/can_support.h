@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/time.h"
 #include "drivers/can/can_bus.h"
 
 namespace narpa {

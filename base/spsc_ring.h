@@ -1,4 +1,4 @@
-/// emulator/spsc_ring.h - a ring buffer of fixed size from one thread to another; neither side waits or allocates.
+/// base/spsc_ring.h - a ring buffer of fixed size from one thread to another; neither side waits or allocates.
 #pragma once
 
 #include <array>

@@ -1,0 +1,328 @@
+#include "drivers/usb/usbip_server.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <utility>
+
+#include "base/read_number.h"
+#include "base/time.h"
+#include "drivers/background_thread.h"
+#include "drivers/usb/usb_control.h"
+
+namespace narpa {
+namespace {
+
+Error usbip_cannot_listen(const std::string& address, std::uint16_t port) {
+    return {.what = "cannot listen at " + address + ":" + std::to_string(port) + ": " + std::strerror(errno),
+            .kind = ErrorKind::missing};
+}
+
+}  // namespace
+
+/// Reads requests, keeps the transfers that are pending, writes the answers; never waits.
+class UsbIpServer::Connection {
+public:
+    Connection(Descriptor fd, UsbIpServer& server)
+        : fd_(std::move(fd)), server_(server), until_ns_(monotonic_ns() + kPatience_ns) {}
+
+    [[nodiscard]] bool imported() const noexcept { return imported_; }
+    [[nodiscard]] pollfd wanted() const noexcept {
+        const bool reads = unsent() < kMostUnsent && !closing_;
+        return {fd_.get(), static_cast<short>((reads ? POLLIN : 0) | (unsent() > 0 ? POLLOUT : 0)), 0};
+    }
+    /// Of those that have not imported the device.
+    [[nodiscard]] std::int64_t until_ns() const noexcept { return imported_ ? INT64_MAX : until_ns_; }
+
+    /// False: it is over.
+    bool proceed(short ready) {
+        if (monotonic_ns() >= until_ns()) return false;
+        if ((ready & (POLLERR | POLLHUP)) != 0 && (ready & POLLIN) == 0) return false;
+        if ((ready & POLLIN) != 0 && !read_some()) return false;
+        if (imported_) serve();
+        return write_some() && !(closing_ && unsent() == 0);
+    }
+
+private:
+    static constexpr std::size_t kMostUnsent = 4 << 20, kMostHeld = 4 << 20;  // bytes
+    struct Transfer {
+        UsbIpSubmit submit;
+        std::vector<std::uint8_t> data;  // from the host
+    };
+
+    [[nodiscard]] std::size_t unsent() const noexcept { return out_.size() - out_begin_; }
+
+    bool read_some() {
+        std::array<std::uint8_t, 65536> bytes;
+        const ssize_t n = ::recv(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+        if (n < 0) return errno == EAGAIN || errno == EINTR;
+        if (n == 0) return false;
+        in_.insert(in_.end(), bytes.begin(), bytes.begin() + n);
+        std::size_t used = 0;
+        while (!closing_) {
+            const auto rest = std::span<const std::uint8_t>(in_).subspan(used);
+            const long taken = imported_ ? take_transfer(rest) : take_op(rest);
+            if (taken < 0) {
+                ++server_.refused_;
+                return false;
+            }
+            if (taken == 0) break;
+            used += static_cast<std::size_t>(taken);
+        }
+        in_.erase(in_.begin(), in_.begin() + static_cast<std::ptrdiff_t>(used));
+        return true;
+    }
+
+    /// Bytes taken; 0: more must come; -1: not USB/IP.
+    long take_op(std::span<const std::uint8_t> bytes) {
+        if (bytes.size() < kUsbIpOpBytes) return 0;
+        const auto header = decode_usbip_op(bytes.first<kUsbIpOpBytes>());
+        if (!header) return -1;
+        if (header->op == UsbIpOp::list_request) {
+            put(encode_usbip_list({&server_.identity_, 1}));
+            closing_ = true;
+            return kUsbIpOpBytes;
+        }
+        if (header->op != UsbIpOp::import_request) return -1;
+        if (bytes.size() < kUsbIpOpBytes + kUsbIpBusIdBytes) return 0;
+        const auto bus_id = decode_usbip_bus_id(bytes.subspan<kUsbIpOpBytes, kUsbIpBusIdBytes>());
+        if (!bus_id) return -1;
+        const bool busy = std::ranges::any_of(server_.connections_, [](const auto& c) { return c->imported(); });
+        const std::uint32_t status = *bus_id != kBusId ? kUsbIpNoDevice : busy ? kUsbIpBusy : 0;
+        if (status != 0) {
+            put(encode_usbip_op({UsbIpOp::import_reply, status}));
+            closing_ = true;
+        } else {
+            put(encode_usbip_import(server_.identity_));
+            imported_ = true;
+            ++server_.plugged_;
+            server_.device_.plugged(true);
+        }
+        return kUsbIpOpBytes + kUsbIpBusIdBytes;
+    }
+
+    long take_transfer(std::span<const std::uint8_t> bytes) {
+        if (bytes.size() < kUsbIpHeaderBytes) return 0;
+        const auto request = decode_usbip_request(bytes.first<kUsbIpHeaderBytes>());
+        if (!request) return -1;
+        if (const auto* unlink = std::get_if<UsbIpUnlink>(&*request)) {
+            give_up(*unlink);
+            return kUsbIpHeaderBytes;
+        }
+        const auto& submit = std::get<UsbIpSubmit>(*request);
+        const std::size_t follow = submit.to_host ? 0 : submit.length;
+        if (bytes.size() < kUsbIpHeaderBytes + follow) return 0;
+        if (transfers_.size() == kTransfers || held_bytes_ + follow > kMostHeld) return -1;
+        held_bytes_ += follow;
+        const auto data = bytes.subspan(kUsbIpHeaderBytes, follow);
+        transfers_.push_back({submit, {data.begin(), data.end()}});
+        return static_cast<long>(kUsbIpHeaderBytes + follow);
+    }
+
+    void give_up(const UsbIpUnlink& unlink) {
+        serve();  // what can be answered now was not given up in time
+        const auto victim =
+            std::ranges::find_if(transfers_, [&](const Transfer& t) { return t.submit.sequence == unlink.victim; });
+        const bool pending = victim != transfers_.end();
+        if (pending) {
+            held_bytes_ -= victim->data.size();
+            transfers_.erase(victim);
+            ++server_.unlinked_;
+        }
+        const std::size_t at = room_for(kUsbIpHeaderBytes);
+        encode_usbip_reply({true, unlink.sequence, pending ? -ECONNRESET : 0, 0},
+                           std::span(out_).subspan(at).first<kUsbIpHeaderBytes>());
+    }
+
+    /// Answers what can be answered. Those of one endpoint and direction keep their order.
+    void serve() {
+        std::uint32_t held = 0;  // bit: endpoint, or 16 + endpoint towards the host
+        for (auto t = transfers_.begin(); t != transfers_.end() && unsent() < kMostUnsent;) {
+            const std::uint32_t lane = 1u << ((t->submit.to_host ? 16 : 0) + t->submit.endpoint);
+            if ((held & lane) != 0 || !answer(*t)) {
+                held |= lane;
+                ++t;
+            } else {
+                held_bytes_ -= t->data.size();
+                t = transfers_.erase(t);
+            }
+        }
+    }
+
+    /// False: not yet.
+    bool answer(Transfer& t) {
+        const UsbIpSubmit& s = t.submit;
+        const std::size_t at = room_for(kUsbIpHeaderBytes + (s.to_host ? s.length : 0));
+        const auto room = std::span(out_).subspan(at + kUsbIpHeaderBytes);
+        UsbDevice& device = server_.device_;
+        int n = 0;
+        if (s.endpoint == 0)
+            n = s.setup.to_host() == s.to_host || s.length == 0
+                    ? usb_control(device, s.setup, s.to_host ? room : std::span(t.data))
+                    : UsbAnswer::kStall;
+        else
+            n = s.to_host ? device.give(s.endpoint, room) : device.take(s.endpoint, t.data);
+        if (n == UsbAnswer::kPending) {
+            out_.resize(at);
+            return false;
+        }
+        const auto moved = static_cast<std::uint32_t>(std::clamp<std::int64_t>(n, 0, s.length));
+        encode_usbip_reply({false, s.sequence, n < 0 ? n : 0, moved},
+                           std::span(out_).subspan(at).first<kUsbIpHeaderBytes>());
+        out_.resize(at + kUsbIpHeaderBytes + (s.to_host ? moved : 0));
+        ++server_.transfers_;
+        return true;
+    }
+
+    void put(std::span<const std::uint8_t> bytes) { out_.insert(out_.end(), bytes.begin(), bytes.end()); }
+    /// Index of so many new bytes.
+    std::size_t room_for(std::size_t bytes) {
+        out_.resize(out_.size() + bytes);
+        return out_.size() - bytes;
+    }
+
+    bool write_some() {
+        while (unsent() > 0) {
+            const ssize_t n = ::send(fd_.get(), out_.data() + out_begin_, unsent(), MSG_DONTWAIT | MSG_NOSIGNAL);
+            if (n < 0) return errno == EAGAIN || errno == EINTR;
+            out_begin_ += static_cast<std::size_t>(n);
+        }
+        out_.clear();
+        out_begin_ = 0;
+        return true;
+    }
+
+    Descriptor fd_;
+    UsbIpServer& server_;
+    std::int64_t until_ns_;
+    bool imported_ = false, closing_ = false;
+    std::vector<std::uint8_t> in_, out_;
+    std::size_t out_begin_ = 0, held_bytes_ = 0;
+    std::deque<Transfer> transfers_;
+};
+
+Result<std::unique_ptr<UsbIpServer>> UsbIpServer::start(const std::string& address, std::uint16_t port,
+                                                        UsbDevice& device) {
+    const UsbDescriptors& d = device.descriptors();
+    const auto configuration = decode_usb_configuration(d.configuration);
+    if (!configuration) return Error{"USB device: its configuration is none"};
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_port = htons(port);
+    if (::inet_pton(AF_INET, address.c_str(), &at.sin_addr) != 1)
+        return Error{"\"" + address + "\": expected an IPv4 address of this machine to listen at"};
+    Descriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    if (!fd) return usbip_cannot_listen(address, port);
+    const int on = 1;
+    ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    socklen_t size = sizeof at;
+    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&at), size) != 0 || ::listen(fd.get(), 8) != 0 ||
+        ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&at), &size) != 0)
+        return usbip_cannot_listen(address, port);
+    Descriptor signal(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+    if (!signal) return usbip_cannot_listen(address, port);
+    UsbIpDevice identity{
+        "/sys/devices/narpa/" + std::string(kBusId), std::string(kBusId), 1, 2, d.speed, d.device, *configuration};
+    return std::unique_ptr<UsbIpServer>(
+        new UsbIpServer(std::move(fd), std::move(signal), ntohs(at.sin_port), std::move(identity), device));
+}
+
+UsbIpServer::UsbIpServer(Descriptor listening, Descriptor signal, std::uint16_t port, UsbIpDevice identity,
+                         UsbDevice& device)
+    : listening_(std::move(listening)),
+      signal_(std::move(signal)),
+      port_(port),
+      identity_(std::move(identity)),
+      device_(device) {
+    connections_.reserve(kConnections);
+    thread_ = start_without_signals([this] { run(); });
+}
+
+UsbIpServer::~UsbIpServer() {
+    ending_.store(true, std::memory_order_release);
+    wake();
+    thread_.join();
+}
+
+void UsbIpServer::wake() noexcept {
+    ::eventfd_write(signal_.get(), 1);
+}
+
+void UsbIpServer::unplug() noexcept {
+    unplugging_.store(true, std::memory_order_release);
+    wake();
+}
+
+UsbIpCounters UsbIpServer::counters() const noexcept {
+    return {plugged_, transfers_, unlinked_, refused_};
+}
+
+void UsbIpServer::run() noexcept {
+    while (!ending_.load(std::memory_order_acquire)) {
+        std::array<pollfd, 2 + kConnections> fds;
+        fds[0] = {signal_.get(), POLLIN, 0};
+        fds[1] = {connections_.size() == kConnections ? -1 : listening_.get(), POLLIN, 0};
+        std::int64_t until_ns = monotonic_ns() + kPatience_ns;
+        for (std::size_t i = 0; i < connections_.size(); ++i) {
+            fds[2 + i] = connections_[i]->wanted();
+            until_ns = std::min(until_ns, connections_[i]->until_ns());
+        }
+        wait_ready(std::span(fds).first(2 + connections_.size()),
+                   std::max<std::int64_t>(0, until_ns - monotonic_ns()));
+        eventfd_t count = 0;
+        if (fds[0].revents != 0) ::eventfd_read(signal_.get(), &count);
+        const bool unplugs = unplugging_.exchange(false, std::memory_order_acquire);
+        try {
+            for (std::size_t i = connections_.size(); i-- > 0;)
+                if ((unplugs && connections_[i]->imported()) || !connections_[i]->proceed(fds[2 + i].revents))
+                    drop(i);
+            if (fds[1].revents != 0) accept_one();
+        } catch (const std::exception&) {  // no memory left
+            while (!connections_.empty()) drop(connections_.size() - 1);
+        }
+    }
+    while (!connections_.empty()) drop(connections_.size() - 1);
+}
+
+void UsbIpServer::drop(std::size_t i) noexcept {
+    if (connections_[i]->imported()) device_.plugged(false);
+    connections_.erase(connections_.begin() + static_cast<std::ptrdiff_t>(i));
+}
+
+void UsbIpServer::accept_one() {
+    Descriptor fd(::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!fd) {
+        if (errno == EMFILE || errno == ENFILE) wait_ready(std::span<pollfd>(), kPatience_ns / 50);
+        return;
+    }
+    // A host that has lost power is noticed within half a minute.
+    const int on = 1, idle_s = 10, every_s = 5, times = 3;
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    ::setsockopt(fd.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof idle_s);
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_KEEPINTVL, &every_s, sizeof every_s);
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_KEEPCNT, &times, sizeof times);
+    connections_.push_back(std::make_unique<Connection>(std::move(fd), *this));
+}
+
+Result<ListenAddress> parse_listen_address(std::string_view text) {
+    ListenAddress at;
+    const std::size_t colon = text.rfind(':');
+    if (colon != std::string_view::npos) at.host = text.substr(0, colon);
+    in_addr unused{};
+    if (!read_number(text.substr(colon == std::string_view::npos ? 0 : colon + 1), at.port) ||
+        ::inet_pton(AF_INET, at.host.c_str(), &unused) != 1)
+        return Error{"\"" + std::string(text) + "\": expected [ADDRESS:]PORT, such as 3240 or 0.0.0.0:3240"};
+    return at;
+}
+
+}  // namespace narpa

@@ -103,7 +103,8 @@ void BeamAssociation::along_beams(const Rigid3& T, const RangeNoise& noise, std:
 void BeamAssociation::find_edges(const RayBatch& axes, const RangeNoise& noise,
                                  std::span<PointToPlane> points) const {
     constexpr int kRim = 6;
-    const double tangent = std::tan(0.5 * noise.footprint_rad);
+    // A hexagon about the footprint.
+    const double tangent = std::tan(0.5 * noise.footprint_rad) / std::cos(3.14159265358979323846 / kRim);
     RayBatch rays;
     HitBatch hits;
     rays.n = axes.n;

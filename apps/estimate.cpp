@@ -35,7 +35,7 @@ struct EstimateOptions {
     // Of a single file. The truth is where scene, trajectory and --pose have the bodies; the guess lies off it.
     std::string frame, sweep;  ///< FILE.raw: the device's bytes; FILE.pcap
     double time_s = 0;
-    double range_noise_m = RangeNoise{}.range_m;  ///< of the sweep, standard deviation
+    double range_noise_m = 0;  ///< of the sweep, standard deviation; 0: the scene's
     PoseOptions pose;
 
     std::vector<Option> only_of_files, only_of_logs;
@@ -251,7 +251,8 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     const double search_m = 0.01 * tracker.start_percent * norm(truth.t) +
                             tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;
-    settings.noise.range_m = o.range_noise_m;
+    settings.noise = range_noise_of(lidar);
+    if (o.range_noise_m > 0) settings.noise.range_m = o.range_noise_m;
     CloudIcp icp((*world)->tracer(), *target, settings);
     TracingThreads threads(o.threads);
     std::optional<Result<CloudEstimate>> found;
@@ -268,8 +269,12 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
         fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
                     "cannot be seen; {} iterations",
                     e.points, e.used, e.explained, unobserved, e.iterations));
-    if (!e.credible) say("  not credible: the pose does not explain its points, or did not settle");
+    if (e.ambiguous)
+        say("  not credible: another pose explains the points nearly as well");
+    else if (!e.credible)
+        say("  not credible: the pose does not explain its points, or did not settle");
     document["passed"] = document["credible"] = e.credible;
+    document["ambiguous"] = e.ambiguous;
     document["points"] = e.points;
     document["used"] = e.used;
     document["explained"] = e.explained;
@@ -317,10 +322,10 @@ Command add_estimate(Parser app) {
         .type_name("SECONDS")
         .range(-9e9, 9e9)
         .finite();
-    c.option("--range-noise", o->range_noise_m, "Standard deviation of the sweep's ranges")
+    c.option("--range-noise", o->range_noise_m,
+             "Standard deviation of the sweep's ranges (default: that of the scene, or 0.02)")
         .type_name("METRES")
-        .range(1e-6, 1e3)
-        .shows_default();
+        .range(1e-6, 1e3);
     o->pose.add_to(c);
     c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
     o->tracker.add_to(c, "");

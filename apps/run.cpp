@@ -116,7 +116,7 @@ Command add_run(Parser app) {
         .repeatable();
     c.option(
          "--lidar", o->lidar,
-         "udp:HOST:PORT | FILE.pcap | ouster:[ADDRESS:]PORT (an Ouster sensor's HTTP server) | can (each shot on "
+         "udp:HOST:PORT (with %INTERFACE after HOST, ,ttl=N after PORT) | FILE.pcap | ouster:[ADDRESS:]PORT (an Ouster sensor's HTTP server) | can (each shot on "
          "the CAN bus) | none; may be given many times")
         .type_name("LIDAR=SINK")
         .repeatable();

@@ -8,7 +8,7 @@
 
 namespace narpa {
 
-/// `address` is HOST:PORT; an IPv6 host is in brackets.
+/// `address`: udp_route.h.
 Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network);
 Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork& network,
                                                    std::int64_t epoch_unix_ns, bool wait_when_full);

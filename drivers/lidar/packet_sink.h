@@ -40,12 +40,12 @@ public:
     [[nodiscard]] virtual std::string_view fate() const { return "sent"; }
 };
 
-/// SINK: `udp:HOST:PORT` | `FILE.pcap` | `ouster:[ADDRESS:]PORT` | `none`. A capture shows the packets as `network`
-/// sends them by default; `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps. `wait_when_full`: a
-/// lockstep run waits for the disk where a real-time run drops. `metadata`: LidarModel::metadata(); where there are
-/// some, FILE.json beside a capture gets them. `ouster:` is a sensor on the network: an HTTP server at ADDRESS
-/// (127.0.0.1) states the metadata and takes where the packets go to; before that they go nowhere and are not
-/// counted.
+/// SINK: `udp:HOST[%INTERFACE]:PORT[,ttl=N]` (one receiver, a broadcast or a multicast address: udp_route.h) |
+/// `FILE.pcap` | `ouster:[ADDRESS:]PORT` | `none`. A capture shows the packets as `network` sends them by default;
+/// `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps. `wait_when_full`: a lockstep run waits for
+/// the disk where a real-time run drops. `metadata`: LidarModel::metadata(); where there are some, FILE.json beside
+/// a capture gets them. `ouster:` is a sensor on the network: an HTTP server at ADDRESS (127.0.0.1) states the
+/// metadata and takes where the packets go to; before that they go nowhere and are not counted.
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
                                                      std::int64_t epoch_unix_ns, bool wait_when_full,
                                                      std::string_view metadata = {});

@@ -35,7 +35,8 @@ protected:
 /// The longest UDP datagram over IPv4: a buffer of this size takes any LiDAR's packets.
 inline constexpr std::size_t kDatagramBytesMax = 65507;
 
-/// SOURCE: `udp:PORT` (on all of this machine's addresses) | `udp:ADDRESS:PORT` (an IPv6 address is in brackets).
+/// SOURCE: `udp:PORT` (on all of this machine's addresses) | `udp:ADDRESS[%INTERFACE]:PORT` (an IPv6 address is in
+/// brackets); a multicast address is joined.
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec);
 
 /// The payloads of this size of all UDP datagrams over IPv4 and Ethernet, in the file's order; other traffic is

@@ -17,28 +17,15 @@
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/packet_source.h"
 #include "drivers/lidar/receiver_watch.h"
+#include "drivers/lidar/udp_route.h"
 
 namespace narpa {
 namespace {
 
-struct Destination {
-    sockaddr_storage address{};
-    socklen_t size = 0;
-
-    void set_port(int port) {
-        const in_port_t wire = htons(static_cast<std::uint16_t>(port));
-        if (address.ss_family == AF_INET6) {
-            reinterpret_cast<sockaddr_in6&>(address).sin6_port = wire;
-        } else {
-            reinterpret_cast<sockaddr_in&>(address).sin_port = wire;
-        }
-    }
-};
-
 class UdpSink final : public PacketSink {
 public:
     /// `position_port_offset`: 0 where there are no position packets.
-    UdpSink(Descriptor fd, const Destination& data, int port, int position_port_offset, const std::string& host)
+    UdpSink(Descriptor fd, const UdpDestination& data, int port, int position_port_offset, const std::string& host)
         : fd_(std::move(fd)),
           destinations_{data, data},
           receivers_(data.address, {port, position_port_offset == 0 ? 0 : port + position_port_offset}),
@@ -50,7 +37,7 @@ public:
     }
 
     bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t) noexcept override {
-        const Destination& to = destinations_[kind == PacketKind::data ? 0 : 1];
+        const UdpDestination& to = destinations_[kind == PacketKind::data ? 0 : 1];
         ssize_t n = 0;
         do
             n = ::sendto(fd_.get(), payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
@@ -66,20 +53,11 @@ public:
 
 private:
     Descriptor fd_;
-    std::array<Destination, 2> destinations_;
+    std::array<UdpDestination, 2> destinations_;
     ReceiverWatch receivers_;
     std::string description_;
     std::atomic<std::uint64_t> sent_{0}, dropped_{0};
 };
-
-/// "HOST:PORT", "[HOST]:PORT" or "PORT".
-std::pair<std::string, std::string> split_port(std::string_view text) {
-    const std::size_t colon = text.rfind(':');
-    if (colon == text.npos) return {"", std::string(text)};
-    std::string_view host = text.substr(0, colon);
-    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-    return {std::string(host), std::string(text.substr(colon + 1))};
-}
 
 /// 1 to 65535, or nothing.
 std::optional<int> udp_port(std::string_view text) {
@@ -97,18 +75,6 @@ Result<int> data_port(std::string_view text, const std::string& address, int pos
         what += " (position packets go to the port " + std::to_string(std::abs(position_port_offset)) +
                 (position_port_offset > 0 ? " above it)" : " below it)");
     return Error{what};
-}
-
-Result<Destination> resolve(const std::string& host, const std::string& address) {
-    addrinfo hints{}, *found = nullptr;
-    hints.ai_socktype = SOCK_DGRAM;
-    if (const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found); error != 0)
-        return Error{"udp:" + address + ": unknown host \"" + host + "\": " + ::gai_strerror(error)};
-    Destination destination;
-    std::memcpy(&destination.address, found->ai_addr, found->ai_addrlen);
-    destination.size = found->ai_addrlen;
-    ::freeaddrinfo(found);
-    return destination;
 }
 
 class UdpSource final : public PacketSource {
@@ -142,41 +108,55 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network) {
-    const auto [host, port_text] = split_port(address);
-    if (host.empty()) return Error{"udp:" + address + ": expected udp:HOST:PORT, as in udp:127.0.0.1:2368"};
-    const Result<int> port = data_port(port_text, address, network.position_port_offset());
+Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& text, const LidarNetwork& network) {
+    const auto address = UdpAddress::parse(text);
+    if (!address) return address.error();
+    const std::string what = "udp:" + text;
+    if (address->host.empty()) return Error{what + ": expected udp:HOST:PORT, as in udp:127.0.0.1:2368"};
+    const Result<int> port = data_port(address->port, text, network.position_port_offset());
     if (!port) return port.error();
-    const Result<Destination> destination = resolve(host, address);
+    Result<UdpDestination> destination = UdpDestination::resolve(address->host, what);
     if (!destination) return destination.error();
 
     // Not connected: on a connected socket an ICMP "port unreachable" makes the next send fail.
     Descriptor fd(::socket(destination->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-    if (!fd) return Error{"udp:" + address + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
-    const int on = 1;  // as the instrument does
-    ::setsockopt(fd.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
-    return std::unique_ptr<PacketSink>(
-        std::make_unique<UdpSink>(std::move(fd), *destination, *port, network.position_port_offset(), host));
+    if (!fd) return Error{what + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
+    if (auto set = set_route(fd.get(), *destination, *address, what); !set) return set.error();
+    const std::string by = address->interface.empty() ? "" : " by " + address->interface;
+    return std::unique_ptr<PacketSink>(std::make_unique<UdpSink>(
+        std::move(fd), *destination, *port, network.position_port_offset(), address->host + by));
 }
 
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) {
     constexpr std::string_view scheme = "udp:";
     const std::string name = "packet source \"" + std::string(spec) + "\"";
     const std::string_view rest = spec.starts_with(scheme) ? spec.substr(scheme.size()) : std::string_view{};
-    const auto [host, port] = split_port(rest);
-    const std::string address = rest.find(':') == rest.npos ? "0.0.0.0" : host;
-    if (address.empty() || !udp_port(port))
+    auto address = UdpAddress::parse(rest);
+    if (!address) return address.error();
+    const std::string& port = address->port;
+    if (rest.find(':') == rest.npos) address->host = "0.0.0.0";
+    if (address->host.empty() || address->ttl >= 0 || !udp_port(port))
         return Error{name + ": expected udp:PORT or udp:ADDRESS:PORT with a port from 1 to 65535, as in udp:2368"};
 
+    // An IPv6 address within its link is one with its interface only.
+    const bool ipv6 = address->host.find(':') != std::string::npos;
+    const std::string node = address->host + (ipv6 && !address->interface.empty() ? "%" + address->interface : "");
     addrinfo hints{}, *found = nullptr;
     hints.ai_socktype = SOCK_DGRAM;
     hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
-    if (const int failure = ::getaddrinfo(address.c_str(), port.c_str(), &hints, &found); failure != 0)
-        return Error{name + ": \"" + address + "\" is not an address: " + ::gai_strerror(failure)};
-    Descriptor fd(::socket(found->ai_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-    const bool bound = fd && ::bind(fd.get(), found->ai_addr, found->ai_addrlen) == 0;
-    const int reason = errno;
+    if (const int failure = ::getaddrinfo(node.c_str(), port.c_str(), &hints, &found); failure != 0)
+        return Error{name + ": \"" + node + "\" is not an address: " + ::gai_strerror(failure)};
+    UdpDestination at;
+    std::memcpy(&at.address, found->ai_addr, found->ai_addrlen);
+    at.size = found->ai_addrlen;
     ::freeaddrinfo(found);
+    if (!ipv6 && !address->interface.empty() && !at.is_multicast())
+        return Error{name + ": an interface is named to join a multicast group, and " + address->host + " is none"};
+    Descriptor fd(::socket(at.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int on = 1;  // a group has any number of receivers
+    if (fd && at.is_multicast()) ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    const bool bound = fd && ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&at.address), at.size) == 0;
+    const int reason = errno;
     if (!bound) {
         Error error{name + ": cannot listen: " + std::strerror(reason), {}, 0, 0, ErrorKind::missing};
         if (reason == EADDRINUSE)
@@ -184,9 +164,10 @@ Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) 
         if (reason == EADDRNOTAVAIL) error.remedy = "ip -br address   (the addresses of this machine)";
         return error;
     }
+    if (auto joined = join_group(fd.get(), at, *address, name); !joined) return joined.error();
     prepare_for_bursts(fd.get());
     return std::unique_ptr<PacketSource>(
-        std::make_unique<UdpSource>(std::move(fd), "UDP at " + address + ", port " + port));
+        std::make_unique<UdpSource>(std::move(fd), "UDP at " + address->host + ", port " + port));
 }
 
 }  // namespace narpa

@@ -55,7 +55,7 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
     if (search_m > 0)
         around_beams(T, search_m, stride, out);
     else
-        along_beams(T, stride, out);
+        along_beams(T, noise, stride, out);
     for (std::size_t k = 0; k < out.size(); ++k) {
         PointToPlane& p = out[k];
         if (p.fate != BeamFate::met) continue;
@@ -75,7 +75,8 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
     }
 }
 
-void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const {
+void BeamAssociation::along_beams(const Rigid3& T, const RangeNoise& noise, std::size_t stride,
+                                  std::vector<PointToPlane>& out) const {
     RayBatch rays;
     HitBatch hits;
     Lanes<double> range_m{};
@@ -92,6 +93,40 @@ void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vect
             p.surface_m = hits.position[lane];
             p.normal = hits.geometric_normal[lane];
             p.distance_m = dot(p.normal, rays.direction[lane]) * (range_m[lane] - hits.range_m[lane]);
+        }
+        if (noise.footprint_rad > 0) find_edges(rays, noise, std::span(out).last(rays.n));
+    }
+}
+
+/// Around the rim of each footprint: a ray that leaves the plane of the axis's hit, or meets what the axis misses,
+/// shows an edge.
+void BeamAssociation::find_edges(const RayBatch& axes, const RangeNoise& noise,
+                                 std::span<PointToPlane> points) const {
+    constexpr int kRim = 6;
+    // A hexagon about the footprint.
+    const double tangent = std::tan(0.5 * noise.footprint_rad) / std::cos(3.14159265358979323846 / kRim);
+    RayBatch rays;
+    HitBatch hits;
+    rays.n = axes.n;
+    for (int k = 0; k < kRim; ++k) {
+        const double turn = 2 * 3.14159265358979323846 * k / kRim;
+        for (std::size_t lane = 0; lane < axes.n; ++lane) {
+            const Vec3 d = axes.direction[lane];
+            const Vec3 x = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
+            const Vec3 off = std::cos(turn) * x + std::sin(turn) * cross(d, x);
+            rays.put(lane, {axes.origin[lane], normalized(d + tangent * off)});
+        }
+        tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
+        for (std::size_t lane = 0; lane < axes.n; ++lane) {
+            PointToPlane& p = points[lane];
+            const bool met = is_set(hits.met, lane);
+            if (p.fate == BeamFate::met) {
+                const bool on_plane =
+                    met && std::abs(dot(p.normal, hits.position[lane] - p.surface_m)) < noise.range_m;
+                if (!on_plane) p.fate = BeamFate::edge;
+            } else if (met) {
+                p.fate = BeamFate::edge;
+            }
         }
     }
 }

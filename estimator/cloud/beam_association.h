@@ -15,6 +15,7 @@ namespace narpa {
 enum class BeamFate : std::uint8_t {
     met,      ///< the model's surface lies on the beam
     missed,   ///< the beam misses the model
+    edge,     ///< a surface ends within its footprint (RangeNoise::footprint_rad)
     grazing,  ///< it meets the surface at too flat an angle for its range to be used
 };
 
@@ -53,7 +54,9 @@ private:
         double range_m = 0;
     };
     [[nodiscard]] Ray in_target(const Rigid3& T_lidar_target, const Beam& beam) const noexcept;
-    void along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const;
+    void along_beams(const Rigid3& T, const RangeNoise& noise, std::size_t stride,
+                     std::vector<PointToPlane>& out) const;
+    void find_edges(const RayBatch& axes, const RangeNoise& noise, std::span<PointToPlane> points) const;
     void around_beams(const Rigid3& T, double search_m, std::size_t stride, std::vector<PointToPlane>& out) const;
 
     const Tracer& tracer_;

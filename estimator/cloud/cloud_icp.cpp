@@ -15,6 +15,16 @@ constexpr int kSearchIterations = 10;       ///< of the search, each with a smal
 constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observability.h)
 constexpr double kTukey = 4.685;            ///< of the biweight: 95 % of the efficiency of least squares
 constexpr double kLastCircle = 0.02;        ///< of the search, in parts of the first
+constexpr double kExplained = 4;            ///< standard deviations of a point that lies on the model
+constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
+/// Answers may have rivals below so many points, where a normalised eigenvalue is smaller, or where a larger part
+/// of the points lies elsewhere.
+constexpr std::size_t kManyPoints = 150;
+constexpr double kWeak = 0.01, kFewElsewhere = 0.02;
+/// A rival is elsewhere, so many variances away; as likely, or better, by these differences of the costs.
+constexpr double kElsewhere = 100, kAsLikely = 8, kBetter = 0.5;
+/// Of a search about a minimum at which points lie beside the model, in parts of the points' spread.
+constexpr double kBesideCircle = 0.15;
 
 /// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
 struct Biweight {
@@ -26,6 +36,20 @@ struct Biweight {
         slope = s * (1 - 5 * r * r);
     }
 };
+
+/// So many of n points would be found with a chance below 5 % if their share were `least` (Clopper and Pearson
+/// 1934): of few points nearly all must be.
+bool share_is_more(std::size_t found, std::size_t n, double least) {
+    if (static_cast<double>(found) < least * static_cast<double>(n)) return false;
+    if (!(least > 0) || least >= 1) return true;
+    // The binomial distribution from n downwards.
+    double term = std::pow(least, static_cast<double>(n)), sum = term;
+    for (std::size_t k = n; k > found && sum < 0.05; --k) {
+        term *= static_cast<double>(k) / static_cast<double>(n - k + 1) * (1 - least) / least;
+        sum += term;
+    }
+    return sum < 0.05;
+}
 
 Status check(std::span<const RangePoint> points) {
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -83,7 +107,8 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
     for (const PointToPlane& p : planes_)
         if (p.fate == BeamFate::met) magnitudes_.push_back(std::abs(p.distance_m) / p.sigma_m);
     out.points = planes_.size();
-    out.used = out.missed = out.grazing = out.rejected = out.explained = 0;
+    out.used = out.missed = out.edges = out.grazing = out.rejected = out.explained = 0;
+    out.cost = 0;
     if (magnitudes_.size() < kFewestBeams) return pass;
     pass.scatter = std::max(1.0, kMadToSigma * upper_median(std::span(magnitudes_)));
 
@@ -92,9 +117,13 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
         const PointToPlane& p = planes_[k];
         out.missed += p.fate == BeamFate::missed;
         out.grazing += p.fate == BeamFate::grazing;
+        out.edges += p.fate == BeamFate::edge;
+        if (p.fate == BeamFate::missed) out.cost += kOutlierCost;
+        if (p.fate == BeamFate::edge) out.cost += kUsualCost;
         if (p.fate != BeamFate::met) continue;
         const double e = p.distance_m / p.sigma_m, u = e / pass.scatter;
-        out.explained += std::abs(e) < 4;
+        out.explained += std::abs(e) < kExplained;
+        out.cost += std::min(0.5 * e * e, kOutlierCost);
         const Biweight robust(u);
         if (robust.weight <= 0) {
             ++out.rejected;
@@ -121,6 +150,7 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
     const Vec3& c = pass.spread.centre_m;
     pass.spread.radius_m = std::sqrt(std::max(1e-18, moment / pass.spread.weight - dot(c, c)));
     out.observability = observability(pass.hessian, pass.spread, kUnobservedBelow);
+    out.radius_m = pass.spread.radius_m;
     return pass;
 }
 
@@ -147,7 +177,9 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         if (!pass.enough) break;
         if (out.settled || i == settings_.iterations) {
             out.bound = out.observability.covariance(pass.information, 1);
-            out.covariance = out.observability.covariance(pass.information, variance_factor(pass, out.used));
+            const double factor = variance_factor(pass, out.used);
+            out.covariance = out.observability.covariance(pass.information, factor);
+            out.root_information = out.observability.root_information(pass.information, factor);
             break;
         }
         Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
@@ -160,9 +192,56 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         last = step;
     }
     out.T_lidar_target = T;
-    out.credible = out.settled && static_cast<double>(out.explained) >=
-                                      settings_.explained_least * static_cast<double>(out.points);
+    out.credible = out.settled && share_is_more(out.explained, out.points - out.edges, settings_.explained_least);
     return out;
+}
+
+/// Points whose beams miss the model draw at nothing: a face can stop short of its edge. A search about the minimum
+/// draws them in.
+void CloudIcp::draw_in(CloudEstimate& found) {
+    for (int i = 0; i < 3; ++i) {
+        if (found.used < kFewestBeams || found.explained + found.grazing + found.edges >= found.points) return;
+        CloudEstimate again =
+            attempt(found.T_lidar_target, kBesideCircle * found.radius_m, 4 * kSearchPoints, kSearchIterations);
+        again.iterations += found.iterations;
+        if (!(again.settled && again.cost < found.cost - kBetter)) return;
+        found = again;
+    }
+}
+
+/// An answer of few points, with a motion that they hold weakly, or with points that lie elsewhere.
+bool CloudIcp::may_have_rivals(const CloudEstimate& e) {
+    const Observability& o = e.observability;
+    const auto elsewhere = static_cast<double>(e.points - e.explained - e.grazing - e.edges);
+    return e.used < kManyPoints || o.eigenvalues[o.unobserved] < kWeak ||
+           elsewhere > kFewElsewhere * static_cast<double>(e.points);
+}
+
+/// Looks for other minima that are as good: from poses that lie a search away along the two motions that the points
+/// hold least. The best is the answer; it is ambiguous where another is nearly as likely.
+void CloudIcp::compete(CloudEstimate& found, double search_m) {
+    if (found.used < kFewestBeams || found.observability.unobserved > 4 || !may_have_rivals(found)) return;
+    const CloudEstimate first = found;
+    for (const int motion : {first.observability.unobserved, first.observability.unobserved + 1})
+        for (const double side : {-search_m, search_m}) {
+            const Rigid3 start = displaced(first.T_lidar_target, side * first.observability.motions.col(motion));
+            CloudEstimate rival = attempt(start, search_m, 2 * kSearchPoints, kSearchIterations);
+            draw_in(rival);
+            found.iterations += rival.iterations;
+            if (!rival.settled || rival.used < kFewestBeams) continue;
+            const bool better = rival.cost < found.cost - kBetter;
+            const Matrix6& root = better ? rival.root_information : found.root_information;
+            const Vector6 apart = error_between(found.T_lidar_target, rival.T_lidar_target);
+            const bool elsewhere = (root * apart).squaredNorm() > kElsewhere;
+            const bool as_likely = std::abs(rival.cost - found.cost) < kAsLikely;
+            const bool ambiguous = elsewhere ? as_likely || (found.ambiguous && !better) : found.ambiguous;
+            if (better) {
+                rival.iterations = found.iterations;
+                found = rival;
+            }
+            found.ambiguous = ambiguous;
+        }
+    found.credible = found.credible && !found.ambiguous;
 }
 
 Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const ApparentMotion& motion,
@@ -181,6 +260,8 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
         again.iterations += out.iterations;
         if (again.explained > out.explained) out = again;
     }
+    draw_in(out);
+    if (search_m > 0) compete(out, search_m);
     if (out.used < kFewestBeams)
         return Error{.what = "only " + std::to_string(out.used) + " of " + std::to_string(points.size()) +
                              " beams meet the target where it is taken to be, expected at least " +

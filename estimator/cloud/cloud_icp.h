@@ -20,8 +20,9 @@ struct IcpSettings {
     RangeNoise noise{};
     int iterations = 50;    ///< at most, after the search
     double settled = 0.05;  ///< converged: a step of fewer standard deviations; 0: all iterations
-    /// Least part of the points on the model at a right pose: fewer mean a false minimum. The search is then
-    /// repeated with four times the points.
+    /// Least part of the points on the model at a right pose, with a confidence of 95 %: fewer mean a false
+    /// minimum, or too few points to tell (29, all on the model, are enough for 0.9). The search is then repeated
+    /// with four times the points.
     double explained_least = 0.9;
 };
 
@@ -30,15 +31,24 @@ struct CloudEstimate {
     /// Of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
     /// section 7.6), for the residuals' own scatter, at least that of the noise.
     Matrix6 covariance = Matrix6::Zero();
+    /// Of the covariance, for filters: rows of zeros for motions that are not observed (root_information.h).
+    Matrix6 root_information = Matrix6::Zero();
     /// Cramer-Rao bound for the points used and the noise of the settings.
     Matrix6 bound = Matrix6::Zero();
     Observability observability{};
     int iterations = 0;     ///< with those of the search
     bool settled = false;   ///< the last step was small
-    bool credible = false;  ///< settled, and enough points are explained
-    std::size_t points = 0, used = 0, missed = 0, grazing = 0, rejected = 0;  ///< sum: points = the rest
+    bool credible = false;  ///< settled, enough points are explained, and not ambiguous
+    /// Another pose explains the points nearly as well: a near symmetry of the model, or few points.
+    bool ambiguous = false;
+    /// The first is the sum of the others.
+    std::size_t points = 0, used = 0, missed = 0, edges = 0, grazing = 0, rejected = 0;
     /// Points within four standard deviations of the noise from the model.
     std::size_t explained = 0;
+    /// Minus the logarithm of the likelihood, of normal noise and outliers beyond four standard deviations: half
+    /// the sum of the points' squared distances in standard deviations, at most 8 each.
+    double cost = 0;
+    double radius_m = 0;  ///< of the points used about their centre, root mean square
 };
 
 class CloudIcp {
@@ -59,6 +69,9 @@ private:
     [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
     [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
+    void draw_in(CloudEstimate& found);
+    [[nodiscard]] static bool may_have_rivals(const CloudEstimate& e);
+    void compete(CloudEstimate& found, double search_m);
     [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,
                                 CloudEstimate& out);
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 namespace narpa {
 namespace {
@@ -41,6 +42,17 @@ Matrix6 Observability::covariance(const Matrix6& information, double factor) con
     for (int i = 0; i < unobserved; ++i)
         c += kUnobservedSigma * kUnobservedSigma * motions.col(i) * motions.col(i).transpose();
     return 0.5 * (c + c.transpose());
+}
+
+Matrix6 Observability::root_information(const Matrix6& information, double factor) const {
+    // A motion is motions * x, and so x = motions^-1 * e.
+    Matrix6 within = motions.transpose() * information * motions / factor;
+    within.topRows(unobserved).setZero();
+    within.leftCols(unobserved).setZero();
+    within.topLeftCorner(unobserved, unobserved).setIdentity();
+    Matrix6 root = within.llt().matrixU() * motions.inverse();
+    root.topRows(unobserved).setZero();
+    return root;
 }
 
 Observability observability(const Matrix6& hessian, const PointSpread& spread, double threshold) {

@@ -34,6 +34,9 @@ struct Observability {
     /// `factor` times the inverse of this information in the observable subspace; along unobservable motions the
     /// standard deviation is kUnobservedSigma.
     [[nodiscard]] Matrix6 covariance(const Matrix6& information, double factor) const;
+    /// The same without the unobservable motions: a root of the information (root_information.h), a row of zeros
+    /// for each of these.
+    [[nodiscard]] Matrix6 root_information(const Matrix6& information, double factor) const;
 };
 
 /// Metres of the eigenvectors' motion: so large that a filter ignores the estimate along them.

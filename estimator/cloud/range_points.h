@@ -10,6 +10,8 @@
 
 namespace narpa {
 
+struct Lidar;
+
 /// One return, in the LiDAR's frame: the beam as it was fired and the range that was read.
 struct RangePoint {
     Vec3 origin_m{};     ///< where the beam starts
@@ -26,7 +28,13 @@ struct RangePoint {
 struct RangeNoise {
     double range_m = 0.02;         ///< including the rounding in the packet: resolution / sqrt(12)
     double pointing_rad = 5.1e-5;  ///< of the beam's direction: an azimuth rounded to 0.01 deg
+    /// Full angle of the beam. Where a surface ends within it, the range is that of the part that meets it, or a
+    /// mean of two surfaces: such points are left out. 0: a line.
+    double footprint_rad = 0;
 };
+
+/// Of a LiDAR's returns as its scene models them; where it models no noise, the values above.
+[[nodiscard]] RangeNoise range_noise_of(const Lidar& lidar);
 
 /// Appends a packet's decoded returns to `out`. `packet_after_ns`: time of the packet's first shot after the time
 /// of the pose.

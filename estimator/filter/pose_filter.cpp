@@ -1,6 +1,7 @@
 #include "estimator/filter/pose_filter.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -28,6 +29,8 @@ const char* fault(const PoseMeasurement& m) {
     if (!is_finite(m.T_sensor_target.t) || !is_finite(m.T_chaser_sensor.t)) return "expected finite positions";
     if (!is_unit(m.T_sensor_target.q) || !is_unit(m.T_chaser_sensor.q) || !is_unit(m.q_frame_chaser))
         return "expected quaternions of length 1";
+    if (m.root_information)
+        return m.root_information->allFinite() ? nullptr : "expected a finite root of the information";
     if (!is_covariance<6>(m.covariance))
         return "expected a covariance that is finite, symmetric and positive definite";
     return nullptr;
@@ -41,6 +44,15 @@ const char* fault(const BeamVelocity& m) {
     if (!std::isfinite(m.velocity_m_s) || !(m.sigma_m_s > 0 && std::isfinite(m.sigma_m_s)))
         return "expected a finite velocity with a standard deviation > 0";
     return nullptr;
+}
+
+/// Of a measurement that observes all six motions; else 0.
+Matrix6 covariance_of(const PoseMeasurement& m) {
+    if (!m.root_information) return m.covariance;
+    const Eigen::FullPivLU<Matrix6> factors(*m.root_information);
+    if (!factors.isInvertible()) return Matrix6::Zero();
+    const Matrix6 inverse = factors.inverse();
+    return inverse * inverse.transpose();
 }
 
 /// Where the sensor's axes are in the frame.
@@ -102,6 +114,11 @@ Innovation<6> innovation_of(const MotionModel&, const RelativeState& state, cons
     Innovation<6> i{.H = pose_jacobian(q_frame_sensor(m), state),
                     .z = error_between(expected_pose(state, m), m.T_sensor_target),
                     .R = m.covariance};
+    if (m.root_information) {  // S is at least 1
+        i.H = (*m.root_information * i.H).eval();
+        i.z = (*m.root_information * i.z).eval();
+        i.R.setIdentity();
+    }
     i.form(P);
     return i;
 }
@@ -171,7 +188,7 @@ Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, const Pose
 
     Matrix12 P = Matrix12::Zero();
     const Matrix6x12 H = pose_jacobian(q_frame_sensor(first), state);
-    P = H.transpose() * first.covariance *
+    P = H.transpose() * covariance_of(first) *
         H;  // H takes errors to errors by rotations: its transpose is its inverse
     for (int i = 0; i < 3; ++i) {
         P(3 + i, 3 + i) = velocity_sigma_m_s * velocity_sigma_m_s;

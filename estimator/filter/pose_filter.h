@@ -34,6 +34,9 @@ struct PoseMeasurement {
     Matrix6 covariance = Matrix6::Zero();  ///< of its error (pose_estimate.h): sensor axes, positive definite
     Rigid3 T_chaser_sensor{};              ///< how the sensor is mounted
     Quat q_frame_chaser{};                 ///< the chaser's attitude then, taken as exact
+    /// In place of `covariance` where motions are not observed (root_information.h). The NIS then has a degree of
+    /// freedom less for each of them. It starts no filter unless it observes all six.
+    std::optional<Matrix6> root_information{};
 };
 
 /// A Doppler instrument's measurement of the target's velocity along a beam.

@@ -66,17 +66,26 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
 void LidarPoseEstimator::remove_own_body(std::span<const RangePoint> points) {
     BodyPoses at(model_->scene().bodies.size());
     const auto own = static_cast<std::uint32_t>(model_->chaser());
+    constexpr int kRim = 6;
+    const double tangent = std::tan(0.55 * lidar_.receiver.beam_divergence_rad);  // a tenth more than the beam
     points_.clear();
     RayBatch rays;
     HitBatch hits;
     for (std::size_t i = 0; i < points.size(); i += kLanes) {
         rays.n = std::min<std::size_t>(kLanes, points.size() - i);
+        std::uint32_t met = 0;
+        for (int rim = 0; rim <= (tangent > 0 ? kRim : 0); ++rim) {  // the axis, then the rim of the beam
+            for (std::size_t k = 0; k < rays.n; ++k) {
+                const Vec3 d = points[i + k].direction, x = normalized(cross(d, Vec3{0, 0, 1})), y = cross(d, x);
+                const double turn = 2 * kDegree * 180 * rim / kRim, r = rim == 0 ? 0 : tangent;
+                const Vec3 ray = normalized(d + r * (std::cos(turn) * x + std::sin(turn) * y));
+                rays.put(k, {lidar_.T_mount_lidar * points[i + k].origin_m, lidar_.T_mount_lidar.q * ray});
+            }
+            model_->tracer().intersect(at, rays, {&own, 1}, hits);
+            met |= hits.met;
+        }
         for (std::size_t k = 0; k < rays.n; ++k)
-            rays.put(k, {lidar_.T_mount_lidar * points[i + k].origin_m,
-                         lidar_.T_mount_lidar.q * points[i + k].direction});
-        model_->tracer().intersect(at, rays, {&own, 1}, hits);
-        for (std::size_t k = 0; k < rays.n; ++k)
-            if (!(hits.met >> k & 1)) points_.push_back(points[i + k]);
+            if (!(met >> k & 1)) points_.push_back(points[i + k]);
     }
 }
 
@@ -99,10 +108,11 @@ MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points
     }
     out.points = static_cast<int>(e->used);
     if (!e->credible) {
-        out.why = fmt::format("{} of {} points lie on the model", e->explained, e->points);
+        out.why = e->ambiguous ? "another pose is nearly as likely"
+                               : fmt::format("{} of {} points lie on the model", e->explained, e->points);
         return out;
     }
-    out.pose = {t_ns, e->T_lidar_target, e->covariance, lidar_.T_mount_lidar};
+    out.pose = {t_ns, e->T_lidar_target, e->covariance, lidar_.T_mount_lidar, e->root_information};
     return out;
 }
 

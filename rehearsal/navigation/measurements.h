@@ -46,7 +46,9 @@ class LidarPoseEstimator {
 public:
     /// `model` outlives it. `lidar`: index in the scene.
     LidarPoseEstimator(SceneModel& model, std::size_t lidar)
-        : model_(&model), lidar_(model.scene().lidars[lidar]), icp_(model.tracer(), model.target()) {}
+        : model_(&model),
+          lidar_(model.scene().lidars[lidar]),
+          icp_(model.tracer(), model.target(), {.noise = range_noise_of(lidar_)}) {}
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
     /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/pose/root_information.h"
+
 namespace narpa::rehearsal {
 
 bool AttitudeTrack::take(const AttitudeReport& report) noexcept {
@@ -49,10 +51,16 @@ constexpr double kMetPosition_m = 0.05, kMetAttitude_rad = 0.3 * kDegree, kMetRa
 constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
                  kLeastRate_rad_s = 2e-3 * kDegree;
 
-/// Covariance of a pose from a star tracker's error, which rotates the target about the chaser.
-Matrix6 star_tracker_covariance(const Vec3& target_from_chaser_m, double sigma_rad) {
+/// A star tracker's error rotates the target about the chaser.
+Eigen::Matrix<double, 6, 3> star_tracker_jacobian(const Vec3& target_from_chaser_m) {
     Eigen::Matrix<double, 6, 3> J;
     J << Eigen::Matrix3d::Identity(), -skew(to_eigen(target_from_chaser_m));
+    return J;
+}
+
+/// Covariance of a pose from it.
+Matrix6 star_tracker_covariance(const Vec3& target_from_chaser_m, double sigma_rad) {
+    const auto J = star_tracker_jacobian(target_from_chaser_m);
     return sigma_rad * sigma_rad * J * J.transpose();
 }
 
@@ -99,6 +107,12 @@ PoseMeasurement at_centres_of_mass(const TargetMeasurement& s, const Vec3& chase
     m.T_chaser_sensor = {s.T_chaser_sensor.q, s.T_chaser_sensor.t - chaser_centre_m};
     m.q_frame_chaser = q_frame_chaser;
     const Vec3 from_chaser = conjugate(m.T_chaser_sensor.q) * (m.T_chaser_sensor * m.T_sensor_target.t);
+    if (s.root_information) {
+        m.root_information = root_information_with(
+            root_information_of_product(s.T_sensor_target, *s.root_information, T_target_mass),
+            star_tracker_jacobian(from_chaser), attitude_sigma_rad);
+        return m;
+    }
     m.covariance = covariance_of_product(s.T_sensor_target, s.covariance, T_target_mass) +
                    star_tracker_covariance(from_chaser, attitude_sigma_rad);
     m.covariance = (0.5 * (m.covariance + m.covariance.transpose())).eval();

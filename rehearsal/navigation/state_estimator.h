@@ -44,6 +44,8 @@ struct TargetMeasurement {
     Rigid3 T_sensor_target{};
     Matrix6 covariance = Matrix6::Zero();
     Rigid3 T_chaser_sensor{};  ///< body axes
+    /// In place of `covariance` where motions are not observed (root_information.h).
+    std::optional<Matrix6> root_information{};
 };
 
 /// Velocity of the target's surface along a beam of the chaser (estimator/filter/pose_filter.h).

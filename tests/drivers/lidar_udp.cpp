@@ -4,9 +4,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstring>
 #include <numeric>
 
 #include "drivers/lidar/packet_sink.h"
+#include "drivers/lidar/packet_source.h"
 #include "protocols/lidar/velodyne.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
@@ -169,6 +172,116 @@ TEST(UdpSink, SendingAllocatesNothing) {
     EXPECT_EQ(counter.on_all_threads(), 0U);
 }
 
+/// A receiver among several of one port: of any address, or of the group that it joins on the loopback.
+class SharedReceiver {
+public:
+    explicit SharedReceiver(int port, const char* group = nullptr) : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
+        const int on = 1;
+        ::setsockopt(fd_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+        ::setsockopt(fd_, IPPROTO_IP, IP_RECVTTL, &on, sizeof on);
+        const timeval patience{30, 0};
+        ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+        sockaddr_in at{};
+        at.sin_family = AF_INET;
+        at.sin_port = htons(static_cast<std::uint16_t>(port));
+        ip_mreq membership{};
+        if (group != nullptr) {
+            ::inet_pton(AF_INET, group, &at.sin_addr);
+            membership.imr_multiaddr = at.sin_addr;
+            membership.imr_interface.s_addr = htonl(INADDR_LOOPBACK);
+        }
+        ready_ = ::bind(fd_, reinterpret_cast<sockaddr*>(&at), sizeof at) == 0 &&
+                 (group == nullptr ||
+                  ::setsockopt(fd_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0);
+    }
+    ~SharedReceiver() { ::close(fd_); }
+    SharedReceiver(const SharedReceiver&) = delete;
+    SharedReceiver& operator=(const SharedReceiver&) = delete;
+
+    [[nodiscard]] bool ready() const { return ready_; }
+    struct Received {
+        Bytes bytes;
+        int ttl = -1;
+    };
+    [[nodiscard]] Received receive() const {
+        Received r{Bytes(2000)};
+        iovec part{r.bytes.data(), r.bytes.size()};
+        alignas(cmsghdr) std::array<char, 64> control{};
+        msghdr message{};
+        message.msg_iov = &part;
+        message.msg_iovlen = 1;
+        message.msg_control = control.data();
+        message.msg_controllen = control.size();
+        const ssize_t n = ::recvmsg(fd_, &message, 0);
+        r.bytes.resize(n < 0 ? 0 : static_cast<std::size_t>(n));
+        if (const cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr && c->cmsg_type == IP_TTL)
+            std::memcpy(&r.ttl, CMSG_DATA(c), sizeof r.ttl);
+        return r;
+    }
+
+private:
+    int fd_;
+    bool ready_ = false;
+};
+
+/// As the instrument does by default, to 255.255.255.255; or to the addresses of one network, here the loopback's.
+TEST(UdpSink, BroadcastsReachEveryReceiver) {
+    const int port = free_port();
+    if (port == 0) GTEST_SKIP() << "no pair of free ports on loopback";
+    const SharedReceiver one(port), two(port), position(port + kPositionPortOffset);
+    ASSERT_TRUE(one.ready() && two.ready() && position.ready());
+    for (const std::string host : {"127.255.255.255", "255.255.255.255%lo"}) {
+        SCOPED_TRACE(host);
+        const auto sink = opened("udp:" + host + ":" + std::to_string(port));
+        ASSERT_TRUE(sink);
+        for (int i = 0; i < 20; ++i) {
+            ASSERT_TRUE(sink->send(PacketKind::data, counted_bytes(1206, i), i));
+            ASSERT_TRUE(sink->send(PacketKind::position, counted_bytes(512, i + 1), i));
+            EXPECT_EQ(one.receive().bytes, counted_bytes(1206, i));
+            EXPECT_EQ(two.receive().bytes, counted_bytes(1206, i));
+            EXPECT_EQ(position.receive().bytes, counted_bytes(512, i + 1));
+        }
+        EXPECT_EQ(sink->counters().sent, 40U);
+    }
+}
+
+TEST(UdpSink, AMulticastGroupsReceiversGetThePacketsAtTheTimeToLiveThatIsSet) {
+    const int port = free_port();
+    if (port == 0) GTEST_SKIP() << "no pair of free ports on loopback";
+    const char* group = "239.255.23.68";
+    const SharedReceiver one(port, group), two(port, group);
+    if (!one.ready()) GTEST_SKIP() << "the loopback joins no multicast group here";
+    for (const auto& [option, ttl] : {std::pair{"", 1}, {",ttl=7", 7}}) {
+        const auto sink = opened("udp:" + std::string(group) + "%lo:" + std::to_string(port) + option);
+        ASSERT_TRUE(sink);
+        EXPECT_NE(sink->description().find("239.255.23.68 by lo"), std::string::npos) << sink->description();
+        for (int i = 0; i < 20; ++i) {
+            ASSERT_TRUE(sink->send(PacketKind::data, counted_bytes(1206, i), i));
+            for (const SharedReceiver* r : {&one, &two}) {
+                const auto received = r->receive();
+                EXPECT_EQ(received.bytes, counted_bytes(1206, i));
+                EXPECT_EQ(received.ttl, ttl);
+            }
+        }
+    }
+}
+
+TEST(PacketSource, JoinsAMulticastGroup) {
+    const int port = free_port();
+    if (port == 0) GTEST_SKIP() << "no pair of free ports on loopback";
+    const std::string at = "udp:239.255.23.69%lo:" + std::to_string(port);
+    auto source = open_packet_source(at), second = open_packet_source(at);
+    ASSERT_TRUE(source) << source.error().text();
+    ASSERT_TRUE(second) << second.error().text();
+    const auto sink = opened(at);
+    ASSERT_TRUE(sink && sink->send(PacketKind::data, counted_bytes(1206, 3), 0));
+    for (auto* s : {source->get(), second->get()}) {
+        Bytes bytes(2000);
+        bytes.resize(s->receive(bytes, 10'000'000'000));
+        EXPECT_EQ(bytes, counted_bytes(1206, 3));
+    }
+}
+
 TEST(PacketSink, NoneCounts) {
     const auto sink = opened("none");
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(sink->send(PacketKind::data, counted_bytes(1206, 0), 0));
@@ -187,6 +300,10 @@ TEST(PacketSink, BadSinksSayWhatIsWrong) {
         {"udp:127.0.0.1:23x", "expected a data port from 1 to 59595"},
         {"udp:127.0.0.1:99999999999", "expected a data port from 1 to 59595"},
         {"udp:256.1.1.1:2368", "unknown host \"256.1.1.1\""},
+        {"udp:239.1.2.3%:2368", "expected an interface after %, as in %eth0"},
+        {"udp:239.1.2.3%lo:2368,ttl=256", "expected nothing after the port but ,ttl=N, from 0 to 255"},
+        {"udp:239.1.2.3%lo:2368,hops=2", "expected nothing after the port but ,ttl=N, from 0 to 255"},
+        {"udp:127.0.0.1:2368,ttl=0", "ttl=0"},
     };
     for (const auto& [spec, says] : cases) {
         const auto sink = open_packet_sink(spec, vlp16().network, 0, false);
@@ -194,6 +311,14 @@ TEST(PacketSink, BadSinksSayWhatIsWrong) {
         EXPECT_EQ(sink.error().kind, ErrorKind::bad_input) << spec;
         EXPECT_NE(sink.error().text().find(says), std::string::npos) << sink.error().text();
     }
+}
+
+TEST(PacketSink, AnInterfaceThatIsNotThereIsMissing) {
+    const auto sink = open_packet_sink("udp:239.1.2.3%none7:2368", vlp16().network, 0, false);
+    ASSERT_FALSE(sink);
+    EXPECT_EQ(sink.error().kind, ErrorKind::missing);
+    EXPECT_NE(sink.error().text().find("no network interface \"none7\""), std::string::npos) << sink.error().text();
+    EXPECT_NE(sink.error().text().find("ip -br link"), std::string::npos) << sink.error().text();
 }
 
 }  // namespace

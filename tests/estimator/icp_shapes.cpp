@@ -2,6 +2,7 @@
 // alone.
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <functional>
 #include <random>
@@ -9,6 +10,7 @@
 #include "../support/shapes.h"
 #include "base/constants.h"
 #include "estimator/cloud/cloud_icp.h"
+#include "estimator/filter/pose_filter.h"
 
 namespace narpa {
 namespace {
@@ -131,6 +133,60 @@ TEST(IcpShapes, UnobservableMotionsAreReported) {
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_EQ(e->observability.unobserved, shape.unobserved);
         EXPECT_TRUE(e->settled);
+    }
+}
+
+/// With standard deviations of 0.1 mm beside motions of which nothing is known, a covariance cannot be told in
+/// double precision; the filter takes the root of the information, and keeps what it knew of the other motions.
+TEST(IcpShapes, TheFilterTakesWhatIsObservedAndKeepsTheRest) {
+    for (const SweptShape& shape : kShapes) {
+        SCOPED_TRACE(shape.name);
+        Scene scene;
+        scene.materials.push_back(test::lambert(0.5f));
+        shape.add(scene);
+        auto tracer = Tracer::create(scene, 1);
+        ASSERT_TRUE(tracer);
+        IcpSettings settings;
+        settings.noise = {1e-4, 0};
+        CloudIcp icp(*tracer, 0, settings);
+        const auto e = icp.align(returns(shape.draw, 4000, 1e-4, 5), {}, displaced(kTruth, start_error()));
+        ASSERT_TRUE(e) << e.error().text();
+        const int observed = 6 - shape.unobserved;
+        EXPECT_EQ(e->root_information.bottomRows(observed).rowwise().norm().minCoeff() > 0, true);
+        EXPECT_EQ(e->root_information.topRows(shape.unobserved).squaredNorm(), 0);
+
+        // The filter's frame and the LiDAR's are the same.
+        Matrix12 before = Matrix12::Zero();
+        before.diagonal() << 0.04, 0.04, 0.04, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6;
+        const Rigid3 guess = displaced(kTruth, 0.5 * start_error());
+        auto filter = PoseFilter::create({}, 0, {guess.t, {}, guess.q, {}}, before);
+        ASSERT_TRUE(filter);
+        PoseMeasurement m;
+        m.T_sensor_target = e->T_lidar_target;
+        m.root_information = e->root_information;
+        EXPECT_EQ(filter->update(m).outcome, UpdateOutcome::taken);
+        const auto& P = filter->covariance();
+        EXPECT_EQ(Eigen::LLT<Matrix12>(P).info(), Eigen::Success);
+        // Of the pose, in the LiDAR's axes, along the motions that were seen and those that were not.
+        const Eigen::Matrix3d R = rotation_matrix(guess.q);
+        const Matrix6 along = e->observability.motions.inverse();
+        const auto pose_part = [&](const Matrix12& C) {
+            Matrix6 axes = Matrix6::Zero();
+            axes.topLeftCorner<3, 3>() = R * C.block<3, 3>(6, 6) * R.transpose();
+            axes.topRightCorner<3, 3>() = R * C.block<3, 3>(6, 0);
+            axes.bottomLeftCorner<3, 3>() = axes.topRightCorner<3, 3>().transpose();
+            axes.bottomRightCorner<3, 3>() = C.block<3, 3>(0, 0);
+            return Matrix6(along * axes * along.transpose());
+        };
+        const Matrix6 known = pose_part(before), now = pose_part(P);
+        for (int i = shape.unobserved; i < 6; ++i) EXPECT_LT(now(i, i), 1e-4 * known(i, i)) << i;
+        if (const int n = shape.unobserved; n > 0) {
+            // The others are now exact: what is left is what was known of these, given them.
+            const Eigen::MatrixXd given = known.inverse().topLeftCorner(n, n).inverse();
+            for (int i = 0; i < n; ++i) EXPECT_NEAR(now(i, i), given(i, i), 0.02 * given(i, i)) << i;
+        }
+        EXPECT_NE(PoseFilter::create({}, m, 1, 0.1).has_value(), shape.unobserved > 0)
+            << "a filter starts only from what knows all of the pose";
     }
 }
 

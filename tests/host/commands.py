@@ -4,7 +4,6 @@ come out are byte-identical to `narpa render` at those poses.
 
 Usage: commands.py slcan|udp_multicast
 """
-import os
 import subprocess
 import sys
 
@@ -57,19 +56,11 @@ def udp_multicast():
     command_and_compare("udp:239.74.163.2", {"interface": "udp_multicast", "channel": "239.74.163.2"}, fd=True)
 
 
-def enter_own_network():
-    """Runs this script again in a network namespace of its own, where only loopback exists."""
-    unshare = ["unshare", "--net"] + ([] if os.geteuid() == 0 else ["--map-root-user"])
-    if subprocess.run([*unshare, "ip", "link", "set", "lo", "up"], capture_output=True).returncode != 0:
-        support.skip("this user may not make a network namespace (unshare --net)")
-    os.execvp(unshare[0], [*unshare, sys.executable, __file__, "udp_multicast", "inside"])
-
-
 match sys.argv[1:]:
     case ["slcan"]:
         slcan()
     case ["udp_multicast"]:
-        enter_own_network()
+        support.enter_own_network(__file__, "udp_multicast", "inside")
     case ["udp_multicast", "inside"]:
         udp_multicast()
     case _:

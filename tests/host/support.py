@@ -46,6 +46,14 @@ def work_folder():
 work_folder.kept = []
 
 
+def enter_own_network(script, *arguments):
+    """Runs the script with these arguments in a network namespace of its own, where only loopback exists."""
+    unshare = ["unshare", "--net"] + ([] if os.geteuid() == 0 else ["--map-root-user"])
+    if subprocess.run([*unshare, "ip", "link", "set", "lo", "up"], capture_output=True).returncode != 0:
+        skip("this user may not make a network namespace (unshare --net)")
+    os.execvp(unshare[0], [*unshare, sys.executable, script, *arguments])
+
+
 def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))

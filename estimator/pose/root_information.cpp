@@ -1,0 +1,21 @@
+#include "estimator/pose/root_information.h"
+
+#include <Eigen/Cholesky>
+
+namespace narpa {
+
+Matrix6 root_information_of_product(const Rigid3& T_a_b, const Matrix6& root_of_a_b, const Rigid3& T_b_c) {
+    // The inverse of the Jacobian of covariance_of_product: d_ab = d_ac + [q_ab t_bc] r
+    Matrix6 J = Matrix6::Identity();
+    J.bottomLeftCorner<3, 3>() = skew(to_eigen(T_a_b.q * T_b_c.t));
+    return root_of_a_b * J;
+}
+
+Matrix6 root_information_with(const Matrix6& root, const Eigen::Matrix<double, 6, 3>& J, double sigma) {
+    // W (e + J n) has the covariance S = 1 + (sigma W J) (sigma W J)', at least 1: its factor whitens again.
+    const Eigen::Matrix<double, 6, 3> spread = sigma * root * J;
+    const Matrix6 S = Matrix6::Identity() + spread * spread.transpose();
+    return S.llt().matrixL().solve(root);
+}
+
+}  // namespace narpa

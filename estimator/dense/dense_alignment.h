@@ -50,6 +50,8 @@ struct DenseEstimate {
     Exposure exposure{};
     std::size_t pixels = 0;  ///< of the last level that show the target
     int renders = 0;         ///< images that were compared with the frame
+    double misfit =
+        0;  ///< loss of the residuals beyond that of noise, per pixel of the target: Robustness{1, 3, 0}
 };
 
 class DenseAlignment {

@@ -33,6 +33,10 @@ constexpr double kSameWay = 0.7, kLongestStride = 8;
 constexpr double kNoFit = 4;
 /// Or a gain this many standard deviations off its prior.
 constexpr double kPriorHolds = 4, kLeastOff = 1e-3;
+/// Or a loss of so much beyond that of noise: station and cube in clean and in saturated frames have up to 8.
+constexpr double kMostMisfit = 10;
+/// Mean of 9 ln(1 + r^2 / 9), r normal.
+constexpr double kLossOfNoise = 0.8741;
 /// Sampling noise may increase the cost of a good step by this part.
 constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
@@ -141,8 +145,12 @@ void LevelSolver::finish() {
     e_.covariance = equations(images, e_.exposure, robust_).pose_covariance();
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
+    const PhotometricCost loss = cost(images, e_.exposure, {});
+    e_.misfit = (loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels)) /
+                static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
     const double off = std::abs(e_.exposure.gain - 1);
-    if (robust_.scale > kNoFit || off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
+    if (robust_.scale > kNoFit || e_.misfit > kMostMisfit ||
+        off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
         e_.status = DenseStatus::does_not_fit;
 }
 
@@ -151,6 +159,7 @@ Result<Matrix6> LevelSolver::bound() {
     differentiate();
     PhotometricImages images = view_.images();
     images.signal_variance = {};
+    images.measured = {};
     const auto all = equations(images, {}, {1, std::numeric_limits<double>::infinity(), 0});
     const Matrix6 information = all.pose_information();
     if (!is_observable(information)) return Error{"too few pixels show the target to determine its pose"};

@@ -99,6 +99,7 @@ void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, c
 
 void LevelView::measure(const MeasuredImage& image, std::span<const float> variance) {
     measured_variance_.resize(variance.empty() ? 0 : measured_.size());
+    measured_clipped_.resize(image.clipped.empty() ? 0 : measured_.size());
     std::size_t to = 0;
     for (int y = 0; y < window_.height; ++y)
         for (int x = 0; x < window_.width; ++x, ++to) {
@@ -106,6 +107,7 @@ void LevelView::measure(const MeasuredImage& image, std::span<const float> varia
                               static_cast<std::size_t>(x + window_.x);
             measured_[to] = image.dn[from];
             if (!variance.empty()) measured_variance_[to] = variance[from];
+            if (!image.clipped.empty()) measured_clipped_[to] = image.clipped[from];
         }
 }
 
@@ -133,7 +135,8 @@ PhotometricImages LevelView::images() const {
             .signal = signal_,
             .signal_variance = signal_variance_,
             .derivative = columns_,
-            .pixels_averaged = pixels_averaged_};
+            .pixels_averaged = pixels_averaged_,
+            .measured_clipped = measured_clipped_};
 }
 
 }  // namespace narpa

@@ -1,6 +1,7 @@
 /// estimator/dense/level_view.h - one pyramid level: measured and predicted image in a window about the target.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -47,6 +48,7 @@ private:
     ModelView view_;
     ImageDerivative derivative_;
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
+    std::vector<std::uint8_t> measured_clipped_;
     std::span<const PixelDerivative> columns_;
 };
 

@@ -34,11 +34,13 @@ public:
         const auto p =
             static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x);
         const auto at_p = [p](std::span<const float> v) { return v.empty() ? 0.0 : static_cast<double>(v[p]); };
-        const double signal = at_p(i_.signal), measured = at_p(i_.measured);
+        const double signal = at_p(i_.signal);
         const double expected = i_.sensor.black_dn + e_.gain * signal + e_.offset_dn;
+        const double measured = i_.measured.empty() ? std::min(expected, i_.sensor.top_dn) : at_p(i_.measured);
+        const bool clipped = i_.measured.empty() ? expected >= i_.sensor.top_dn
+                                                 : !i_.measured_clipped.empty() && i_.measured_clipped[p] != 0;
         Residual out;
-        // A clipped value carries no information.
-        if (expected >= i_.sensor.top_dn || measured >= i_.sensor.top_dn) return out;
+        if (clipped && expected >= measured) return out;
         const double variance = i_.sensor.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
                                 model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance);
         out.counts = variance > 0;
@@ -79,7 +81,7 @@ using Vector8 = Eigen::Matrix<double, 8, 1>;
 }  // namespace
 
 PhotometricCost& PhotometricCost::operator+=(const PhotometricCost& b) {
-    robust += b.robust, chi2 += b.chi2, pixels += b.pixels;
+    robust += b.robust, chi2 += b.chi2, pixels += b.pixels, all_pixels += b.all_pixels;
     return *this;
 }
 
@@ -138,6 +140,7 @@ PhotometricCost cost(const PhotometricImages& images, const Exposure& exposure, 
         residuals.each(y, [&](const Residual& r, std::size_t) {
             const double square = r.r * r.r;
             row.robust += std::isfinite(k) ? k * k * std::log1p(square / (k * k)) : square;
+            ++row.all_pixels;
             if (!r.shows_target) return;
             row.chi2 += square;
             ++row.pixels;

@@ -4,10 +4,15 @@
 /// I(x) = black + gain * S(x; pose) + offset + noise. Each pixel weighs 1 / s^2, s^2 = the sensor's variance at the
 /// predicted DN + gain^2 times the variance of the prediction + the frame's own variance. Gain and offset have
 /// Gaussian priors and are eliminated by the Schur complement.
+///
+/// A clipped pixel is a lower limit of the light: its residual is what the prediction is too dark by, and it says
+/// nothing where the prediction is as bright (censored data; J. Tobin, Econometrica 26, 1958). Predictions are
+/// never clipped, so a dark pixel cannot be explained by light beyond the end of the scale.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <span>
 
 #include "estimator/dense/image_derivative.h"
@@ -26,19 +31,21 @@ struct ExposurePrior {
 struct PhotometricImages {
     int width = 0, height = 0;
     const SensorModel& sensor;
-    std::span<const float> measured;           ///< DN
+    std::span<const float> measured;           ///< DN; empty: as predicted, and clipped (the bound)
     std::span<const float> measured_variance;  ///< DN^2 beside the sensor's noise; empty: none
     std::span<const float> signal;             ///< predicted DN above black, not clipped
     std::span<const float> signal_variance;    ///< of its own noise, DN^2; empty: none
     std::span<const PixelDerivative> derivative;
     double pixels_averaged = 1;  ///< each pixel is the mean of so many of the sensor's
     ExposurePrior prior{};
+    std::span<const std::uint8_t> measured_clipped{};  ///< MeasuredImage::clipped; empty: nowhere
 };
 
 struct PhotometricCost {
     double robust = 0;  ///< sum of Cauchy's loss, (k s)^2 ln(1 + (r / k s)^2), of normalised residuals, + prior
     double chi2 = 0;    ///< of the same pixels, plain
-    std::size_t pixels = 0;  ///< that show the target: signal or Jacobian not zero
+    std::size_t pixels = 0;      ///< that show the target: signal or Jacobian not zero
+    std::size_t all_pixels = 0;  ///< that `robust` is the sum of
 
     PhotometricCost& operator+=(const PhotometricCost& b);
 };

@@ -30,24 +30,31 @@ double step_dn(const Camera& camera) {
     return is_16_bit(camera.format) ? 1 : eight_bits;
 }
 
+/// Standard deviations of read noise by which a full well may come out below its mean.
+constexpr double kReadSigmas = 4;
+
 /// Each pixel becomes the mean of its neighbourhood with the weights [1 2 1] x [1 2 1] / 16, which has a quarter of
-/// red, half of green and a quarter of blue wherever it stands. The image is mirrored at its edges, which keeps the
-/// bands' places.
+/// red, half of green and a quarter of blue wherever it stands, clipped where one of the nine is. The image is
+/// mirrored at its edges, which keeps the bands' places.
 void without_mosaic(MeasuredImage& image) {
     const std::vector<float> mosaic = image.dn;
+    const std::vector<std::uint8_t> clipped = image.clipped;
     const auto inside = [](int i, int size) {
         return std::clamp(i < 0 ? -i : i >= size ? 2 * size - 2 - i : i, 0, size - 1);
     };
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
             float sum = 0;
+            std::uint8_t any = 0;
             for (int dy = -1; dy <= 1; ++dy)
                 for (int dx = -1; dx <= 1; ++dx) {
                     const int weight = (2 - std::abs(dx)) * (2 - std::abs(dy));
                     const int from = inside(y + dy, image.height) * image.width + inside(x + dx, image.width);
                     sum += static_cast<float>(weight) * mosaic[static_cast<std::size_t>(from)];
+                    any |= clipped[static_cast<std::size_t>(from)];
                 }
             image.dn[static_cast<std::size_t>(y * image.width + x)] = sum / 16;
+            image.clipped[static_cast<std::size_t>(y * image.width + x)] = any;
         }
 }
 
@@ -73,7 +80,7 @@ SensorModel sensor_model(const Camera& camera) {
         const double share = is_mono(camera.format) ? 1.0 / 3 : 1.0;
         for (std::size_t b = 0; b < 3; ++b)
             s.dn_per_radiance[b] = weights[b] * share * converter_top / camera.white_radiance;
-        s.top_dn = converter_top;
+        s.top_dn = s.clips_dn = converter_top;
         return s;
     }
     const Detector& d = *camera.detector;
@@ -88,7 +95,9 @@ SensorModel sensor_model(const Camera& camera) {
     const double dark_e = dark_electrons(d);
     s.black_dn = d.black_level_dn + dark_e * dn_per_e;
     s.rounding_dn2 *= camera.format == PixelFormat::rgb24 ? squares : 1;
-    s.top_dn = std::min(converter_top, std::floor(d.black_level_dn + d.full_well_e * dn_per_e + 0.5));
+    const double well_dn = d.black_level_dn + d.full_well_e * dn_per_e;
+    s.top_dn = std::min(converter_top, std::floor(well_dn + 0.5));
+    s.clips_dn = std::min(converter_top, well_dn - kReadSigmas * d.read_noise_e * dn_per_e);
     if (!is_16_bit(camera.format)) {  // what its truncated bytes stand for
         const double byte = std::exp2(converter_bits(camera) - 8);
         s.top_dn = std::floor(s.top_dn / byte) * byte + 0.5 * (byte - 1);
@@ -108,6 +117,8 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
                      std::to_string(camera.height) + " " + std::string(name(camera.format))};
     MeasuredImage image{camera.width, camera.height - (camera.embedded_line ? 1 : 0), {}};
     image.dn.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+    image.clipped.resize(image.dn.size());
+    const double clips_dn = sensor_model(camera).clips_dn;
     const int bits = converter_bits(camera);
     // A truncated number is read as the centre of its interval.
     const double step = std::exp2(bits - 8), middle = (step - 1) / 2;
@@ -122,6 +133,11 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
         else
             dn = bytes[i] * step + middle;
         image.dn[i] = static_cast<float>(dn);
+        const double brightest = camera.format != PixelFormat::rgb24
+                                     ? dn
+                                     : std::max({bytes[3 * i], bytes[3 * i + 1], bytes[3 * i + 2]}) * step + middle;
+        const double interval_end = is_16_bit(camera.format) ? brightest : brightest + middle;
+        image.clipped[i] = interval_end >= clips_dn ? 1 : 0;
     }
     if (is_bayer(camera.format)) without_mosaic(image);
     return image;
@@ -146,12 +162,18 @@ Camera coarser_camera(const Camera& camera, int factor) {
 MeasuredImage coarser_image(const MeasuredImage& image, int factor) {
     MeasuredImage out{image.width / factor, image.height / factor, {}};
     out.dn.reserve(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+    if (!image.clipped.empty()) out.clipped.reserve(out.dn.capacity());
     for (int y = 0; y < out.height; ++y)
         for (int x = 0; x < out.width; ++x) {
             double sum = 0;
+            std::uint8_t any = 0;
             for (int j = 0; j < factor; ++j)
-                for (int i = 0; i < factor; ++i) sum += image.at(x * factor + i, y * factor + j);
+                for (int i = 0; i < factor; ++i) {
+                    sum += image.at(x * factor + i, y * factor + j);
+                    if (!image.clipped.empty()) any |= image.clipped[image.index(x * factor + i, y * factor + j)];
+                }
             out.dn.push_back(static_cast<float>(sum / (factor * factor)));
+            if (!image.clipped.empty()) out.clipped.push_back(any);
         }
     return out;
 }

@@ -16,10 +16,14 @@ namespace narpa {
 struct MeasuredImage {
     int width = 0, height = 0;
     std::vector<float> dn;
+    /// Not 0 where a value that the pixel is made of may have been clipped (SensorModel::clips_dn): the light was
+    /// at least what `dn` says. Empty: nowhere.
+    std::vector<std::uint8_t> clipped{};
 
-    [[nodiscard]] float at(int x, int y) const {
-        return dn[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+    [[nodiscard]] std::size_t index(int x, int y) const {
+        return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
     }
+    [[nodiscard]] float at(int x, int y) const { return dn[index(x, y)]; }
 };
 
 /// From radiance to digital numbers: DN = black + sum over bands of dn_per_radiance * L, clipped to 0 .. top, with
@@ -29,6 +33,7 @@ struct SensorModel {
     std::array<double, 3> dn_per_radiance{};  ///< DN per W m^-2 sr^-1 in the red, green, blue band
     double black_dn = 0;                      ///< without light: the black level and the mean dark current
     double top_dn = 255;                      ///< what a pixel cannot exceed: full well or the end of the converter
+    double clips_dn = 255;                    ///< the least value that a saturated pixel has, with its read noise
     double read_dn2 = 0;                      ///< variance without light: read noise, dark current, DSNU
     double shot_dn = 0;                       ///< variance per DN above black; 0: no shot noise
     double prnu2 = 0;                         ///< variance per square of the DN above black
@@ -44,8 +49,9 @@ struct SensorModel {
 /// it.
 [[nodiscard]] SensorModel sensor_model(const Camera& camera);
 
-/// A frame's bytes in the camera's format (renderer/camera/detector.h) as DN. Of a camera with an embedded line the
-/// image has one row fewer: the last holds no light. Errors: the number of bytes is not the format's.
+/// A frame's bytes in the camera's format (renderer/camera/detector.h) as DN, and which of them may be clipped; of
+/// YUYV those whose luma is. Of a camera with an embedded line the image has one row fewer: the last holds no
+/// light. Errors: the number of bytes is not the format's.
 [[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);
 
 /// An Error where the image has not the camera's size, less the embedded line, or a pixel that is not finite.
@@ -55,7 +61,8 @@ struct SensorModel {
 /// A pyramid level: the same camera with 1 / factor of the pixels each way. Incomplete ones at the right and at the
 /// bottom are left out.
 [[nodiscard]] Camera coarser_camera(const Camera& camera, int factor);
-/// Means over factor x factor pixels: the image of coarser_camera, with 1 / factor^2 of the variance.
+/// Means over factor x factor pixels: the image of coarser_camera, with 1 / factor^2 of the variance. Clipped where
+/// one of them is.
 [[nodiscard]] MeasuredImage coarser_image(const MeasuredImage& image, int factor);
 
 }  // namespace narpa

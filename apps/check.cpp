@@ -367,7 +367,8 @@ bool is_bus(const std::string& spec) {
 
 /// The error names the device, or leaves that to the finding.
 Finding absent(const std::string& spec, const Error& e) {
-    return {spec, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
+    const std::string name = spec == "usb:" ? "usb" : spec;  // any adapter
+    return {name, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
 }
 
 /// Opens the device as a run would.

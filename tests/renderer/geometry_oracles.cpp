@@ -19,7 +19,7 @@ namespace {
 using nlohmann::json;
 using namespace test;
 
-Vec3 vec(const json& j) {
+Vec3 oracle_vec(const json& j) {
     return {j[0], j[1], j[2]};
 }
 
@@ -28,7 +28,7 @@ TEST(TracerOracle, RaySphere) {
     int judged = 0;
     for (const json& c : reference["cases"]) {
         const json &in = c["in"], &out = c["out"];
-        const Vec3 o = vec(in["origin"]) - vec(in["center"]), d = vec(in["dir"]);
+        const Vec3 o = oracle_vec(in["origin"]) - oracle_vec(in["center"]), d = oracle_vec(in["dir"]);
         const double radius = in["radius"];
         const auto roots = sphere_roots(o, d, radius);
         const double margin = out["impact_minus_radius"];
@@ -56,13 +56,13 @@ TEST(TracerOracle, RaySphereThroughTheTracer) {
     int judged = 0;
     for (const json& c : reference["cases"]) {
         const json &in = c["in"], &out = c["out"];
-        const Vec3 o = vec(in["origin"]), d = vec(in["dir"]);
+        const Vec3 o = oracle_vec(in["origin"]), d = oracle_vec(in["dir"]);
         const double radius = in["radius"], length = norm(d), margin = out["impact_minus_radius"];
         // Making the direction unit rounds it once more: the limb moves by that much.
-        if (std::abs(margin) <= 1e-15 * (norm(o - vec(in["center"])) + radius)) continue;
+        if (std::abs(margin) <= 1e-15 * (norm(o - oracle_vec(in["center"])) + radius)) continue;
         Scene s;
         s.materials.push_back(lambert(0.4f));
-        add_sphere(s, radius, vec(in["center"]));
+        add_sphere(s, radius, oracle_vec(in["center"]));
         const auto tracer = Tracer::create(s, 1);
         ASSERT_TRUE(tracer);
         const Hit hit = tracer->intersect(placed(s), {o, d / length}, kInfinity);
@@ -73,8 +73,8 @@ TEST(TracerOracle, RaySphereThroughTheTracer) {
         const double bound = 8 * (0x1p-53 * expected + out["t_input_ulp_error"].get<double>() * length);
         EXPECT_LE(std::abs(hit.range_m - expected), bound) << c["id"] << " " << c["description"];
         // Where the centre is far from the world's origin, a position in the world has that distance's rounding.
-        const double rounding = 4e-15 * (norm(o) + norm(vec(in["center"])) + radius);
-        EXPECT_LE(std::abs(norm(hit.position - vec(in["center"])) - radius), rounding) << c["id"];
+        const double rounding = 4e-15 * (norm(o) + norm(oracle_vec(in["center"])) + radius);
+        EXPECT_LE(std::abs(norm(hit.position - oracle_vec(in["center"])) - radius), rounding) << c["id"];
     }
     EXPECT_GT(judged, 40);
 }
@@ -94,9 +94,9 @@ TEST(TracerOracle, RayTriangleAndTheRaysThatEmbreeLoses) {
             mesh.positions.push_back(vec_cast<float>(p));
             mesh.uvs.push_back(uv);
         };
-        add(vec(in["a"]), {0, 0});
-        add(vec(in["b"]), {1, 0});
-        add(vec(in["c"]), {0, 1});
+        add(oracle_vec(in["a"]), {0, 0});
+        add(oracle_vec(in["b"]), {1, 0});
+        add(oracle_vec(in["c"]), {0, 1});
         if (in.contains("neighbours"))
             for (const json& n : in["neighbours"])
                 for (int k = 0; k < 3; ++k) add({n[3 * k], n[3 * k + 1], n[3 * k + 2]}, {0, 0});
@@ -105,13 +105,13 @@ TEST(TracerOracle, RayTriangleAndTheRaysThatEmbreeLoses) {
         add_mesh(s, mesh);
         const auto tracer = Tracer::create(s, 1);
         ASSERT_TRUE(tracer) << tracer.error().text();
-        const Vec3 d = vec(in["dir"]);
-        const Hit hit = tracer->intersect(placed(s), {vec(in["origin"]), normalized(d)}, kInfinity);
+        const Vec3 d = oracle_vec(in["dir"]);
+        const Hit hit = tracer->intersect(placed(s), {oracle_vec(in["origin"]), normalized(d)}, kInfinity);
         const std::string label = c["id"].dump() + " " + c["description"].get<std::string>();
         ++judged;
         RayBatch packet;
         packet.n = 1;
-        packet.put(0, {vec(in["origin"]), normalized(d)});
+        packet.put(0, {oracle_vec(in["origin"]), normalized(d)});
         HitBatch in_packet;
         tracer->intersect(placed(s), packet, tracer->all_bodies(), in_packet);
         EXPECT_EQ(in_packet.body[0], hit.body) << label;
@@ -145,7 +145,7 @@ TEST(TracerOracle, SphereUv) {
     int judged = 0, turned = 0;
     for (const json& c : reference["cases"]) {
         const json& out = c["out"];
-        const Vec3 p = vec(c["in"]["p"]) - vec(c["in"]["c"]);
+        const Vec3 p = oracle_vec(c["in"]["p"]) - oracle_vec(c["in"]["c"]);
         const auto [u, v] = EllipsoidShape::uv(p);
         EXPECT_NEAR(v, out["v"].get<double>(), 1e-15) << c["id"];
         ++judged;

@@ -14,7 +14,7 @@ namespace {
 
 using namespace test;
 
-Vec3 vec(const nlohmann::json& j) {
+Vec3 doppler_vec(const nlohmann::json& j) {
     return {j[0], j[1], j[2]};
 }
 
@@ -26,19 +26,19 @@ TEST(LidarDoppler, IsTheLineOfSightVelocityOfTheMaterialPoint) {
         const auto &in = c["in"], &expected = c["out"];
         Scene scene;
         scene.materials.push_back(lambert(0.5f));
-        add_sphere(scene, in["radius"], vec(in["body_center"]));
+        add_sphere(scene, in["radius"], doppler_vec(in["body_center"]));
         scene.bodies.push_back({.name = "sensor", .shape = Sphere{.radius_m = 1e-9}});
         const auto render_scene = RenderScene::create(scene, 1);
         ASSERT_TRUE(render_scene);
         BodyPoses at(2);
-        at.set(0, {{}, vec(in["body_center"])});
-        at.set(1, {{}, vec(in["sensor_pos"]) - Vec3{0, 0, 1}});
+        at.set(0, {{}, doppler_vec(in["body_center"])});
+        at.set(1, {{}, doppler_vec(in["sensor_pos"]) - Vec3{0, 0, 1}});
         const std::vector<Motion> motions{
-            {.velocity_m_s = vec(in["body_vel"]), .rate_rad_s = vec(in["body_omega"])},
-            {.velocity_m_s = vec(in["sensor_vel"])}};
-        const LidarReturn r =
-            shoot(render_scene->tracer(), at, {vec(in["sensor_pos"]), normalized(vec(in["beam_dir"]))},
-                  {.range_max_m = 1e12, .motions = motions, .mount = 1});
+            {.velocity_m_s = doppler_vec(in["body_vel"]), .rate_rad_s = doppler_vec(in["body_omega"])},
+            {.velocity_m_s = doppler_vec(in["sensor_vel"])}};
+        const LidarReturn r = shoot(render_scene->tracer(), at,
+                                    {doppler_vec(in["sensor_pos"]), normalized(doppler_vec(in["beam_dir"]))},
+                                    {.range_max_m = 1e12, .motions = motions, .mount = 1});
         if (!expected.contains("range_m") || expected["range_m"].is_null()) {
             EXPECT_EQ(r.body, -1) << c["description"];
             continue;

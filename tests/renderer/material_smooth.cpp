@@ -13,7 +13,7 @@ namespace {
 using namespace test;
 using nlohmann::json;
 
-Vec3 vec(const json& a) {
+Vec3 material_vec(const json& a) {
     return {a[0], a[1], a[2]};
 }
 
@@ -29,16 +29,16 @@ TEST(SmoothInterface, MeetsTheReferenceNumbers) {
     for (const json& c : reference["cases"]) {
         const json &in = c["in"], &out = c["out"];
         const std::string label = c["id"].dump() + " " + c["group"].dump() + " " + c["description"].dump();
-        const Vec3 v = vec(in["V"]), n = vec(in["N"]);
+        const Vec3 v = material_vec(in["V"]), n = material_vec(in["N"]);
         const double eta = in["n2"].get<double>() / in["n1"].get<double>(), cos_i = -dot(v, n);
         // The reference makes V and N unit before it starts; they are so to a rounding, which a direction keeps.
-        expect_near(reflect(v, n), vec(out["reflected"]), 1e-15, label);
+        expect_near(reflect(v, n), material_vec(out["reflected"]), 1e-15, label);
         const double cos_t = refracted_cosine(cos_i, eta);
         EXPECT_EQ(cos_t < 0, out["tir"] == 1) << label;
         double steep = 1;
         if (out["tir"] == 0) {
             steep = 1 + 1 / out["cos_t"].get<double>();
-            expect_near(refract(v, n, eta, cos_t), vec(out["transmitted"]), 1e-15 * steep, label);
+            expect_near(refract(v, n, eta, cos_t), material_vec(out["transmitted"]), 1e-15 * steep, label);
         }
         EXPECT_NEAR(fresnel_dielectric(cos_i, eta), out["R_fresnel"].get<double>(), 1e-14 * steep) << label;
         EXPECT_NEAR(fresnel_schlick(cos_i, eta), out["R_schlick_general"].get<double>(), 1e-14 * steep) << label;

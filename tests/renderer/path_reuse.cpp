@@ -117,11 +117,11 @@ Scene dish_and_block() {
     return s;
 }
 
-struct Case {
+struct ReuseCase {
     const char* name;
     void (*add)(Scene&);
 };
-class PathReuse : public testing::TestWithParam<Case> {};
+class PathReuse : public testing::TestWithParam<ReuseCase> {};
 
 TEST_P(PathReuse, KeepsTheMeanAndReducesTheNoise) {
     Scene s = dish_and_block();
@@ -150,28 +150,29 @@ TEST_P(PathReuse, KeepsTheMeanAndReducesTheNoise) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, PathReuse,
     testing::Values(
-        Case{"InTheSun", [](Scene&) {}},
-        Case{"UnderALamp",
-             [](Scene& s) {
-                 Light l;
-                 l.kind = Light::Kind::disc;
-                 l.T_mount_light = looking({1.5, -1, 2}, {});
-                 l.emission = {90, 80, 70};
-                 s.lights.push_back(l);
-             }},
-        Case{"UnderASkyAndAWideSun",
-             [](Scene& s) {
-                 s.ambient = {30, 20, 10};
-                 s.sun->angular_diameter_rad = 1;
-             }},
-        Case{"BesideMirrorsGlassAndAGlow",
-             [](Scene& s) {
-                 const int first = static_cast<int>(s.materials.size());
-                 s.materials.insert(s.materials.end(), {mirror(0.9f), glass(1.5f), shining(0.4f, {40, 50, 60})});
-                 add_sphere(s, 0.4, {0.8, -0.2, -1}, first);
-                 add_sphere(s, 0.4, {-0.6, -0.9, -0.9}, first + 1);
-                 add_sphere(s, 0.2, {1.2, 0.6, 0.2}, first + 2);
-             }}),
+        ReuseCase{"InTheSun", [](Scene&) {}},
+        ReuseCase{"UnderALamp",
+                  [](Scene& s) {
+                      Light l;
+                      l.kind = Light::Kind::disc;
+                      l.T_mount_light = looking({1.5, -1, 2}, {});
+                      l.emission = {90, 80, 70};
+                      s.lights.push_back(l);
+                  }},
+        ReuseCase{"UnderASkyAndAWideSun",
+                  [](Scene& s) {
+                      s.ambient = {30, 20, 10};
+                      s.sun->angular_diameter_rad = 1;
+                  }},
+        ReuseCase{
+            "BesideMirrorsGlassAndAGlow",
+            [](Scene& s) {
+                const int first = static_cast<int>(s.materials.size());
+                s.materials.insert(s.materials.end(), {mirror(0.9f), glass(1.5f), shining(0.4f, {40, 50, 60})});
+                add_sphere(s, 0.4, {0.8, -0.2, -1}, first);
+                add_sphere(s, 0.4, {-0.6, -0.9, -0.9}, first + 1);
+                add_sphere(s, 0.2, {1.2, 0.6, 0.2}, first + 2);
+            }}),
     [](const auto& test) { return test.param.name; });
 
 /// Of camera frames, in the first band.

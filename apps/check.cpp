@@ -311,8 +311,8 @@ void check_own_hulls(const World& world, nlohmann::json& document) {
                        s.lidars[i].T_mount_lidar, rays_of(s.lidars[i]), document["lidars"][i]);
 }
 
-/// Of a frame at time 0, where the scene itself places its bodies. Eight rays a pixel suffice for a mean level; a large
-/// image gets fewer, so that the frame takes a second or less.
+/// Of a frame at time 0, where the scene itself places its bodies. Eight rays a pixel suffice for a mean level; a
+/// large image gets fewer, so that the frame takes a second or less.
 SignalLevels first_levels(const World& world, const Camera& camera) {
     constexpr std::uint64_t kRays = 2'000'000;
     const Scene& s = world.scene();

@@ -114,10 +114,10 @@ Command add_run(Parser app) {
              "times")
         .type_name("CAMERA=SINK")
         .repeatable();
-    c.option(
-         "--lidar", o->lidar,
-         "udp:HOST:PORT (with %INTERFACE after HOST, ,ttl=N after PORT) | FILE.pcap | ouster:[ADDRESS:]PORT (an Ouster sensor's HTTP server) | can (each shot on "
-         "the CAN bus) | none; may be given many times")
+    c.option("--lidar", o->lidar,
+             "udp:HOST:PORT (with %INTERFACE after HOST, ,ttl=N after PORT) | FILE.pcap | ouster:[ADDRESS:]PORT "
+             "(an Ouster sensor's HTTP server) | can (each shot on "
+             "the CAN bus) | none; may be given many times")
         .type_name("LIDAR=SINK")
         .repeatable();
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,

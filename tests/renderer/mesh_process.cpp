@@ -64,8 +64,9 @@ TEST(MeshProcess, OtherFormatsAreNotGivenToAssimp) {
         const Result<MeshFile> mesh = read_mesh(folder.write(name, blender), 1);
         return mesh ? "" : mesh.error().what;
     };
-    EXPECT_EQ(text_of("m.blend"),
-              "not a mesh format that can be read, expected .obj, .tab, .icq, .gltf, .glb, .ply, .stl, .3ds or .dae");
+    EXPECT_EQ(
+        text_of("m.blend"),
+        "not a mesh format that can be read, expected .obj, .tab, .icq, .gltf, .glb, .ply, .stl, .3ds or .dae");
     EXPECT_EQ(text_of("m.glb"),
               "not a mesh that can be read: No suitable reader found for the file format of file \"" +
                   (folder / "m.glb") + "\".");

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "renderer/scene/time_scales.h"
+
 namespace narpa {
 
 namespace {
@@ -86,33 +88,17 @@ Quat attitude_from(const Elements& e) {
     return about(2, e.ra + 90) * about(0, 90 - e.dec) * about(2, e.w);
 }
 
-/// Two-part Julian dates of a UTC instant.
-struct Instant {
-    double utc1 = 2440587.5, utc2 = 0, tt1 = 0, tt2 = 0;
-
-    explicit Instant(std::int64_t unix_ns) {
-        constexpr std::int64_t kDay_ns = 86'400'000'000'000;
-        std::int64_t days = unix_ns / kDay_ns, rest = unix_ns % kDay_ns;
-        if (rest < 0) --days, rest += kDay_ns;
-        utc1 += static_cast<double>(days), utc2 = static_cast<double>(rest) / static_cast<double>(kDay_ns);
-        double tai1 = 0, tai2 = 0;
-        eraUtctai(utc1, utc2, &tai1, &tai2);
-        eraTaitt(tai1, tai2, &tt1, &tt2);
-    }
-    [[nodiscard]] double days() const { return tt1 - 2451545.0 + tt2; }
-};
-
-Quat earth(const Instant& t) {
+Quat earth(const TimeScales& t) {
     double m[3][3];  // celestial to terrestrial
-    eraC2t06a(t.tt1, t.tt2, t.utc1, t.utc2, 0, 0, m);
+    eraC2t06a(t.tt.days, t.tt.fraction, t.utc.days, t.utc.fraction, 0, 0, m);
     return quat_from_columns({m[0][0], m[0][1], m[0][2]}, {m[1][0], m[1][1], m[1][2]}, {m[2][0], m[2][1], m[2][2]});
 }
 
 }  // namespace
 
 std::optional<Quat> q_icrs_body(std::string_view body, std::int64_t unix_ns) {
-    const Instant t(unix_ns);
-    const double d = t.days(), T = d / 36525;
+    const TimeScales t = time_scales(unix_ns);
+    const double d = t.days_since_j2000(), T = d / 36525;
     if (body == "earth") return earth(t);
     if (body == "moon") return attitude_from(moon(d, T));
     if (body == "mars") return attitude_from(mars(d, T));

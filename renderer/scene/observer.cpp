@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "renderer/atmosphere/refractive_index.h"
-#include "renderer/scene/sun_direction.h"
+#include "renderer/scene/time_scales.h"
 
 namespace narpa {
 namespace {
@@ -18,23 +18,6 @@ constexpr double kEarthRate_rad_s = 7.292115e-5, kEarthMu = 3.986004418e14;
 constexpr double kAirTop_m = 80'000;
 constexpr int kWgs84 = 1;
 
-struct Instant {
-    double utc[2], tt[2], ut1[2];
-};
-Instant instant_of(std::int64_t unix_ns, double ut1_utc_s) {
-    constexpr std::int64_t kDayNs = 86'400'000'000'000;
-    std::int64_t days = unix_ns / kDayNs, rest = unix_ns % kDayNs;
-    if (rest < 0) --days, rest += kDayNs;
-    Instant t{};
-    double tai[2];
-    t.utc[0] = 2440587.5 + static_cast<double>(days);
-    t.utc[1] = static_cast<double>(rest) / static_cast<double>(kDayNs);
-    eraUtctai(t.utc[0], t.utc[1], &tai[0], &tai[1]);
-    eraTaitt(tai[0], tai[1], &t.tt[0], &t.tt[1]);
-    eraUtcut1(t.utc[0], t.utc[1], ut1_utc_s, &t.ut1[0], &t.ut1[1]);
-    return t;
-}
-
 Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) {
     return normalized(direction + velocity_m_s / kLightSpeed);
 }
@@ -42,9 +25,11 @@ Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) {
 }  // namespace
 
 GroundObserver::GroundObserver(const ObserverPlace& place, std::int64_t unix_ns) : unix_ns_(unix_ns) {
-    const Instant t = instant_of(unix_ns, place.ut1_utc_s);
+    const TimeScales t = time_scales(unix_ns);
+    JulianDate ut1;
+    eraUtcut1(t.utc.days, t.utc.fraction, place.ut1_utc_s, &ut1.days, &ut1.fraction);
     double m[3][3], fixed[3];
-    eraC2t06a(t.tt[0], t.tt[1], t.ut1[0], t.ut1[1], 0, 0, m);
+    eraC2t06a(t.tt.days, t.tt.fraction, ut1.days, ut1.fraction, 0, 0, m);
     eraGd2gc(kWgs84, place.longitude_rad, place.latitude_rad, place.height_m, fixed);
     // Rows of m are the Earth's axes in GCRS.
     const Vec3 x{m[0][0], m[0][1], m[0][2]}, y{m[1][0], m[1][1], m[1][2]}, z{m[2][0], m[2][1], m[2][2]};
@@ -81,9 +66,9 @@ Vec3 GroundObserver::apparent_direction(const Vec3& object_m, const Vec3& object
 }
 
 Vec3 GroundObserver::apparent_sun(bool refract) const {
-    const Instant t = instant_of(unix_ns_, 0);
+    const JulianDate tt = time_scales(unix_ns_).tt;
     double heliocentric[2][3], barycentric[2][3];
-    eraEpv00(t.tt[0], t.tt[1], heliocentric, barycentric);
+    eraEpv00(tt.days, tt.fraction, heliocentric, barycentric);
     const Vec3 sun = -kAu_m * Vec3{heliocentric[0][0], heliocentric[0][1], heliocentric[0][2]};
     const Vec3 earth_m_s = kAu_m / kDay_s * Vec3{barycentric[1][0], barycentric[1][1], barycentric[1][2]};
     const Vec3 direction = aberrated(normalized(sun - position_m_), earth_m_s + velocity_m_s_);

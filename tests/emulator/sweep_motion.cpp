@@ -53,7 +53,7 @@ TEST_F(SweepMotion, AWallIsFlatWhereEachShotHasItsOwnPoseAndBentByTheMotionWitho
             w->place(t_ns, -1, at);
             return w->sensor_pose(unit.lidar().mount, unit.lidar().T_mount_lidar, at);
         };
-        // A turn about the time at which the rotor looks at the wall.
+        // A turn about the time at which the beams point at the wall.
         const std::int64_t middle_ns = 100'000'000, from_ns = 50'000'000, to_ns = 150'000'000;
         const Rigid3 T_middle = pose(middle_ns);
         const Vec3 velocity =

@@ -14,6 +14,7 @@
 
 #include "base/time.h"
 #include "drivers/background_thread.h"
+#include "drivers/tcp_listener.h"
 
 namespace narpa {
 namespace {
@@ -43,14 +44,6 @@ std::string bytes_of(const HttpResponse& r) {
 
 HttpResponse plain(int status, const std::string& words) {
     return {.status = status, .body = words + "\n", .type = "text/plain"};
-}
-
-Error cannot_listen(const std::string& address, std::uint16_t port) {
-    return {"cannot listen at " + address + ":" + std::to_string(port) + ": " + std::strerror(errno),
-            {},
-            0,
-            0,
-            ErrorKind::missing};
 }
 
 }  // namespace
@@ -127,20 +120,11 @@ private:
 
 Result<std::unique_ptr<HttpServer>> HttpServer::start(const std::string& address, std::uint16_t port,
                                                       HttpHandler handler) {
-    sockaddr_in at{};
-    at.sin_family = AF_INET;
-    at.sin_port = htons(port);
-    if (::inet_pton(AF_INET, address.c_str(), &at.sin_addr) != 1)
-        return Error{"\"" + address + "\": expected an IPv4 address of this machine to listen at"};
-    Descriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-    if (!fd) return cannot_listen(address, port);
-    const int on = 1;
-    ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 || ::listen(fd.get(), 16) != 0)
-        return cannot_listen(address, port);
+    auto listener = listen_tcp(address, port);
+    if (!listener) return listener.error();
     Descriptor end(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!end) return cannot_listen(address, port);
-    return std::unique_ptr<HttpServer>(new HttpServer(std::move(fd), std::move(end), std::move(handler)));
+    if (!end) return Error{.what = std::string("eventfd: ") + std::strerror(errno), .kind = ErrorKind::missing};
+    return std::unique_ptr<HttpServer>(new HttpServer(std::move(listener->fd), std::move(end), std::move(handler)));
 }
 
 HttpServer::HttpServer(Descriptor listening, Descriptor end, HttpHandler handler)

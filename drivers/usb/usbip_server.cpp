@@ -17,17 +17,10 @@
 #include "base/read_number.h"
 #include "base/time.h"
 #include "drivers/background_thread.h"
+#include "drivers/tcp_listener.h"
 #include "drivers/usb/usb_control.h"
 
 namespace narpa {
-namespace {
-
-Error usbip_cannot_listen(const std::string& address, std::uint16_t port) {
-    return {.what = "cannot listen at " + address + ":" + std::to_string(port) + ": " + std::strerror(errno),
-            .kind = ErrorKind::missing};
-}
-
-}  // namespace
 
 /// Reads requests, keeps the transfers that are pending, writes the answers; never waits.
 class UsbIpServer::Connection {
@@ -214,26 +207,15 @@ Result<std::unique_ptr<UsbIpServer>> UsbIpServer::start(const std::string& addre
                                                         UsbDevice& device) {
     const UsbDescriptors& d = device.descriptors();
     const auto configuration = decode_usb_configuration(d.configuration);
-    if (!configuration) return Error{"USB device: its configuration is none"};
-    sockaddr_in at{};
-    at.sin_family = AF_INET;
-    at.sin_port = htons(port);
-    if (::inet_pton(AF_INET, address.c_str(), &at.sin_addr) != 1)
-        return Error{"\"" + address + "\": expected an IPv4 address of this machine to listen at"};
-    Descriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-    if (!fd) return usbip_cannot_listen(address, port);
-    const int on = 1;
-    ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    socklen_t size = sizeof at;
-    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&at), size) != 0 || ::listen(fd.get(), 8) != 0 ||
-        ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&at), &size) != 0)
-        return usbip_cannot_listen(address, port);
+    if (!configuration) return Error{"the USB device's configuration descriptor cannot be decoded"};
+    auto listener = listen_tcp(address, port);
+    if (!listener) return listener.error();
     Descriptor signal(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!signal) return usbip_cannot_listen(address, port);
+    if (!signal) return Error{.what = std::string("eventfd: ") + std::strerror(errno), .kind = ErrorKind::missing};
     UsbIpDevice identity{
         "/sys/devices/narpa/" + std::string(kBusId), std::string(kBusId), 1, 2, d.speed, d.device, *configuration};
     return std::unique_ptr<UsbIpServer>(
-        new UsbIpServer(std::move(fd), std::move(signal), ntohs(at.sin_port), std::move(identity), device));
+        new UsbIpServer(std::move(listener->fd), std::move(signal), listener->port, std::move(identity), device));
 }
 
 UsbIpServer::UsbIpServer(Descriptor listening, Descriptor signal, std::uint16_t port, UsbIpDevice identity,

@@ -118,18 +118,23 @@ Vector6 start_error() {
     return 0.1 * e;
 }
 
+/// From 4000 returns.
+Result<CloudEstimate> align(const SweptShape& shape, double noise_m) {
+    Scene scene;
+    scene.materials.push_back(test::lambert(0.5f));
+    shape.add(scene);
+    auto tracer = Tracer::create(scene, 1);
+    if (!tracer) return tracer.error();
+    IcpSettings settings;
+    settings.noise = {noise_m, 0};
+    return CloudIcp(*tracer, 0, settings)
+        .align(returns(shape.draw, 4000, noise_m, 5), {}, displaced(kTruth, start_error()));
+}
+
 TEST(IcpShapes, UnobservableMotionsAreReported) {
     for (const SweptShape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
-        Scene scene;
-        scene.materials.push_back(test::lambert(0.5f));
-        shape.add(scene);
-        auto tracer = Tracer::create(scene, 1);
-        ASSERT_TRUE(tracer);
-        IcpSettings settings;
-        settings.noise = {0.002, 0};
-        CloudIcp icp(*tracer, 0, settings);
-        const auto e = icp.align(returns(shape.draw, 4000, 0.002, 5), {}, displaced(kTruth, start_error()));
+        const auto e = align(shape, 0.002);
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_EQ(e->observability.unobserved, shape.unobserved);
         EXPECT_TRUE(e->settled);
@@ -141,18 +146,10 @@ TEST(IcpShapes, UnobservableMotionsAreReported) {
 TEST(IcpShapes, TheFilterTakesWhatIsObservedAndKeepsTheRest) {
     for (const SweptShape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
-        Scene scene;
-        scene.materials.push_back(test::lambert(0.5f));
-        shape.add(scene);
-        auto tracer = Tracer::create(scene, 1);
-        ASSERT_TRUE(tracer);
-        IcpSettings settings;
-        settings.noise = {1e-4, 0};
-        CloudIcp icp(*tracer, 0, settings);
-        const auto e = icp.align(returns(shape.draw, 4000, 1e-4, 5), {}, displaced(kTruth, start_error()));
+        const auto e = align(shape, 1e-4);
         ASSERT_TRUE(e) << e.error().text();
         const int observed = 6 - shape.unobserved;
-        EXPECT_EQ(e->root_information.bottomRows(observed).rowwise().norm().minCoeff() > 0, true);
+        EXPECT_GT(e->root_information.bottomRows(observed).rowwise().norm().minCoeff(), 0);
         EXPECT_EQ(e->root_information.topRows(shape.unobserved).squaredNorm(), 0);
 
         // The filter's frame and the LiDAR's are the same.

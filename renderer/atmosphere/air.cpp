@@ -132,7 +132,7 @@ Air::Air(const AirDescription& description, double wavelength_m)
 }
 
 void Air::fill(std::size_t lane, const AirCoefficients& c) {
-    const double g = c.asymmetry, f = std::pow(g, kDegree + 1);
+    const double g = c.asymmetry, f = std::pow(g, kMaxDegree + 1);
     gas[lane] = static_cast<float>(c.gas_scattering);
     aerosol[lane] = static_cast<float>(c.aerosol_scattering);
     aerosol_extinction[lane] = static_cast<float>(c.aerosol_extinction);
@@ -140,7 +140,8 @@ void Air::fill(std::size_t lane, const AirCoefficients& c) {
     asymmetry[lane] = static_cast<float>(g);
     scaled_aerosol[lane] = static_cast<float>((1 - f) * c.aerosol_scattering);
     scaled_extinction[lane] = static_cast<float>(c.aerosol_extinction - f * c.aerosol_scattering);
-    for (std::size_t l = 0; l <= kDegree; ++l) moment[l][lane] = static_cast<float>((std::pow(g, l) - f) / (1 - f));
+    for (std::size_t l = 0; l <= kMaxDegree; ++l)
+        moment[l][lane] = static_cast<float>((std::pow(g, l) - f) / (1 - f));
 }
 
 AirDensities Air::densities(double height_m) const noexcept {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "renderer/atmosphere/air_description.h"
+#include "renderer/atmosphere/spherical_harmonics.h"
 
 namespace narpa {
 
@@ -55,15 +56,12 @@ public:
     /// Of the layer's maximum, at a height in metres.
     [[nodiscard]] static float ozone_density(float height_m) noexcept;
 
-    /// Degree of the phase functions of light that is scattered again.
-    static constexpr std::size_t kDegree = 6;
-
     // 1/m at reference density. For light that is scattered again the aerosol's forward peak, what is beyond
-    // kDegree, is taken as no scattering (delta-M); "scaled" is the rest.
+    // kMaxDegree, is taken as no scattering (delta-M); "scaled" is the rest.
     Spectrum gas{}, aerosol{}, aerosol_extinction{}, ozone{}, asymmetry{};
     Spectrum scaled_aerosol{}, scaled_extinction{};
-    std::array<Spectrum, kDegree + 1> moment{};  ///< Legendre moments of the rest
-    Spectrum red{}, green{}, blue{};             ///< weights of the lanes in the bands
+    std::array<Spectrum, kMaxDegree + 1> moment{};  ///< Legendre moments of the rest
+    Spectrum red{}, green{}, blue{};                ///< weights of the lanes in the bands
 
 private:
     void fill(std::size_t lane, const AirCoefficients& c);

@@ -12,20 +12,9 @@
 /// Positions are metres from the planet's centre, directions unit. The Sun's irradiance is 1.
 #pragma once
 
-#include <vector>
-
-#include "renderer/atmosphere/air_path.h"
+#include "renderer/atmosphere/air_tables.h"
 
 namespace narpa {
-
-/// How finely the tables are made, and rays are marched.
-struct AirResolution {
-    int steps = 12;               ///< quadrature nodes of a panel of a ray: PanelRule
-    int heights = 16, suns = 32;  ///< of the table of scattered light
-    int directions = 10;          ///< above and below the horizon each, times 8 azimuths
-    int column_heights = 64, column_angles = 256;
-    int most_orders = 40;
-};
 
 class ScatteredLight {
 public:
@@ -62,35 +51,22 @@ public:
 
     [[nodiscard]] int orders() const { return orders_; }
     /// Bytes of the tables.
-    [[nodiscard]] std::size_t bytes() const {
-        return sizeof(float) * (moments_.size() + ground_.size() + sun_columns_.size());
-    }
-
-    struct Way;
+    [[nodiscard]] std::size_t bytes() const { return tables_.bytes(); }
 
 private:
-    void make_columns();
-    void solve(const AirResolution& resolution, int threads);
-    void measure();
-    double iterate(const AirResolution& resolution);
-    void gather(std::size_t height, const AirResolution& resolution, bool once, std::vector<float>& moments,
-                std::vector<float>& ground) const;
-    [[nodiscard]] double height_of(std::size_t i) const;
-    [[nodiscard]] double sun_cosine_of(std::size_t j) const;
+    struct Moments;
+    void solve(const AirResolution& resolution);
+    double iterate(const AirResolution& resolution, const Moments& once);
+    void gather(std::size_t height, const AirResolution& resolution, bool once, Moments& to) const;
 
     Air air_;
     PanelRule rule_;
-    double sun_radius_rad_;
-    std::size_t column_heights_, column_angles_, heights_, suns_;
-    std::vector<float> sun_columns_;  ///< [height][angle][gas, aerosol, ozone, 0]
-    std::vector<float> moments_;      ///< [height][sun][harmonic][lane]
-    std::vector<float> brightness_;   ///< [height][sun]: logarithm of the mean radiance's sum over lanes, inverse
-    std::vector<float> ground_;       ///< [sun][lane]: irradiance
-    std::vector<float> moments_once_,
-        ground_once_;  ///< of light scattered once or reflected once, while it is solved
+    AirTables tables_;
     int orders_ = 0;
 };
 
+/// From a height above the ground, metres.
+[[nodiscard]] double distance_to_horizon_m(const Air& air, double height_m) noexcept;
 /// Bands of a spectrum.
 [[nodiscard]] Rgb bands_of(const Air& air, const Air::Spectrum& light) noexcept;
 /// exp(-optical depth) in the bands.

@@ -38,13 +38,13 @@ Simulation at_contact(const Scenario& scenario) {
 
 /// What the judge makes of the messages that the dynamics send at contact.
 Verdict judged(const Scenario& scenario, const Simulation& simulation) {
-    test::Messages m(scenario);
+    Messages m(scenario);
     const double t_s = 1e-9 * static_cast<double>(simulation.t_ns());
     const Truth truth = simulation.truth();
     m.report(t_s, simulation.phase());
     m.poses(t_s, truth.chaser, truth.target);
     m.report(t_s + 1, DynamicsPhase::finished);
-    return test::judge(scenario, m);
+    return judge(scenario, m);
 }
 
 /// The limits of an envelope in the order of its conditions; the closing rate has two.
@@ -74,7 +74,7 @@ TEST(DockingGeometry, DynamicsAndJudgeAgreeAtEveryLimit) {
             ASSERT_TRUE(v.contact);
             const GateState expected = ulp >= 0 ? GateState::passed : GateState::failed;
             EXPECT_EQ(simulation.contact()->captured, ulp >= 0) << limit << " " << ulp;
-            EXPECT_EQ(test::gate(v, "contact").state, expected) << limit << " " << test::gate(v, "contact").reason;
+            EXPECT_EQ(gate(v, "contact").state, expected) << limit << " " << gate(v, "contact").reason;
             EXPECT_EQ(within(*scenario.gates.contact, v.contact->state), ulp >= 0) << limit << " " << ulp;
         }
     }

@@ -11,8 +11,6 @@
 namespace narpa::rehearsal {
 namespace {
 
-using namespace test;
-
 Scenario with_all_gates() {
     Scenario s = small_scenario();
     s.gates.corridor = Gates::Corridor{};
@@ -27,7 +25,7 @@ TEST(JudgeBus, ALogGivesTheSameVerdict) {
     Messages m = docking(s, chaser_at(s, {}, {-0.2, 0, 0}), DynamicsPhase::captured, 4);
     m.ledger(0, 1, 1.02);
     const Verdict live = judge(s, m);
-    const narpa::test::TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const std::string path = folder / "can.log";
     std::ofstream file(path);
     for (const CanFrame& f : m.frames) {

@@ -8,7 +8,6 @@
 namespace narpa::rehearsal {
 namespace {
 
-using namespace test;
 using State = GateState;
 constexpr double kRad = std::numbers::pi / 180;
 

@@ -9,7 +9,7 @@
 #include "protocols/can/messages.h"
 #include "rehearsal/judge/judge.h"
 
-namespace narpa::rehearsal::test {
+namespace narpa::rehearsal {
 
 /// Two bodies whose ports stand off their origins, in world axes that are the target's port axes.
 inline Scenario small_scenario() {
@@ -148,4 +148,4 @@ inline Result<Verdict> judge_log(const Scenario& scenario, const std::string& pa
     return judge.finish();
 }
 
-}  // namespace narpa::rehearsal::test
+}  // namespace narpa::rehearsal

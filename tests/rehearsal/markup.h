@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace narpa::rehearsal::test {
+namespace narpa::rehearsal {
 
 /// Empty, or what is wrong and where. XML, and HTML that closes all its tags.
 inline std::string markup_error(const std::string& text) {
@@ -54,4 +54,4 @@ inline std::string markup_error(const std::string& text) {
     return open.empty() ? "" : "never closed: " + open.back();
 }
 
-}  // namespace narpa::rehearsal::test
+}  // namespace narpa::rehearsal

@@ -10,8 +10,6 @@
 namespace narpa::rehearsal {
 namespace {
 
-using test::docking;
-
 Leg straight(const Vec3& to_m, double speed_m_s) {
     Leg leg;
     leg.to_m = to_m;
@@ -77,7 +75,7 @@ double when(Guidance& g, GuidancePhase phase, double from_s = 0) {
 }
 
 TEST(Guidance, FliesTheLegsHoldsAndDocks) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     Guidance g(s, 0);
     const double held = when(g, GuidancePhase::holding);
     EXPECT_GT(held, 30);
@@ -100,7 +98,7 @@ TEST(Guidance, FliesTheLegsHoldsAndDocks) {
 }
 
 TEST(Guidance, AHoldLastsUntilTheEstimateIsNear) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     Guidance g(s, 0);
     const double held = when(g, GuidancePhase::holding);
     for (double t = held; t < held + 60; t += 1) {
@@ -114,7 +112,7 @@ TEST(Guidance, AHoldLastsUntilTheEstimateIsNear) {
 }
 
 TEST(Guidance, ARetreatNearThePortStopsBeforeIt) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     Guidance g(s, 0);
     GuidanceInput input = at(g, 0);
     input.port_m = {0.15, 0.01, 0};
@@ -127,7 +125,7 @@ TEST(Guidance, ARetreatNearThePortStopsBeforeIt) {
 }
 
 TEST(Guidance, AbortsForEachReason) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     const auto reason = [&](const auto& change) {
         Guidance g(s, 0);
         for (double t = 0; t < 30; t += 1) g.step(at(g, t));
@@ -154,7 +152,7 @@ TEST(Guidance, AbortsForEachReason) {
 }
 
 TEST(Guidance, PointsAtTheTargetAlongAnArc) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     Leg arc;
     arc.arc_deg = 180;
     arc.axis = {0, 0, 1};
@@ -203,7 +201,7 @@ TEST(PulseAxis, SmallForcesAreRightInTheMean) {
 }
 
 struct Loop {
-    test::Plant plant;
+    Plant plant;
     FlightControl control;
     explicit Loop(const Scenario& s) : plant{s}, control(s) {}
     void fly(const Reference& reference) {
@@ -221,7 +219,7 @@ Reference standing(const Vec3& at_m) {
 /// Off the V-bar, where gravity pulls, from a metre and three degrees off; then it stays, within what one least
 /// pulse a control period does: 8 N s / 9500 kg = 0.84 mm/s.
 TEST(FlightControl, MovesThePortToTheReferenceAndHoldsIt) {
-    Loop loop(docking());
+    Loop loop(docking_scenario());
     loop.plant.stand({30, 11, -9}, {0.05, -0.03, 0.04});
     const Reference r = standing({30, 10, -10});
     for (int k = 0; k < 120; ++k) loop.fly(r);
@@ -237,7 +235,7 @@ TEST(FlightControl, MovesThePortToTheReferenceAndHoldsIt) {
 
 /// The port is 3.2 m before the centre of mass: it stays in place while the chaser rotates by ten degrees.
 TEST(FlightControl, ThePortStaysWhileTheChaserRotates) {
-    Loop loop(docking());
+    Loop loop(docking_scenario());
     loop.plant.stand({10, 0, 0}, {0, 0.17, 0});
     const Reference r = standing({10, 0, 0});
     double worst_m = 0, centre_m = 0;
@@ -254,7 +252,7 @@ TEST(FlightControl, ThePortStaysWhileTheChaserRotates) {
 
 /// All legs with a perfect estimate: follows within centimetres, meets the port at its speed.
 TEST(FlightControl, FollowsTheLegsToContact) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     Loop loop(s);
     loop.plant.stand(s.start.position_m, {});
     Guidance g(s, 0);
@@ -277,7 +275,7 @@ TEST(FlightControl, FollowsTheLegsToContact) {
 
 /// Before the port of a target that turns it stays where it is, and turns with it.
 TEST(FlightControl, FollowsARotatingTarget) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     s.target_motion.with_lvlh = false;
     s.target_motion.rate_deg_s = {0, 0, 0.15};
     Loop loop(s);
@@ -293,10 +291,10 @@ TEST(FlightControl, FollowsARotatingTarget) {
 }
 
 TEST(RelativeMotion, RoundTripsAndVelocityIsItsRateOfChange) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     s.target_motion.rate_deg_s = {0.2, -0.1, 0.3};
     s.chaser.T_body_port = {exp_rotation({0.1, 0.2, -0.3}), {0.2, -0.1, 0.3}};
-    test::Plant plant{s};
+    Plant plant{s};
     plant.stand({20, 3, -2}, {0.1, -0.2, 0.05});
     plant.motion.chaser_rate_rad_s = {0.01, -0.02, 0.005};
     place_port({20, 3, -2}, {0.1, -0.2, 0.3}, s.target, s.chaser, plant.motion);

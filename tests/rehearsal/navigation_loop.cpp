@@ -12,8 +12,6 @@
 namespace narpa::rehearsal {
 namespace {
 
-using test::docking;
-
 struct Flight {
     std::vector<CycleRecord> cycles;
     std::vector<Vector6> errors;  ///< of each estimate, in its standard deviations
@@ -69,7 +67,7 @@ Flight fly(const Scenario& s, std::uint64_t seed, const Seen& seen) {
 }
 
 TEST(NavigationLoop, DocksInsideTheEnvelope) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     for (const std::uint64_t seed : {1, 2, 3}) {
         const Flight flight = fly(s, seed, [](double) { return true; });
         ASSERT_TRUE(flight.contact) << seed;
@@ -91,7 +89,7 @@ TEST(NavigationLoop, DocksInsideTheEnvelope) {
 }
 
 TEST(NavigationLoop, AbortsWithoutMeasurements) {
-    const Scenario s = docking();
+    const Scenario s = docking_scenario();
     const Flight flight = fly(s, 4, [](double t_s) { return t_s < 60; });
     EXPECT_EQ(flight.last().abort, AbortReason::lost);
     EXPECT_EQ(flight.last().phase, GuidancePhase::retreating);
@@ -105,7 +103,7 @@ TEST(NavigationLoop, AbortsWithoutMeasurements) {
 
 /// Too fast for the docking system: it bounces, and goes away without touching again, knowing where it is.
 TEST(NavigationLoop, RetreatsAfterABounce) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     s.legs.back().speed_m_s = 0.2;
     const Flight flight = fly(s, 7, [](double) { return true; });
     ASSERT_TRUE(flight.contact);
@@ -120,7 +118,7 @@ TEST(NavigationLoop, RetreatsAfterABounce) {
 /// A thruster that does not fire: it is off its reference, or the filter contradicts the sensor, but it does not
 /// touch.
 TEST(NavigationLoop, AbortsOffTheReference) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     Fault fault;
     fault.kind = Fault::Kind::commands_lost;
     fault.from_s = 50;
@@ -132,7 +130,7 @@ TEST(NavigationLoop, AbortsOffTheReference) {
 }
 
 TEST(NavigationLoop, TheSameSeedGivesTheSameCommands) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     s.duration_s = 60;
     const auto until_60_s = [](double t_s) { return t_s < 20; };
     const Flight one = fly(s, 6, until_60_s), other = fly(s, 6, until_60_s);

@@ -26,8 +26,8 @@ Stage& stage() {
     return s;
 }
 
-test::Plant plant_at(const Vec3& port_m, const Vec3& off_rad) {
-    test::Plant plant{stage().scenario};
+Plant plant_at(const Vec3& port_m, const Vec3& off_rad) {
+    Plant plant{stage().scenario};
     plant.stand(port_m, off_rad);
     return plant;
 }
@@ -42,9 +42,9 @@ TEST(CameraPoseEstimator, MeasuresTheTruePose) {
     CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], 1);
     std::uint32_t number = 0;
     for (const double x_m : {25.0, 6.0}) {
-        const test::Plant plant = plant_at({x_m, 0.3, -0.2}, {0.01, -0.02, 0.01});
-        const Rigid3 truth = test::chaser_target(plant);
-        const auto bytes = test::frame(*stage().model, plant, ++number);
+        const Plant plant = plant_at({x_m, 0.3, -0.2}, {0.01, -0.02, 0.01});
+        const Rigid3 truth = chaser_target(plant);
+        const auto bytes = frame(*stage().model, plant, ++number);
         const MeasurementResult s = estimator.measure(bytes, 0, 0, plant.motion.q_world_chaser, beside(truth));
         ASSERT_TRUE(s.pose) << s.why;
         EXPECT_GT(s.points, 30);
@@ -57,9 +57,9 @@ TEST(CameraPoseEstimator, MeasuresTheTruePose) {
 
 TEST(CameraPoseEstimator, GivesAReasonWithoutAPose) {
     CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], 1);
-    const test::Plant plant = plant_at({20, 0, 0}, {});
-    const Rigid3 truth = test::chaser_target(plant);
-    auto bytes = test::frame(*stage().model, plant, 9);
+    const Plant plant = plant_at({20, 0, 0}, {});
+    const Rigid3 truth = chaser_target(plant);
+    auto bytes = frame(*stage().model, plant, 9);
     std::fill(bytes.begin(), bytes.end(), std::uint8_t{4});  // the Earth's shadow
     const MeasurementResult dark = estimator.measure(bytes, 0, 0, plant.motion.q_world_chaser, truth);
     EXPECT_FALSE(dark.pose);
@@ -70,24 +70,23 @@ TEST(CameraPoseEstimator, GivesAReasonWithoutAPose) {
 
 TEST(LidarPoseEstimator, MeasuresThePoseWhileTheChaserMoves) {
     LidarPoseEstimator estimator(*stage().model, stage().model->lidars()[0]);
-    test::Plant plant = plant_at({15, 0.5, -0.3}, {0.01, 0.02, -0.01});
+    Plant plant = plant_at({15, 0.5, -0.3}, {0.01, 0.02, -0.01});
     plant.motion.chaser_rate_rad_s = plant.motion.chaser_rate_rad_s + Vec3{0.01, -0.02, 0.03};
     plant.motion.velocity_m_s = plant.motion.velocity_m_s + Vec3{-0.4, 0.1, 0.05};
     plant.t_s = 10;
     const std::int64_t epoch = stage().model->scene().epoch_unix_ns;
     SweepBuffer buffer(estimator.lidar(), epoch);
-    for (const auto& bytes : test::turn(*stage().model, plant, epoch))
-        ASSERT_TRUE(buffer.take(bytes, 10'000'000'000));
+    for (const auto& bytes : turn(*stage().model, plant, epoch)) ASSERT_TRUE(buffer.take(bytes, 10'000'000'000));
     const auto t_ns = std::llround(1e9 * plant.t_s);
     std::vector<RangePoint> points;
     buffer.turn(t_ns, points);
     ASSERT_GT(points.size(), 500u);
 
     // As the chaser sees the target move.
-    const Rigid3 truth = test::chaser_target(plant);
-    test::Plant later = plant;
+    const Rigid3 truth = chaser_target(plant);
+    Plant later = plant;
     later.step({}, {}, 1e-3);
-    const Vector6 rate = error_between(truth, test::chaser_target(later)) / 1e-3;
+    const Vector6 rate = error_between(truth, chaser_target(later)) / 1e-3;
     const ApparentMotion motion{to_vec3(rate.tail<3>()), to_vec3(rate.head<3>())};
     const MeasurementResult s = estimator.measure(points, t_ns, motion, beside(truth), 0.1, 0.2 * kRadPerDeg);
     ASSERT_TRUE(s.pose) << s.why;
@@ -103,8 +102,7 @@ TEST(LidarPoseEstimator, MeasuresThePoseWhileTheChaserMoves) {
 
 TEST(LidarPoseEstimator, GivesAReasonWithoutAPose) {
     LidarPoseEstimator estimator(*stage().model, stage().model->lidars()[0]);
-    const MeasurementResult s =
-        estimator.measure({}, 0, {}, test::chaser_target(plant_at({15, 0, 0}, {})), 0.1, 0.01);
+    const MeasurementResult s = estimator.measure({}, 0, {}, chaser_target(plant_at({15, 0, 0}, {})), 0.1, 0.01);
     EXPECT_FALSE(s.pose);
     EXPECT_NE(s.why.find("beams"), std::string::npos) << s.why;
 }

@@ -20,8 +20,8 @@ namespace {
 
 const std::string kScenario = NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml";
 
-/// By camera alone.
-Scenario docking() {
+/// The docking that comes with narpa, by camera alone.
+Scenario by_camera_alone() {
     static const Scenario scenario = [] {
         auto s = read_scenario(kScenario);
         EXPECT_TRUE(s) << s.error().text();
@@ -41,7 +41,7 @@ struct Sent {
 };
 
 Sent fly(const std::string& folder, std::int64_t cycles) {
-    const Scenario s = docking();
+    const Scenario s = by_camera_alone();
     auto model = SceneModel::create(s);
     EXPECT_TRUE(model);
     const Camera& camera = (*model)->scene().cameras[0];
@@ -79,14 +79,14 @@ Sent fly(const std::string& folder, std::int64_t cycles) {
         listen(0);  // lets it onto the bus
         return ready.load();
     }));
-    test::Plant plant{s};
+    Plant plant{s};
     plant.stand(s.start.position_m + Vec3{0.4, -0.3, 0.3}, {0.01, -0.01, 0.01});
     for (std::int64_t k = 0; k < cycles; ++k) {
         const std::int64_t t_ns = k * s.period_ns();
         send(DynamicsReport{static_cast<std::uint8_t>(k), t_ns, 0, DynamicsPhase::flying});
         send(AttitudeReport{static_cast<std::uint8_t>(k), t_ns, plant.motion.q_world_chaser,
                             plant.motion.chaser_rate_rad_s});
-        (*sink)->send(test::frame(**model, plant, static_cast<std::uint32_t>(k)));
+        (*sink)->send(frame(**model, plant, static_cast<std::uint32_t>(k)));
         FrameLedger ledger;
         ledger.frame = static_cast<std::uint32_t>(5 * k);
         ledger.t_exposure_mid_ns = ledger.t_hand_over_ns = t_ns;
@@ -99,7 +99,7 @@ Sent fly(const std::string& folder, std::int64_t cycles) {
         if (sent.commands.size() != static_cast<std::size_t>(k + 1) ||
             sent.estimates.size() != static_cast<std::size_t>(k + 1))
             break;
-        sent.errors_m.push_back(norm(sent.estimates.back().T_chaser_target.t - test::chaser_target(plant).t));
+        sent.errors_m.push_back(norm(sent.estimates.back().T_chaser_target.t - chaser_target(plant).t));
         plant.fly({sent.commands.back().impulse_n_s, sent.commands.back().angular_impulse_n_m_s}, 1);
     }
     send(DynamicsReport{static_cast<std::uint8_t>(cycles), cycles * s.period_ns(), 0, DynamicsPhase::finished});
@@ -108,7 +108,7 @@ Sent fly(const std::string& folder, std::int64_t cycles) {
 }
 
 TEST(NavigationNode, AnswersEachPeriodAndRepeatsItself) {
-    const narpa::test::TemporaryFolder folder, other;
+    const test::TemporaryFolder folder, other;
     const Sent one = fly(folder / "", 3);
     EXPECT_TRUE(one.ended) << one.ended.error().text();
     ASSERT_EQ(one.commands.size(), 3u);
@@ -135,7 +135,7 @@ TEST(NavigationNode, NamesWhatIsWrongWithItsSources) {
     options.bus = "slcan:1";
     options.wait_s = 0;
     const auto what = [&] {
-        const Status ended = navigate(docking(), options, stop, [] {});
+        const Status ended = navigate(by_camera_alone(), options, stop, [] {});
         EXPECT_FALSE(ended);
         return ended ? std::string() : ended.error().what;
     };

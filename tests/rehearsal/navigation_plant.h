@@ -8,10 +8,10 @@
 
 #include "rehearsal/navigation/flight_control.h"
 
-namespace narpa::rehearsal::test {
+namespace narpa::rehearsal {
 
 /// The docking that comes with narpa; read once.
-inline const Scenario& docking() {
+inline const Scenario& docking_scenario() {
     static const Scenario scenario = [] {
         auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
         EXPECT_TRUE(s) << s.error().text();
@@ -75,4 +75,4 @@ struct Plant {
     }
 };
 
-}  // namespace narpa::rehearsal::test
+}  // namespace narpa::rehearsal

@@ -14,10 +14,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-using test::chaser_target;
-using test::docking;
-
-AttitudeReport attitude(const test::Plant& plant) {
+AttitudeReport attitude(const Plant& plant) {
     return {0, std::llround(1e9 * plant.t_s), plant.motion.q_world_chaser, plant.motion.chaser_rate_rad_s};
 }
 
@@ -57,9 +54,9 @@ TEST(CentresOfMass, TheCovarianceIsThatOfRandomDraws) {
 }
 
 struct Estimated {
-    test::Plant plant;
+    Plant plant;
     std::optional<StateEstimator> estimator;
-    explicit Estimated(const Scenario& scenario = docking()) : plant{scenario} {
+    explicit Estimated(const Scenario& scenario = docking_scenario()) : plant{scenario} {
         plant.stand(plant.scenario.start.position_m, {0.02, -0.01, 0.03});
         auto made = StateEstimator::create(plant.scenario, 0, attitude(plant));
         EXPECT_TRUE(made);
@@ -78,7 +75,7 @@ struct Estimated {
 };
 
 Scenario docking_from(const Vec3& port_m, const Vec3& velocity_m_s) {
-    Scenario s = docking();
+    Scenario s = docking_scenario();
     s.start.position_m = port_m;
     s.start.velocity_m_s = velocity_m_s;
     return s;

@@ -17,10 +17,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-using namespace test;
-using narpa::test::TemporaryFolder;
-
-ChildProcess::Command shell(const TemporaryFolder& folder, const std::string& words) {
+ChildProcess::Command shell(const test::TemporaryFolder& folder, const std::string& words) {
     return {"it", {"/bin/sh", "-c", words}, {{"WHERE", "here & there"}}, folder / "out", folder / "err"};
 }
 
@@ -30,7 +27,7 @@ int status_of(ChildProcess& child) {
 }
 
 TEST(ChildProcess, HasItsExitStatusAndOutput) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     auto child = ChildProcess::start(shell(folder, "echo \"$WHERE\"; echo first >&2; echo last >&2; exit 3"));
     ASSERT_TRUE(child);
     EXPECT_EQ(status_of(*child), 3);
@@ -40,14 +37,14 @@ TEST(ChildProcess, HasItsExitStatusAndOutput) {
 }
 
 TEST(ChildProcess, NamesWhatCannotBeStarted) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const auto child = ChildProcess::start({"the dynamics", {folder / "none"}, {}, folder / "out", folder / "out"});
     ASSERT_FALSE(child);
     EXPECT_NE(child.error().what.find("cannot start the dynamics"), std::string::npos);
 }
 
 TEST(ChildProcess, StopsWithAllThatItStarted) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     auto child = ChildProcess::start(shell(folder, "trap '' TERM; sleep 100 & echo $!; wait; sleep 100"));
     ASSERT_TRUE(child);
     while (read_text(folder / "out").find('\n') == std::string::npos)
@@ -78,7 +75,7 @@ std::string wait_for_ready(ChildProcess& child) {
 }
 
 TEST(ChildProcess, IsReadyWhenItHasWrittenSoToItsDescriptor) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     ChildProcess::Command command = shell(
         folder, "echo READY=1; echo CAN=slcan:29537 >&$READY_FD; read line; echo READY=1 >&$READY_FD; sleep 100");
     command.ready = ChildProcess::Ready::variable;
@@ -91,7 +88,7 @@ TEST(ChildProcess, IsReadyWhenItHasWrittenSoToItsDescriptor) {
 }
 
 TEST(ChildProcess, IsNotReadyWhenItEndsBefore) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     ChildProcess::Command command = shell(folder, "echo CAN=vcan0 >&$READY_FD; exit 2");
     command.ready = ChildProcess::Ready::variable;
     auto child = ChildProcess::start(command);
@@ -106,7 +103,7 @@ TEST(ChildProcess, IsNotReadyWhenItEndsBefore) {
 }
 
 TEST(ChildProcess, GetsTheDescriptorAsAnOption) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     ChildProcess::Command command = shell(folder, "echo \"$0 $1\"; echo READY=1 >&3");
     command.ready = ChildProcess::Ready::option;
     auto child = ChildProcess::start(command);
@@ -117,7 +114,7 @@ TEST(ChildProcess, GetsTheDescriptorAsAnOption) {
 }
 
 TEST(ErrorIn, IsTheErrorWithItsRemedyAndNoMore) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const auto of = [&](const char* printed) {
         std::ofstream(folder / "log") << printed;
         return error_in(folder / "log");
@@ -138,7 +135,7 @@ TEST(ReadyFd, ThatIsNotOpenIsBadInput) {
 }
 
 TEST(Rerun, TheFirstDifferenceIsFoundByLine) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const auto leave = [&](const char* name, const std::string& text) { std::ofstream(folder / name) << text; };
     leave("a", "1\n2\n3\n");
     leave("b", "1\n2\n3\n");
@@ -164,7 +161,7 @@ TEST(Rerun, MessagesHaveNames) {
 }
 
 TEST(Rerun, RejectsFoldersWithoutARehearsal) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     EXPECT_FALSE(read_record(folder / ""));
     std::ofstream(folder / "rehearsal.json") << R"({"format": 1, "seed": "x"})";
     EXPECT_FALSE(read_record(folder / ""));
@@ -180,7 +177,7 @@ TEST(LidarPort, LeavesRoomForPositionPackets) {
 }
 
 TEST(Folder, WithOtherFilesIsNotClaimed) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
     EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
     std::ofstream(folder / "new/letter.txt") << "dear";

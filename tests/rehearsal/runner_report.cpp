@@ -12,8 +12,6 @@
 namespace narpa::rehearsal {
 namespace {
 
-using namespace test;
-
 Scenario full_scenario() {
     Scenario s = small_scenario();
     s.title = "Docking <\"small\"> & simple";
@@ -35,7 +33,7 @@ std::string page_of(const Scenario& s, const Messages& m, const std::string& fol
 TEST(Page, IsWellFormedAndNeedsNoNetwork) {
     Scenario s = full_scenario();
     s.navigation.cameras = {"nav"};
-    const narpa::test::TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     std::filesystem::create_directory(folder / "navigation");
     std::ofstream(folder / "navigation/hold_far_nav.png") << "not looked at";
     std::filesystem::create_directory(folder / "charts");
@@ -55,7 +53,7 @@ TEST(Page, IsWellFormedAndNeedsNoNetwork) {
 TEST(Page, ShowsTheEmulatorsFramesWhateverNavigationFlew) {
     Scenario s = full_scenario();
     s.navigation.cameras = {"nav", "far"};
-    const narpa::test::TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     std::filesystem::create_directory(folder / "emulator");
     std::ofstream(folder / "emulator/nav.png") << "not looked at";
     std::ofstream(folder / "emulator/nav.ledger.csv") << "frame";
@@ -105,7 +103,7 @@ TEST(Charts, HaveWhatWasOnTheBus) {
 
 TEST(Charts, BecomePartOfThePage) {
     const std::initializer_list<PageChart> kRates{{"range", "Range over time"}, {"rates", "Rates over time"}};
-    const narpa::test::TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     EXPECT_NE(charts_of(folder / "", kRates).find("narpa-plot charts.json"), std::string::npos);
     std::filesystem::create_directory(folder / "charts");
     std::ofstream(folder / "charts/range.svg") << "foobar";
@@ -165,7 +163,7 @@ TEST(Campaign, PageAndTestReportAreWellFormed) {
 }
 
 TEST(Campaign, ARunWithItsResultIsNotRepeated) {
-    const narpa::test::TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const auto leave = [&](const char* result) { std::ofstream(folder / "result.json") << result; };
     EXPECT_FALSE(is_done(folder / "", "abc", 4));
     leave(R"({"scenario_hash": "abc", "seed": 4, "trouble": ""})");

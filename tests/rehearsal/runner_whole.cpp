@@ -19,19 +19,17 @@
 namespace narpa::rehearsal {
 namespace {
 
-using namespace test;
-using narpa::test::TemporaryFolder;
 namespace fs = std::filesystem;
 
 /// The docking that comes with narpa, for a second.
-std::string short_scenario(const TemporaryFolder& folder) {
+std::string short_scenario(const test::TemporaryFolder& folder) {
     std::ofstream(folder / "short.toml")
         << "[scenario]\nbased_on = \"" NARPA_BUILD_DIR
            "/scenes/rehearsal/docking.toml\"\nname = \"short\"\nduration_s = 1.0\n";
     return folder / "short.toml";
 }
 
-RehearsalOptions options(const TemporaryFolder& folder) {
+RehearsalOptions options(const test::TemporaryFolder& folder) {
     RehearsalOptions o;
     o.scenario = short_scenario(folder);
     o.folder = folder / "run";
@@ -44,7 +42,7 @@ RehearsalOptions options(const TemporaryFolder& folder) {
 const Console kSilent{[](std::string_view) {}, [](double, double, std::string_view) {}};
 
 TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     const auto done = run_rehearsal(o, kSilent, stop);
@@ -78,7 +76,7 @@ TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
 }
 
 TEST(Whole, NamesAProgramThatEndsTooSoon) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     o.navigation = "echo ready; echo out of fuel >&2; sleep 0.2; exit 7";
@@ -93,7 +91,7 @@ TEST(Whole, NamesAProgramThatEndsTooSoon) {
 }
 
 TEST(Whole, EndsAfterTooLongWithoutProgress) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     o.dynamics = "sleep 100";
@@ -106,7 +104,7 @@ TEST(Whole, EndsAfterTooLongWithoutProgress) {
 }
 
 TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     o.bus = "slcan:notaport";
@@ -120,7 +118,7 @@ TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
 }
 
 TEST(Whole, AFailedStartKeepsTheEarlierRun) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
@@ -146,7 +144,7 @@ TEST(Whole, AFailedStartKeepsTheEarlierRun) {
 
 /// A navigation that the user starts some time after the request.
 TEST(Whole, WaitsForANavigationStartedByTheUser) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     o.navigation = "none";
@@ -185,7 +183,7 @@ TEST(Whole, WaitsForANavigationStartedByTheUser) {
 
 /// The log of somebody else, whose record is valid but for the commands in it.
 TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     const auto scenario = read_scenario(short_scenario(folder));
     ASSERT_TRUE(scenario);
@@ -221,7 +219,7 @@ TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
 }
 
 TEST(Whole, ASecondRunIntoTheSameFolderIsRefused) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
     o.dynamics = "sleep 100";
@@ -242,7 +240,7 @@ TEST(Whole, ASecondRunIntoTheSameFolderIsRefused) {
 }
 
 TEST(Whole, ACampaignShowsHowFarARunIs) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const std::string log = folder / "0001.log";
     EXPECT_EQ(progress_of(log).text, "");
     ASSERT_TRUE(write_text(log,
@@ -260,7 +258,7 @@ TEST(Whole, ACampaignShowsHowFarARunIs) {
 }
 
 TEST(Whole, RejectsImpossibleCampaigns) {
-    const TemporaryFolder folder;
+    const test::TemporaryFolder folder;
     const auto refused = [&](const RehearsalOptions& run, int jobs) {
         const auto done = run_campaign({run, 2, jobs}, kSilent, StopFlag{false});
         return done ? std::string() : done.error().what;

@@ -11,7 +11,7 @@
 #include "renderer/lidar/lidar_shot.h"
 #include "tests/rehearsal/navigation_plant.h"
 
-namespace narpa::rehearsal::test {
+namespace narpa::rehearsal {
 
 /// Target's body axes from the chaser's.
 inline Rigid3 chaser_target(const Plant& plant) {
@@ -70,4 +70,4 @@ inline std::vector<std::vector<std::uint8_t>> turn(SceneModel& model, Plant& pla
     return out;
 }
 
-}  // namespace narpa::rehearsal::test
+}  // namespace narpa::rehearsal

@@ -79,7 +79,7 @@ private:
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace narpa;
-    static const rehearsal::Scenario scenario = rehearsal::test::small_scenario();
+    static const rehearsal::Scenario scenario = rehearsal::small_scenario();
     Decoders decoders;
     rehearsal::Judge judge(scenario);
     const std::string_view text = fuzz::text_of(data, size);

@@ -174,5 +174,18 @@ TEST_F(UsbCanDevice, OutlivesAnAdapterThatMisbehaves) {
     EXPECT_EQ(usb_->counters().interface_down, 0u);
 }
 
+TEST(UsbCanAdapter, ThatAnswersWronglyIsNamedAtTheStart) {
+    // The adapter's answers are cut short from its second on (narpa-usbcan --fault answers@1).
+    if (std::getenv("NARPA_TEST_USB_ANSWERS") == nullptr) GTEST_SKIP() << "NARPA_TEST_USB_ANSWERS is not set";
+    std::string what = "no USB-CAN adapter";
+    for (const std::int64_t until_ns = monotonic_ns() + 60 * kSecond_ns;  // until it is seen
+         what.find("no USB-CAN adapter") != std::string::npos && monotonic_ns() < until_ns;) {
+        const auto bus = open_can_bus("usb:", CanRole::hub);
+        ASSERT_FALSE(bus);
+        what = bus.error().what;
+    }
+    EXPECT_NE(what.find("NARPA0001: does not speak gs_usb: its"), std::string::npos) << what;
+}
+
 }  // namespace
 }  // namespace narpa

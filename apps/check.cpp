@@ -72,10 +72,9 @@ Finding usb_adapters() {
     if (!adapters) return {"USB-CAN adapters", false, adapters.error().what, adapters.error().remedy};
     if (adapters->empty()) return {"USB-CAN adapters", false, "none is plugged in", ""};
     Finding f{"USB-CAN adapters", true, "", ""};
-    for (const UsbAdapter& a : *adapters) {
-        f.detail +=
-            fmt::format("{}usb:{} at {}{}", f.detail.empty() ? "" : ", ", a.serial.empty() ? a.place : a.serial,
-                        a.place, a.trouble.empty() ? "" : " (" + a.trouble + ")");
+    for (const PluggedUsbDevice& a : *adapters) {
+        f.detail += fmt::format("{}usb:{} at {}{}", f.detail.empty() ? "" : ", ", a.name(), a.place,
+                                a.trouble.empty() ? "" : " (" + a.trouble + ")");
         if (a.trouble.empty()) continue;
         f.there = false;
         f.remedy = usb_permission_remedy();

@@ -27,16 +27,17 @@ Result<WantedFault> parse_fault(std::string_view text) {
     WantedFault f;
     const std::size_t at = text.find('@');
     const std::string_view kind = text.substr(0, at);
-    f.kind = kind == "stall"    ? UsbFault::stall
-             : kind == "short"  ? UsbFault::shorten
-             : kind == "babble" ? UsbFault::babble
-             : kind == "hang"   ? UsbFault::hang
-                                : UsbFault::none;
+    f.kind = kind == "stall"     ? UsbFault::stall
+             : kind == "short"   ? UsbFault::shorten
+             : kind == "babble"  ? UsbFault::babble
+             : kind == "hang"    ? UsbFault::hang
+             : kind == "answers" ? UsbFault::answers
+                                 : UsbFault::none;
     f.is_bus_off = kind == "bus-off";
     if ((f.kind == UsbFault::none && !f.is_bus_off) || at == std::string_view::npos ||
         !read_number(text.substr(at + 1), f.after) || f.after == 0)
         return Error{"--fault " + std::string(text) +
-                     ": expected stall@N, short@N, babble@N, hang@N or bus-off@N, with N > 0 transfers"};
+                     ": expected stall@N, short@N, babble@N, hang@N, answers@N or bus-off@N, with N > 0 transfers"};
     return f;
 }
 
@@ -88,7 +89,8 @@ void add_usbcan_options(UsbCanArguments& a, const cli::Parser& p) {
     p.option("--serial", a.serial, "Its serial number").shows_default();
     p.flag("--classic", a.is_classic, "An adapter without CAN FD");
     p.flag("--client", a.is_client, "Join the bus of `narpa run` (slcan) instead of being its hub");
-    p.option("--fault", a.fault, "stall|short|babble|hang|bus-off after N transfers: to try how hosts take it")
+    p.option("--fault", a.fault,
+             "stall|short|babble|hang|answers|bus-off after N transfers: to try how hosts take it")
         .type_name("KIND@N");
     p.examples(
         {"narpa-usbcan --can vcan0", "sudo usbip attach -r 127.0.0.1 -b 1-1   (then: ip link set can0 up ...)"});

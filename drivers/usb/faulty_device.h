@@ -15,18 +15,22 @@ enum class UsbFault : std::uint8_t {
     shorten,  ///< every tenth transfer towards the host ends early
     babble,   ///< every tenth transfer towards the host has too many bytes
     hang,     ///< no transfer of a bulk endpoint is ever answered again
+    answers,  ///< every answer to a vendor's control request ends in its middle
 };
 
 class FaultyDevice final : public UsbDevice {
 public:
-    /// `device` must outlive it. `after`: transfers of bulk endpoints that are as they should be.
+    /// `device` must outlive it. `after`: transfers of bulk endpoints that are as they should be; for `answers`,
+    /// requests.
     FaultyDevice(UsbDevice& device, UsbFault fault, std::uint64_t after)
         : device_(device), fault_(fault), after_(after) {}
 
     [[nodiscard]] const UsbDescriptors& descriptors() const noexcept override { return device_.descriptors(); }
     void plugged(bool in) noexcept override { device_.plugged(in); }
     [[nodiscard]] int control(const UsbSetup& setup, std::span<std::uint8_t> data) noexcept override {
-        return device_.control(setup, data);
+        const int n = device_.control(setup, data);
+        if (fault_ != UsbFault::answers || setup.kind() != 2 || !setup.to_host() || n < 0) return n;
+        return ++requests_ > after_ ? n / 2 : n;
     }
     [[nodiscard]] int take(int endpoint, std::span<const std::uint8_t> data) noexcept override {
         if (hangs()) return UsbAnswer::kPending;
@@ -45,7 +49,8 @@ public:
             case UsbFault::shorten: return n / 2;
             case UsbFault::babble: return UsbAnswer::kBabble;
             case UsbFault::none:
-            case UsbFault::hang: break;
+            case UsbFault::hang:
+            case UsbFault::answers: break;
         }
         return n;
     }
@@ -55,7 +60,7 @@ private:
 
     UsbDevice& device_;
     UsbFault fault_;
-    std::uint64_t after_, transfers_ = 0;
+    std::uint64_t after_, transfers_ = 0, requests_ = 0;
 };
 
 }  // namespace narpa

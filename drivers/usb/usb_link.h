@@ -1,0 +1,108 @@
+/// drivers/usb/usb_link.h - a vendor-specific interface with two bulk endpoints, claimed through libusb: control
+/// requests and asynchronous transfers.
+///
+/// libusb allocates with every transfer and takes locks, so a link belongs to one thread that is not the loop's.
+/// Where the kernel has a driver for the interface, the link takes it over and gives it back at its end.
+#pragma once
+
+#include <poll.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "drivers/usb/usb_devices.h"
+
+namespace narpa {
+
+class UsbLink;
+
+/// How a transfer ended.
+enum class UsbEnd : std::uint8_t {
+    whole,
+    partial,  ///< from the host: fewer bytes were taken than sent
+    stalled,
+    cancelled,
+    gone,    ///< the device has been pulled out
+    failed,  ///< more than was asked for, or an error of the wire
+};
+
+/// A transfer and its memory, which the link keeps until libusb has let go of it.
+struct UsbTransfer {
+    UsbLink* link = nullptr;
+    LibusbOwned<libusb_transfer> transfer{};
+    bool under_way = false;
+    std::vector<std::uint8_t> bytes{};
+    std::size_t moved = 0;  ///< bytes, once it has ended
+};
+
+class UsbLink {
+public:
+    /// Told of each transfer that has ended, on the thread that calls `serve` or destroys the link. In the latter
+    /// case the link is reached by the transfer alone.
+    class Client {
+    public:
+        virtual void received(UsbTransfer& transfer, UsbEnd end) noexcept = 0;
+        virtual void sent(UsbTransfer& transfer, UsbEnd end) noexcept = 0;
+
+    protected:
+        ~Client() = default;
+    };
+    struct Pool {
+        std::size_t transfers = 0, bytes = 0;  ///< bytes of each
+    };
+
+    /// Claims the interface. `wake_fd`: `serve` also wakes when it can be read.
+    static Result<std::unique_ptr<UsbLink>> open(const UsbKind& kind, std::string_view wanted, Client& client,
+                                                 Pool in, Pool out, int wake_fd);
+    /// Cancels what is under way, waits at most 2 s for it, and gives the interface back.
+    ~UsbLink();
+    UsbLink(const UsbLink&) = delete;
+    UsbLink& operator=(const UsbLink&) = delete;
+
+    [[nodiscard]] const std::string& name() const noexcept { return device_.what.name(); }
+    [[nodiscard]] bool gone() const noexcept { return gone_; }
+    /// The device is not to be used any more.
+    void give_up() noexcept { gone_ = true; }
+
+    // --- Vendor requests to the interface; they wait at most a second ---
+    Status put(std::uint8_t request, std::uint16_t value, std::span<const std::uint8_t> data);
+    /// Returns the number of bytes.
+    Result<std::size_t> get(std::uint8_t request, std::uint16_t value, std::span<std::uint8_t> room);
+
+    // --- Transfers ---
+    [[nodiscard]] std::span<UsbTransfer> ins() noexcept { return in_; }
+    [[nodiscard]] std::span<UsbTransfer> outs() noexcept { return out_; }
+    /// Begins one that is not under way: asks for as much as it holds, or sends its first `length` bytes. False:
+    /// the device is taken for gone.
+    bool receive(UsbTransfer& transfer) noexcept;
+    bool send(UsbTransfer& transfer, std::size_t length) noexcept;
+    /// Waits for events, at most timeout_ns, and tells the client of them.
+    void serve(std::int64_t timeout_ns) noexcept;
+    /// After a stall of the endpoint towards the host. False: it cannot be cleared.
+    [[nodiscard]] bool clear_halt() noexcept;
+
+private:
+    UsbLink(OpenUsbDevice device, Client& client) : device_(std::move(device)), client_(client) {}
+    Status start(Pool in, Pool out, int wake_fd);
+    Status find_endpoints();
+    bool submit(UsbTransfer& transfer, std::uint8_t endpoint, std::size_t length) noexcept;
+    static void on_end(libusb_transfer* transfer);
+    void handle_events(std::int64_t timeout_ns) noexcept;
+    [[nodiscard]] bool any_under_way() const noexcept;
+
+    OpenUsbDevice device_;
+    Client& client_;
+    std::vector<UsbTransfer> in_, out_;
+    std::vector<pollfd> fds_;
+    int interface_ = 0;
+    std::uint8_t endpoint_in_ = 0, endpoint_out_ = 0;
+    bool claimed_ = false, gone_ = false, closing_ = false;
+};
+
+}  // namespace narpa

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""In the rig: the last half metre of a docking on real kernel devices: CAN FD on vcan0, frames through /dev/video10, LiDAR packets
+"""In the rig: the last 0.3 m of a docking on real kernel devices: CAN FD on vcan0, frames through /dev/video10, LiDAR packets
 over UDP; in lockstep, with small frames. It docks and passes every gate.
 
 Usage: rehearse.py [BUS [CAMERA=DEVICE]]   (outside the rig: rehearse.py slcan:0)"""
@@ -22,13 +22,13 @@ SCENARIO = """
 [scenario]
 based_on = "{scenes}/rehearsal/docking.toml"
 name = "kernel"
-title = "The last 0.5 m, on kernel devices"
+title = "The last 0.3 m, on kernel devices"
 scene = "scene.toml"
 duration_s = 120.0
 pose_rate_hz = 5.0
 
 [start]
-position_m = [0.5, 0.02, -0.02]
+position_m = [0.3, 0.02, -0.02]
 position_sigma_m = [0.02, 0.01, 0.01]
 velocity_sigma_m_s = [0.002, 0.002, 0.002]
 attitude_sigma_deg = [0.2, 0.2, 0.2]

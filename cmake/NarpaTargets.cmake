@@ -13,7 +13,7 @@ endif()
 
 option(NARPA_UNITY "Compile several sources of a target at once: a faster whole build, slower single changes" OFF)
 if(NOT DEFINED CMAKE_UNITY_BUILD_BATCH_SIZE)
-  set(CMAKE_UNITY_BUILD_BATCH_SIZE 10)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 20)
 endif()
 set(NARPA_SANITIZE "" CACHE STRING "Sanitizers for every target: address,undefined or thread")
 set(NARPA_SANITIZED 0)

@@ -28,7 +28,7 @@ Scene read_good_text(const std::string& text) {
     return read_good(folder.write("s.toml", text));
 }
 
-void expect_near(const Vec3& a, const Vec3& b, double tolerance) {
+void expect_close(const Vec3& a, const Vec3& b, double tolerance) {
     EXPECT_LE(norm(a - b), tolerance) << a.x << " " << a.y << " " << a.z << " against " << b.x << " " << b.y << " "
                                       << b.z;
 }
@@ -49,7 +49,7 @@ TEST(SceneFile, ReadsSurroundings) {
     EXPECT_EQ(s.epoch_unix_ns, 1772366400'000'000'000);  // date -u -d 2026-03-01T12:00:00Z +%s
     ASSERT_TRUE(s.sun);
     EXPECT_NEAR(norm(s.sun->direction), 1, 1e-15);
-    expect_near(s.sun->direction, normalized(Vec3{1, -0.5, 0.2}), 1e-15);
+    expect_close(s.sun->direction, normalized(Vec3{1, -0.5, 0.2}), 1e-15);
     EXPECT_DOUBLE_EQ(s.sun->angular_diameter_rad, 0.533 * kPi / 180);
     EXPECT_EQ(s.ambient, (Rgb{0.1f, 0.1f, 0.2f}));
     ASSERT_TRUE(s.stars);
@@ -134,9 +134,9 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     ASSERT_EQ(s.lidars.size(), 1u);
     EXPECT_EQ(s.lidars[0].mount, 1);
     EXPECT_EQ(s.lidars[0].model->spec().name, "VLP-16");
-    expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 2, 0}, {2.5, 0, 0.5},
-                1e-15);  // y is forward: along +x of the body
-    expect_near(s.lidars[0].T_mount_lidar * Vec3{0, 0, 1}, {0.5, 0, 1.5}, 1e-15);  // z is up
+    expect_close(s.lidars[0].T_mount_lidar * Vec3{0, 2, 0}, {2.5, 0, 0.5},
+                 1e-15);  // y is forward: along +x of the body
+    expect_close(s.lidars[0].T_mount_lidar * Vec3{0, 0, 1}, {0.5, 0, 1.5}, 1e-15);  // z is up
 }
 
 TEST(SceneFile, ReadsLights) {
@@ -151,16 +151,16 @@ TEST(SceneFile, ReadsLights) {
     EXPECT_EQ(earthshine.kind, Light::Kind::directional);
     EXPECT_EQ(earthshine.mount, -1);
     EXPECT_EQ(earthshine.emission, (Rgb{80, 90, 120}));
-    expect_near(earthshine.T_mount_light.q * Vec3{0, 0, 1}, {0, 0, -1}, 1e-15);  // shines along its z: downward
+    expect_close(earthshine.T_mount_light.q * Vec3{0, 0, 1}, {0, 0, -1}, 1e-15);  // shines along its z: downward
     EXPECT_EQ(floodlight.kind, Light::Kind::disc);
     EXPECT_EQ(floodlight.mount, 1);
     EXPECT_EQ(floodlight.radius_m, 0.05);
     EXPECT_EQ(floodlight.emission, (Rgb{5000, 5000, 5000}));
-    expect_near(floodlight.T_mount_light.q * Vec3{0, 0, 1}, normalized(Vec3{9.5, -0.3, 0}), 1e-15);
+    expect_close(floodlight.T_mount_light.q * Vec3{0, 0, 1}, normalized(Vec3{9.5, -0.3, 0}), 1e-15);
     EXPECT_EQ(panel.kind, Light::Kind::rectangle);
     EXPECT_EQ(panel.width_m, 1);
     EXPECT_EQ(panel.height_m, 0.5);
-    expect_near(panel.T_mount_light.q * Vec3{0, 0, 1}, {0, 0, -1}, 1e-15);
+    expect_close(panel.T_mount_light.q * Vec3{0, 0, 1}, {0, 0, -1}, 1e-15);
 }
 
 TEST(SceneFile, LightsSitAsCamerasDo) {
@@ -174,9 +174,9 @@ TEST(SceneFile, LightsSitAsCamerasDo) {
 TEST(SceneFile, LookAtPutsTheTargetAheadAndUpUpward) {
     const Scene s = read_good(data_file("complete.toml"));
     const Rigid3& T = s.cameras[0].T_mount_camera;
-    expect_near(inverse(T) * Vec3{10, 0, 0}, {0, 0, 9.5}, 1e-14);  // along z
-    expect_near(T.q * Vec3{0, 1, 0}, {0, 0, -1}, 1e-15);           // y is down
-    expect_near(T.q * Vec3{1, 0, 0}, {0, -1, 0}, 1e-15);           // x is right: looking along +x, right is -y
+    expect_close(inverse(T) * Vec3{10, 0, 0}, {0, 0, 9.5}, 1e-14);  // along z
+    expect_close(T.q * Vec3{0, 1, 0}, {0, 0, -1}, 1e-15);           // y is down
+    expect_close(T.q * Vec3{1, 0, 0}, {0, -1, 0}, 1e-15);           // x is right: looking along +x, right is -y
 }
 
 TEST(SceneFile, DirectionsMayHaveAnyLength) {
@@ -188,8 +188,8 @@ TEST(SceneFile, DirectionsMayHaveAnyLength) {
     for (const auto& [sun, up] : {std::pair("[6e-301, 0, -8e-301]", "[0, 2e-300, 1e-300]"),
                                   std::pair("[6e300, 0, -8e300]", "[0, 1e308, 5e307]")}) {
         const Scene s = read(sun, up);
-        expect_near(s.sun->direction, unit.sun->direction, 1e-15);
-        expect_near(s.cameras[0].T_mount_camera.q.vec(), unit.cameras[0].T_mount_camera.q.vec(), 1e-15);
+        expect_close(s.sun->direction, unit.sun->direction, 1e-15);
+        expect_close(s.cameras[0].T_mount_camera.q.vec(), unit.cameras[0].T_mount_camera.q.vec(), 1e-15);
     }
     EXPECT_NEAR(norm(read("[0, 5e-324, 0]", "[0, 1, 0]").sun->direction), 1, 1e-15)
         << "the smallest number there is";

@@ -78,8 +78,8 @@ void advance(Path& path, const BodyPoses& at, const Hit& hit, const ShotSettings
     path.velocity = velocity;
 }
 
-NARPA_EACH_ISA void move(const PoseLanes& T_world_mount, const Rigid3& T_mount_lidar, Vec3Lanes& __restrict origin,
-                         Vec3Lanes& __restrict direction) {
+NARPA_EACH_ISA void take_to_world(const PoseLanes& T_world_mount, const Rigid3& T_mount_lidar,
+                                  Vec3Lanes& __restrict origin, Vec3Lanes& __restrict direction) {
     for (std::size_t i = 0; i < kLanes; ++i) {
         const Rigid3 T_world_lidar = T_world_mount[i] * T_mount_lidar;
         origin.put(i, T_world_lidar * origin[i]);
@@ -95,7 +95,7 @@ void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, Ra
         T_world_mount.fill({});
     else
         poses_at(at, static_cast<std::size_t>(mount), beams.time, T_world_mount);
-    move(T_world_mount, T_mount_lidar, beams.origin, beams.direction);
+    take_to_world(T_world_mount, T_mount_lidar, beams.origin, beams.direction);
 }
 
 void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,

@@ -86,11 +86,10 @@ void LidarUnit::over_spans(std::int64_t start_ns, std::int64_t span_ns, const Wo
     }
 }
 
-Ray LidarUnit::beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) const noexcept {
+Ray LidarUnit::beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) noexcept {
     const double time = static_cast<double>(start_ns + shot.t_offset_ns - span.begin_ns) /
                         static_cast<double>(std::max<std::int64_t>(1, span.end_ns - span.begin_ns));
-    const Rigid3 T_world_lidar = world_.sensor_pose(lidar_.mount, lidar_.T_mount_lidar, placement_, time);
-    return {T_world_lidar * shot.origin_m, T_world_lidar.q * shot.direction, time};
+    return {shot.origin_m, shot.direction, time};
 }
 
 void LidarUnit::trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcept {
@@ -106,6 +105,7 @@ void LidarUnit::trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcep
                 shot[beams.n] = by_laser ? by_laser_[next] : next;
                 beams.put(beams.n, beam(shots_[shot[beams.n]], start_ns, span));
             }
+            place_beams(placement_, lidar_.mount, lidar_.T_mount_lidar, beams);
             Lanes<LidarEchoes> echoes;
             receiver_.receive(world_.tracer(), placement_, beams, first_number + span.first + done,
                               velocity ? std::span<const Motion>(motions_) : std::span<const Motion>(),
@@ -127,6 +127,7 @@ void LidarUnit::trace_truth(std::int64_t start_ns) noexcept {
             RayBatch beams;
             for (; beams.n < kLanes && first + beams.n < end; ++beams.n)
                 beams.put(beams.n, beam(shots_[first + beams.n], start_ns, span));
+            place_beams(placement_, lidar_.mount, lidar_.T_mount_lidar, beams);
             shoot(world_.tracer(), placement_, beams, settings, std::span(truth_).subspan(first, beams.n));
             first += beams.n;
         }

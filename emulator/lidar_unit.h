@@ -59,7 +59,8 @@ private:
     /// Calls `work(Span)` for the packet's shots; longer spans have no velocities.
     template <class Work>
     void over_spans(std::int64_t start_ns, std::int64_t span_ns, const Work& work) noexcept;
-    [[nodiscard]] Ray beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) const noexcept;
+    /// In the LiDAR's axes.
+    [[nodiscard]] static Ray beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) noexcept;
     void trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcept;
     void trace_truth(std::int64_t start_ns) noexcept;
 

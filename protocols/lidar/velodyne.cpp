@@ -74,13 +74,17 @@ constexpr LidarNetwork kNetwork{.data_port = 2368,
                                 .mac = {0x60, 0x76, 0x88, 0, 0, 0},  // the maker's prefix
                                 .address = {192, 168, 1, 201}};
 
+/// [0, 1)
+double fraction_of(double turns) {
+    const double fraction = turns - std::floor(turns);
+    return fraction < 1 ? fraction : 0.0;
+}
+
 /// Azimuth of the rotor in revolutions, [0, 1). Whole seconds are taken apart, so that a long run keeps its angle.
 double rotor_revolutions(std::int64_t t_ns, double rotation_hz) {
     const std::int64_t seconds = t_ns / kSecond_ns;
     const double whole = std::fmod(static_cast<double>(seconds) * rotation_hz, 1.0);
-    const double turns = whole + static_cast<double>(t_ns % kSecond_ns) * rotation_hz * 1e-9;
-    const double fraction = turns - std::floor(turns);
-    return fraction < 1 ? fraction : 0.0;
+    return fraction_of(whole + static_cast<double>(t_ns % kSecond_ns) * rotation_hz * 1e-9);
 }
 
 std::uint16_t to_azimuth_cdeg(double revolutions) {
@@ -133,22 +137,34 @@ public:
             cos_elevation_.push_back(std::cos(b.elevation_rad));
             sin_elevation_.push_back(std::sin(b.elevation_rad));
         }
+        for (int i = 0; i < kShotsPerBlock; ++i) {
+            const int laser = i % product_.lasers();
+            const LidarBeam& beam = settings_.beams[laser];
+            LidarShot shot{.t_offset_ns = product_.shot_offset_ns(i),
+                           .origin_m = {0, 0, beam.height_m},
+                           .elevation_rad = beam.elevation_rad,
+                           .beam = laser};
+            const double turned = 1e-9 * static_cast<double>(shot.t_offset_ns) * spec().rate_hz;
+            shot.direction = direction(2 * std::numbers::pi * turned + beam.azimuth_rad, laser);
+            block_.push_back({shot, turned});
+        }
     }
 
     void shots(std::int64_t packet, std::span<LidarShot> out) const noexcept override {
-        for (std::size_t i = 0; i < out.size(); ++i) {
-            const int block = static_cast<int>(i) / kShotsPerBlock, in_block = static_cast<int>(i) % kShotsPerBlock,
-                      laser = in_block % product_.lasers();
-            const LidarBeam& beam = settings_.beams[laser];
-            LidarShot& shot = out[i];
-            shot.t_offset_ns = block * product_.block_period_ns() + product_.shot_offset_ns(in_block);
-            const double rotor = rotor_revolutions(packet_start_ns(packet) + shot.t_offset_ns, spec().rate_hz);
-            shot.azimuth_rad = 2 * std::numbers::pi * rotor + beam.azimuth_rad;
-            shot.elevation_rad = beam.elevation_rad;
-            shot.origin_m = {0, 0, beam.height_m};
-            shot.direction = direction(shot.azimuth_rad, laser);
-            shot.beam = laser;
-            shot.block = dual_ ? 2 * block : block;
+        for (int block = 0; !out.empty(); ++block, out = out.subspan(kShotsPerBlock)) {
+            const std::int64_t begin_ns = block * product_.block_period_ns();
+            const double rotor = rotor_revolutions(packet_start_ns(packet) + begin_ns, spec().rate_hz);
+            const double s = std::sin(2 * std::numbers::pi * rotor), c = std::cos(2 * std::numbers::pi * rotor);
+            for (std::size_t i = 0; i < kShotsPerBlock; ++i) {
+                const auto& [at_zero, turned] = block_[i];
+                const Vec3 d = at_zero.direction;
+                LidarShot& shot = out[i] = at_zero;
+                shot.t_offset_ns += begin_ns;
+                shot.azimuth_rad =
+                    2 * std::numbers::pi * fraction_of(rotor + turned) + settings_.beams[shot.beam].azimuth_rad;
+                shot.direction = {c * d.x + s * d.y, c * d.y - s * d.x, d.z};
+                shot.block = dual_ ? 2 * block : block;
+            }
         }
     }
 
@@ -282,10 +298,17 @@ private:
         return {horizontal * std::sin(azimuth_rad), horizontal * std::cos(azimuth_rad), sin_elevation_[laser]};
     }
 
+    /// A shot of the first block as if that started at azimuth 0, and how far the rotor has turned by then.
+    struct BlockShot {
+        LidarShot at_zero;
+        double revolutions;
+    };
+
     const Product& product_;
     LidarSettings settings_;
     bool dual_;
     std::vector<double> cos_elevation_, sin_elevation_;
+    std::vector<BlockShot> block_;
 };
 
 LidarMake make_of(const Product& product) {

@@ -6,6 +6,7 @@
 
 #include "base/constants.h"
 #include "base/each_isa.h"
+#include "renderer/geometry/poses_at.h"
 #include "renderer/geometry/sphere_roots.h"
 #include "renderer/geometry/tracer_impl.h"
 
@@ -90,6 +91,14 @@ NARPA_EACH_ISA void enter(const WorldRays& rays, std::uint32_t leave, const Vec3
     }
 }
 
+/// Rays that leave the body start where it says.
+inline void start_own(const WorldRays& rays, std::uint32_t leave, ShapeRays& __restrict local) {
+    if (leave == 0) return;
+    const Lanes<int> own = masks_of(leave);
+    for (std::size_t i = 0; i < kLanes; ++i)
+        local.origin.put(i, choose(own[i] != 0, (*rays.own_start)[i], local.origin[i]));
+}
+
 /// The rays in the frame of a body.
 NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid3& T_world_body,
                          ShapeRays& __restrict local) {
@@ -99,38 +108,39 @@ NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid
         local.origin.put(i, {dot(x, o), dot(y, o), dot(z, o)});
         local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
     }
-    if (leave == 0) return;
-    const Lanes<int> own = masks_of(leave);
-    for (std::size_t i = 0; i < kLanes; ++i)
-        local.origin.put(i, choose(own[i] != 0, (*rays.own_start)[i], local.origin[i]));
+    start_own(rays, leave, local);
 }
 
 /// The same two for a body that moves within the exposure, where each ray meets it at its own moment.
-void enter_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, double bound_m,
-                  Lanes<double>& entry_m) {
+NARPA_EACH_ISA void enter_moving(const WorldRays& rays, std::uint32_t leave, const Vec3Lanes& t, double bound_m,
+                                 Lanes<double>& __restrict entry_m) {
+    const Lanes<int> own = masks_of(leave);
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const Vec3 o = rays.origin_from(at.position_at(body, rays.time[i]), i);
-        entry_m[i] = is_set(leave, i) ? 0 : bounding_entry(o, rays.direction[i], bound_m);
+        const double entry = bounding_entry(rays.origin_from(t[i], i), rays.direction[i], bound_m);
+        entry_m[i] = choose(own[i] != 0, 0, entry);
     }
 }
-void turn_moving(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave,
-                 ShapeRays& local) {
-    Rigid3 T;
+NARPA_EACH_ISA void turn_moving(const WorldRays& rays, std::uint32_t leave, const PoseLanes& T_world_body,
+                                ShapeRays& __restrict local) {
     for (std::size_t i = 0; i < kLanes; ++i) {
-        if (i == 0 || rays.time[i] != rays.time[i - 1]) T = at.T_world_body_at(body, rays.time[i]);
+        const Rigid3 T = T_world_body[i];
         const auto [x, y, z] = columns(T.q);
         const Vec3 o = rays.origin_from(T.t, i), d = rays.direction[i];
-        local.origin.put(i, is_set(leave, i) ? (*rays.own_start)[i] : Vec3{dot(x, o), dot(y, o), dot(z, o)});
+        local.origin.put(i, {dot(x, o), dot(y, o), dot(z, o)});
         local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
     }
+    start_own(rays, leave, local);
 }
 
 /// Into the frame of a body, at each ray's moment.
 void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, ShapeRays& local) {
-    if (at.moves(body) && !rays.one_moment)
-        turn_moving(at, body, rays, leave, local);
-    else
+    if (at.moves(body) && !rays.one_moment) {
+        PoseLanes T_world_body;
+        poses_at(at, body, rays.time, T_world_body);
+        turn_moving(rays, leave, T_world_body, local);
+    } else {
         turn(rays, leave, at.T_world_body_at(body, rays.time[0]), local);
+    }
     local.leaving = leave;
     local.inside = rays.inside & leave;
     local.coherent = rays.coherent;
@@ -139,12 +149,9 @@ void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::
 /// Poses of a body at the moments of these lanes.
 void put_poses(const BodyPoses& at, std::size_t body, const Lanes<double>& time, std::uint32_t lanes,
                PoseLanes& T_world_body) {
-    Rigid3 T = at.T_world_body[body];
-    double moment = kMidExposure;  // of T
-    for_each_lane(lanes, [&](std::size_t i) {
-        if (time[i] != moment && at.moves(body)) T = at.T_world_body_at(body, moment = time[i]);
-        T_world_body.put(i, T);
-    });
+    PoseLanes T;
+    poses_at(at, body, time, T);
+    for_each_lane(lanes, [&](std::size_t i) { T_world_body.put(i, T[i]); });
 }
 
 /// Starts in the world's axes; and directions and times, but for lanes that are not wanted some that are finite.
@@ -241,10 +248,13 @@ void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::u
                               Lanes<double>& entry_m) const noexcept {
     const std::uint32_t leave = rays.that_leave(body);
     const double bound_m = shapes[body]->properties().bound_m;
-    if (at.moves(body) && !rays.one_moment)
-        enter_moving(at, body, rays, leave, bound_m, entry_m);
-    else
+    if (at.moves(body) && !rays.one_moment) {
+        Vec3Lanes t;
+        positions_at(at, body, rays.time, t);
+        enter_moving(rays, leave, t, bound_m, entry_m);
+    } else {
         enter(rays, leave, at.position_at(body, rays.time[0]), bound_m, entry_m);
+    }
 }
 
 void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,

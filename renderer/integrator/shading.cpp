@@ -126,7 +126,8 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
     const Texture *const colour = texture(m.texture), *const glow = texture(m.emission_texture),
                          *const normals = texture(m.normal_texture), *const heights = texture(m.height_texture);
     const auto has_levels = [](const Texture* t) { return t != nullptr && !t->coarser.empty(); };
-    const bool filter = has_levels(colour) || has_levels(glow) || has_levels(normals) || has_levels(heights);
+    const bool filter =
+        width_m > 0 && (has_levels(colour) || has_levels(glow) || has_levels(normals) || has_levels(heights));
     const bool turn = normals != nullptr || heights != nullptr;
 
     const TextureLayout layout = tracer.shape(static_cast<std::size_t>(hit.body)).properties().texture_layout;

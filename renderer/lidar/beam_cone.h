@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/vec3.h"
+#include "renderer/geometry/ray_batch.h"
 
 namespace narpa {
 
@@ -21,23 +21,22 @@ public:
     /// `divergence_rad`: the full angle. One ray alone is the axis. Allocates here and never again.
     BeamCone(double divergence_rad, int rays);
 
-    [[nodiscard]] std::size_t size() const noexcept { return offsets_.size(); }
+    [[nodiscard]] std::size_t size() const noexcept { return x_.size(); }
     /// Of half the full angle; 0 of one ray alone.
     [[nodiscard]] double tangent() const noexcept { return tangent_; }
     /// `beam`: a unit vector. `turn`: 32 random bits.
     [[nodiscard]] static Across across(const Vec3& beam, std::uint32_t turn) noexcept;
     /// Unit vector along the n-th ray of the beam; number 0 is nearest to the axis.
     [[nodiscard]] Vec3 direction(const Vec3& beam, const Across& across, std::size_t n) const noexcept {
-        return normalized(beam + (offsets_[n].x * across.x + offsets_[n].y * across.y));
+        return normalized(beam + (x_[n] * across.x + y_[n] * across.y));
     }
+    /// Appends `count` rays of the beam from its n-th on.
+    void append(const Ray& beam, const Across& across, std::size_t n, std::size_t count,
+                RayBatch& rays) const noexcept;
 
 private:
-    /// From the axis, at a distance of 1.
-    struct Offset {
-        double x = 0, y = 0;
-    };
     double tangent_ = 0;
-    std::vector<Offset> offsets_;
+    std::vector<double> x_, y_;  ///< of each ray from the axis, at a distance of 1
 };
 
 }  // namespace narpa

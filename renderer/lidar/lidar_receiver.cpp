@@ -5,6 +5,8 @@
 #include <numbers>
 
 #include "base/constants.h"
+#include "base/each_isa.h"
+#include "renderer/geometry/poses_at.h"
 
 namespace narpa {
 namespace {
@@ -23,32 +25,31 @@ double light_of(const LidarReturn& r) {
     return static_cast<double>(r.reflectivity) / (r.range_m * r.range_m);
 }
 
-/// False: the beam, a cone about the ray, misses the bounds of the body. First its sphere, then its ellipsoid.
-bool may_meet(const Tracer& tracer, const BodyPoses& at, std::size_t body, const Ray& ray, double tangent) {
-    const Vec3 to = at.position_at(body, ray.time) - ray.origin;
-    const double radius_m = tracer.bounding_radius_m(body), along_m = dot(to, ray.direction), to2 = dot(to, to);
-    const double spot_m = tangent * (std::sqrt(to2) + radius_m), reach_m = radius_m + spot_m;
-    const double reach2 = reach_m * reach_m;
-    if (to2 > reach2 && (along_m < 0 || to2 - along_m * along_m > reach2)) return false;
+/// The beams, cones about the rays, that may meet the bounds of a body: its sphere and its ellipsoid.
+NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_world_body, double body_radius_m,
+                                      const BodyBounds& body, double half_tangent, Lanes<int>& __restrict meeting) {
+    const double radius_m = body_radius_m, tangent = half_tangent;
+    const Vec3 a = body.semi_axes_m, centre_m = body.centre_m;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Rigid3 T = T_world_body[i];
+        const Vec3 to = T.t - beams.origin[i], d = beams.direction[i];
+        const double along_m = dot(to, d), to2 = dot(to, to);
+        const double spot_m = tangent * (std::sqrt(to2) + radius_m), reach_m = radius_m + spot_m;
+        const double reach2 = reach_m * reach_m;
+        const bool near = (to2 <= reach2) | ((along_m >= 0) & (to2 - along_m * along_m <= reach2));
 
-    // An ellipsoid that holds all points within spot_m of the body's: (a + s)^2 <= 1.1 a^2 + 11 s^2.
-    const BodyBounds& bounds = tracer.bounds(body);
-    const auto [x, y, z] = columns(at.T_world_body_at(body, ray.time).q);
-    const Vec3 a = bounds.semi_axes_m, d = ray.direction;
-    const auto axis = [&](double a_m) {
-        return tangent > 0 ? std::sqrt(1.1 * a_m * a_m + 11 * spot_m * spot_m) : a_m * (1 + 1e-6);
-    };
-    const Vec3 b{axis(a.x), axis(a.y), axis(a.z)};
-    const Vec3 o = (Vec3{-dot(x, to), -dot(y, to), -dot(z, to)} - bounds.centre_m) / b;
-    const Vec3 v = Vec3{dot(x, d), dot(y, d), dot(z, d)} / b;
-    const double ov = dot(o, v), vv = dot(v, v), c = dot(o, o) - 1;
-    return c <= 0 || (ov < 0 && ov * ov >= (1 - 1e-9) * vv * c);
-}
-
-bool may_meet(const Tracer& tracer, const BodyPoses& at, const Ray& ray, double tangent) {
-    for (const std::uint32_t body : tracer.all_bodies())
-        if (may_meet(tracer, at, body, ray, tangent)) return true;
-    return false;
+        // An ellipsoid that holds all points within spot_m of the body's: (a + s)^2 <= 1.1 a^2 + 11 s^2.
+        const auto [x, y, z] = columns(T.q);
+        const auto axis = [&](double a_m) {
+            return choose(tangent > 0, std::sqrt(1.1 * a_m * a_m + 11 * spot_m * spot_m), a_m * (1 + 1e-6));
+        };
+        const Vec3 b{axis(a.x), axis(a.y), axis(a.z)};
+        const Vec3 o = (Vec3{-dot(x, to), -dot(y, to), -dot(z, to)} - centre_m) / b;
+        const Vec3 v = Vec3{dot(x, d), dot(y, d), dot(z, d)} / b;
+        const double ov = dot(o, v), vv = dot(v, v), c = dot(o, o) - 1;
+        const bool inside = c <= 0, ahead = (ov < 0) & (ov * ov >= (1 - 1e-9) * vv * c);
+        meeting[i] = -static_cast<int>(near & (inside | ahead));
+    }
 }
 
 }  // namespace
@@ -95,9 +96,14 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
                                 .medium = medium_};
     Draws draws(*this, first);
     const std::size_t sub_rays = cone_.size();
-    trace(tracer, at, beams, settings, draws);
+    const std::uint32_t meeting = find_meeting(tracer, at, beams);
+    trace(tracer, at, beams, meeting, settings, draws);
     for (std::size_t i = 0; i < beams.n; ++i) {
-        const auto met = std::span(met_).subspan(i * sub_rays, sub_rays);
+        if (!is_set(meeting, i)) {
+            echoes[i] = {};
+            continue;
+        }
+        const auto met = std::span(met_).subspan(first_[i], sub_rays);
         const double sunlight = static_cast<double>(met.front().sunlight);
         EchoList list;
         const std::size_t n = part(met, list);
@@ -120,38 +126,61 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
     }
 }
 
-/// Sub-rays of a beam run side by side, so they are traced together, and none of a beam that meets nothing.
-void LidarReceiver::trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
-                          Draws& draws) noexcept {
+/// The beams that may meet a body.
+std::uint32_t LidarReceiver::find_meeting(const Tracer& tracer, const BodyPoses& at,
+                                          const RayBatch& beams) noexcept {
+    const std::size_t bodies = tracer.all_bodies().size();
+    meeting_.resize(bodies);
+    bodies_.resize(bodies);
+    std::uint32_t any = 0;
+    for (std::size_t body = 0; body < bodies; ++body) {
+        PoseLanes T_world_body;
+        poses_at(at, body, beams.time, T_world_body);
+        Lanes<int> meeting;
+        find_meeting_body(beams, T_world_body, tracer.bounding_radius_m(body), tracer.bounds(body), cone_.tangent(),
+                          meeting);
+        meeting_[body] = bits_of(meeting) & lanes_below(beams.n);
+        any |= meeting_[body];
+    }
+    return any;
+}
+
+/// The bodies that any of these shots may meet.
+std::span<const std::uint32_t> LidarReceiver::bodies_of(std::uint32_t shots) noexcept {
+    std::size_t n = 0;
+    for (std::size_t body = 0; body < meeting_.size(); ++body)
+        if ((meeting_[body] & shots) != 0) bodies_[n++] = static_cast<std::uint32_t>(body);
+    return std::span(bodies_).first(n);
+}
+
+/// Sub-rays of a beam run side by side, so they are traced together, through the bodies that their beams may meet.
+void LidarReceiver::trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted,
+                          ShotSettings settings, Draws& draws) noexcept {
     const std::size_t sub_rays = cone_.size();
-    Lanes<std::size_t> beam;  // those that may meet a body
+    Lanes<std::size_t> beam;
     Lanes<BeamCone::Across> across{};
     std::size_t count = 0;
-    for (std::size_t i = 0; i < beams.n; ++i) {
-        if (!may_meet(tracer, at, beams[i], cone_.tangent())) {
-            std::fill_n(met_.begin() + static_cast<std::ptrdiff_t>(i * sub_rays), sub_rays, LidarReturn{});
-            continue;
-        }
-        beam[count++] = i;
+    for_each_lane(wanted, [&](std::size_t i) {
         if (sub_rays > 1) across[i] = BeamCone::across(beams.direction[i], draws.of_echo(0).w2[i]);
-    }
+        first_[i] = count * sub_rays;
+        beam[count++] = i;
+    });
     const bool sunlight = settings.sunlight != 0;
-    std::array<LidarReturn, kLanes> met;
-    Lanes<std::size_t> target;
     for (std::size_t k = 0; k < count * sub_rays;) {
         RayBatch rays;
+        std::uint32_t shots = 0;
         settings.sunlight = 0;
-        for (; rays.n < kLanes && k < count * sub_rays; ++k, ++rays.n) {
-            const std::size_t i = beam[k / sub_rays], s = k % sub_rays;
-            const Vec3 axis = beams.direction[i];
-            rays.put(rays.n,
-                     {beams.origin[i], sub_rays > 1 ? cone_.direction(axis, across[i], s) : axis, beams.time[i]});
-            target[rays.n] = i * sub_rays + s;
+        const std::size_t begin = k;
+        while (rays.n < kLanes && k < count * sub_rays) {
+            const std::size_t i = beam[k / sub_rays], s = k % sub_rays, n = std::min(sub_rays - s, kLanes - rays.n);
             // Of the first sub-ray alone, which is the nearest to the axis.
             if (sunlight && s == 0) settings.sunlight |= 1u << rays.n;
+            cone_.append(beams[i], across[i], s, n, rays);
+            shots |= 1u << i;
+            k += n;
         }
-        shoot(tracer, at, rays, settings, met);
-        for (std::size_t j = 0; j < rays.n; ++j) met_[target[j]] = met[j];
+        settings.bodies = bodies_of(shots);
+        shoot(tracer, at, rays, settings, std::span(met_).subspan(begin, rays.n));
     }
 }
 

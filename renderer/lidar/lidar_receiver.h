@@ -28,7 +28,7 @@ public:
     /// More echoes of one shot than these, the nearest ones, are lost.
     static constexpr std::size_t kMostEchoes = 4;
 
-    /// `seed`: the scene's; `index`: of the LiDAR, so that they differ. Allocates here and never again.
+    /// `seed`: the scene's; `index`: of the LiDAR, so that they differ.
     LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
     /// Dims what comes back; null, as at first: a vacuum. It must outlive this.
@@ -37,7 +37,7 @@ public:
     /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
     /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Writes beams.n echoes: range with bias
     /// and noise, before a packet's rounding; the reflectivity that the light stands for at that range, which is
-    /// less where only a part of the beam is met.
+    /// less where only a part of the beam is met. Allocates for more bodies than ever before only.
     void receive(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
                  std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
 
@@ -49,8 +49,11 @@ private:
     using EchoList = std::array<Echo, kMostEchoes>;
     class Draws;
 
-    void trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, ShotSettings settings,
-               Draws& draws) noexcept;
+    [[nodiscard]] std::uint32_t find_meeting(const Tracer& tracer, const BodyPoses& at,
+                                             const RayBatch& beams) noexcept;
+    [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::uint32_t shots) noexcept;
+    void trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted,
+               ShotSettings settings, Draws& draws) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
     [[nodiscard]] LidarEcho measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
                                     Draws& draws) const noexcept;
@@ -65,7 +68,10 @@ private:
     std::uint32_t stream_;
     BeamCone cone_;
     const Medium* medium_ = nullptr;
-    std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
+    Lanes<std::size_t> first_{};          ///< sub-ray in `met_` of each shot that may meet a body
+    std::vector<LidarReturn> met_;        ///< of the sub-rays of one shot after the other
+    std::vector<std::uint32_t> meeting_;  ///< for each body a bit for each shot that may meet it
+    std::vector<std::uint32_t> bodies_;   ///< that sub-rays traced together may meet
 };
 
 }  // namespace narpa

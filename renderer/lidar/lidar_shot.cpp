@@ -3,6 +3,8 @@
 #include <limits>
 #include <numbers>
 
+#include "base/each_isa.h"
+#include "renderer/geometry/poses_at.h"
 #include "renderer/integrator/shading.h"
 
 namespace narpa {
@@ -76,12 +78,30 @@ void advance(Path& path, const BodyPoses& at, const Hit& hit, const ShotSettings
     path.velocity = velocity;
 }
 
+NARPA_EACH_ISA void take_to_world(const PoseLanes& T_world_mount, const Rigid3& T_mount_lidar,
+                                  Vec3Lanes& __restrict origin, Vec3Lanes& __restrict direction) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Rigid3 T_world_lidar = T_world_mount[i] * T_mount_lidar;
+        origin.put(i, T_world_lidar * origin[i]);
+        direction.put(i, T_world_lidar.q * direction[i]);
+    }
+}
+
 }  // namespace
+
+void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, RayBatch& beams) noexcept {
+    PoseLanes T_world_mount;
+    if (mount < 0)
+        T_world_mount.fill({});
+    else
+        poses_at(at, static_cast<std::size_t>(mount), beams.time, T_world_mount);
+    take_to_world(T_world_mount, T_mount_lidar, beams.origin, beams.direction);
+}
 
 void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
            std::span<LidarReturn> returns) noexcept {
     HitBatch hits;
-    tracer.intersect(at, beams, tracer.all_bodies(), hits);
+    tracer.intersect(at, beams, settings.bodies.empty() ? tracer.all_bodies() : settings.bodies, hits);
     Lanes<Path> paths;
     for (std::size_t i = 0; i < beams.n; ++i) {
         returns[i] = {};

@@ -26,9 +26,14 @@ struct ShotSettings {
     std::uint32_t sunlight = 0;  ///< a bit for each shot of the batch whose sunlight is wanted
     /// Of all bodies, for velocities; empty: they are not wanted.
     std::span<const Motion> motions{};
-    int mount = -1;                  ///< body that the LiDAR rides on; -1: it is at rest
-    const Medium* medium = nullptr;  ///< dims the light on its way there and back; null: a vacuum
+    int mount = -1;                           ///< body that the LiDAR rides on; -1: it is at rest
+    std::span<const std::uint32_t> bodies{};  ///< all that the shots may meet before a mirror; empty: any may be
+    const Medium* medium = nullptr;           ///< dims the light on its way there and back; null: a vacuum
 };
+
+/// Takes beams from the axes of a LiDAR to the world's, each at its own time. `mount`: the body that it rides on;
+/// -1: it is at rest at T_mount_lidar.
+void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, RayBatch& beams) noexcept;
 
 /// A batch of shots, each at its own time. Writes the first beams.n returns.
 ///

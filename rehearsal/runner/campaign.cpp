@@ -26,6 +26,12 @@ json read_json(const std::string& file) {
     return document.is_discarded() ? json(nullptr) : document;
 }
 
+/// What a failed run's result says; where it left none, its error.
+std::string failure_of(const std::string& folder, const std::string& log) {
+    const json result = read_json(folder + "/result.json");
+    return result.is_object() ? result.value("headline", error_in(log)) : error_in(log);
+}
+
 std::string run_folder(std::size_t run) {
     return fmt::format("runs/{:04}", run);
 }
@@ -131,9 +137,8 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
             if (!status) return false;
             ++done;
             if (*status != 0)
-                console.print(fmt::format(
-                    "run {} failed: {}", r.run,
-                    read_json(folder_of(runs[r.run - 1]) + "/result.json").value("headline", last_line(r.log))));
+                console.print(
+                    fmt::format("run {} failed: {}", r.run, failure_of(folder_of(runs[r.run - 1]), r.log)));
             return true;
         });
         if (const auto now = std::chrono::steady_clock::now(); now - shown >= kShowPeriod) {

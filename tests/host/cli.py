@@ -137,6 +137,9 @@ def check_errors():
     done = narpa("rehearse", "docking", "--can", "can77", "-o", folder / "can77", status=3)
     said = done.stderr.decode()
     expect(re.search(r"ended with status 3: can77: .+\n +try: ", said), f"rehearse names its child's reason: {said[-300:]}")
+    done = narpa("rehearse", "docking", "--runs", "1", "--can", "can77", "-o", folder / "runs", status=1)
+    said = done.stderr.decode()
+    expect(re.search(r"run 1 failed: .*can77: ", said), f"a campaign names the reason of a run that left no result: {said[-300:]}")
     plural = folder / "plural.toml"
     plural.write_text('[scene]\nname = "x"\n[[bodies]]\nname = "a"\nsphere = {radius_m = 1.0}\n')
     expect_refusal(2, r'plural\.toml:3:\d+: unknown key "bodies".*did you mean "body"', "check", plural)

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/can/buses.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/can/candump.h"
 
 namespace narpa {

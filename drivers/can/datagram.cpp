@@ -3,7 +3,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "base/spsc_ring.h"
 #include "drivers/can/can_bus.h"
-#include "drivers/can/descriptor.h"
 #include "drivers/can/usb_spec.h"
+#include "drivers/descriptor.h"
 #include "drivers/usb/usb_link.h"
 #include "protocols/usb/gs_usb.h"
 

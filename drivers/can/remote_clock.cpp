@@ -5,7 +5,7 @@
 #include <cmath>
 #include <thread>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 

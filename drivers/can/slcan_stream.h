@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/can/slcan.h"
 
 namespace narpa {

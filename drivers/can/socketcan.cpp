@@ -13,7 +13,7 @@
 
 #include "drivers/can/buses.h"
 #include "drivers/can/datagram.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "drivers/can/buses.h"
 #include "drivers/can/datagram.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/can/udp_multicast.h"
 
 namespace narpa {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/http/http_request.h"
 
 namespace narpa {

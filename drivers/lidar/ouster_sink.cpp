@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "base/read_number.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/http/http_server.h"
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/ouster_api.h"

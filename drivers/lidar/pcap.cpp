@@ -15,7 +15,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/write_queue.h"
 
 namespace narpa {

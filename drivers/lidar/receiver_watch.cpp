@@ -10,7 +10,7 @@
 #include <cstring>
 
 #include "drivers/background_thread.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 namespace {

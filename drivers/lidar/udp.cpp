@@ -13,7 +13,7 @@
 
 #include "base/read_number.h"
 #include "drivers/can/datagram.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/packet_source.h"
 #include "drivers/lidar/receiver_watch.h"

@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "base/read_number.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "base/time.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/little_endian.h"
 
 namespace narpa {

@@ -8,7 +8,7 @@
 #include <array>
 
 #include "base/time.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa {
 namespace {

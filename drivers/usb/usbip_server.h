@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/usb/usb_device.h"
 #include "protocols/usb/usbip.h"
 

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <numeric>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/video/backends.h"
 #include "drivers/video/v4l2_device.h"
 

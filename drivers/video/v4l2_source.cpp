@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/video/backends.h"
 #include "drivers/video/v4l2_device.h"
 

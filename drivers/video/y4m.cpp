@@ -10,7 +10,7 @@
 #include <cstring>
 #include <vector>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/video/backends.h"
 
 namespace narpa {

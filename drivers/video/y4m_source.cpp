@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "drivers/video/backends.h"
 #include "protocols/video/y4m.h"
 

@@ -10,8 +10,8 @@
 #include <optional>
 #include <span>
 
-#include "drivers/can/descriptor.h"
 #include "drivers/can/remote_clock.h"
+#include "drivers/descriptor.h"
 #include "protocols/can/messages.h"
 #include "rehearsal/dynamics/flight_log.h"
 #include "rehearsal/dynamics/simulation.h"

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "rehearsal/navigation/loop.h"
 
 namespace narpa::rehearsal {

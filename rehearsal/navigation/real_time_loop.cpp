@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/stop.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "estimator/features/feature_matcher.h"
 #include "protocols/video/embedded_line.h"
 #include "rehearsal/navigation/loop.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 
 namespace narpa::rehearsal {
 

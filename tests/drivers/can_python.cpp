@@ -11,7 +11,7 @@
 #include <fstream>
 
 #include "drivers/can/client_hub.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
 

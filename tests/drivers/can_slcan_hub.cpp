@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "drivers/can/client_hub.h"
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "tests/drivers/can_support.h"
 
 namespace narpa {

@@ -9,7 +9,7 @@
 
 #include <cstdlib>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "tests/drivers/can_support.h"
 
 namespace narpa {

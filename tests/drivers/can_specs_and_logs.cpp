@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/can/udp_multicast.h"
 #include "tests/drivers/can_support.h"
 

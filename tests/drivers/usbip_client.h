@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/descriptor.h"
+#include "drivers/descriptor.h"
 #include "protocols/big_endian.h"
 #include "protocols/usb/usbip.h"
 

@@ -1,4 +1,4 @@
-/// drivers/can/descriptor.h - a file descriptor that closes itself, and waiting on some of them.
+/// drivers/descriptor.h - a file descriptor that closes itself, and waiting on some of them.
 #pragma once
 
 #include <poll.h>

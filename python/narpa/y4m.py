@@ -1,7 +1,7 @@
 """YUV4MPEG2 ("Y4M") video: what `narpa run --video CAMERA=FILE.y4m` and its FIFOs carry.
 
 Frames are NumPy arrays: height x width of uint8 (Cmono) or uint16 (Cmono16). Streams in colour are not read as arrays:
-`Reader.read_bytes` gives the samples of a frame as they come (C422: Y, U and V planes of YUYV cameras; C444: R, G, B).
+`Reader.read_bytes` gives the samples of a frame as they come (C422: Y, U and V planes of YUYV cameras).
 """
 import os
 import re

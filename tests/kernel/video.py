@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""In the rig: poses on vcan0, frames on /dev/video10, read by v4l2-ctl, ffmpeg, GStreamer and OpenCV in turn. Each gets
-frames byte-identical to `narpa render`, in every pixel format. A reader that is killed does not stop the stream."""
+"""In the rig: poses on vcan0, frames on /dev/video10, read by v4l2-ctl, ffmpeg, GStreamer and OpenCV in turn. In every pixel
+format, each gets frames byte-identical to `narpa render`: by way of a Y4M file of the same run where the format fits in one
+(tests/host/readers.py renders all of its frames, here one). A reader that is killed does not stop the stream."""
 import subprocess
 import sys
 import threading
@@ -18,6 +19,7 @@ FRAMES_PER_READER = 3
 # A frame is written shortly after its ledger is sent, and a reader needs time on an emulated processor.
 PACE_S = 0.15
 POSES = support.flight(60)
+IN_Y4M = {"GREY", "Y16", "YUYV"}
 
 # None of them is given the format.
 COMMANDS = {
@@ -117,16 +119,24 @@ def kill_a_reader(flight, folder):
     expect(True, "v4l2-ctl was killed while it read")
 
 
-class Reference:
-    """What `narpa render` says of each frame, rendered when it is first asked for."""
+def reference_frames(scene, pixel_format, video, sent, folder):
+    """All frames of a run as the device has them: from the Y4M file that the run wrote, Y, U and V interleaved again, or, where
+    Y4M cannot hold them, rendered."""
+    if not video:
+        return [support.render(scene, frame, POSES[frame], folder) for frame in range(sent)]
+    frames, last = support.read_y4m(video), sent - 1
+    if pixel_format == "YUYV":
+        n = support.WIDTH * support.HEIGHT
+        frames = [interleaved(f[:n:2], f[n : n * 3 // 2], f[1:n:2], f[n * 3 // 2 :]) for f in frames]
+    expect(frames[last] == support.render(scene, last, POSES[last], folder), f"{pixel_format}: frame {last} is narpa render's")
+    return frames
 
-    def __init__(self, scene, folder):
-        self.scene, self.folder, self.frames = scene, folder, {}
 
-    def __getitem__(self, frame):
-        if frame not in self.frames:
-            self.frames[frame] = support.render(self.scene, frame, POSES[frame], self.folder)
-        return self.frames[frame]
+def interleaved(*planes):
+    out = bytearray(sum(map(len, planes)))
+    for i, plane in enumerate(planes):
+        out[i :: len(planes)] = plane
+    return bytes(out)
 
 
 def expect_from(reference, path, first, sent, what):
@@ -137,16 +147,18 @@ def expect_from(reference, path, first, sent, what):
         got, begin = data[at : at + size], numbers[-1] + 1 if numbers else first
         number = next((k for k in range(begin, sent) if reference[k] == got), None)
         if number is None:
-            expect(False, f"{what}: frame {len(numbers)} ({len(got)} bytes) is one of {begin}..{sent - 1} as rendered")
+            expect(False, f"{what}: frame {len(numbers)} ({len(got)} bytes) is one of {begin}..{sent - 1}")
         numbers.append(number)
-    expect(len(numbers) == FRAMES_PER_READER, f"{what}: frames {numbers} byte-identical to narpa render")
+    expect(len(numbers) == FRAMES_PER_READER, f"{what}: frames {numbers} byte-identical")
 
 
 def check_format(pixel_format, wire):
     folder = support.work_folder()
     scene = support.scene_with(folder, pixel_format)
     readings = []  # name, first frame that it can have got, one past the last
-    with support.Run(scene, "--can", "vcan0", "--video", f"{support.CAMERA}={DEVICE}", "--lockstep") as run:
+    video = folder / "nav.y4m" if pixel_format in IN_Y4M else None
+    sinks = [word for sink in (DEVICE, video) if sink for word in ("--video", f"{support.CAMERA}={sink}")]
+    with support.Run(scene, "--can", "vcan0", *sinks, "--lockstep") as run:
         flight = Flight(run, wire)
         flight.next()  # the device is a camera once a frame has been written
 
@@ -162,9 +174,10 @@ def check_format(pixel_format, wire):
             kill_a_reader(flight, folder)
             reading("v4l2-ctl after another was killed", read_by_command, "v4l2-ctl")
         summary = run.stop()
-    [sink] = summary["cameras"][0]["sinks"]
-    expect(sink["written"] == flight.sent, f"{pixel_format}: {flight.sent} frames written to the device: {sink}")
-    reference = Reference(scene, folder)
+    for sink in summary["cameras"][0]["sinks"]:
+        expect(sink["written"] == flight.sent, f"{pixel_format}: {flight.sent} frames written: {sink}")
+    reference = reference_frames(scene, pixel_format, video, flight.sent, folder)
+    expect(len(reference) == len(set(reference)) == flight.sent, f"{pixel_format}: all {flight.sent} frames differ")
     for name, first, end in readings:
         expect_from(reference, folder / name, first, end, f"{pixel_format}, {name}")
 

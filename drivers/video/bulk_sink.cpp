@@ -133,7 +133,8 @@ private:
             if (went_wrong_ || link_->gone() || queue.time_left_ms() == 0 ||
                 monotonic_ns() - t_progress_ns_ > kPatience_ns) {
                 take_back();
-                return false;
+                cut_ = went_wrong_ || !pieces.empty() || !link_;  // not if it ended just then
+                return !cut_;
             }
             if (pieces.empty() && !any_under_way()) break;
             link_->serve(kTurn_ns);
@@ -142,9 +143,8 @@ private:
         return true;
     }
 
-    /// The rest of the frame is not sent. The bridge has a part of it.
+    /// Cancels what is under way, and makes the bridge ready for the next frame or gives it up.
     void take_back() noexcept {
-        cut_ = true;
         if (!link_->gone()) {
             link_->cancel_outs();
             for (const std::int64_t until_ns = monotonic_ns() + kPatience_ns;

@@ -47,8 +47,8 @@ constexpr std::array<UsbId, 2> kBridgeIds{{{0x04b4, 0x00f1}, {0x1209, 0x0002}}};
 namespace {
 
 constexpr std::size_t kTransfers = 8, kTransferBytes = 65536;
-constexpr std::int64_t kPatience_ns = kSecond_ns;  // with a bridge that takes nothing
-constexpr std::int64_t kTurn_ns = 20'000'000;      // between two looks at the time that is left
+constexpr std::int64_t kBridgePatience_ns = kSecond_ns;  // with a bridge that takes nothing
+constexpr std::int64_t kTurn_ns = 20'000'000;            // between two looks at the time that is left
 
 /// A frame in transfers: what ends a frame that was cut short, header and pixels, and what ends this one.
 class FramePieces {
@@ -131,7 +131,7 @@ private:
             for (UsbTransfer& t : outs)
                 if (!t.under_way && !pieces.empty() && !went_wrong_) link_->send(t, pieces.next(t.bytes));
             if (went_wrong_ || link_->gone() || queue.time_left_ms() == 0 ||
-                monotonic_ns() - t_progress_ns_ > kPatience_ns) {
+                monotonic_ns() - t_progress_ns_ > kBridgePatience_ns) {
                 take_back();
                 cut_ = went_wrong_ || !pieces.empty() || !link_;  // not if it ended just then
                 return !cut_;
@@ -147,7 +147,7 @@ private:
     void take_back() noexcept {
         if (!link_->gone()) {
             link_->cancel_outs();
-            for (const std::int64_t until_ns = monotonic_ns() + kPatience_ns;
+            for (const std::int64_t until_ns = monotonic_ns() + kBridgePatience_ns;
                  any_under_way() && !link_->gone() && monotonic_ns() < until_ns;)
                 link_->serve(kTurn_ns);
             if (any_under_way() || (stalled_ && !link_->clear_halt_out())) link_->give_up();

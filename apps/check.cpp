@@ -20,6 +20,7 @@
 #include "base/constants.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/can/usb_adapters.h"
+#include "drivers/video/bulk_bridges.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera_unit.h"
 #include "emulator/world.h"
@@ -67,13 +68,14 @@ Finding video_devices() {
     return {"V4L2 devices", true, found, ""};
 }
 
-Finding usb_adapters() {
-    const auto adapters = find_usb_adapters();
-    if (!adapters) return {"USB-CAN adapters", false, adapters.error().what, adapters.error().remedy};
-    if (adapters->empty()) return {"USB-CAN adapters", false, "none is plugged in", ""};
-    Finding f{"USB-CAN adapters", true, "", ""};
-    for (const PluggedUsbDevice& a : *adapters) {
-        f.detail += fmt::format("{}usb:{} at {}{}", f.detail.empty() ? "" : ", ", a.name(), a.place,
+/// `prefix`: of the option that takes them.
+Finding usb_devices(const std::string& name, std::string_view prefix,
+                    const Result<std::vector<PluggedUsbDevice>>& devices) {
+    if (!devices) return {name, false, devices.error().what, devices.error().remedy};
+    if (devices->empty()) return {name, false, "none is plugged in", ""};
+    Finding f{name, true, "", ""};
+    for (const PluggedUsbDevice& a : *devices) {
+        f.detail += fmt::format("{}{}{} at {}{}", f.detail.empty() ? "" : ", ", prefix, a.name(), a.place,
                                 a.trouble.empty() ? "" : " (" + a.trouble + ")");
         if (a.trouble.empty()) continue;
         f.there = false;
@@ -366,21 +368,22 @@ bool is_bus(const std::string& spec) {
 
 /// The error names the device, or leaves that to the finding.
 Finding absent(const std::string& spec, const Error& e) {
-    const std::string name = spec == "usb:" ? "usb" : spec;  // any adapter
+    const std::string name = spec == "usb:" || spec == "bulk:" ? spec.substr(0, spec.size() - 1) : spec;  // any
     return {name, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
 }
 
 /// Opens the device as a run would.
 Result<Finding> try_device(const std::string& spec) {
-    if (spec.starts_with("/dev/video")) {
+    if (spec.starts_with("/dev/video") || spec.starts_with("bulk:")) {
         auto sink = open_video_sink(spec, {640, 480, PixelFormat::grey, 100'000'000}, WhenFull::drop);
+        if (!sink && sink.error().kind == ErrorKind::bad_input) return sink.error();
         if (!sink) return absent(spec, sink.error());
         return Finding{spec, true, (*sink)->description(), ""};
     }
     if (!is_bus(spec))
         return Error{
-            "is neither a CAN bus nor a video device, expected vcan0, can0, slcan:PORT, udp:GROUP, usb:[ADAPTER] "
-            "or /dev/videoN",
+            "is neither a CAN bus nor a video device, expected vcan0, can0, slcan:PORT, udp:GROUP, usb:[ADAPTER], "
+            "/dev/videoN or bulk:[BRIDGE]",
             spec};
     auto bus = open_can_bus(spec, CanRole::hub);
     if (bus) return Finding{spec, true, (*bus)->description(), ""};
@@ -447,7 +450,11 @@ Outcome check(const CheckOptions& o) {
     }
 
     std::vector<Finding> findings{
-        socketcan(), usb_adapters(), video_devices(),
+        socketcan(),
+        usb_devices("USB-CAN adapters", "usb:", find_usb_adapters()),
+        video_devices(),
+        usb_devices("USB frame bridges", "bulk:", find_bulk_bridges()),
+
         permission("real-time priority", RLIMIT_RTPRIO, 60, "SCHED_FIFO",
                    "SCHED_FIFO is not permitted: deadlines may slip under load", "rtprio 90"),
         permission("locked memory", RLIMIT_MEMLOCK, RLIM_INFINITY, "mlockall",
@@ -481,7 +488,8 @@ Command add_check(Parser app) {
     const Parser c = app.subcommand("check", "Check a scene or scenario and this machine; names what is missing");
     c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows").required();
     c.option("DEVICE", o->devices,
-             "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, /dev/video10 ...");
+             "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, usb:, /dev/video10, "
+             "bulk: ...");
     c.option("--calibration", o->calibration,
              "Takes CAMERA.yaml (camera_info of ROS) and calibration.json: matrix, distortion and mount of each "
              "sensor")

@@ -36,6 +36,7 @@ Command add_rehearse(Parser app);
 Command add_bench_render(Parser bench);
 Command add_bench_loop(Parser bench);
 Command add_bench_lidar(Parser bench);
+Command add_bench_latency(Parser bench);
 Command add_bench_atmosphere(Parser bench);
 Command add_bench_estimate(Parser bench);
 

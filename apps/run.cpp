@@ -108,10 +108,10 @@ Command add_run(Parser app) {
     c.option("--can", o->run.bus,
              "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER] (a gs_usb adapter) | log:FILE")
         .type_name("BUS");
-    c.option("--video", o->video,
-             "/dev/videoN | uvc:[ADDRESS:]PORT (a USB camera over USB/IP) | FILE.y4m | a FIFO | none; may be given "
-             "many "
-             "times")
+    c.option(
+         "--video", o->video,
+         "/dev/videoN | uvc:[ADDRESS:]PORT (a USB camera over USB/IP) | bulk:[VENDOR:PRODUCT/][SERIAL|BUS-PORT] "
+         "(a USB frame bridge: FPGA, FX3) | FILE.y4m | a FIFO | none; may be given many times")
         .type_name("CAMERA=SINK")
         .repeatable();
     c.option("--lidar", o->lidar,

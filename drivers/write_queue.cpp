@@ -41,15 +41,16 @@ WriteQueue::~WriteQueue() {
     ::close(wake_fd_);
 }
 
-bool WriteQueue::push(std::span<const std::uint8_t> item) noexcept {
-    const bool fits = item.size() <= slot_bytes_;
+bool WriteQueue::push(std::span<const std::uint8_t> head, std::span<const std::uint8_t> rest) noexcept {
+    const bool fits = head.size() <= slot_bytes_ && rest.size() <= slot_bytes_ - head.size();
     if (!fits || (wait_when_full_ ? sem_wait(&free_slots_) : sem_trywait(&free_slots_)) != 0) {
         dropped_.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
     const std::size_t slot = next_push_ % slots_;
-    std::memcpy(ring_.data() + slot * slot_bytes_, item.data(), item.size());
-    sizes_[slot] = item.size();
+    const auto at = ring_.begin() + static_cast<std::ptrdiff_t>(slot * slot_bytes_);
+    std::ranges::copy(rest, std::ranges::copy(head, at).out);
+    sizes_[slot] = head.size() + rest.size();
     pushed_.store(++next_push_, std::memory_order_release);
     ::eventfd_write(wake_fd_, 1);
     return true;

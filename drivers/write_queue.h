@@ -44,7 +44,9 @@ public:
 
     /// Copies the item into the ring. False: dropped and counted, because it is larger than a slot, the ring is
     /// full, or a signal handler (installed without SA_RESTART) interrupted the wait for a slot.
-    bool push(std::span<const std::uint8_t> item) noexcept;
+    bool push(std::span<const std::uint8_t> item) noexcept { return push(item, {}); }
+    /// An item in two pieces.
+    bool push(std::span<const std::uint8_t> head, std::span<const std::uint8_t> rest) noexcept;
     /// Gives the writer one second for what is still in the ring, drops the rest. Called by the pushing thread.
     void flush() noexcept;
     /// Less than half of the slots are free, and a push would not wait: what matters less is better left out.

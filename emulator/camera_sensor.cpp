@@ -100,7 +100,7 @@ void CameraSensor::make_next(const Clock& clock) {
 void CameraSensor::hand_over(FrameLedger& ledger, const Clock& clock) noexcept {
     ledger.deadline_met = clock.now_ns() <= ledger.t_deadline_ns;
     unit_.embed(ledger);
-    ledger.delivery = deliver(ledger.deadline_met);
+    ledger.delivery = deliver(ledger);
     const std::int64_t out = clock.now_ns();
     unit_.handed_over(clock.to_monotonic(out));
     if (ledger.delivery != Delivery::nothing) ledger.t_hand_over_ns = out;
@@ -111,19 +111,20 @@ void CameraSensor::hand_over(FrameLedger& ledger, const Clock& clock) noexcept {
         std::copy(unit_.bytes().begin(), unit_.bytes().end(), spare_.begin());
 }
 
-Delivery CameraSensor::deliver(bool in_time) noexcept {
+Delivery CameraSensor::deliver(const FrameLedger& ledger) noexcept {
     const LatePolicy late = unit_.camera().late;
-    if (in_time || late == LatePolicy::late) {
-        send(unit_.bytes());
+    const FrameStamp stamp{ledger.t_exposure_mid_ns, ledger.frame};
+    if (ledger.deadline_met || late == LatePolicy::late) {
+        send(unit_.bytes(), stamp);
         return Delivery::frame;
     }
     if (late == LatePolicy::drop) return Delivery::nothing;
-    send(spare_);
+    send(spare_, stamp);
     return late == LatePolicy::repeat ? Delivery::repeated : Delivery::blank;
 }
 
-void CameraSensor::send(std::span<const std::uint8_t> bytes) noexcept {
-    for (const auto& sink : sinks_) sink->send(bytes);
+void CameraSensor::send(std::span<const std::uint8_t> bytes, const FrameStamp& stamp) noexcept {
+    for (const auto& sink : sinks_) sink->send(bytes, stamp);
     ++stats_.handed_over;
 }
 

@@ -88,8 +88,8 @@ private:
     [[nodiscard]] std::int64_t deadline_ns() const noexcept;
     /// The next frame was exposed or skipped. `level`: CameraControl::advance.
     void advance(std::optional<double> level) noexcept;
-    [[nodiscard]] Delivery deliver(bool in_time) noexcept;
-    void send(std::span<const std::uint8_t> bytes) noexcept;
+    [[nodiscard]] Delivery deliver(const FrameLedger& ledger) noexcept;
+    void send(std::span<const std::uint8_t> bytes, const FrameStamp& stamp) noexcept;
     void take_requests(CanNode& can, std::int64_t t_ns) noexcept;
     void account(const FrameLedger& ledger) noexcept;
     /// Skips the frames whose successors are due already: the stream keeps step with the clock.

@@ -50,7 +50,8 @@ Status run(Arguments& a) {
 void add_options(Arguments& a, const cli::Parser& p) {
     p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
     p.option("--can", a.node.bus, "vcan0 | slcan:PORT | udp:239.74.163.2").type_name("BUS").required();
-    p.option("--video", a.video, "A FIFO, FILE.y4m or /dev/videoN, for each of the scenario's cameras")
+    p.option("--video", a.video,
+             "A FIFO, FILE.y4m, /dev/videoN or bridge:[ADDRESS:]PORT, for each of the scenario's cameras")
         .type_name("CAMERA=SOURCE")
         .repeatable();
     p.option("--lidar", a.lidar, "udp:PORT, for each of the scenario's LiDARs")

@@ -19,7 +19,7 @@ struct UsbCanArguments {
 
 struct WantedFault {
     UsbFault kind = UsbFault::none;
-    bool is_bus_off = false;
+    bool is_bus_off = false, loses_echoes = false;
     std::uint64_t after = 0;
 };
 
@@ -34,10 +34,12 @@ Result<WantedFault> parse_fault(std::string_view text) {
              : kind == "answers" ? UsbFault::answers
                                  : UsbFault::none;
     f.is_bus_off = kind == "bus-off";
-    if ((f.kind == UsbFault::none && !f.is_bus_off) || at == std::string_view::npos ||
+    f.loses_echoes = kind == "echoes";
+    if ((f.kind == UsbFault::none && !f.is_bus_off && !f.loses_echoes) || at == std::string_view::npos ||
         !read_number(text.substr(at + 1), f.after) || f.after == 0)
         return Error{"--fault " + std::string(text) +
-                     ": expected stall@N, short@N, babble@N, hang@N, answers@N or bus-off@N, with N > 0 transfers"};
+                     ": expected stall@N, short@N, babble@N, hang@N, answers@N, echoes@N or bus-off@N, with N > 0 "
+                     "transfers"};
     return f;
 }
 
@@ -55,6 +57,7 @@ Status run_usbcan(const UsbCanArguments& a) {
     if ((*bus)->recorded() || (*bus)->ended()) return Error{a.bus + ": expected a bus, not a log"};
     GsUsbDevice adapter(a.serial, (*bus)->carries_fd() && !a.is_classic);
     if (fault.is_bus_off) adapter.bus_off_after(fault.after);
+    if (fault.loses_echoes) adapter.lose_echoes_after(fault.after);
     FaultyDevice faulty(adapter, fault.kind, fault.after);
     auto server = UsbIpServer::start(listen->host, listen->port, faulty);
     if (!server) return server.error();
@@ -90,7 +93,7 @@ void add_usbcan_options(UsbCanArguments& a, const cli::Parser& p) {
     p.flag("--classic", a.is_classic, "An adapter without CAN FD");
     p.flag("--client", a.is_client, "Join the bus of `narpa run` (slcan) instead of being its hub");
     p.option("--fault", a.fault,
-             "stall|short|babble|hang|answers|bus-off after N transfers: to try how hosts take it")
+             "stall|short|babble|hang|answers|echoes|bus-off after N transfers: to try how hosts take it")
         .type_name("KIND@N");
     p.examples(
         {"narpa-usbcan --can vcan0", "sudo usbip attach -r 127.0.0.1 -b 1-1   (then: ip link set can0 up ...)"});

@@ -163,15 +163,6 @@ Result<std::vector<PluggedUsbDevice>> find_usb_adapters() {
 #else
 
 namespace narpa {
-namespace {
-
-Error built_without_usb() {
-    return {.what = "this narpa was built without USB",
-            .kind = ErrorKind::missing,
-            .remedy = "cmake -DNARPA_WITH_USB=ON ... (needs libusb-1.0-0-dev), and build again"};
-}
-
-}  // namespace
 
 CanBusResult open_gs_usb(std::string_view text) {
     if (auto spec = parse_usb_can(text); !spec) return spec.error();

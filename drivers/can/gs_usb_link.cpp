@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::int64_t kRestart_ns = 100'000'000;  // after bus-off, as `restart-ms 100` of ip-link
 constexpr int kMostErrorsInARow = 64;
+constexpr std::int64_t kEchoPatience_ns = 2 * kSecond_ns;
 constexpr std::size_t kReceiveBytes = 512;  // a packet of a high-speed endpoint
 
 // As in the table of Linux' gs_usb driver.
@@ -60,7 +61,7 @@ Result<std::unique_ptr<GsUsbLink>> GsUsbLink::open(const UsbCanSpec& spec, GsUsb
 GsUsbLink::~GsUsbLink() {
     if (usb_ && !usb_->gone()) (void)put(GsUsbRequest::mode, encode_gs_usb_mode({}), spec_.channel);
     usb_.reset();  // which still tells of transfers
-    shared_.lost += static_cast<std::uint64_t>(std::ranges::count(unconfirmed_, true));
+    shared_.lost += static_cast<std::uint64_t>(std::ranges::count(places_, true, &Place::unconfirmed));
 }
 
 Status GsUsbLink::start() {
@@ -130,6 +131,7 @@ bool GsUsbLink::turn(std::int64_t timeout_ns) noexcept {
     ::eventfd_read(shared_.wanted.get(), &count);
     if (stalled_) recover();
     if (restart_ns_ != 0 && monotonic_ns() >= restart_ns_) restart();
+    give_up_old_echoes();
     while (!usb_->gone() && restart_ns_ == 0 && send_next()) {
     }
     return !usb_->gone();
@@ -168,35 +170,56 @@ void GsUsbLink::take_frame(std::span<const std::uint8_t> bytes) noexcept {
         ++shared_.bus_off;
         restart_ns_ = t_now_ns + kRestart_ns;
     } else if (f->echo != GsUsbFrame::kReceived) {
-        if (f->echo < unconfirmed_.size())
-            unconfirmed_[f->echo] = false;
-        else
-            ++shared_.malformed;
+        confirm(f->echo);
     } else {
         if (!shared_.received.push({f->frame, t_ns})) ++shared_.overflow;
         ::eventfd_write(shared_.arrived.get(), 1);
     }
 }
 
+/// An echo is the number of a place, and of its generation: adapters send back any 32 bits but kReceived. As long
+/// as none is lost, these are Linux' numbers.
+void GsUsbLink::confirm(std::uint32_t echo) noexcept {
+    const std::uint32_t place = echo % kOuts, generation = echo / kOuts;
+    if (generation > places_[place].generation)
+        ++shared_.malformed;
+    else if (generation == places_[place].generation)
+        places_[place].unconfirmed = false;
+    // An echo that was given up: its frame counts as lost already.
+}
+
+/// The adapter may have lost them: their places are needed.
+void GsUsbLink::give_up_old_echoes() noexcept {
+    const std::int64_t t_old_ns = monotonic_ns() - kEchoPatience_ns;
+    for (std::size_t i = 0; i < kOuts; ++i) {
+        Place& p = places_[i];
+        if (!p.unconfirmed || usb_->outs()[i].under_way || p.t_sent_ns > t_old_ns) continue;
+        p.unconfirmed = false;
+        p.generation = (p.generation + 1) % (GsUsbFrame::kReceived / kOuts);
+        ++shared_.lost;
+    }
+}
+
 bool GsUsbLink::send_next() noexcept {
     const auto outs = usb_->outs();
     std::size_t slot = 0;
-    while (slot < outs.size() && (outs[slot].under_way || unconfirmed_[slot])) ++slot;
+    while (slot < outs.size() && (outs[slot].under_way || places_[slot].unconfirmed)) ++slot;
     CanFrame frame;
     if (slot == outs.size() || !shared_.to_send.pop(frame)) return false;
     GsUsbFrame f;
-    f.echo = static_cast<std::uint32_t>(slot);
+    f.echo = static_cast<std::uint32_t>(slot + kOuts * places_[slot].generation);
     f.channel = spec_.channel;
     f.frame = frame;
     const std::size_t n = encode_gs_usb_frame(f, false, std::span(outs[slot].bytes).first<kGsUsbFrameMostBytes>());
-    unconfirmed_[slot] = true;
+    places_[slot].unconfirmed = true;
+    places_[slot].t_sent_ns = monotonic_ns();
     return usb_->send(outs[slot], n);
 }
 
 void GsUsbLink::sent(UsbTransfer& transfer, UsbEnd end) noexcept {
     if (end == UsbEnd::whole) return;
-    bool& unconfirmed = unconfirmed_[static_cast<std::size_t>(&transfer - transfer.link->outs().data())];
-    if (std::exchange(unconfirmed, false)) ++shared_.lost;
+    Place& place = places_[static_cast<std::size_t>(&transfer - transfer.link->outs().data())];
+    if (std::exchange(place.unconfirmed, false)) ++shared_.lost;
     if (end != UsbEnd::cancelled) transfer.link->give_up();  // the adapter is opened anew
 }
 
@@ -204,7 +227,7 @@ void GsUsbLink::sent(UsbTransfer& transfer, UsbEnd end) noexcept {
 void GsUsbLink::recover() noexcept {
     stalled_ = false;
     if (usb_->gone()) return;
-    if (++errors_in_a_row_ > kMostErrorsInARow || !usb_->clear_halt()) return usb_->give_up();
+    if (++errors_in_a_row_ > kMostErrorsInARow || !usb_->clear_halt_in()) return usb_->give_up();
     for (UsbTransfer& in : usb_->ins())
         if (!in.under_way) usb_->receive(in);
 }
@@ -212,8 +235,8 @@ void GsUsbLink::recover() noexcept {
 /// After bus-off. What was under way on the bus is lost.
 void GsUsbLink::restart() noexcept {
     restart_ns_ = 0;
-    for (std::size_t i = 0; i < unconfirmed_.size(); ++i)
-        if (!usb_->outs()[i].under_way && std::exchange(unconfirmed_[i], false)) ++shared_.lost;
+    for (std::size_t i = 0; i < kOuts; ++i)
+        if (!usb_->outs()[i].under_way && std::exchange(places_[i].unconfirmed, false)) ++shared_.lost;
     if (!put(GsUsbRequest::mode, encode_gs_usb_mode({}), spec_.channel) ||
         !put(GsUsbRequest::mode, encode_gs_usb_mode({true, wanted_features_}), spec_.channel))
         usb_->give_up();

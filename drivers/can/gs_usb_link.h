@@ -71,13 +71,21 @@ private:
     void sent(UsbTransfer& transfer, UsbEnd end) noexcept override;
     void take_frame(std::span<const std::uint8_t> bytes) noexcept;
     bool send_next() noexcept;
+    void confirm(std::uint32_t echo) noexcept;
+    void give_up_old_echoes() noexcept;
     void recover() noexcept;
     void restart() noexcept;
 
     UsbCanSpec spec_;
     GsUsbShared& shared_;
     std::unique_ptr<UsbLink> usb_;
-    std::array<bool, kOuts> unconfirmed_{};  // by transfer: its echo has not come
+    /// Of a transfer: the frame in it whose echo has not come.
+    struct Place {
+        bool unconfirmed = false;
+        std::uint32_t generation = 0;  ///< +1 when an echo is given up, so that it is known if it comes late
+        std::int64_t t_sent_ns = 0;
+    };
+    std::array<Place, kOuts> places_{};
     std::uint32_t wanted_features_ = 0;
     bool fd_ = false, with_time_ = false, stalled_ = false;
     int errors_in_a_row_ = 0;

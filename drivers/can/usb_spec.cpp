@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/read_number.h"
+#include "drivers/usb/usb_devices.h"
 
 namespace narpa {
 namespace {
@@ -11,11 +12,6 @@ constexpr std::uint32_t kSlowest = 10'000, kFastest = 1'000'000, kFastestData = 
 
 bool is_rate(std::string_view text, std::uint32_t fastest, std::uint32_t& rate) {
     return read_number(text, rate) && rate >= kSlowest && rate <= fastest;
-}
-
-/// Letters that serial numbers have; others may not be copied from a terminal.
-bool is_name(std::string_view text) {
-    return text.size() <= 126 && std::ranges::all_of(text, [](char c) { return c > ' ' && c < 0x7f && c != '"'; });
 }
 
 }  // namespace
@@ -41,7 +37,7 @@ Result<UsbCanSpec> parse_usb_can(std::string_view text) {
         if (!read_number(name.substr(slash + 1), spec.channel)) return expected;
         name = name.substr(0, slash);
     }
-    if (!is_name(name)) return expected;
+    if (!is_usb_name(name)) return expected;
     spec.adapter = name;
     return spec;
 }

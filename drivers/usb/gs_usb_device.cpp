@@ -203,9 +203,9 @@ bool GsUsbDevice::to_bus(CanBus& bus) noexcept {
             continue;
         }
         if (!bus.send(sending_->frame.frame)) break;  // as a controller, try again until the bus takes it
-        ++frames_from_host_;
+        const std::uint64_t frames = ++frames_from_host_;
         sending_->frame.time_us = device_time_us(monotonic_ns());
-        (void)push(sending_->frame);
+        if (frames <= lose_echoes_after_ || frames % 2 == 0) (void)push(sending_->frame);
         sending_.reset();
         if (--bus_off_after_ == 0) report_bus_off();
     }

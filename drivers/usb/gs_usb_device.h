@@ -54,6 +54,8 @@ public:
     bool turn(CanBus& bus, std::int64_t timeout_ns) noexcept;
     /// The controller goes bus-off after so many more frames of the host; the host has to start the channel again.
     void bus_off_after(std::uint64_t frames) noexcept { bus_off_after_ = frames; }
+    /// After so many frames of the host, every second one has no echo.
+    void lose_echoes_after(std::uint64_t frames) noexcept { lose_echoes_after_ = frames; }
 
     /// From any thread.
     [[nodiscard]] bool started() const noexcept { return started_.load(std::memory_order_acquire); }
@@ -86,7 +88,7 @@ private:
     std::atomic<std::size_t> in_to_host_{0};
     SpscRing<Entry, kFromHost> from_host_;
     std::optional<Entry> sending_;  ///< the CAN thread's: a frame that the bus has not taken yet
-    std::uint64_t bus_off_after_ = UINT64_MAX, bus_off_seen_ = 0, errors_seen_ = 0;
+    std::uint64_t bus_off_after_ = UINT64_MAX, lose_echoes_after_ = UINT64_MAX, bus_off_seen_ = 0, errors_seen_ = 0;
     std::atomic<std::uint64_t> frames_from_host_{0}, abandoned_{0}, frames_to_host_{0}, overflow_{0}, missed_{0},
         malformed_{0}, bus_off_{0};
 };

@@ -1,10 +1,11 @@
 #include "drivers/usb/usb_devices.h"
 
+#include <algorithm>
+
 #ifdef NARPA_WITH_USB
 
 #include <libusb-1.0/libusb.h>
 
-#include <algorithm>
 #include <array>
 
 namespace narpa {
@@ -141,7 +142,19 @@ namespace narpa {
 
 std::string usb_permission_remedy() {
     return "sudo cp drivers/usb/udev/70-narpa-usb.rules /etc/udev/rules.d/ && sudo udevadm control --reload && "
-           "sudo udevadm trigger   (from the sources or from share/narpa; then plug the adapter in again)";
+           "sudo udevadm trigger   (from the sources or from share/narpa; then plug the device in again)";
+}
+
+bool is_usb_name(std::string_view text) noexcept {
+    constexpr std::size_t kLongest = 126;  // of a string descriptor
+    return text.size() <= kLongest &&
+           std::ranges::all_of(text, [](char c) { return c > ' ' && c < 0x7f && c != '"'; });
+}
+
+Error built_without_usb() {
+    return {.what = "this narpa was built without USB",
+            .kind = ErrorKind::missing,
+            .remedy = "cmake -DNARPA_WITH_USB=ON ... (needs libusb-1.0-0-dev), and build again"};
 }
 
 }  // namespace narpa

@@ -38,6 +38,10 @@ struct PluggedUsbDevice {
 
 /// What permits users to open them.
 [[nodiscard]] std::string usb_permission_remedy();
+/// Whether it can be a serial number or a place: letters that can be copied from a terminal; or empty.
+[[nodiscard]] bool is_usb_name(std::string_view text) noexcept;
+/// Of a program without libusb.
+[[nodiscard]] Error built_without_usb();
 
 struct LibusbRelease {
     void operator()(libusb_context* c) const noexcept;

@@ -39,6 +39,11 @@ Status allocate(std::vector<UsbTransfer>& transfers, UsbLink::Pool pool, UsbLink
     return Ok{};
 }
 
+void cancel(std::vector<UsbTransfer>& transfers) noexcept {
+    for (UsbTransfer& t : transfers)
+        if (t.under_way) libusb_cancel_transfer(t.transfer.get());
+}
+
 }  // namespace
 
 Result<std::unique_ptr<UsbLink>> UsbLink::open(const UsbKind& kind, std::string_view wanted, Client& client,
@@ -55,7 +60,7 @@ Result<std::unique_ptr<UsbLink>> UsbLink::open(const UsbKind& kind, std::string_
 }
 
 Status UsbLink::start(Pool in, Pool out, int wake_fd) {
-    if (auto found = find_endpoints(); !found) return found.error();
+    if (auto found = find_endpoints(in.transfers > 0, out.transfers > 0); !found) return found.error();
     libusb_set_auto_detach_kernel_driver(device_.handle.get(), 1);
     if (const int code = libusb_claim_interface(device_.handle.get(), interface_); code != 0)
         return usb_error("cannot be claimed", code);
@@ -69,35 +74,39 @@ Status UsbLink::start(Pool in, Pool out, int wake_fd) {
     return Ok{};
 }
 
-Status UsbLink::find_endpoints() {
+/// Those of the first interface that has what is wanted. What a device says of itself need not be true.
+Status UsbLink::find_endpoints(bool wants_in, bool wants_out) {
     libusb_config_descriptor* raw = nullptr;
     if (const int code = libusb_get_active_config_descriptor(libusb_get_device(device_.handle.get()), &raw);
         code != 0)
-        return usb_error("has no configuration", code);
+        return usb_error("has no configuration that can be read", code);
     const LibusbOwned<libusb_config_descriptor> config(raw);
     for (int i = 0; i < config->bNumInterfaces; ++i) {
         if (config->interface[i].num_altsetting < 1) continue;
         const libusb_interface_descriptor& d = config->interface[i].altsetting[0];
         if (d.bInterfaceClass != LIBUSB_CLASS_VENDOR_SPEC) continue;
-        endpoint_in_ = endpoint_out_ = 0;
+        in_endpoint_ = out_endpoint_ = {};
         for (int e = 0; e < d.bNumEndpoints; ++e) {
             const libusb_endpoint_descriptor& endpoint = d.endpoint[e];
-            if ((endpoint.bmAttributes & 3) != LIBUSB_TRANSFER_TYPE_BULK) continue;
+            const std::size_t packet_bytes = endpoint.wMaxPacketSize & 0x7ff;
+            if ((endpoint.bmAttributes & 3) != LIBUSB_TRANSFER_TYPE_BULK || packet_bytes == 0) continue;
             const bool is_in = (endpoint.bEndpointAddress & LIBUSB_ENDPOINT_IN) != 0;
-            std::uint8_t& mine = is_in ? endpoint_in_ : endpoint_out_;
-            if (mine == 0) mine = endpoint.bEndpointAddress;
+            Endpoint& mine = is_in ? in_endpoint_ : out_endpoint_;
+            if (mine.address == 0) mine = {endpoint.bEndpointAddress, packet_bytes};
         }
         interface_ = d.bInterfaceNumber;
-        if (endpoint_in_ != 0 && endpoint_out_ != 0) return Ok{};
+        if ((!wants_in || in_endpoint_.address != 0) && (!wants_out || out_endpoint_.address != 0)) return Ok{};
     }
-    return Error{.what = "has no vendor-specific interface with two bulk endpoints", .kind = ErrorKind::missing};
+    const char* wanted = wants_in && wants_out ? "a bulk endpoint each way"
+                         : wants_in            ? "a bulk endpoint towards the host"
+                                               : "a bulk endpoint from the host";
+    return Error{.what = std::string("has no vendor-specific interface with ") + wanted,
+                 .kind = ErrorKind::missing};
 }
 
 UsbLink::~UsbLink() {
     closing_ = true;
-    for (auto* transfers : {&in_, &out_})
-        for (UsbTransfer& t : *transfers)
-            if (t.under_way) libusb_cancel_transfer(t.transfer.get());
+    cancel(in_), cancel(out_);
     for (const std::int64_t until_ns = monotonic_ns() + kFarewell_ns; any_under_way() && monotonic_ns() < until_ns;)
         handle_events(10'000'000);
     if (claimed_) libusb_release_interface(device_.handle.get(), interface_);  // the kernel's driver has it again
@@ -127,11 +136,11 @@ Result<std::size_t> UsbLink::get(std::uint8_t request, std::uint16_t value, std:
 }
 
 bool UsbLink::receive(UsbTransfer& t) noexcept {
-    return submit(t, endpoint_in_, t.bytes.size());
+    return submit(t, in_endpoint_.address, t.bytes.size());
 }
 
 bool UsbLink::send(UsbTransfer& t, std::size_t length) noexcept {
-    return submit(t, endpoint_out_, length);
+    return submit(t, out_endpoint_.address, length);
 }
 
 bool UsbLink::submit(UsbTransfer& t, std::uint8_t endpoint, std::size_t length) noexcept {
@@ -167,8 +176,12 @@ void UsbLink::handle_events(std::int64_t timeout_ns) noexcept {
         gone_ = true;
 }
 
-bool UsbLink::clear_halt() noexcept {
-    return libusb_clear_halt(device_.handle.get(), endpoint_in_) == 0;
+void UsbLink::cancel_outs() noexcept {
+    cancel(out_);
+}
+
+bool UsbLink::clear_halt(std::uint8_t endpoint) noexcept {
+    return libusb_clear_halt(device_.handle.get(), endpoint) == 0;
 }
 
 bool UsbLink::any_under_way() const noexcept {

@@ -1,4 +1,4 @@
-/// drivers/usb/usb_link.h - a vendor-specific interface with two bulk endpoints, claimed through libusb: control
+/// drivers/usb/usb_link.h - a vendor-specific interface with bulk endpoints, claimed through libusb: control
 /// requests and asynchronous transfers.
 ///
 /// libusb allocates with every transfer and takes locks, so a link belongs to one thread that is not the loop's.
@@ -54,7 +54,7 @@ public:
         ~Client() = default;
     };
     struct Pool {
-        std::size_t transfers = 0, bytes = 0;  ///< bytes of each
+        std::size_t transfers = 0, bytes = 0;  ///< bytes of each; no transfers: the endpoint is not needed
     };
 
     /// Claims the interface. `wake_fd`: `serve` also wakes when it can be read.
@@ -84,13 +84,24 @@ public:
     bool send(UsbTransfer& transfer, std::size_t length) noexcept;
     /// Waits for events, at most timeout_ns, and tells the client of them.
     void serve(std::int64_t timeout_ns) noexcept;
-    /// After a stall of the endpoint towards the host. False: it cannot be cleared.
-    [[nodiscard]] bool clear_halt() noexcept;
+    /// Asks for the end of all that are under way from the host; `serve` tells of it.
+    void cancel_outs() noexcept;
+    /// After a stall of the endpoint towards the host, or from it. False: it cannot be cleared.
+    [[nodiscard]] bool clear_halt_in() noexcept { return clear_halt(in_endpoint_.address); }
+    [[nodiscard]] bool clear_halt_out() noexcept { return clear_halt(out_endpoint_.address); }
+    /// Of the endpoint from the host; a transfer that is a multiple of it does not end a message.
+    [[nodiscard]] std::size_t out_packet_bytes() const noexcept { return out_endpoint_.packet_bytes; }
 
 private:
+    struct Endpoint {
+        std::uint8_t address = 0;  ///< 0: none
+        std::size_t packet_bytes = 0;
+    };
+
     UsbLink(OpenUsbDevice device, Client& client) : device_(std::move(device)), client_(client) {}
     Status start(Pool in, Pool out, int wake_fd);
-    Status find_endpoints();
+    Status find_endpoints(bool wants_in, bool wants_out);
+    [[nodiscard]] bool clear_halt(std::uint8_t endpoint) noexcept;
     bool submit(UsbTransfer& transfer, std::uint8_t endpoint, std::size_t length) noexcept;
     static void on_end(libusb_transfer* transfer);
     void handle_events(std::int64_t timeout_ns) noexcept;
@@ -101,7 +112,7 @@ private:
     std::vector<UsbTransfer> in_, out_;
     std::vector<pollfd> fds_;
     int interface_ = 0;
-    std::uint8_t endpoint_in_ = 0, endpoint_out_ = 0;
+    Endpoint in_endpoint_, out_endpoint_;
     bool claimed_ = false, gone_ = false, closing_ = false;
 };
 

@@ -14,6 +14,11 @@ namespace narpa {
 /// Writes the frames of a queue and counts them.
 class VideoWriter : public QueueWriter {
 public:
+    /// Writes a frame, or counts why not; may block as QueueWriter::write may.
+    virtual void write_frame(std::span<const std::uint8_t> frame, const FrameStamp& stamp,
+                             const WriteQueue& queue) noexcept = 0;
+    /// An item: the stamp, then the frame.
+    void write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept final;
     void abandon(std::span<const std::uint8_t>) noexcept override { ++failed; }
     /// As VideoSink's.
     virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
@@ -31,12 +36,16 @@ Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const
 /// `address`: [HOST:]PORT to listen at for hosts that attach the camera.
 Result<std::unique_ptr<VideoSink>> open_uvc_sink(std::string_view address, const VideoFormat& format, WhenFull full,
                                                  const std::optional<VideoControls>& controls);
+/// `text`: [VENDOR:PRODUCT/][SERIAL|BUS-PORT]; a bridge that vanishes later is looked for once a second.
+Result<std::unique_ptr<VideoSink>> open_bulk_sink(std::string_view text, const VideoFormat& format, WhenFull full);
 /// `fifo`: the path is a FIFO; else a file, made or emptied.
 Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool fifo, const VideoFormat& format,
                                                  WhenFull full);
 
 /// A device that is no camera yet (v4l2loopback before its writer's first frame) is looked at again.
 Result<std::unique_ptr<VideoSource>> open_v4l2_source(const std::string& path, const VideoFormat& format);
+/// `address`: [HOST:]PORT to listen at for the host that attaches the bridge.
+Result<std::unique_ptr<VideoSource>> open_bridge_source(std::string_view address, const VideoFormat& format);
 Result<std::unique_ptr<VideoSource>> open_y4m_source(const std::string& path, const VideoFormat& format);
 
 }  // namespace narpa

@@ -1,5 +1,6 @@
 #include <sys/stat.h>
 
+#include <array>
 #include <cstring>
 #include <exception>
 
@@ -17,10 +18,12 @@ public:
         : writer_(std::move(writer)),
           frame_size_(frame_bytes(format)),
           description_(std::move(description)),
-          queue_(*writer_, kSlots, frame_size_, full == WhenFull::wait) {}
+          queue_(*writer_, kSlots, sizeof(FrameStamp) + frame_size_, full == WhenFull::wait) {}
 
-    bool send(std::span<const std::uint8_t> frame) noexcept override {
-        if (frame.size() == frame_size_) return queue_.push(frame);
+    bool send(std::span<const std::uint8_t> frame, const FrameStamp& stamp) noexcept override {
+        std::array<std::uint8_t, sizeof stamp> head;
+        std::memcpy(head.data(), &stamp, sizeof stamp);
+        if (frame.size() == frame_size_) return queue_.push(head, frame);
         ++writer_->failed;
         return false;
     }
@@ -51,7 +54,7 @@ private:
 class NullSink final : public VideoSink {
 public:
     explicit NullSink(std::size_t frame_size) : frame_size_(frame_size) {}
-    bool send(std::span<const std::uint8_t> frame) noexcept override {
+    bool send(std::span<const std::uint8_t> frame, const FrameStamp& /*stamp*/) noexcept override {
         const bool whole = frame.size() == frame_size_;
         ++(whole ? written_ : failed_);
         return whole;
@@ -67,9 +70,10 @@ private:
 
 Result<std::unique_ptr<VideoSink>> open_by_kind(const std::string& spec, const VideoFormat& format, WhenFull full,
                                                 const std::optional<VideoControls>& controls) {
-    constexpr std::string_view kUvc = "uvc:";
+    constexpr std::string_view kUvc = "uvc:", kBulk = "bulk:";
     if (spec.starts_with(kUvc))
         return open_uvc_sink(std::string_view(spec).substr(kUvc.size()), format, full, controls);
+    if (spec.starts_with(kBulk)) return open_bulk_sink(std::string_view(spec).substr(kBulk.size()), format, full);
     if (spec == "none") return std::unique_ptr<VideoSink>(new NullSink(frame_bytes(format)));
     struct stat info {};
     const bool exists = ::stat(spec.c_str(), &info) == 0;
@@ -78,7 +82,7 @@ Result<std::unique_ptr<VideoSink>> open_by_kind(const std::string& spec, const V
     if (spec.starts_with("/dev/video") || (exists && S_ISCHR(info.st_mode)))
         return open_v4l2_sink(spec, format, full);
     return Error{"video sink \"" + spec +
-                 "\": expected /dev/videoN, uvc:PORT, FILE.y4m, an existing FIFO, or none"};
+                 "\": expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], FILE.y4m, an existing FIFO, or none"};
 }
 
 Error no_such_path(const std::string& spec) {
@@ -89,15 +93,23 @@ Error no_such_path(const std::string& spec) {
 }
 
 Result<std::unique_ptr<VideoSource>> open_by_kind(const std::string& spec, const VideoFormat& format) {
+    constexpr std::string_view kBridge = "bridge:";
+    if (spec.starts_with(kBridge)) return open_bridge_source(std::string_view(spec).substr(kBridge.size()), format);
     struct stat info {};
     const bool exists = ::stat(spec.c_str(), &info) == 0;
     if (spec.starts_with("/dev/video") || (exists && S_ISCHR(info.st_mode))) return open_v4l2_source(spec, format);
     if (exists && (S_ISFIFO(info.st_mode) || spec.ends_with(".y4m"))) return open_y4m_source(spec, format);
     if (!exists && !spec.empty()) return no_such_path(spec);
-    return Error{"video source \"" + spec + "\": expected /dev/videoN, FILE.y4m, or an existing FIFO"};
+    return Error{"video source \"" + spec + "\": expected /dev/videoN, bridge:PORT, FILE.y4m, or an existing FIFO"};
 }
 
 }  // namespace
+
+void VideoWriter::write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept {
+    FrameStamp stamp;
+    std::memcpy(&stamp, item.data(), sizeof stamp);
+    write_frame(item.subspan(sizeof stamp), stamp, queue);
+}
 
 std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,
                                        WhenFull full, std::string description) {

@@ -18,7 +18,8 @@ public:
     }
     [[nodiscard]] std::uint16_t port() const noexcept { return server_->port(); }
 
-    void write(std::span<const std::uint8_t> frame, const WriteQueue& queue) noexcept override {
+    void write_frame(std::span<const std::uint8_t> frame, const FrameStamp&,
+                     const WriteQueue& queue) noexcept override {
         reconnects = device_.streams();
         const auto shown = device_.show(
             frame, monotonic_ns(), [this] { server_->wake(); }, [&] { return queue.time_left_ms() == 0; });

@@ -104,7 +104,7 @@ public:
     V4l2Writer(std::string path, const VideoFormat& format, Descriptor fd)
         : path_(std::move(path)), format_(format), fd_(std::move(fd)) {}
 
-    void write(std::span<const std::uint8_t> frame, const WriteQueue&) noexcept override {
+    void write_frame(std::span<const std::uint8_t> frame, const FrameStamp&, const WriteQueue&) noexcept override {
         if (!fd_ && !reopen()) return abandon(frame);
         ssize_t n = 0;
         do n = ::write(fd_.get(), frame.data(), frame.size());

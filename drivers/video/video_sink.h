@@ -1,4 +1,5 @@
-/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera, a Y4M file or FIFO, or none.
+/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera or frame bridge, a Y4M file or
+/// FIFO, or none.
 ///
 /// A sink owns a thread and a ring of preallocated frames, so that handing over a frame is one copy: no disk,
 /// reader or device can block the loop.
@@ -24,6 +25,12 @@ struct VideoCounters {
     std::uint64_t reconnects = 0;  ///< times that a reader or a device was connected again
 };
 
+/// Which frame it is. Sinks that have no place for it leave it out.
+struct FrameStamp {
+    std::int64_t t_ns = 0;     ///< mid-exposure, simulation clock
+    std::uint32_t number = 0;  ///< +1 with every frame that falls due
+};
+
 /// What a camera lets the reader of its frames set, where the sink is a device with controls.
 struct VideoControls {
     std::int64_t exposure_min_ns = 0, exposure_max_ns = 0, exposure_ns = 0;
@@ -45,7 +52,8 @@ public:
     virtual ~VideoSink() = default;  ///< flushes what is in the ring, within a second
     /// Copies one whole frame (frame_bytes) into the ring. False: dropped and counted. Never blocks unless
     /// the sink was opened with WhenFull::wait.
-    virtual bool send(std::span<const std::uint8_t> frame) noexcept = 0;
+    virtual bool send(std::span<const std::uint8_t> frame, const FrameStamp& stamp) noexcept = 0;
+    bool send(std::span<const std::uint8_t> frame) noexcept { return send(frame, {}); }
     /// Waits, at most a second, until what was sent is written; then the counters are final.
     virtual void flush() noexcept = 0;
     [[nodiscard]] virtual VideoCounters counters() const noexcept = 0;
@@ -56,8 +64,9 @@ public:
     virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
 };
 
-/// SINK: `/dev/videoN` (V4L2 output) | `uvc:[ADDRESS:]PORT` (USB camera over USB/IP) | `FILE.y4m` or an existing
-/// FIFO | `none`. `controls`: absent where the camera has none; sinks without controls leave them out.
+/// SINK: `/dev/videoN` (V4L2 output) | `uvc:[ADDRESS:]PORT` (USB camera over USB/IP) |
+/// `bulk:[VENDOR:PRODUCT/][SERIAL|BUS-PORT]` (USB frame bridge) | `FILE.y4m` or an existing FIFO | `none`.
+/// `controls`: absent where the camera has none; sinks without controls leave them out.
 Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full,
                                                    const std::optional<VideoControls>& controls = {});
 

@@ -1,4 +1,4 @@
-/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a Y4M FIFO or file.
+/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a USB frame bridge, a Y4M FIFO or file.
 #pragma once
 
 #include <cstdint>
@@ -39,8 +39,9 @@ protected:
     VideoSourceCounters counters_{};
 };
 
-/// SOURCE: `/dev/videoN` (V4L2 capture) | an existing FIFO or `FILE.y4m` (Y4M, as the sink writes it; a file is
-/// followed as it grows). Does not wait for a writer: errors that only its stream shows are in `status` later.
+/// SOURCE: `/dev/videoN` (V4L2 capture) | `bridge:[ADDRESS:]PORT` (a USB frame bridge in software) | an existing
+/// FIFO or `FILE.y4m` (Y4M, as the sink writes it; a file is followed as it grows). Does not wait for a writer:
+/// errors that only its stream shows are in `status` later.
 Result<std::unique_ptr<VideoSource>> open_video_source(std::string_view spec, const VideoFormat& format);
 
 }  // namespace narpa

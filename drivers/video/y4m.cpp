@@ -78,7 +78,7 @@ public:
     FileWriter(Descriptor fd, const VideoFormat& format, std::string header)
         : Y4mWriter(format, std::move(header)), fd_(std::move(fd)) {}
 
-    void write(std::span<const std::uint8_t> frame, const WriteQueue&) noexcept override {
+    void write_frame(std::span<const std::uint8_t> frame, const FrameStamp&, const WriteQueue&) noexcept override {
         Pieces left = pieces(samples(frame), end_of_last_frame_ == 0);
         off_t end = end_of_last_frame_;
         while (!left.empty()) {
@@ -110,7 +110,8 @@ public:
     FifoWriter(std::string path, const VideoFormat& format, std::string header, bool wait_for_reader)
         : Y4mWriter(format, std::move(header)), path_(std::move(path)), wait_for_reader_(wait_for_reader) {}
 
-    void write(std::span<const std::uint8_t> frame, const WriteQueue& queue) noexcept override {
+    void write_frame(std::span<const std::uint8_t> frame, const FrameStamp&,
+                     const WriteQueue& queue) noexcept override {
         const std::span<const std::uint8_t> data = samples(frame);
         for (;;) {
             if (!reach_reader(queue)) return void(++no_reader);

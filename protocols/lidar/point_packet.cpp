@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "protocols/crc32.h"
 #include "protocols/little_endian.h"
 
 namespace narpa {
@@ -25,25 +26,9 @@ enum Offset : std::size_t {
 };
 static_assert(kChecksumAt + 4 == PointPacket::kHeaderBytes);
 
-constexpr std::array<std::uint32_t, 256> kCrcTable = [] {
-    std::array<std::uint32_t, 256> table{};
-    for (std::uint32_t byte = 0; byte < table.size(); ++byte) {
-        std::uint32_t crc = byte;
-        for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? 0xEDB88320U : 0);
-        table[byte] = crc;
-    }
-    return table;
-}();
-
-/// CRC-32 (ISO-HDLC, as of zip and Ethernet) of all bytes but its own.
+/// CRC-32 of all bytes but its own.
 std::uint32_t checksum(std::span<const std::uint8_t> packet) noexcept {
-    std::uint32_t crc = 0xFFFFFFFF;
-    const auto add = [&](std::span<const std::uint8_t> bytes) {
-        for (const std::uint8_t byte : bytes) crc = crc >> 8 ^ kCrcTable[(crc ^ byte) & 0xFF];
-    };
-    add(packet.first(kChecksumAt));
-    add(packet.subspan(PointPacket::kHeaderBytes));
-    return ~crc;
+    return crc32(packet.subspan(PointPacket::kHeaderBytes), crc32(packet.first(kChecksumAt)));
 }
 
 }  // namespace

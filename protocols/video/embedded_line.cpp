@@ -5,6 +5,7 @@
 #include <bit>
 #include <type_traits>
 
+#include "protocols/crc32.h"
 #include "protocols/ledger_fields.h"
 #include "protocols/little_endian.h"
 
@@ -13,16 +14,6 @@ namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic{'N', 'R', 'P', 'A'};
 constexpr std::size_t kVersion = 4, kSize = 5, kCrc = kEmbeddedLineBytes - 4;
-
-// CRC-32 of IEEE 802.3 (reflected 0x04C11DB7, start and final exclusive or all ones), as zlib's crc32.
-std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
-    std::uint32_t crc = 0xFFFF'FFFF;
-    for (const std::uint8_t byte : bytes) {
-        crc ^= byte;
-        for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xEDB8'8320 : 0);
-    }
-    return ~crc;
-}
 
 /// A field's value at its place in the line; `bit` is of a flag.
 template <class Whole>

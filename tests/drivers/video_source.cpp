@@ -198,7 +198,7 @@ TEST(VideoSource, BadSourcesSayWhatIsWrong) {
         ErrorKind kind;
         std::string says;
     } cases[] = {
-        {"", kGreySource, ErrorKind::bad_input, "expected /dev/videoN, FILE.y4m, or an existing FIFO"},
+        {"", kGreySource, ErrorKind::bad_input, "expected /dev/videoN, bridge:PORT, FILE.y4m, or an existing FIFO"},
         {folder / "frames.bin", kGreySource, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "fifo", kGreySource, ErrorKind::missing, "try: mkfifo " + (folder / "fifo")},
         {folder / "colour.y4m", {8, 8, PixelFormat::rgb24, 1}, ErrorKind::bad_input, "it holds GREY, Y16 and YUYV"},

@@ -298,7 +298,7 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         std::string says;
     } cases[] = {
         {"nowhere", kGrey, ErrorKind::bad_input,
-         "expected /dev/videoN, uvc:PORT, FILE.y4m, an existing FIFO, or none"},
+         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], FILE.y4m, an existing FIFO, or none"},
         {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "out.y4m", {8, 8, PixelFormat::rgb24, 1}, ErrorKind::bad_input, "it holds GREY, Y16 and YUYV"},
         {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold BGGR16 frames"},

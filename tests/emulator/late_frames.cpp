@@ -14,9 +14,10 @@ constexpr std::int64_t kHourNs = 3'600'000'000'000;
 /// Keeps all that it is sent.
 class Keeper final : public VideoSink {
 public:
-    explicit Keeper(std::vector<std::string>& frames) : frames_(frames) {}
-    bool send(std::span<const std::uint8_t> frame) noexcept override {
+    Keeper(std::vector<std::string>& frames, std::vector<FrameStamp>& stamps) : frames_(frames), stamps_(stamps) {}
+    bool send(std::span<const std::uint8_t> frame, const FrameStamp& stamp) noexcept override {
         frames_.emplace_back(frame.begin(), frame.end());
+        stamps_.push_back(stamp);
         return true;
     }
     void flush() noexcept override {}
@@ -25,6 +26,7 @@ public:
 
 private:
     std::vector<std::string>& frames_;
+    std::vector<FrameStamp>& stamps_;
 };
 
 class LatePolicies : public LoopTest, public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {
@@ -40,7 +42,7 @@ protected:
         auto world = World::create(scene(text));
         ASSERT_TRUE(world) << world.error().text();
         std::vector<std::unique_ptr<VideoSink>> sinks;
-        sinks.push_back(std::make_unique<Keeper>(sent_));
+        sinks.push_back(std::make_unique<Keeper>(sent_, stamps_));
         CameraSensor feed(**world, 0, std::move(sinks));
         feed.keep_ledgers();
         ASSERT_TRUE(feed.log_to(folder_ / "", true));
@@ -74,6 +76,14 @@ protected:
         EXPECT_EQ(stats_.deadline_missed, late.size());
         EXPECT_EQ(stats_.skipped, 0U);
         EXPECT_EQ(stats_.handed_over, sent_.size());
+        std::size_t sent = 0;  // each goes out as the frame that fell due, whatever its image
+        for (const FrameLedger& l : ledgers_) {
+            if (l.delivery == Delivery::nothing) continue;
+            ASSERT_LT(sent, stamps_.size());
+            EXPECT_EQ(stamps_[sent].number, l.frame);
+            EXPECT_EQ(stamps_[sent++].t_ns, l.t_exposure_mid_ns);
+        }
+        EXPECT_EQ(sent, stamps_.size());
     }
     static std::string policy() { return std::get<0>(GetParam()); }
     static std::string format() { return std::get<1>(GetParam()); }
@@ -97,6 +107,7 @@ protected:
     }
 
     std::vector<std::string> sent_;
+    std::vector<FrameStamp> stamps_;
     std::vector<FrameLedger> ledgers_;
     CameraStats stats_;
 };

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""In the rig: the last 0.3 m of a docking on real kernel devices: CAN FD on vcan0, frames through /dev/video10, LiDAR packets
-over UDP; in lockstep, with small frames. It docks and passes every gate.
+"""In the rig: the last 0.3 m of a docking on real kernel devices: CAN FD on vcan0, and a navigation whose only sensor is a USB
+camera, which the kernel's uvcvideo has; in lockstep, with small frames. It docks and passes every gate.
 
-Usage: rehearse.py [BUS [CAMERA=DEVICE]]   (outside the rig: rehearse.py slcan:0)"""
+Usage: rehearse.py [BUS]   (outside the rig: rehearse.py slcan:0, with a FIFO in the camera's place)"""
 import json
 import os
 import re
@@ -12,15 +12,18 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "host"))
 import support
+import usb_devices
 from support import expect
 
 SCENES = Path(os.environ["NARPA_BUILD_DIR"]) / "scenes"
+NAVIGATION = Path(support.NARPA).with_name("narpa-navigation")
 os.environ["NARPA_PLOT"] = "true"  # no charts: an emulated processor takes minutes for matplotlib
-DEVICES = sys.argv[1:] or ["vcan0", "nav=/dev/video10"]
+BUS = sys.argv[1] if sys.argv[1:] else "vcan0"
+CAMERA_PORT = 3241
 
 SCENARIO = """
 [scenario]
-based_on = "{scenes}/rehearsal/docking.toml"
+based_on = "{scenes}/rehearsal/docking-camera.toml"
 name = "kernel"
 title = "The last 0.3 m, on kernel devices"
 scene = "scene.toml"
@@ -43,27 +46,52 @@ contact = true
 
 
 def small_scene():
-    """The rehearsals' scene with small frames. v4l2loopback keeps two that nobody has taken: one a control period is well."""
+    """The rehearsals' scene with small frames."""
     text = (SCENES / "rehearsal/scene.toml").read_text().replace('"../docking/', f'"{SCENES}/docking/')
     text, changed = re.subn(r"^resolution = .*", "resolution = [160, 120]", text, flags=re.M)
     expect(changed == 1, "the scene has one camera, now with 160 x 120 pixels")
     return text
 
 
+def start_navigation(log):
+    """Attaches the camera that the emulator serves and starts the navigation, which `narpa rehearse` asks for: it streams
+    before the first frame is made."""
+    wait_until = usb_devices.wait_until
+    wait_until("narpa rehearse asks for the navigation", lambda: "LOG=" in log.read_text(), 120)
+    told = dict(re.findall(r"^  (\w+)=(.*)$", log.read_text(), flags=re.M))
+    usb_devices.attach(CAMERA_PORT)
+    wait_until("uvcvideo has the camera", usb_devices.usb_camera)
+    command = [NAVIGATION, told["SCENARIO"], "--can", told["BUS"], "--video", f"nav={usb_devices.usb_camera()}", "--lockstep",
+               "--seed", told["SEED"], "--threads", "2", "--log", folder / "navigation"]  # fmt: skip
+    with open(folder / "navigation.out", "w") as out, open(folder / "navigation.err", "w") as err:
+        navigation = subprocess.Popen([str(c) for c in command], stdout=out, stderr=err)
+    wait_until("the navigation is ready", lambda: navigation.poll() is not None or "ready" in (folder / "navigation.out").read_text(), 240)
+    return navigation
+
+
 folder = support.work_folder()
 (folder / "scene.toml").write_text(small_scene())
 (folder / "kernel.toml").write_text(SCENARIO.format(scenes=SCENES))
-command = [support.NARPA, "rehearse", folder / "kernel.toml", "-o", folder / "out", "--can", DEVICES[0], "--threads", "2",
+command = [support.NARPA, "rehearse", folder / "kernel.toml", "-o", folder / "out", "--can", BUS, "--threads", "2",
            "--patience", "300", "--json"]
-for device in DEVICES[1:]:
-    command += ["--video", device]
-done = subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, text=True)
-if done.returncode != 0:
-    print(done.stdout)
-    for log in sorted((folder / "out").rglob("*.log")) + sorted((folder / "out").rglob("*.err")):
+on_usb = BUS == "vcan0"
+if on_usb:
+    command += ["--video", f"nav=uvc:{CAMERA_PORT}", "--navigation", "none"]
+log = folder / "rehearse.err"
+rehearsal = subprocess.Popen([str(c) for c in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=open(log, "w"), text=True)
+navigation = start_navigation(log) if on_usb else None
+out, _ = rehearsal.communicate("\n" if on_usb else None)  # Enter: it listens
+if rehearsal.returncode != 0:
+    print(out)
+    for log in sorted(folder.rglob("*.log")) + sorted(folder.rglob("*.err")):
         print(f"--- {log}\n{log.read_text(errors='replace')[-2000:]}")
-expect(done.returncode == 0, f"narpa rehearse on {' '.join(DEVICES)} exits with 0 (it did with {done.returncode})")
-verdict = json.loads(done.stdout)
+expect(rehearsal.returncode == 0, f"narpa rehearse on {BUS} exits with 0 (it did with {rehearsal.returncode})")
+verdict = json.loads(out)
 contact = {c["name"]: f"{c['value']:.4f} {c['unit']}" for c in verdict["contact"]["conditions"]}
 expect(verdict["contact"]["captured"], f"captured: {contact}")
 expect(verdict["bus"]["refused"] == 0, f"nothing on the bus was refused: {verdict['bus']}")
+if on_usb:
+    expect(navigation.wait(60) == 0, "the navigation ends well")
+    n = json.loads((folder / "navigation/navigation.json").read_text())
+    taken = n["sensors"]["nav"]["taken"]
+    expect(n["frames_missing"] == 0 and n["frames"] == n["cycles"] == taken > 5, f"each of {n['cycles']} cycles had its frame, by USB alone")

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """In the rig: narpa run whose only devices are on USB. Poses come through narpa-usbcan, which narpa's own driver has
 (libusb), and frames leave as a USB camera, which the kernel's uvcvideo has. v4l2-ctl and ffmpeg get every frame, byte-identical to
-`narpa render`. The adapter is pulled out and put back; exposure and gain are set with v4l2-ctl.
+`narpa render`. Adapter and camera are pulled out and put back; exposure and gain are set with v4l2-ctl.
 
 Usage: usb_run.py NARPA_USBCAN [all]     (all: also YUYV, and OpenCV and GStreamer: minutes more)"""
 import json
@@ -15,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "host"))
 import support
 from support import expect
+from usb_devices import attach, detach, ports_used, usb_camera, wait_until
 
 ADAPTER_PORT, CAMERA_PORT = 3240, 3241
 FRAMES = 3
@@ -33,38 +34,6 @@ with open(sys.argv[2], "wb") as out:
         good, picture = video.read()
         out.write(picture.tobytes() if good else b"")
 """
-
-
-def wait_until(what, condition, seconds=60):
-    until = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > until:
-            expect(False, what)
-        time.sleep(0.1)
-
-
-def attach(port):
-    """Once the server listens."""
-    command = ["usbip", "--tcp-port", str(port), "attach", "-r", "127.0.0.1", "-b", "1-1"]
-    wait_until(f"usbip attaches port {port}", lambda: subprocess.run(command, capture_output=True).returncode == 0)
-
-
-def ports_used():
-    status = Path("/sys/devices/platform/vhci_hcd.0/status").read_text().splitlines()[1:]
-    return [line.split()[1] for line in status if line.split()[2] == "006"]  # VDEV_ST_USED
-
-
-def detach(port):
-    subprocess.run(["usbip", "detach", "-p", str(int(port))], check=True, capture_output=True)
-
-
-def usb_camera():
-    """The capture device of uvcvideo, or None."""
-    for folder in sorted(Path("/sys/class/video4linux").glob("video*")):
-        if "narpa camera" in (folder / "name").read_text() and (folder / "index").read_text().strip() == "0":
-            if (device := Path("/dev") / folder.name).exists():
-                return str(device)
-    return None
 
 
 class Flight:
@@ -116,8 +85,9 @@ def expect_poses_left(flight):
         expect(False, "the reader has its frames in time")
 
 
-def check_frames(scene, folder, path, first, flight, what):
-    """Consecutive frames from first..sent-1 on, byte for byte: once the stream runs none is lost or repeated."""
+def check_frames(scene, folder, path, first, flight, what, pulled=False):
+    """Consecutive frames from first..sent-1 on, byte for byte: once the stream runs none is lost or repeated. `pulled`: there
+    may be more than FRAMES, and a part of one."""
     data = path.read_bytes()
     rendered = {}
 
@@ -127,12 +97,12 @@ def check_frames(scene, folder, path, first, flight, what):
         return rendered[k]
 
     size = len(render(first))
-    got = [data[at : at + size] for at in range(0, len(data), size)]
+    got = [data[at : at + size] for at in range(0, len(data) - (size - 1 if pulled else 0), size)]
     start = next((k for k in range(first, flight.sent) if render(k) == got[0]), None)
     if start is None:
         expect(False, f"{what}: the first of {len(got)} frames ({len(got[0])} bytes) is one of {first}..{flight.sent - 1} as rendered")
     same = [k for k in range(len(got)) if start + k < flight.sent and render(start + k) == got[k]]
-    expect(len(same) == len(got) == FRAMES, f"{what}: frames {start}..{start + len(got) - 1}, all, byte-identical to narpa render")
+    expect(len(same) == len(got) and (len(got) == FRAMES or pulled and len(got) > FRAMES), f"{what}: frames {start}..{start + len(got) - 1}, all, byte-identical to narpa render")
 
 
 def controlled(scene):
@@ -168,6 +138,23 @@ def set_controls(device, flight):
     expect(any(e == 3_000_000 for e, _ in states.values()), "the settings act")
 
 
+def read_until_pulled(device, port, flight, out, frame_bytes):
+    """v4l2-ctl streams; with FRAMES frames in its hands the camera is pulled out. The run goes on without it."""
+    command = READERS["v4l2-ctl"].replace("OUT", str(out)).replace("DEVICE", device).format(n=10000).split()
+    with open(f"{out}.log", "w") as log:
+        reader = subprocess.Popen(command, stdout=log, stderr=log)
+    wait_until("v4l2-ctl begins", lambda: reader.poll() is None and device in Path(f"/proc/{reader.pid}/maps").read_text(), 240)
+    time.sleep(1)  # it has started the stream
+    while not out.exists() or out.stat().st_size < FRAMES * frame_bytes:
+        expect_poses_left(flight)
+        flight.next()
+        time.sleep(0.2)
+    detach(port)
+    for _ in range(2):
+        flight.next()
+    expect(reader.wait(60) is not None, "the camera was pulled out of a stream: its reader ends, the run goes on")
+
+
 def session(pixel_format, readers, wire, pulls=False, controls=False):
     folder = support.work_folder()
     scene = support.scene_with(folder, pixel_format)
@@ -185,6 +172,14 @@ def session(pixel_format, readers, wire, pulls=False, controls=False):
         if controls:
             set_controls(device, flight)
         checks = []
+        if pulls:
+            first = flight.sent
+            read_until_pulled(device, camera_port, flight, folder / "pulled", len(support.render(scene, 0, POSES[0], folder)))
+            checks.append(("pulled", first))
+            attach(CAMERA_PORT)
+            wait_until("uvcvideo has the camera again", usb_camera)
+            device = usb_camera()
+            [camera_port] = set(ports_used()) - before
         for tool in readers:
             first = flight.sent
             log = read(tool, device, flight, folder / tool)
@@ -210,9 +205,13 @@ def session(pixel_format, readers, wire, pulls=False, controls=False):
     print(f"{pixel_format}: can {can}\n{pixel_format}: sink {sink}")
     expect(can["commands_taken"] == flight.sent, f"{flight.sent} commands were sent over USB, {can['commands_taken']} taken")
     expect(can["interface_down"] == (1 if pulls else 0), "the summary counts how often the adapter went away")
+    streams = len(checks)
+    counted = sum(sink[n] for n in ("written", "dropped_failed", "dropped_no_reader", "dropped_ring_full"))
+    expect(counted == flight.sent, f"each of {flight.sent} frames is in one of the sink's counts")
+    expect(sink["reconnects"] == streams, f"the sink counts {streams} streams: {sink['reconnects']}")
     if not controls:
         for tool, first in checks:
-            check_frames(scene, folder, folder / tool, first, flight, f"{pixel_format}, {tool}")
+            check_frames(scene, folder, folder / tool, first, flight, f"{pixel_format}, {tool}", pulled=tool == "pulled")
 
 
 usbcan = subprocess.Popen([sys.argv[1], "--can", "vcan0", "--listen", str(ADAPTER_PORT)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -220,7 +219,7 @@ attach(ADAPTER_PORT)
 wait_until("the adapter is seen", lambda: len(ports_used()) == 1)
 wire = support.Wire()
 everything = sys.argv[2:] == ["all"]
-session("GREY", ["v4l2-ctl", "ffmpeg", "OpenCV"] if everything else ["v4l2-ctl", "ffmpeg"], wire, pulls=True)
+session("GREY", ["v4l2-ctl", "ffmpeg", "OpenCV"] if everything else ["ffmpeg"], wire, pulls=True)
 session("GREY", [], wire, controls=True)
 session("Y16", ["v4l2-ctl"], wire)
 if everything:

@@ -1,11 +1,13 @@
-// What a USB host sends over USB/IP to the adapter and to the camera in software, transfer after transfer, and what
-// an adapter sends to its host. The first byte says which.
+// What a USB host sends over USB/IP to the adapter, the camera and the frame bridge in software, transfer after
+// transfer, and what an adapter sends to its host. The first byte says which.
 #include <algorithm>
 #include <vector>
 
+#include "drivers/usb/bridge_device.h"
 #include "drivers/usb/gs_usb_device.h"
 #include "drivers/usb/usb_control.h"
 #include "drivers/usb/uvc_device.h"
+#include "protocols/crc32.h"
 #include "protocols/usb/gs_usb.h"
 #include "protocols/usb/usbip.h"
 #include "tests/fuzz/can_frames.h"
@@ -56,6 +58,8 @@ void listen(Bytes bytes) {
                 fuzz::require(l->clock_hz / t->brp / t->quanta() == rate, "a bit timing is exact");
     (void)decode_gs_usb_config(bytes), (void)decode_gs_usb_bit_timing(bytes), (void)decode_gs_usb_mode(bytes);
     (void)decode_usb_device(bytes), (void)decode_usb_configuration(bytes);
+    if (const auto h = decode_bulk_header(bytes))
+        fuzz::require(std::ranges::equal(encode_bulk_header(*h), bytes), "a header has one form");
     (void)decode_uvc_probe(bytes), (void)decode_uvc_header(bytes);
     if (bytes.size() >= kUsbIpHeaderBytes) (void)decode_usbip_reply(bytes.first<kUsbIpHeaderBytes>());
     if (bytes.size() >= kUsbIpOpBytes) (void)decode_usbip_op(bytes.first<kUsbIpOpBytes>());
@@ -70,9 +74,17 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static UvcDevice camera({64, 48, PixelFormat::yuyv, 100'000'000},
                             VideoControls{50'000, 30'000'000, 5'000'000, 2400, 0, false}, "FUZZ");
     const Bytes rest(data + 1, size - 1);
-    switch (data[0] % 3) {
+    switch (data[0] % 4) {
         case 0: serve(adapter, rest); break;
         case 1: serve(camera, rest); break;
+        case 3: {
+            BridgeDevice bridge({16, 8, PixelFormat::grey, 100'000'000}, "FUZZ");
+            serve(bridge, rest);
+            std::array<std::uint8_t, 16 * 8> pixels{};
+            for (BulkFrameHeader h; bridge.receive(pixels, h, 0, [] {});)
+                fuzz::require(h.pixels_crc32 == crc32(pixels), "a frame is whole");
+            break;
+        }
         default: listen(rest);
     }
     for (VideoRequest r; camera.next_request(r);)

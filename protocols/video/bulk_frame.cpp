@@ -1,0 +1,69 @@
+#include "protocols/video/bulk_frame.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "protocols/crc32.h"
+#include "protocols/little_endian.h"
+
+namespace narpa {
+namespace {
+
+constexpr std::array<std::uint8_t, 4> kBulkMagic{'N', 'R', 'P', 'F'};
+
+struct BulkAt {
+    static constexpr std::size_t kVersion = 4, kLength = 6, kTime = 8, kNumber = 16, kFormat = 20, kWidth = 24,
+                                 kHeight = 28, kRow = 32, kSize = 36, kPixelsCrc = 40, kCrc = 44;
+};
+static_assert(BulkAt::kCrc + 4 == kBulkHeaderBytes);
+
+/// V4L2's codes, in the order of PixelFormat.
+constexpr std::array<std::string_view, kPixelFormatNames.size()> kBulkFourCc{
+    "GREY", "Y16 ", "YUYV", "RGB3", "RGGB", "GRBG", "GBRG", "BA81", "RG16", "GR16", "GB16", "BYR2"};
+
+}  // namespace
+
+std::array<std::uint8_t, kBulkHeaderBytes> encode_bulk_header(const BulkFrameHeader& h) noexcept {
+    std::array<std::uint8_t, kBulkHeaderBytes> b{};
+    std::ranges::copy(kBulkMagic, b.begin());
+    put_le(&b[BulkAt::kVersion], kBulkVersion);
+    put_le(&b[BulkAt::kLength], static_cast<std::uint16_t>(kBulkHeaderBytes));
+    put_le(&b[BulkAt::kTime], static_cast<std::uint64_t>(h.t_ns));
+    put_le(&b[BulkAt::kNumber], h.number);
+    std::ranges::copy(kBulkFourCc[static_cast<std::size_t>(h.pixel)], &b[BulkAt::kFormat]);
+    put_le(&b[BulkAt::kWidth], h.width);
+    put_le(&b[BulkAt::kHeight], h.height);
+    put_le(&b[BulkAt::kRow], static_cast<std::uint32_t>(h.width * bytes_per_pixel(h.pixel)));
+    put_le(&b[BulkAt::kSize], static_cast<std::uint32_t>(h.pixel_bytes()));
+    put_le(&b[BulkAt::kPixelsCrc], h.pixels_crc32);
+    put_le(&b[BulkAt::kCrc], crc32(std::span(b).first(BulkAt::kCrc)));
+    return b;
+}
+
+std::optional<BulkFrameHeader> decode_bulk_header(std::span<const std::uint8_t> b) noexcept {
+    if (b.size() != kBulkHeaderBytes || !std::ranges::equal(kBulkMagic, b.first(kBulkMagic.size())))
+        return std::nullopt;
+    if (get_le<std::uint16_t>(&b[BulkAt::kVersion]) != kBulkVersion ||
+        get_le<std::uint16_t>(&b[BulkAt::kLength]) != kBulkHeaderBytes ||
+        get_le<std::uint32_t>(&b[BulkAt::kCrc]) != crc32(b.first(BulkAt::kCrc)))
+        return std::nullopt;
+    BulkFrameHeader h;
+    h.t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(&b[BulkAt::kTime]));
+    h.number = get_le<std::uint32_t>(&b[BulkAt::kNumber]);
+    const auto code = std::ranges::find_if(kBulkFourCc, [&](std::string_view fourcc) {
+        return std::ranges::equal(fourcc, b.subspan(BulkAt::kFormat, 4), {},
+                                  [](char c) { return static_cast<std::uint8_t>(c); });
+    });
+    if (code == kBulkFourCc.end()) return std::nullopt;
+    h.pixel = static_cast<PixelFormat>(code - kBulkFourCc.begin());
+    h.width = get_le<std::uint32_t>(&b[BulkAt::kWidth]);
+    h.height = get_le<std::uint32_t>(&b[BulkAt::kHeight]);
+    h.pixels_crc32 = get_le<std::uint32_t>(&b[BulkAt::kPixelsCrc]);
+    const std::uint64_t row = std::uint64_t{h.width} * bytes_per_pixel(h.pixel);
+    const auto told_row = get_le<std::uint32_t>(&b[BulkAt::kRow]),
+               told_size = get_le<std::uint32_t>(&b[BulkAt::kSize]);
+    if (told_size == 0 || told_row != row || told_size != row * h.height) return std::nullopt;
+    return h;
+}
+
+}  // namespace narpa

@@ -1,0 +1,72 @@
+"""Frames as `narpa run --video CAMERA=bulk:` sends them to a USB frame bridge: what an FPGA or FX3 has to understand.
+
+protocols/video/README.md has the table. Rows have no padding. A bridge that hands its host what it got, or a capture of
+it, is read with `read`; a frame that is cut short or spoilt is passed over.
+"""
+import struct
+import zlib
+from typing import NamedTuple
+
+import numpy as np
+
+MAGIC, VERSION, HEADER_BYTES = b"NRPF", 1, 48
+FORMATS = {"GREY": (1, np.uint8), "Y16 ": (1, "<u2"), "YUYV": (2, np.uint8), "RGB3": (3, np.uint8),
+           "RGGB": (1, np.uint8), "GRBG": (1, np.uint8), "GBRG": (1, np.uint8), "BA81": (1, np.uint8),
+           "RG16": (1, "<u2"), "GR16": (1, "<u2"), "GB16": (1, "<u2"), "BYR2": (1, "<u2")}  # fmt: skip
+
+
+class Header(NamedTuple):
+    t_ns: int  # mid-exposure, simulation clock
+    number: int
+    format: str  # V4L2's code
+    width: int
+    height: int
+    row_bytes: int
+    size: int  # bytes behind the header
+    crc: int  # CRC-32 of them
+
+
+def decode(data):
+    """The header in the first 48 bytes, or None where there is none."""
+    if len(data) < HEADER_BYTES or data[:4] != MAGIC:
+        return None
+    version, length, t_ns, number, fourcc, *sizes, crc = struct.unpack_from("<HHqI4s5II", data, 4)
+    header = Header(t_ns, number, fourcc.decode("latin-1"), *sizes)
+    channels, kind = FORMATS.get(header.format, (0, np.uint8))
+    row = header.width * channels * np.dtype(kind).itemsize
+    good = (version, length, crc) == (VERSION, HEADER_BYTES, zlib.crc32(data[: HEADER_BYTES - 4]))
+    return header if good and row == header.row_bytes and row * header.height == header.size > 0 else None
+
+
+def encode(pixels, t_ns, number, fourcc):
+    """Header and pixels of an array of height x width, or height x width x channels."""
+    channels, kind = FORMATS[fourcc]
+    pixels = np.ascontiguousarray(pixels, kind)
+    height, width = pixels.shape[:2]
+    data = pixels.tobytes()
+    head = MAGIC + struct.pack("<HHqI4s5I", VERSION, HEADER_BYTES, t_ns, number, fourcc.encode(), width, height,
+                               len(data) // height, len(data), zlib.crc32(data))  # fmt: skip
+    return head + struct.pack("<I", zlib.crc32(head)) + data
+
+
+def read(file):
+    """Yields header and pixels (as `encode` takes them) of each whole frame of a stream of bytes."""
+    held = b""
+    while True:
+        if len(held) < HEADER_BYTES:
+            held += file.read(HEADER_BYTES - len(held))
+            if len(held) < HEADER_BYTES:
+                return
+        if (header := decode(held)) is None:
+            at = held.find(MAGIC, 1)  # not here: perhaps further on
+            held = held[at:] if at > 0 else held[-(len(MAGIC) - 1) :]
+            continue
+        held += file.read(HEADER_BYTES + header.size - len(held))
+        data = held[HEADER_BYTES : HEADER_BYTES + header.size]
+        if len(data) < header.size or zlib.crc32(data) != header.crc:
+            held = held[1:]  # another may begin within
+            continue
+        channels, kind = FORMATS[header.format]
+        shape = (header.height, header.width) + ((channels,) if channels > 1 else ())
+        yield header, np.frombuffer(data, kind).reshape(shape)
+        held = held[HEADER_BYTES + header.size :]

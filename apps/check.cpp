@@ -49,7 +49,7 @@ Finding socketcan() {
     const int fd = ::socket(PF_CAN, SOCK_RAW, 1);  // CAN_RAW
     if (fd < 0)
         return {"SocketCAN", false, std::strerror(errno),
-                "sudo modprobe can-raw (or use --can slcan:29537, which needs no kernel support)"};
+                "sudo modprobe can_raw (or use --can slcan:29537, which needs no kernel support)"};
     ::close(fd);
     return {"SocketCAN", true, "the kernel has it", ""};
 }

@@ -11,6 +11,7 @@
 
 #include "apps/cli.h"
 #include "apps/scene_options.h"
+#include "apps/shipped.h"
 #include "drivers/lidar/packet_source.h"
 #include "emulator/log/estimate_report.h"
 #include "emulator/replay/replay.h"
@@ -297,6 +298,11 @@ Outcome estimate(EstimateOptions o) {
     for (const std::string& file : {o.csv, o.picture})
         if (auto made = make_folder_of(file); !made) return made.error();
     if (of_log) return estimate_log(o, *tracker);
+    if (o.frame.empty() && o.sweep.empty() && !find_file(FileKind::scene, o.input))
+        return Error{
+            "no such folder, expected that of a logged run or rehearsal, or a scene with --frame FILE.raw or "
+            "--sweep FILE.pcap",
+            o.input};
     if (o.frame.empty() == o.sweep.empty())
         return Error{"with a scene, expected one of --frame FILE.raw and --sweep FILE.pcap", o.input};
     return o.frame.empty() ? estimate_sweep(o, *tracker) : estimate_frame(o, *tracker);

@@ -197,8 +197,8 @@ Outcome fly(const FlyOptions& o) {
         return join_can_bus(o.bus, o.wait_s, stop_flag());
     }();
     if (!bus) return bus.error();
-    say(fmt::format("{}: {} rows, {} bodies, on {}", o.trajectory, rows->size(), bodies->size(),
-                    (*bus)->description()));
+    say(fmt::format("{}: {} rows, {} {}, on {}", o.trajectory, rows->size(), bodies->size(),
+                    bodies->size() == 1 ? "body" : "bodies", (*bus)->description()));
     Player player(o, **bus, *bodies);
     if (auto played = player.play(*rows); !played) return played.error();
 
@@ -219,7 +219,9 @@ Outcome fly(const FlyOptions& o) {
 Command add_fly(Parser app) {
     auto o = std::make_shared<FlyOptions>();
     const Parser c = app.subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
-    c.option("TRAJECTORY", o->trajectory, "Poses of bodies over time (CSV)").required();
+    c.option("TRAJECTORY", o->trajectory,
+             "Poses of bodies over time (CSV, with the columns of a run's CAMERA.truth.csv)")
+        .required();
     c.option("--can", o->bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").type_name("BUS").required();
     c.option("--id", o->ids, "Base identifier of a body's commands, the scene's can_id (default: 0x100)")
         .type_name("BODY=ID")

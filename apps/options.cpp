@@ -285,6 +285,12 @@ std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<
         if (option.starts_with("--") && std::find(known.begin(), known.end(), option) == known.end())
             return name + ": there is no option \"" + option + "\"" + did_you_mean(option, known) + help;
     }
+    const auto commands = command.get_subcommands([](const CLI::App*) { return true; });
+    if (!commands.empty() && command.get_subcommands().empty()) {
+        std::string names;
+        for (const CLI::App* c : commands) names += (names.empty() ? "" : ", ") + c->get_name();
+        return name + ": expected one of the commands " + names + help;
+    }
     return name + ": " + e.what() + help;
 }
 

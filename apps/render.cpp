@@ -92,6 +92,7 @@ Outcome render(const RenderOptions& o) {
     if (!index) return index.error();
     Camera& camera = scene->cameras[*index];
     if (auto good = override_scene(o, *scene, camera); !good) return good.error();
+    if (auto good = check_image_name(o.out); !good) return good.error();
     auto outputs = parse_outputs(o.aov);
     if (!outputs) return outputs.error();
     if (!outputs->empty() && !o.out.ends_with(".exr"))

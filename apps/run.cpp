@@ -44,7 +44,10 @@ std::string addresses(const std::string& bus, CanNode* can) {
 Step step_of(const Emulator& emulator) {
     const RunOptions& o = emulator.options();
     const double t_s = static_cast<double>(emulator.t_ns()) * 1e-9;
-    if (o.lockstep && t_s == 0) return {-1, "waiting for commands"};
+    if (o.lockstep && t_s == 0) {
+        const std::string bodies = emulator.bodies_without_a_pose();
+        return {-1, bodies.empty() ? "waiting for commands" : "waiting for the first pose of " + bodies};
+    }
     if (o.duration_s == 0) return {-1, fmt::format("t = {:.1f} s", t_s)};
     return {t_s / o.duration_s, fmt::format("t = {:.1f} s of {:g} s", t_s, o.duration_s)};
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -35,7 +37,9 @@ template <class Take>
 Status read_csv_lines(const std::string& file, std::string_view header, const std::string& what,
                       const std::string& item, const Take& take) {
     std::ifstream in(file);
-    if (!in) return Error{"cannot be opened, expected " + what + " (CSV)", file};
+    if (!in)
+        return Error{std::string("cannot be opened (") + std::strerror(errno) + "), expected " + what + " (CSV)",
+                     file};
     bool has_header = false, has_lines = false;
     std::string line;
     for (int number = 1; std::getline(in, line); ++number) {

@@ -192,7 +192,7 @@ std::string bus_in_words(const CanNode& node) {
                                  {"bus-off", b.bus_off},
                                  {"connection or interface lost", b.interface_down}})) +
            (node.hub() && node.hub()->clients_left() > 0
-                ? fmt::format("    {} clients have come and gone\n", node.hub()->clients_left())
+                ? fmt::format("    clients that have come and gone: {}\n", node.hub()->clients_left())
                 : "");
 }
 

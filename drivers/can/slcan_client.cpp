@@ -168,7 +168,7 @@ CanBusResult open_slcan_client(std::uint16_t port) {
     const auto failed = [&](const std::string& what) {
         return Error{.what = spec + ": " + what,
                      .kind = ErrorKind::missing,
-                     .remedy = "narpa run SCENE --can " + spec + "   (start the hub first)"};
+                     .remedy = "narpa run SCENE --can " + spec + " --video CAMERA=none   (start the hub first)"};
     };
     Descriptor fd;
     Connection connection = connect_to(port, fd);

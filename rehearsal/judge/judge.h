@@ -56,6 +56,8 @@ public:
     [[nodiscard]] const BusRecord& bus() const { return bus_; }
     /// The dynamics have reported the end.
     [[nodiscard]] bool finished() const { return bus_.first_report(DynamicsPhase::finished) != nullptr; }
+    /// "the navigation sent nothing; last received: ...": whose message is due next.
+    [[nodiscard]] std::string awaited() const;
     /// Gates that have failed so far.
     [[nodiscard]] std::size_t failures() const { return failures_; }
 

@@ -92,11 +92,15 @@ constexpr const char* kNoPoses = "no poses of both bodies were on the bus";
 
 }  // namespace
 
+std::string Judge::awaited() const {
+    return missing_sender(scenario_, bus_);
+}
+
 GateResult Judge::corridor() const {
     const Gates::Corridor& c = *scenario_.gates.corridor;
     return pose_gate("corridor",
-                     fmt::format("within a cone of {:g} deg about the port's axis, {:g} m wide at the port, nearer "
-                                 "than {:g} m",
+                     fmt::format("within a cone of {:g} deg about the port's axis, with a radius of {:g} m at the "
+                                 "port, nearer than {:g} m",
                                  c.half_angle_deg, c.radius_m, c.from_m),
                      scenario_, bus_, corridor_, fmt::format("the chaser never came nearer than {:g} m", c.from_m),
                      [&](const TruthState& s) {

@@ -29,7 +29,8 @@ using Ready = ChildProcess::Ready;
 
 constexpr double kStartPatience_s = 120, kCommandPatience_s = 10, kEndPatience_s = 20;
 constexpr double kSpeedWindow_s = 5;
-constexpr double kEnding_s = 2;  // to end the programs and to draw charts and page, typically
+constexpr double kStalled_s = 5;  ///< of wall time; a clock that stands still for longer is reported
+constexpr double kEnding_s = 2;   // to end the programs and to draw charts and page, typically
 constexpr std::int64_t kBusWait_ns = 20'000'000;
 
 double seconds_since(Clock::time_point t) {
@@ -311,7 +312,7 @@ private:
             receive();
             if (const std::int64_t t = judge_.bus().t_heartbeat_ns; t != newest)
                 newest = t, advanced = Clock::now();
-            if (seconds_since(shown) > 0.2) shown = Clock::now(), show_progress();
+            if (seconds_since(shown) > 0.2) shown = Clock::now(), show_progress(seconds_since(advanced));
             if (!judge_.finished()) trouble_ = find_trouble(seconds_since(advanced));
         }
     }
@@ -328,7 +329,7 @@ private:
         return stalled_s > options_.patience_s ? fmt::format("nothing moved for {:g} s", options_.patience_s) : "";
     }
 
-    void show_progress() {
+    void show_progress(double stalled_s) {
         const BusRecord& bus = judge_.bus();
         if (bus.truth.empty()) return console_.progress(-1, -1, "waiting for the first poses");
         const double t_s = bus.seconds(bus.truth.back().t_ns);
@@ -340,6 +341,8 @@ private:
             text += fmt::format(", {}, {}", leg_text(scenario_, bus.commands.back().leg),
                                 kGuidancePhases[static_cast<std::size_t>(bus.commands.back().phase)]);
         text += judge_.failures() == 0 ? ", gates good" : fmt::format(", {} gate(s) FAILED", judge_.failures());
+        if (stalled_s > kStalled_s)
+            text += fmt::format(", no progress for {:.0f} s: {}", stalled_s, judge_.awaited());
         console_.progress(overdue ? -1 : t_s / nominal_s_, overdue ? -1 : left_s(t_s), text);
     }
 

@@ -122,10 +122,12 @@ Result<std::string> replacement(const json& record, const std::string& folder, c
                         "frames can be replayed alone",
                         program, folder),
             folder};
-    return Error{fmt::format("the {0} was the command {1}, which is not run on the word of a log; expected --{0} "
-                             "COMMAND if you trust it, or {2}/emulator, whose frames can be replayed alone",
-                             program, logged.dump(-1, ' ', true, json::error_handler_t::replace), folder),
-                 folder + "/rehearsal.json"};
+    return Error{
+        fmt::format(
+            "the {0} was the command {1}; a command in a log is never run by itself: expected --{0} 'COMMAND' "
+            "if you trust it, or {2}/emulator, whose frames can be replayed alone",
+            program, logged.dump(-1, ' ', true, json::error_handler_t::replace), folder),
+        folder + "/rehearsal.json"};
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
@@ -336,6 +337,10 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
     table->finish();
     if (!scene) return std::nullopt;
     s.scene = beside(*place.path, *scene);
+    if (std::error_code error; !std::filesystem::exists(s.scene, error)) {
+        problems.add(place, "scene: " + s.scene + ": no such file");
+        return std::nullopt;
+    }
     auto read = read_scene(s.scene);
     if (read) return *std::move(read);
     problems.add(place, read.error());

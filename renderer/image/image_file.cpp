@@ -146,17 +146,29 @@ Status write_png(const std::string& path, const RenderedFrame& frame) {
     }
 }
 
-}  // namespace
-
-Status write_image(const std::string& path, const RenderedFrame& frame) {
+/// In lower case, with the dot.
+std::string extension_of(const std::string& path) {
     std::string extension = std::filesystem::path(path).extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return extension;
+}
+
+}  // namespace
+
+Status check_image_name(const std::string& path) {
+    const std::string extension = extension_of(path);
+    for (const char* known : {".exr", ".pfm", ".png", ".raw"})
+        if (extension == known) return Ok{};
+    return Error{"unknown image format \"" + extension + "\": expected .exr, .pfm, .png or .raw", path};
+}
+
+Status write_image(const std::string& path, const RenderedFrame& frame) {
+    if (auto good = check_image_name(path); !good) return good;
+    const std::string extension = extension_of(path);
     if (extension == ".exr") return write_exr(path, frame);
     if (extension == ".pfm")
         return write_pfm(path, "PF", frame.radiance.width, frame.radiance.height, frame.radiance.pixels);
-    if (extension != ".png" && extension != ".raw")
-        return Error{"unknown image format \"" + extension + "\": expected .exr, .pfm, .png or .raw", path};
     const std::size_t expected = frame_bytes({frame.radiance.width, frame.radiance.height, frame.camera.format, 0});
     if (frame.bytes.size() != expected)
         return Error{"the frame has " + std::to_string(frame.bytes.size()) + " bytes where its format has " +

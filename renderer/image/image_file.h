@@ -19,6 +19,9 @@ struct RenderedFrame {
     std::span<const std::uint8_t> bytes{};  ///< what `expose` wrote: needed by .png and .raw
 };
 
+/// Error: `path` has an extension that write_image does not know.
+Status check_image_name(const std::string& path);
+
 /// Writes by the extension of `path`:
 ///   .exr  linear radiance R, G, B (W m^-2 sr^-1) and beside it, where `aovs` has them, depth.Z and range (m,
 ///         infinite where nothing is hit), normal.X/Y/Z and position.X/Y/Z (world, m), body (index, -1 none),

@@ -137,7 +137,14 @@ std::string key_meant(std::string_view unknown, const std::vector<std::string>& 
             for (const std::string_view key : other.keys)
                 if (std::ranges::find(known, key) != known.end())
                     keys += fmt::format("{}\"{}\"", keys.empty() ? "" : " or ", key);
-    return keys.empty() ? did_you_mean(unknown, known) : fmt::format("; did you mean {}?", keys);
+    if (!keys.empty()) return fmt::format("; did you mean {}?", keys);
+    if (std::string text = did_you_mean(unknown, known); !text.empty()) return text;
+    // The same quantity in another unit: "attitude_deg" for "attitude_wxyz".
+    const std::string_view quantity = unknown.substr(0, unknown.rfind('_') + 1);
+    const auto same = std::ranges::find_if(known, [&](const std::string& k) {
+        return k.starts_with(quantity) && k.find('_', quantity.size()) == std::string::npos;
+    });
+    return quantity.empty() || same == known.end() ? std::string() : fmt::format("; did you mean \"{}\"?", *same);
 }
 
 }  // namespace narpa

@@ -16,7 +16,7 @@ struct OtherName {
 [[nodiscard]] std::span<const OtherName> other_names();
 
 /// "; did you mean "rate_hz"?", or nothing: those of a table's `known` keys that have another tool's name for it,
-/// else the one with nearly this spelling.
+/// else the one with nearly this spelling, else one that only ends in another unit.
 [[nodiscard]] std::string key_meant(std::string_view unknown, const std::vector<std::string>& known);
 
 }  // namespace narpa

@@ -76,8 +76,8 @@ TEST(Scenario, NamesAMissingScene) {
     std::ofstream(folder / "lost.toml") << "[scenario]\nname = \"lost\"\nscene = \"none.toml\"\n";
     const auto s = read_scenario(folder / "lost.toml");
     ASSERT_FALSE(s);
-    EXPECT_EQ(s.error().file, folder / "none.toml");
-    EXPECT_EQ(s.error().what, "no such file");
+    EXPECT_EQ(s.error().text(),
+              (folder / "lost.toml") + ":3:9: scene: " + (folder / "none.toml") + ": no such file");
 }
 
 TEST(Scenario, InheritsMissingKeys) {

@@ -4,11 +4,28 @@
 #include <cmath>
 #include <limits>
 
+#include "base/constants.h"
+
 namespace narpa {
 namespace {
 
 /// Beams that meet a surface at a flatter angle are not used.
 constexpr double kGrazingCosine = 0.05;
+
+/// From the plane of the axis's hit, in standard deviations of the range, beyond which a ray of the footprint is on
+/// another surface: steps that are as small in the mean of a footprint's range as this do no harm to a thousand
+/// points.
+constexpr double kOnPlane = 0.1;
+/// The rim that is searched for edges, in parts of the footprint's radius.
+constexpr double kWider = 1.1;
+
+/// Rays of like elevation and azimuth lie together: a spinning LiDAR's lasers fire by turns at elevations that are
+/// far apart, and rays are traced in packets that are the faster the closer they run.
+float place_of(const Vec3& direction) {
+    constexpr double kBands_1_rad = 200;
+    return static_cast<float>(8 * std::floor(kBands_1_rad * std::asin(std::clamp(direction.z, -1.0, 1.0))) +
+                              std::atan2(direction.x, direction.y));
+}
 
 /// Sixteen places of even density on a disc of radius 1, the first in its middle.
 const std::array<std::array<double, 2>, kLanes>& disc() {
@@ -31,7 +48,12 @@ BeamAssociation::BeamAssociation(const Tracer& tracer, std::size_t target)
 
 void BeamAssociation::take(std::span<const RangePoint> points, const ApparentMotion& motion) {
     turning_ = !(motion.rate_rad_s == Vec3{});
+    order_.clear();
+    for (std::size_t i = 0; i < points.size(); ++i)
+        order_.emplace_back(place_of(points[i].direction), static_cast<std::uint32_t>(i));
+    std::ranges::sort(order_);
     beams_.clear();
+    nearest_m_ = points.empty() ? 0 : std::ranges::min_element(points, {}, &RangePoint::range_m)->range_m;
     for (const RangePoint& p : points) {
         Beam b{{}, p.origin_m - p.t_s * motion.velocity_m_s, p.direction, p.range_m};
         if (turning_) {
@@ -55,7 +77,7 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
     if (search_m > 0)
         around_beams(T, search_m, stride, out);
     else
-        along_beams(T, noise, stride, out);
+        along_beams(T, stride, out);
     for (std::size_t k = 0; k < out.size(); ++k) {
         PointToPlane& p = out[k];
         if (p.fate != BeamFate::met) continue;
@@ -75,60 +97,78 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
     }
 }
 
-void BeamAssociation::along_beams(const Rigid3& T, const RangeNoise& noise, std::size_t stride,
-                                  std::vector<PointToPlane>& out) const {
+void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const {
+    out.resize((beams_.size() + stride - 1) / stride);
     RayBatch rays;
     HitBatch hits;
-    Lanes<double> range_m{};
-    for (std::size_t i = 0; i < beams_.size();) {
-        for (rays.n = 0; rays.n < kLanes && i < beams_.size(); ++rays.n, i += stride) {
-            rays.put(rays.n, in_target(T, beams_[i]));
-            range_m[rays.n] = beams_[i].range_m;
+    Lanes<std::size_t> index{};
+    for (auto next = order_.begin(); next != order_.end();) {
+        for (rays.n = 0; rays.n < kLanes && next != order_.end(); ++next) {
+            if (next->second % stride != 0) continue;
+            index[rays.n] = next->second;
+            rays.put(rays.n++, in_target(T, beams_[next->second]));
         }
         tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
         for (std::size_t lane = 0; lane < rays.n; ++lane) {
-            PointToPlane& p = out.emplace_back();
-            if (!is_set(hits.met, lane)) continue;
+            const Beam& beam = beams_[index[lane]];
+            PointToPlane& p = out[index[lane] / stride] = {};
+            if (beam.edge) p.fate = BeamFate::edge;
+            if (beam.edge || !is_set(hits.met, lane)) continue;
             p.fate = BeamFate::met;
             p.surface_m = hits.position[lane];
             p.normal = hits.geometric_normal[lane];
-            p.distance_m = dot(p.normal, rays.direction[lane]) * (range_m[lane] - hits.range_m[lane]);
+            p.distance_m = dot(p.normal, rays.direction[lane]) * (beam.range_m - hits.range_m[lane]);
         }
-        if (noise.footprint_rad > 0) find_edges(rays, noise, std::span(out).last(rays.n));
     }
 }
 
-/// Around the rim of each footprint: a ray that leaves the plane of the axis's hit, or meets what the axis misses,
-/// shows an edge.
-void BeamAssociation::find_edges(const RayBatch& axes, const RangeNoise& noise,
-                                 std::span<PointToPlane> points) const {
+void BeamAssociation::find_edges(const Rigid3& T, const RangeNoise& noise) {
+    RayBatch axes;
+    HitBatch hits;
+    for (std::size_t first = 0; first < order_.size(); first += kLanes) {
+        std::uint32_t edges = 0;
+        axes.n = std::min(kLanes, order_.size() - first);
+        if (noise.footprint_rad > 0) {
+            for (std::size_t lane = 0; lane < axes.n; ++lane)
+                axes.put(lane, in_target(T, beams_[order_[first + lane].second]));
+            tracer_.intersect(at_rest_, axes, {&target_, 1}, hits);
+            edges = meeting_edges(axes, hits, noise);
+        }
+        for (std::size_t lane = 0; lane < axes.n; ++lane)
+            beams_[order_[first + lane].second].edge = is_set(edges, lane);
+    }
+}
+
+/// Around the rim of each footprint, and halfway to it: a ray that leaves the plane of the axis's hit, or meets
+/// what the axis misses, shows an edge.
+std::uint32_t BeamAssociation::meeting_edges(const RayBatch& axes, const HitBatch& met,
+                                             const RangeNoise& noise) const {
     constexpr int kRim = 6;
-    // A hexagon about the footprint.
-    const double tangent = std::tan(0.5 * noise.footprint_rad) / std::cos(3.14159265358979323846 / kRim);
+    // Hexagons about the footprint and inside of it.
+    const double tangent = kWider * std::tan(0.5 * noise.footprint_rad) / std::cos(kPi / kRim);
     RayBatch rays;
     HitBatch hits;
     rays.n = axes.n;
-    for (int k = 0; k < kRim; ++k) {
-        const double turn = 2 * 3.14159265358979323846 * k / kRim;
+    std::uint32_t edges = 0;
+    for (int k = 0; k < 2 * kRim; ++k) {
+        const double turn = kPi * k / kRim, radius = k % 2 == 0 ? tangent : 0.5 * tangent;
         for (std::size_t lane = 0; lane < axes.n; ++lane) {
             const Vec3 d = axes.direction[lane];
             const Vec3 x = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
             const Vec3 off = std::cos(turn) * x + std::sin(turn) * cross(d, x);
-            rays.put(lane, {axes.origin[lane], normalized(d + tangent * off)});
+            rays.put(lane, {axes.origin[lane], normalized(d + radius * off)});
         }
         tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
         for (std::size_t lane = 0; lane < axes.n; ++lane) {
-            PointToPlane& p = points[lane];
-            const bool met = is_set(hits.met, lane);
-            if (p.fate == BeamFate::met) {
-                const bool on_plane =
-                    met && std::abs(dot(p.normal, hits.position[lane] - p.surface_m)) < noise.range_m;
-                if (!on_plane) p.fate = BeamFate::edge;
-            } else if (met) {
-                p.fate = BeamFate::edge;
-            }
+            const bool here = is_set(hits.met, lane), there = is_set(met.met, lane);
+            const bool same =
+                here == there &&
+                (!here || std::abs(dot(met.geometric_normal[lane], hits.position[lane] - met.position[lane])) <
+                              kOnPlane * noise.range_m);
+            edges |= same ? 0u : 1u << lane;
         }
     }
+    return edges;
 }
 
 void BeamAssociation::around_beams(const Rigid3& T, double search_m, std::size_t stride,

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "estimator/cloud/range_points.h"
@@ -35,6 +36,10 @@ public:
     /// Sets the sweep. Allocates only for more points than ever before.
     void take(std::span<const RangePoint> points, const ApparentMotion& motion);
     [[nodiscard]] std::size_t size() const noexcept { return beams_.size(); }
+    /// The shortest range of the sweep.
+    [[nodiscard]] double nearest_m() const noexcept { return nearest_m_; }
+    /// Of the target about its origin.
+    [[nodiscard]] double reach_m() const noexcept { return tracer_.bounding_radius_m(target_); }
 
     /// For every `stride`-th point from the first, in order, at this pose at the time of the sweep. With `search_m`
     /// > 0, for poses that are far off, sixteen rays within that distance of the beam are traced and the hit
@@ -42,6 +47,10 @@ public:
     /// sigma_m is a quarter of `search_m` combined with the noise, so that all points within reach weigh alike.
     void associate(const Rigid3& T_lidar_target, const RangeNoise& noise, double search_m, std::size_t stride,
                    std::vector<PointToPlane>& out) const;
+
+    /// Finds the points in whose footprint a surface ends at this pose; they are of BeamFate::edge until the next
+    /// call. Without a footprint there are none.
+    void find_edges(const Rigid3& T_lidar_target, const RangeNoise& noise);
 
     /// The derivative of distance_m with an error of the pose (pose_estimate.h), for point `i` of the sweep.
     [[nodiscard]] Vector6 derivative(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const;
@@ -52,18 +61,21 @@ private:
         Quat turn{};               ///< of the target since then, LiDAR axes
         Vec3 origin_m, direction;  ///< turned back
         double range_m = 0;
+        bool edge = false;  ///< find_edges
     };
     [[nodiscard]] Ray in_target(const Rigid3& T_lidar_target, const Beam& beam) const noexcept;
-    void along_beams(const Rigid3& T, const RangeNoise& noise, std::size_t stride,
-                     std::vector<PointToPlane>& out) const;
-    void find_edges(const RayBatch& axes, const RangeNoise& noise, std::span<PointToPlane> points) const;
+    void along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const;
+    [[nodiscard]] std::uint32_t meeting_edges(const RayBatch& axes, const HitBatch& met,
+                                              const RangeNoise& noise) const;
     void around_beams(const Rigid3& T, double search_m, std::size_t stride, std::vector<PointToPlane>& out) const;
 
     const Tracer& tracer_;
     BodyPoses at_rest_;  ///< target coordinates are the tracer's world
     std::uint32_t target_;
     bool turning_ = false;
+    double nearest_m_ = 0;
     std::vector<Beam> beams_;
+    std::vector<std::pair<float, std::uint32_t>> order_;  ///< points, by neighbourhood
 };
 
 }  // namespace narpa

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/constants.h"
 #include "estimator/pose/median.h"
 
 namespace narpa {
@@ -171,8 +172,13 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     CloudEstimate out;
     Rigid3 T = search_m > 0 ? search(start, search_m, points, circles, out) : start;
     Vector6 last = Vector6::Zero();
-    double damping = 1;
+    double damping = 1, moved_m = 0;  // since edges were found
     for (int i = 0;; ++i) {
+        if (i == 0 || (out.settled && moved_m > edges_hold_m() && i < settings_.iterations)) {
+            association_.find_edges(T, settings_.noise);
+            moved_m = 0;
+            out.settled = false;
+        }
         const Pass pass = linearise(T, 0, 1, out);
         if (!pass.enough) break;
         if (out.settled || i == settings_.iterations) {
@@ -187,6 +193,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         if (step.dot(pass.hessian * last) < 0) damping *= 0.5;
         step *= damping;
         T = displaced(T, step);
+        moved_m += step.tail<3>().norm() + step.head<3>().norm() * association_.reach_m();
         ++out.iterations;
         out.settled = step.dot(pass.hessian * step) < std::pow(settings_.settled * pass.scatter, 2);
         last = step;
@@ -194,6 +201,12 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     out.T_lidar_target = T;
     out.credible = out.settled && share_is_more(out.explained, out.points - out.edges, settings_.explained_least);
     return out;
+}
+
+/// So far the surfaces may move before edges are found anew: the rim that is searched is wider by as much.
+double CloudIcp::edges_hold_m() const {
+    if (!(settings_.noise.footprint_rad > 0)) return kInfinity;
+    return 0.05 * settings_.noise.footprint_rad * association_.nearest_m();
 }
 
 /// Points whose beams miss the model draw at nothing: a face can stop short of its edge. A search about the minimum

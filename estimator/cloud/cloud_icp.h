@@ -69,6 +69,7 @@ private:
     [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
     [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
+    [[nodiscard]] double edges_hold_m() const;
     void draw_in(CloudEstimate& found);
     [[nodiscard]] static bool may_have_rivals(const CloudEstimate& e);
     void compete(CloudEstimate& found, double search_m);

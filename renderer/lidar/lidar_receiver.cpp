@@ -104,11 +104,11 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
             continue;
         }
         const auto met = std::span(met_).subspan(first_[i], sub_rays);
-        const double sunlight = static_cast<double>(met.front().sunlight);
-        EchoList list;
-        const std::size_t n = part(met, list);
         LidarEchoes& out = echoes[i] = {};
         out.sunlight = met.front().sunlight;
+        const auto sunlight = static_cast<double>(out.sunlight);
+        EchoList list;
+        const std::size_t n = part(met, list);
         double most = -1, second = -1;
         for (std::size_t k = 0; k < n; ++k) {
             const LidarEcho echo = measure(list[k], sunlight, i, k, draws);
@@ -184,7 +184,22 @@ void LidarReceiver::trace(const Tracer& tracer, const BodyPoses& at, const RayBa
     }
 }
 
-/// Sorts the sub-rays by range. Returns the number of echoes, the nearest first.
+/// Of `n` sub-rays those that make one echo, whose nearest is at `nearest_m`.
+LidarReceiver::Echo LidarReceiver::echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept {
+    double light = 0, moment = 0, velocity = 0, velocity_of_nearest = 0;
+    for (const LidarReturn& r : met) {
+        if (!(r.range_m > 0)) continue;
+        if (r.range_m == nearest_m) velocity_of_nearest = r.velocity_m_s;
+        const double l = light_of(r) / n;
+        light += l;
+        moment += l * (r.range_m - nearest_m);
+        velocity += l * r.velocity_m_s;
+    }
+    if (!(light > 0)) return {light, nearest_m, velocity_of_nearest};
+    return {light, nearest_m + moment / light, velocity / light};
+}
+
+/// Returns the number of echoes, the nearest first. Sorts the sub-rays by range where there may be several.
 std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept {
     if (sub_rays.size() == 1) {
         const LidarReturn& r = sub_rays.front();
@@ -193,28 +208,26 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
         return 1;
     }
     const auto n = static_cast<double>(sub_rays.size());
-    const float sunlight = sub_rays.front().sunlight;
+    double nearest_m = kInfinity, farthest_m = 0;
+    for (const LidarReturn& r : sub_rays) {
+        nearest_m = std::min(nearest_m, choose(r.range_m > 0, r.range_m, kInfinity));
+        farthest_m = std::max(farthest_m, r.range_m);
+    }
+    if (!(farthest_m > 0)) return 0;
+    if (farthest_m - nearest_m <= model_.pulse_length_m) {
+        echoes[0] = echo_of(sub_rays, nearest_m, n);
+        return 1;
+    }
     const auto end =
         std::partition(sub_rays.begin(), sub_rays.end(), [](const LidarReturn& r) { return r.range_m > 0; });
-    if (end == sub_rays.begin()) return 0;
     std::sort(sub_rays.begin(), end,
               [](const LidarReturn& a, const LidarReturn& b) { return a.range_m < b.range_m; });
-    sub_rays.front().sunlight = sunlight;
-    const double spacing_m = ((end - 1)->range_m - sub_rays.front().range_m) / n;
-    const double gap_m = std::max(model_.pulse_length_m, kMeanSpacings * spacing_m);
+    const double gap_m = std::max(model_.pulse_length_m, kMeanSpacings * (farthest_m - nearest_m) / n);
     std::size_t count = 0;
     for (auto begin = sub_rays.begin(); begin != end && count < kMostEchoes; ++count) {
         auto next = begin + 1;
         while (next != end && next->range_m - (next - 1)->range_m <= gap_m) ++next;
-        double light = 0, moment = 0, velocity = 0;
-        for (auto r = begin; r != next; ++r) {
-            const double l = light_of(*r) / n;
-            light += l;
-            moment += l * (r->range_m - begin->range_m);
-            velocity += l * r->velocity_m_s;
-        }
-        echoes[count] = {light, begin->range_m, begin->velocity_m_s};
-        if (light > 0) echoes[count] = {light, begin->range_m + moment / light, velocity / light};
+        echoes[count] = echo_of({begin, next}, begin->range_m, n);
         begin = next;
     }
     return count;

@@ -54,6 +54,7 @@ private:
     [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::uint32_t shots) noexcept;
     void trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted,
                ShotSettings settings, Draws& draws) noexcept;
+    [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
     [[nodiscard]] LidarEcho measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
                                     Draws& draws) const noexcept;

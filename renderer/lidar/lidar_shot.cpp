@@ -1,11 +1,13 @@
 #include "renderer/lidar/lidar_shot.h"
 
+#include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "base/each_isa.h"
 #include "renderer/geometry/poses_at.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/material/texture_lookup.h"
 
 namespace narpa {
 namespace {
@@ -44,36 +46,61 @@ float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, con
                               mean(bsdf(surface, surface.normal, sun->direction, back)));
 }
 
+/// As surface_at, of a lane. Most surfaces have no more than a picture of their colour: for these nothing else of
+/// the hit is read.
+Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i,
+                   const Vec3& direction) {
+    const Scene& scene = tracer.scene();
+    const Material& m = scene.materials[static_cast<std::size_t>(hits.material[i])];
+    if (m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0)
+        return surface_at(tracer, at, hits[i], direction, 0);
+    Surface s{.diffuse = m.diffuse,
+              .specular = m.specular,
+              .exponent = m.exponent,
+              .material = &m,
+              .normal = hits.shading_normal[i],
+              .outside = is_set(hits.outside, i)};
+    if (m.texture < 0 || !std::isfinite(hits.u[i]) || !std::isfinite(hits.v[i])) return s;
+    const TextureLayout layout = tracer.shape(static_cast<std::size_t>(hits.body[i])).properties().texture_layout;
+    s.diffuse = s.diffuse * texture_lookup(scene.textures[static_cast<std::size_t>(m.texture)], hits.u[i],
+                                           hits.v[i], {}, layout);
+    return s;
+}
+
 /// What the shot meets at the end of its path.
-LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Path& path, bool sunlight) {
+LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i,
+                      const Path& path, bool sunlight) {
     const Vec3 back = -path.direction;
-    const Surface surface = surface_at(tracer, at, hit, path.direction, 0);
+    const Surface surface = surface_of(tracer, at, hits, i, path.direction);
     const double cosine = dot(surface.normal, back);
     const double reflectivity = std::numbers::pi * mean(bsdf(surface, surface.normal, back, back)) +
                                 static_cast<double>(surface.material->retroreflectance);
     LidarReturn r{.range_m = path.range_m,
                   .reflectivity = static_cast<float>(path.throughput * cosine * reflectivity),
-                  .body = hit.body,
+                  .body = hits.body[i],
                   .cos_incidence = static_cast<float>(cosine),
                   .velocity_m_s = path.rate_m_s};
-    if (sunlight) r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hit, surface, back);
+    if (sunlight)
+        r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hits[i], surface, back);
     return r;
 }
 
 /// By the air on the piece of the path that ends in the hit, there and back.
-void dim(Path& path, const BodyPoses& at, const Vec3& from, const Hit& hit, const Medium& medium) {
+void dim(Path& path, const BodyPoses& at, const Vec3& from, const HitBatch& hits, std::size_t i,
+         const Medium& medium) {
     const double passes =
-        medium.lidar_transmittance(at, {from, path.direction, hit.time}, norm(hit.position - from));
+        medium.lidar_transmittance(at, {from, path.direction, hits.time[i]}, norm(hits.position[i] - from));
     path.throughput *= passes * passes;
 }
 
 /// Takes the hit as the end of a piece of the path.
-void advance(Path& path, const BodyPoses& at, const Hit& hit, const ShotSettings& settings) {
+void advance(Path& path, const BodyPoses& at, const HitBatch& hits, std::size_t i, const ShotSettings& settings) {
     // From a mirror on: rays leave it a little above, so that it does not meet itself.
-    path.range_m += path.range_m > 0 ? norm(hit.position - path.start) : hit.range_m;
-    path.start = hit.position;
+    const Vec3 position = hits.position[i];
+    path.range_m += path.range_m > 0 ? norm(position - path.start) : hits.range_m[i];
+    path.start = position;
     if (settings.motions.empty()) return;
-    const Vec3 velocity = velocity_at(settings, at, hit.body, hit.position, hit.time);
+    const Vec3 velocity = velocity_at(settings, at, hits.body[i], position, hits.time[i]);
     path.rate_m_s += dot(path.direction, velocity - path.velocity);
     path.velocity = velocity;
 }
@@ -115,17 +142,16 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
         Vec3Lanes directions;
         for (std::size_t i = 0; i < beams.n; ++i) {
             if (!is_set(going & hits.met, i)) continue;
-            const Hit hit = hits[i];
             Path& path = paths[i];
             if (settings.medium != nullptr)
-                dim(path, at, mirrors == 0 ? beams.origin[i] : path.start, hit, *settings.medium);
-            advance(path, at, hit, settings);
+                dim(path, at, mirrors == 0 ? beams.origin[i] : path.start, hits, i, *settings.medium);
+            advance(path, at, hits, i, settings);
             if (!(path.range_m < settings.range_max_m)) continue;
-            const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];
+            const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
             if (!settings.multipath || m.kind != Material::Kind::mirror) {
-                returns[i] = return_of(tracer, at, hit, path, is_set(settings.sunlight, i));
+                returns[i] = return_of(tracer, at, hits, i, path, is_set(settings.sunlight, i));
             } else if (mirrors < kMirrors) {
-                const Vec3 n = hit.shading_normal, d = path.direction;
+                const Vec3 n = hits.shading_normal[i], d = path.direction;
                 path.direction = normalized(d - 2 * dot(d, n) * n);
                 path.throughput *= mean(m.specular) * mean(m.specular);  // there and back
                 directions.put(i, path.direction);

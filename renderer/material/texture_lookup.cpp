@@ -148,6 +148,7 @@ double narrowness(const Texture& t, float v) {
 
 Filter filter_for(const Texture& t, const TextureFootprint& footprint, float v, TextureLayout layout) {
     Filter f;
+    if (footprint == TextureFootprint{}) return f;
     const Ellipse e = ellipse_of(t, footprint);
     const double length = 2 * e.major;
     if (length <= 1) return f;

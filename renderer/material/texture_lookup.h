@@ -22,6 +22,8 @@ enum class TextureLayout : std::uint8_t {
 /// circle.
 struct TextureFootprint {
     std::array<float, 2> axis1{}, axis2{};  ///< (du, dv)
+
+    friend bool operator==(const TextureFootprint&, const TextureFootprint&) = default;
 };
 
 /// Mean over the footprint: several trilinear lookups along its longer axis, up to 15, so that it may be 15 times

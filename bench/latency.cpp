@@ -56,7 +56,7 @@ Result<LatencyRow> measure_latency(const LatencyEnds& ends, const LatencySetting
     LatencyExchange x;
     std::thread sender([&] { send_all(ends, s, x); });
     LatencyRow row;
-    constexpr std::int64_t kTurn_ns = 50'000'000;
+    constexpr std::int64_t kPollPeriod_ns = 50'000'000;
     std::int64_t t_came_ns = monotonic_ns();
     const auto ended = [&] {
         const std::lock_guard lock(x.mutex);
@@ -64,7 +64,7 @@ Result<LatencyRow> measure_latency(const LatencyEnds& ends, const LatencySetting
     };
     const auto wanted = static_cast<std::size_t>(s.count);
     while (row.latencies_s.size() < wanted && !stop && !ended()) {
-        const auto number = ends.receive(kTurn_ns);
+        const auto number = ends.receive(kPollPeriod_ns);
         const std::int64_t now_ns = monotonic_ns();
         if (!number) {
             if (now_ns - t_came_ns > 4 * s.patience_ns) break;

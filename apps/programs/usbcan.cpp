@@ -68,9 +68,9 @@ Status run_usbcan(const UsbCanArguments& a) {
                "gs_usb adapter {} at {}:{}; on the host, as root: usbip --tcp-port {} attach -r HOST -b {}\n",
                a.serial, listen->host, (*server)->port(), (*server)->port(), UsbIpServer::kBusId);
     notify_ready(a.ready_fd, fmt::format("USBIP={}:{}\n", listen->host, (*server)->port()));
-    constexpr std::int64_t kTurn_ns = 100'000'000;
+    constexpr std::int64_t kPollPeriod_ns = 100'000'000;
     while (!stop_flag().load(std::memory_order_relaxed))
-        if (adapter.turn(**bus, kTurn_ns)) (*server)->wake();
+        if (adapter.turn(**bus, kPollPeriod_ns)) (*server)->wake();
     const UsbIpCounters usb = (*server)->counters();
     server->reset();
     const GsUsbDeviceCounters c = adapter.counters();

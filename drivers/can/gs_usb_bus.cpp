@@ -74,7 +74,7 @@ public:
     }
 
 private:
-    static constexpr std::int64_t kTurn_ns = 100'000'000;
+    static constexpr std::int64_t kPollPeriod_ns = 100'000'000;
 
     /// What the thread has counted. `sent` are the frames that the bus has or may still get.
     void account() noexcept {
@@ -96,7 +96,7 @@ private:
         while (!shared_->ending.load(std::memory_order_acquire)) {
             try {
                 if (link_) {
-                    if (!link_->turn(kTurn_ns)) lose();
+                    if (!link_->turn(kPollPeriod_ns)) lose();
                 } else {
                     wait_without_adapter(retry);
                 }
@@ -116,7 +116,7 @@ private:
     void wait_without_adapter(RetryTimer& retry) {
         for (CanFrame dropped; shared_->to_send.pop(dropped);) ++shared_->lost;
         std::array<pollfd, 1> fds{{{shared_->wanted.get(), POLLIN, 0}}};
-        wait_ready(fds, retry.limit(kTurn_ns));
+        wait_ready(fds, retry.limit(kPollPeriod_ns));
         eventfd_t count = 0;
         ::eventfd_read(shared_->wanted.get(), &count);
         if (!retry.due()) return;

@@ -48,7 +48,7 @@ namespace {
 
 constexpr std::size_t kTransfers = 8, kTransferBytes = 65536;
 constexpr std::int64_t kBridgePatience_ns = kSecond_ns;  // with a bridge that takes nothing
-constexpr std::int64_t kTurn_ns = 20'000'000;            // between two looks at the time that is left
+constexpr std::int64_t kServePeriod_ns = 20'000'000;     // how often the time that is left is checked
 
 /// A frame in transfers: what ends a frame that was cut short, header and pixels, and what ends this one.
 class FramePieces {
@@ -137,7 +137,7 @@ private:
                 return !cut_;
             }
             if (pieces.empty() && !any_under_way()) break;
-            link_->serve(kTurn_ns);
+            link_->serve(kServePeriod_ns);
         }
         cut_ = false;
         return true;
@@ -149,7 +149,7 @@ private:
             link_->cancel_outs();
             for (const std::int64_t until_ns = monotonic_ns() + kBridgePatience_ns;
                  any_under_way() && !link_->gone() && monotonic_ns() < until_ns;)
-                link_->serve(kTurn_ns);
+                link_->serve(kServePeriod_ns);
             if (any_under_way() || (stalled_ && !link_->clear_halt_out())) link_->give_up();
         }
         if (!link_->gone()) return;

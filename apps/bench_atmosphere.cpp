@@ -71,7 +71,10 @@ Outcome bench_atmosphere(const AirBenchOptions& o) {
     print_rows(e.steps, "steps", "us a ray");
     print_rows(e.tables, "heights of the tables", "CPU us to make");
     print_rows(e.bands, "wavelengths a band", "us a ray");
+    say("\ntiles of 8 x 8 pixels by interpolation, against each ray by itself");
+    print_rows(e.bundles, "tolerance, 1e-4", "us a ray");
     return nlohmann::json{{"passed", true},
+                          {"tiles", air_rows(e.bundles, "tolerance_1e4")},
                           {"shells", air_rows(e.shells, "shells")},
                           {"steps", air_rows(e.steps, "steps")},
                           {"tables", air_rows(e.tables, "heights")},

@@ -11,7 +11,7 @@ namespace narpa {
 
 /// With one setting, all others being the finest.
 struct AirErrorRow {
-    int setting = 0;           ///< shells, steps, heights of the table, wavelengths of a band
+    int setting = 0;  ///< shells, steps, heights of the table, wavelengths of a band, 1e4 times the tolerance
     double rms = 0, most = 0;  ///< relative errors over views; refraction: arcsec at 85 and at 89 degrees
     double time_s = 0;         ///< of a ray, or to make the tables; refraction: of a ray
     std::size_t bytes = 0;     ///< of the tables
@@ -20,10 +20,12 @@ struct AirErrorRow {
 
 struct AirErrors {
     std::vector<AirErrorRow> shells, steps, tables, bands;
+    std::vector<AirErrorRow> bundles;  ///< of tiles of 8 x 8 pixels against each ray by itself (ray_bundle.h)
 };
 
 /// Views of the Earth's sky at turbidity 3: from the ground, from an aeroplane and from orbit, with the Sun from 60
-/// degrees above the horizon to 6 below. `progress` is told each step.
+/// degrees above the horizon to 6 below; views darker than 1e-6 of the irradiance per sr are left out. `progress`
+/// is told each step.
 [[nodiscard]] AirErrors measure_air_errors(const std::function<void(const std::string&)>& progress);
 
 /// A physical sky, Hosek and Wilkie's and the path-traced one at one place: radiance of the green band for an

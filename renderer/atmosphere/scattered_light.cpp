@@ -6,12 +6,39 @@
 #include <cmath>
 #include <limits>
 
+#include "base/each_isa.h"
 #include "renderer/atmosphere/panel_scattering.h"
 
 namespace narpa {
 namespace {
 
 constexpr float kSqrt4Pi = 3.5449077f;
+
+/// Adds the irradiance of a surface, whose normal has the components nz along the zenith and nx towards the Sun.
+NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lanes, float nz, float nx,
+                                    Air::Spectrum& out) noexcept {
+    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P. Hanrahan, SIGGRAPH 2001).
+    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f, -0.13089969f, 0.0f, 0.04908739f};
+    static_assert(kLobe.size() == kMaxDegree + 1);
+    Harmonics y;
+    harmonics(nz, nx, kMaxDegree, y);
+    Air::Spectrum sum = out;
+    std::size_t i = 0;
+    for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
+        if (kLobe[degree] == 0) {
+            i += degree + 1;
+            continue;
+        }
+        for (std::size_t m = 0; m <= degree; ++m, ++i)
+            for (std::size_t l = 0; l < lanes; ++l) {
+                const std::size_t at = i * lanes + l;
+                sum[l] += kLobe[degree] * y[i] *
+                          (c.weight[0] * c.at[0][at] + c.weight[1] * c.at[1][at] + c.weight[2] * c.at[2][at] +
+                           c.weight[3] * c.at[3][at]);
+            }
+    }
+    out = sum;
+}
 
 }  // namespace
 
@@ -98,23 +125,11 @@ ScatteredLight::Spectrum ScatteredLight::skylight(const Vec3& position, const Ve
     const AirTables& t = tables_;
     const AirTables::Corners c =
         t.corners(static_cast<float>(distance_to_horizon_m(air_, h)), static_cast<float>(sun));
-    const std::size_t lanes = t.lanes;
-    Harmonics y;
-    harmonics(std::clamp(nz, -1.0f, 1.0f), nx, kMaxDegree, y);
-    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P. Hanrahan, SIGGRAPH 2001).
-    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f, -0.13089969f, 0.0f, 0.04908739f};
-    static_assert(kLobe.size() == kMaxDegree + 1);
-    for (std::size_t k = 0; k < 4; ++k) {
-        std::size_t i = 0;
-        for (std::size_t degree = 0; degree <= kMaxDegree; ++degree)
-            for (std::size_t m = 0; m <= degree; ++m, ++i)
-                for (std::size_t l = 0; l < lanes; ++l)
-                    out[l] += c.weight[k] * kLobe[degree] * y[i] * c.at[k][i * lanes + l];
-    }
+    add_cosine_lobe(c, t.lanes, std::clamp(nz, -1.0f, 1.0f), nx, out);
     const auto facing = static_cast<float>(std::max(0.0, dot(normal, to_sun)));
     if (facing > 0) {
         const Spectrum scaled = sunlight(h, sun, true), direct = sunlight(h, sun, false);
-        for (std::size_t l = 0; l < lanes; ++l) out[l] += facing * (scaled[l] - direct[l]);
+        for (std::size_t l = 0; l < t.lanes; ++l) out[l] += facing * (scaled[l] - direct[l]);
     }
     for (float& x : out) x = std::max(x, 0.0f);
     return out;

@@ -15,6 +15,22 @@ namespace {
 constexpr std::size_t kAzimuths = 8;
 constexpr double kConverged = 2e-5;
 
+/// A ray's way through the air, ready to be lit.
+struct Way {
+    PanelEnds ends;
+    AirColumns columns;
+    std::array<AirPanel, PanelEnds::kMost> panels;
+    std::array<PanelTransmittance, PanelEnds::kMost> to_nodes;
+
+    void fill(const Air& air, const PanelRule& rule, const Vec3& origin, const Vec3& direction) {
+        columns = {};
+        for (std::size_t k = 0; k + 1 < ends.n; ++k) {
+            fill_panel(air, rule, origin, direction, ends.t_m[k], ends.t_m[k + 1], columns, panels[k]);
+            attenuate(air, panels[k], to_nodes[k]);
+        }
+    }
+};
+
 }  // namespace
 
 /// As in AirTables.
@@ -69,18 +85,14 @@ void ScatteredLight::gather(std::size_t height, const AirResolution& resolution,
                 const double b = r * up;
                 range = -b - std::sqrt(std::max(0.0, b * b - h * (2 * air_.ground_radius_m() + h)));
             }
-            const PanelEnds ends = panel_ends(air_, origin, direction, range, nullptr);
-            std::array<AirPanel, PanelEnds::kMost> panels;
-            AirColumns columns;
-            std::array<PanelTransmittance, PanelEnds::kMost> to_nodes;
-            for (std::size_t k = 0; k + 1 < ends.n; ++k) {
-                fill_panel(air_, rule_, origin, direction, ends.t_m[k], ends.t_m[k + 1], columns, panels[k]);
-                attenuate(air_, panels[k], to_nodes[k]);
-            }
+            Way whole, parted;
+            whole.ends = panel_ends(air_, origin, direction, range, nullptr);
+            whole.fill(air_, rule_, origin, direction);
             Spectrum through{};
             for (std::size_t l = 0; l < lanes; ++l)
-                through[l] = std::exp(-(air_.gas[l] * columns.gas + air_.scaled_extinction[l] * columns.aerosol +
-                                        air_.ozone[l] * columns.ozone));
+                through[l] =
+                    std::exp(-(air_.gas[l] * whole.columns.gas + air_.scaled_extinction[l] * whole.columns.aerosol +
+                               air_.ozone[l] * whole.columns.ozone));
             for (std::size_t j = 0; j < t.suns; ++j) {
                 const double sun = t.sun_cosine(j), sun_sine = std::sqrt((1 - sun) * (1 + sun));
                 for (std::size_t a = 0; a < kAzimuths; ++a) {
@@ -88,9 +100,18 @@ void ScatteredLight::gather(std::size_t height, const AirResolution& resolution,
                     const double wx = sine * std::cos(phi), nu = wx * sun_sine + up * sun;
                     const AirRay ray{static_cast<float>(r), static_cast<float>(up), static_cast<float>(sun),
                                      static_cast<float>(nu), false};
+                    const Way* way = &whole;
+                    if (once) {  // direct light ends at the edge of the planet's shadow
+                        const Vec3 to_sun{sun_sine * std::cos(phi), sun_sine * std::sin(phi), sun};
+                        parted.ends = panel_ends(air_, origin, direction, range, &to_sun);
+                        if (parted.ends.n > whole.ends.n) {
+                            parted.fill(air_, rule_, origin, direction);
+                            way = &parted;
+                        }
+                    }
                     Spectrum light{};
-                    for (std::size_t k = 0; k + 1 < ends.n; ++k)
-                        (once ? add_once : add_again)(t, air_, panels[k], to_nodes[k], ray, light);
+                    for (std::size_t k = 0; k + 1 < way->ends.n; ++k)
+                        (once ? add_once : add_again)(t, air_, way->panels[k], way->to_nodes[k], ray, light);
                     if (side == 1) {
                         const double there = (r * sun + range * nu) / air_.ground_radius_m();
                         const Spectrum lit = once ? sunlight(0, there, true) : ground_irradiance(there);

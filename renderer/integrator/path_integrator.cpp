@@ -1,29 +1,38 @@
+#include <algorithm>
 #include <array>
 #include <limits>
 
 #include "renderer/integrator/integrator.h"
+#include "renderer/integrator/uninitialized_array.h"
 
 namespace narpa {
 namespace {
 
-/// Each ray by itself: of lanes `lanes` of one batch.
-void trace_paths(const Frame& f, CameraBatch& p, std::uint32_t lanes, RgbLanes& radiance) {
-    PhaseClock clock(p.times);
-    Lanes<Ray> rays;
-    Lanes<Hit> hits;
-    Lanes<Rgb> light;
-    Lanes<std::uint32_t> number, sample;
+/// Batches whose paths go together.
+constexpr std::size_t kTogether = 8;
+
+/// Each ray by itself, of up to kTogether batches: of the lanes that `lanes` gives for a batch. `put(batch, lane,
+/// radiance)` takes the results.
+template <class LanesOf, class Put>
+void trace_paths(const Frame& f, std::span<CameraBatch> batches, LanesOf&& lanes, Put&& put) {
+    PhaseClock clock(batches.front().times);
+    UninitializedArray<Ray, kTogether * kLanes> rays;
+    UninitializedArray<Hit, kTogether * kLanes> hits;
+    UninitializedArray<Rgb, kTogether * kLanes> light;
+    std::array<std::uint32_t, kTogether * kLanes> number, sample;
     std::size_t n = 0;
-    for_each_lane(lanes, [&](std::size_t i) {
-        rays[n] = p.rays[i], hits[n] = p.hits[i];
-        number[n] = p.number[i], sample[n++] = p.sample[i];
-    });
-    p.rays_traced +=
-        path_radiance(f.render_scene, f.at, f.path, std::span(rays).first(n), std::span(hits).first(n),
+    for (const CameraBatch& p : batches)
+        for_each_lane(lanes(p), [&](std::size_t i) {
+            rays[n] = p.rays[i], hits[n] = p.hits[i];
+            number[n] = p.number[i], sample[n++] = p.sample[i];
+        });
+    batches.front().rays_traced +=
+        path_radiance(f.render_scene, f.at, f.path, rays.first(n), hits.first(n),
                       {f.settings.seed, f.settings.frame, std::span(number).first(n), std::span(sample).first(n)},
-                      std::span(light).first(n));
+                      light.first(n));
     n = 0;
-    for_each_lane(lanes, [&](std::size_t i) { radiance.put(i, light[n++]); });
+    for (std::size_t k = 0; k < batches.size(); ++k)
+        for_each_lane(lanes(batches[k]), [&](std::size_t i) { put(k, i, light[n++]); });
     clock.ends(Phase::indirect);
 }
 
@@ -65,7 +74,9 @@ void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<cons
 }  // namespace
 
 void DirectIntegrator::radiance(const Frame& f, CameraBatch& p, RgbLanes& radiance) const noexcept {
-    trace_paths(f, p, lanes_below(p.rays.n), radiance);
+    trace_paths(
+        f, std::span(&p, 1), [](const CameraBatch& batch) { return lanes_below(batch.rays.n); },
+        [&](std::size_t, std::size_t i, const Rgb& light) { radiance.put(i, light); });
 }
 void DirectIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
                                 std::span<BatchRadiance> light) const noexcept {
@@ -73,8 +84,12 @@ void DirectIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
         light[k].direct.fill({});
         light[k].path.fill({});
         batches[k].variance.fill(0);
-        trace_paths(f, batches[k], batches[k].path_lanes & lanes_below(batches[k].rays.n), light[k].path);
     }
+    for (std::size_t first = 0; first < batches.size(); first += kTogether)
+        trace_paths(
+            f, batches.subspan(first, std::min(kTogether, batches.size() - first)),
+            [](const CameraBatch& batch) { return batch.path_lanes & lanes_below(batch.rays.n); },
+            [&](std::size_t k, std::size_t i, const Rgb& r) { light[first + k].path.put(i, r); });
 }
 
 void PathIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,

@@ -109,6 +109,7 @@ void Wavefront::extend() {
 
 /// Adds what the rays have found; paths that have escaped, or that end here, leave.
 void Wavefront::arrive(int vertex) {
+    if (medium_ != nullptr) find_segments(vertex);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < n_; ++i) {
         Path& path = paths_[i];
@@ -117,7 +118,10 @@ void Wavefront::arrive(int vertex) {
         if (lights_.any_with_extent())
             add(path, lights_.radiance_before(range_m, at_, path.start, group_, directions_[i], path.direction_pdf,
                                               medium_));
-        if (medium_ != nullptr) add_segment(i, vertex);
+        if (medium_ != nullptr) {
+            add(path, segments_[i].in_scattering);
+            path.throughput = path.throughput * segments_[i].transmittance;
+        }
         if (is_escaped) add(path, escaped(path, directions_[i], vertex));
         if (is_escaped || (vertex > 0 && settings_.direct)) continue;
         keep(i, kept);
@@ -126,16 +130,18 @@ void Wavefront::arrive(int vertex) {
     n_ = kept;
 }
 
-/// The medium along the ray.
-void Wavefront::add_segment(std::size_t i, int vertex) {
-    Path& path = paths_[i];
-    const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[path.ray]);
-    const double u = numbers.point(numbers_.sample[path.ray], medium_group(vertex))[0];
-    const double range_m = hits_[i].body < 0 ? kInfinity : hits_[i].range_m;
-    const Ray ray{path.start.anchor + path.start.offset, directions_[i], path.start.time};
-    const MediumSegment segment = medium_->along(at_, ray, range_m, u);
-    add(path, segment.in_scattering);
-    path.throughput = path.throughput * segment.transmittance;
+/// The medium along the rays.
+void Wavefront::find_segments(int vertex) {
+    UninitializedArray<MediumRay, kWavefront> rays;
+    for (std::size_t i = 0; i < n_; ++i) {
+        const Path& path = paths_[i];
+        rays[i] = {{path.start.anchor + path.start.offset, directions_[i], path.start.time},
+                   hits_[i].body < 0 ? kInfinity : hits_[i].range_m};
+        if (!medium_->uses_random_numbers()) continue;
+        const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[path.ray]);
+        rays[i].u = numbers.point(numbers_.sample[path.ray], medium_group(vertex))[0];
+    }
+    medium_->along_each(at_, rays.first(n_), segments_.first(n_));
 }
 
 Rgb Wavefront::escaped(const Path& path, const Vec3& direction, int vertex) const {

@@ -59,7 +59,7 @@ private:
     // Extend.
     void extend();
     void arrive(int vertex);
-    void add_segment(std::size_t i, int vertex);
+    void find_segments(int vertex);
     void shade(std::size_t i);
     [[nodiscard]] Rgb ambient(std::size_t i) const;
     [[nodiscard]] Rgb escaped(const Path& path, const Vec3& direction, int vertex) const;
@@ -125,8 +125,9 @@ private:
     using PerPath = UninitializedArray<T, kWavefront>;
     PerPath<Path> paths_;
     PerPath<PathVertex> vertices_;
-    PerPath<Vec3> directions_;  ///< of the rays
-    PerPath<Hit> hits_;         ///< where the rays start; after `extend` where they end
+    PerPath<Vec3> directions_;         ///< of the rays
+    PerPath<MediumSegment> segments_;  ///< along the rays, where there is a medium
+    PerPath<Hit> hits_;                ///< where the rays start; after `extend` where they end
     std::size_t n_shadow_ = 0, n_to_lights_ = 0, n_to_surfaces_ = 0;
     PerPath<ShadowRay> shadow_rays_;  ///< without an end
     PerPath<ShadowRay> to_lights_, to_surfaces_;

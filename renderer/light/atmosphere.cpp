@@ -1,5 +1,7 @@
 #include "renderer/light/atmosphere.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace narpa {
@@ -7,6 +9,8 @@ namespace {
 
 /// Wavelength of the LiDARs' beams.
 constexpr double kLidar_m = 905e-9;
+/// Rays that start so near to each other start at one place: as a lens's do.
+constexpr double kOnePlace_m = 1;
 
 AirResolution resolution_of(const Atmosphere& a) {
     AirResolution r;
@@ -37,20 +41,46 @@ AtmosphereMedium::Frame AtmosphereMedium::frame_at(const BodyPoses& at, double t
     return {at.T_world_body_at(body_, time), scale_};
 }
 
+std::optional<Vec3> AtmosphereMedium::to_sun(const Frame& frame) const noexcept {
+    if (!sun_) return std::nullopt;
+    return normalized(frame.direction(sun_->direction));
+}
+
+MediumSegment AtmosphereMedium::segment(const AirLight& light) const noexcept {
+    if (!sun_) return {light.transmittance, {}};
+    return {light.transmittance, static_cast<float>(sun_->irradiance_w_m2) * light.in_scattering};
+}
+
 MediumSegment AtmosphereMedium::along(const BodyPoses& at, const Ray& ray, double range_m, double) const noexcept {
     const Frame frame = frame_at(at, ray.time);
     const Vec3 toward = frame.direction(ray.direction);
     const double metre = norm(toward);
-    const Vec3 origin = frame.point(ray.origin), direction = toward / metre;
-    const Air& air = light_.air();
-    if (!sun_) {
-        const AirColumns c = columns_along(air, lidar_rule_, origin, direction, range_m * metre);
-        return {transmittance_of(air, c), {}};
+    const std::optional<Vec3> sun = to_sun(frame);
+    return segment(
+        air_along(light_, frame.point(ray.origin), toward / metre, range_m * metre, sun ? &*sun : nullptr));
+}
+
+void AtmosphereMedium::along_each(const BodyPoses& at, std::span<const MediumRay> rays,
+                                  std::span<MediumSegment> segments) const noexcept {
+    if (rays.empty()) return;
+    const Ray& first = rays.front().ray;
+    const auto beside = [&](const MediumRay& r) {
+        return r.ray.time == first.time && norm(r.ray.origin - first.origin) <= kOnePlace_m;
+    };
+    if (rays.size() > RayBundle::kMost || !std::ranges::all_of(rays, beside))
+        return Medium::along_each(at, rays, segments);
+    const Frame frame = frame_at(at, first.time);
+    std::array<RayBundle::Ray, RayBundle::kMost> bundle;
+    std::array<AirLight, RayBundle::kMost> light;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Vec3 toward = frame.direction(rays[i].ray.direction);
+        const double metre = norm(toward);
+        bundle[i] = {toward / metre, rays[i].range_m * metre};
     }
-    const Vec3 to_sun = normalized(frame.direction(sun_->direction));
-    const ScatteredLight::Segment s = light_.along(origin, direction, range_m * metre, to_sun);
-    return {transmittance_of(air, s.columns),
-            static_cast<float>(sun_->irradiance_w_m2) * bands_of(air, s.in_scattering)};
+    const std::optional<Vec3> sun = to_sun(frame);
+    RayBundle(light_, frame.point(first.origin), sun ? &*sun : nullptr)
+        .trace(std::span(bundle).first(rays.size()), light);
+    for (std::size_t i = 0; i < rays.size(); ++i) segments[i] = segment(light[i]);
 }
 
 Rgb AtmosphereMedium::transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept {

@@ -8,7 +8,7 @@
 
 #include <optional>
 
-#include "renderer/atmosphere/scattered_light.h"
+#include "renderer/atmosphere/ray_bundle.h"
 #include "renderer/light/medium.h"
 #include "renderer/scene/scene.h"
 
@@ -21,6 +21,10 @@ public:
 
     [[nodiscard]] MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                       double u) const noexcept override;
+    [[nodiscard]] bool uses_random_numbers() const noexcept override { return false; }
+    /// Camera rays of one moment from one place: by interpolation (renderer/atmosphere/ray_bundle.h).
+    void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
+                    std::span<MediumSegment> segments) const noexcept override;
     [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;
     [[nodiscard]] Rgb ambient(const BodyPoses& at, const Vec3& position, const Vec3& normal,
                               double time) const noexcept override;
@@ -43,6 +47,8 @@ private:
         }
     };
     [[nodiscard]] Frame frame_at(const BodyPoses& at, double time) const noexcept;
+    [[nodiscard]] std::optional<Vec3> to_sun(const Frame& frame) const noexcept;
+    [[nodiscard]] MediumSegment segment(const AirLight& light) const noexcept;
 
     std::size_t body_;
     Vec3 scale_{1, 1, 1};

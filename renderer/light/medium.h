@@ -4,6 +4,9 @@
 /// without one pays nothing.
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 #include "base/vec3.h"
 #include "renderer/geometry/tracer.h"
 
@@ -13,6 +16,12 @@ namespace narpa {
 struct MediumSegment {
     Rgb transmittance{1, 1, 1};  ///< part of the radiance from its end that reaches its start
     Rgb in_scattering{};         ///< radiance that arises along it and reaches its start, W m^-2 sr^-1
+};
+
+/// Arguments of Medium::along.
+struct MediumRay {
+    Ray ray;
+    double range_m = 0, u = 0;
 };
 
 /// Thread-safe; allocates nothing when it is evaluated.
@@ -25,6 +34,15 @@ public:
     /// the integral.
     [[nodiscard]] virtual MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                               double u) const noexcept = 0;
+    /// False: the integral is exact, and `u` is not used.
+    [[nodiscard]] virtual bool uses_random_numbers() const noexcept { return true; }
+    /// The same of several rays that start side by side, as a tile's do: each by itself, unless a kind can do with
+    /// less.
+    virtual void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
+                            std::span<MediumSegment> segments) const noexcept {
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            segments[i] = along(at, rays[i].ray, rays[i].range_m, rays[i].u);
+    }
     /// For shadow rays.
     [[nodiscard]] virtual Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept = 0;
     /// Method "direct": radiance of an even light that a surface at this place reflects, beside

@@ -19,6 +19,8 @@ namespace {
 
 constexpr double kSunRadius_rad = 0.00465, kArcsec = 3600 * kDegPerRad;
 
+constexpr std::array kSunElevations_deg{60.0, 20.0, 5.0, -2.0, -6.0};
+
 struct AirView {
     Vec3 from, direction, to_sun;
 };
@@ -30,7 +32,7 @@ Vec3 sky_direction(double zenith_deg, double azimuth_deg) {
 
 std::vector<AirView> sky_views(const AirDescription& air) {
     std::vector<AirView> views;
-    for (const double elevation : {60.0, 20.0, 5.0, -2.0, -6.0})
+    for (const double elevation : kSunElevations_deg)
         for (const double azimuth : {20.0, 100.0, 180.0}) {
             const Vec3 to_sun = sky_direction(90 - elevation, 0);
             for (const double zenith : {5.0, 45.0, 70.0, 84.0})
@@ -54,22 +56,29 @@ std::vector<Rgb> seen(const ScatteredLight& light, const std::vector<AirView>& v
     return out;
 }
 
-/// Radiance for an irradiance of 1, 1/sr, below which a view is too dark to count: a hundred-thousandth of the
-/// day's sky. The night side of the limb goes down to 1e-11.
-constexpr double kDarkest = 1e-6;
+/// A camera that is exposed for the brightest view sees none of what is fainter than this part of it. The night
+/// side of the limb goes down to 1e-8.
+constexpr double kFaintest = 1e-3;
 
+/// Views, one after the other for each elevation of the Sun.
 void set_error(AirErrorRow& row, const std::vector<Rgb>& found, const std::vector<Rgb>& exact) {
+    const std::size_t of_sun = exact.size() / kSunElevations_deg.size();
     double squares = 0;
     std::size_t n = 0;
-    for (std::size_t i = 0; i < found.size(); ++i)
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+        const auto first = exact.begin() + static_cast<std::ptrdiff_t>(i / of_sun * of_sun);
+        float brightest = 0;
+        for (auto view = first; view != first + static_cast<std::ptrdiff_t>(of_sun); ++view)
+            brightest = std::max({brightest, view->x, view->y, view->z});
         for (int band = 0; band < 3; ++band) {
             const double truth = static_cast<double>(exact[i][band]);
-            if (truth < kDarkest) continue;
+            if (truth < kFaintest * static_cast<double>(brightest)) continue;
             const double error = static_cast<double>(found[i][band]) / truth - 1;
             squares += error * error;
             row.most = std::max(row.most, std::abs(error));
             ++n;
         }
+    }
     row.rms = std::sqrt(squares / static_cast<double>(n));
 }
 

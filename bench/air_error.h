@@ -24,8 +24,8 @@ struct AirErrors {
 };
 
 /// Views of the Earth's sky at turbidity 3: from the ground, from an aeroplane and from orbit, with the Sun from 60
-/// degrees above the horizon to 6 below; views darker than 1e-6 of the irradiance per sr are left out. `progress`
-/// is told each step.
+/// degrees above the horizon to 6 below. Views fainter than a thousandth of the brightest with the same Sun are
+/// left out. `progress` is told each step.
 [[nodiscard]] AirErrors measure_air_errors(const std::function<void(const std::string&)>& progress);
 
 /// A physical sky, Hosek and Wilkie's and the path-traced one at one place: radiance of the green band for an

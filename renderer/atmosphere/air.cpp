@@ -98,6 +98,23 @@ AirCoefficients coefficients(const AirDescription& air, double wavelength_m) {
     return c;
 }
 
+namespace {
+
+/// Over the wavelengths that a node stands for: ozone's absorption has more structure than the nodes resolve.
+double mean_ozone_absorption(const AirDescription& air, const SpectralNode& node) {
+    constexpr int kSteps = 16;
+    double sum = 0, weights = 0;
+    for (int i = 0; i < kSteps; ++i) {
+        const double wavelength_m = node.from_m + (node.to_m - node.from_m) * (i + 0.5) / kSteps;
+        const double weight = planck(wavelength_m);
+        sum += weight * coefficients(air, wavelength_m).ozone_absorption;
+        weights += weight;
+    }
+    return sum / weights;
+}
+
+}  // namespace
+
 std::vector<SpectralNode> spectral_nodes(int per_band) {
     constexpr std::array<std::array<double, 2>, 3> kBands_m{{{580e-9, 680e-9}, {490e-9, 580e-9}, {400e-9, 490e-9}}};
     const Quadrature rule = gauss_legendre(static_cast<std::size_t>(per_band));
@@ -108,7 +125,8 @@ std::vector<SpectralNode> spectral_nodes(int per_band) {
         const std::size_t first = nodes.size();
         for (std::size_t i = 0; i < rule.node.size(); ++i) {
             const double wavelength_m = low + (high - low) * rule.node[i];
-            nodes.push_back({wavelength_m, band, rule.weight[i] * planck(wavelength_m)});
+            const double from_m = i == 0 ? low : nodes.back().to_m, to_m = from_m + (high - low) * rule.weight[i];
+            nodes.push_back({wavelength_m, band, rule.weight[i] * planck(wavelength_m), from_m, to_m});
             sum += nodes.back().weight;
         }
         for (std::size_t i = first; i < nodes.size(); ++i) nodes[i].weight /= sum;
@@ -119,7 +137,9 @@ std::vector<SpectralNode> spectral_nodes(int per_band) {
 Air::Air(const AirDescription& description, int per_band)
     : description_(description), nodes_(spectral_nodes(per_band)), lanes_((nodes_.size() + 7) / 8 * 8) {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-        fill(i, coefficients(description, nodes_[i].wavelength_m));
+        AirCoefficients c = coefficients(description, nodes_[i].wavelength_m);
+        c.ozone_absorption = mean_ozone_absorption(description, nodes_[i]);
+        fill(i, c);
         Spectrum& weights = nodes_[i].band == 0 ? red : nodes_[i].band == 1 ? green : blue;
         weights[i] = static_cast<float>(nodes_[i].weight);
     }

@@ -23,8 +23,9 @@ struct AirCoefficients {
 /// A wavelength that stands for a part of one of the camera's bands (solar_bands.h).
 struct SpectralNode {
     double wavelength_m = 0;
-    int band = 0;       ///< 0 red, 1 green, 2 blue
-    double weight = 0;  ///< of sunlight in the band; those of a band add up to 1
+    int band = 0;                 ///< 0 red, 1 green, 2 blue
+    double weight = 0;            ///< of sunlight in the band; those of a band add up to 1
+    double from_m = 0, to_m = 0;  ///< wavelengths that it stands for
 };
 /// Red 580 to 680 nm, green 490 to 580, blue 400 to 490: `per_band` Gauss points of each, weighted with sunlight as
 /// a blackbody of 5772 K.

@@ -2,12 +2,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
 #include <span>
 #include <sstream>
 #include <type_traits>
+#include <utility>
 
 #include "base/nearest_name.h"
 #include "base/result.h"
@@ -272,6 +274,22 @@ const CLI::App& chosen(const CLI::App& app) {
     return commands.empty() ? app : chosen(*commands.front());
 }
 
+/// What other renderers and tools call options of narpa's.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kOtherOptions{
+    {{"--samples", "--spp"},
+     {"--bounces", "--max-depth"},
+     {"--resolution", "--size"},
+     {"--interface", "--can"},
+     {"--seconds", "--duration"},
+     {"--integrator", "--method"}}};
+
+std::string option_meant(const std::string& option, const std::vector<std::string>& known) {
+    for (const auto& [others, ours] : kOtherOptions)
+        if (option == others && std::ranges::find(known, ours) != known.end())
+            return "; did you mean \"" + std::string(ours) + "\"?";
+    return did_you_mean(option, known);
+}
+
 std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<char* const> words) {
     const CLI::App& command = chosen(app);
     const std::string name = full_name(command), help = "\n" + name + " --help has all options, and examples";
@@ -283,7 +301,7 @@ std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<
     for (const std::string word : words) {
         const std::string option = word.substr(0, word.find('='));
         if (option.starts_with("--") && std::find(known.begin(), known.end(), option) == known.end())
-            return name + ": there is no option \"" + option + "\"" + did_you_mean(option, known) + help;
+            return name + ": there is no option \"" + option + "\"" + option_meant(option, known) + help;
     }
     const auto commands = command.get_subcommands([](const CLI::App*) { return true; });
     if (!commands.empty() && command.get_subcommands().empty()) {

@@ -184,13 +184,15 @@ std::string bus_in_words(const CanNode& node) {
     const CanCounters& b = node.bus().counters();
     return fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", node.bus().description(), c.taken,
                        c.missed, non_zero(c.rejected())) +
-           fmt::format("    {} frames received ({} foreign), {} sent; faults: {}\n", b.received, c.foreign, b.sent,
-                       non_zero({{"not sent (no client, full queue or interface down)", b.send_drops},
-                                 {"receive overflow", b.receive_overflow},
-                                 {"malformed", b.malformed},
-                                 {"error frames", b.error_frames},
-                                 {"bus-off", b.bus_off},
-                                 {"connection or interface lost", b.interface_down}})) +
+           fmt::format(
+               "    {} frames received ({} foreign), {} sent{}; faults: {}\n", b.received, c.foreign, b.sent,
+               b.send_drops == 0 ? ""
+                                 : fmt::format(", {} not (no client, full queue or interface down)", b.send_drops),
+               non_zero({{"receive overflow", b.receive_overflow},
+                         {"malformed", b.malformed},
+                         {"error frames", b.error_frames},
+                         {"bus-off", b.bus_off},
+                         {"connection or interface lost", b.interface_down}})) +
            (node.hub() && node.hub()->clients_left() > 0
                 ? fmt::format("    clients that have come and gone: {}\n", node.hub()->clients_left())
                 : "");

@@ -53,7 +53,9 @@ Result<Scene> read_files(const std::string& path) {
         TableReader root(*table, "the scene", reading.problems);
         read_root(root, reading);
     } catch (const toml::parse_error& e) {
-        reading.problems.add(e.source(), std::string(e.description()));
+        const bool toml = path.ends_with(".toml");
+        reading.problems.add(e.source(),
+                             std::string(e.description()) + (toml ? "" : ", expected a scene file (TOML)"));
     }
     if (!reading.problems.none()) return reading.problems.first();
     warn_of_dark_materials(reading.scene);

@@ -41,11 +41,11 @@ struct CommandCounts {
 
 class Node {
 public:
-    Node(const Scenario& scenario, const DynamicsOptions& options, std::optional<TruthLog> log, CanBus& bus,
-         const StopFlag& stop)
+    Node(const Scenario& scenario, const DynamicsOptions& options, std::shared_ptr<const Terrain> terrain,
+         std::optional<TruthLog> log, CanBus& bus, const StopFlag& stop)
         : scenario_(scenario),
           options_(options),
-          simulation_(scenario, options.seed),
+          simulation_(scenario, options.seed, std::move(terrain)),
           log_(std::move(log)),
           bus_(bus),
           stop_(stop),
@@ -286,13 +286,19 @@ nlohmann::json Node::report() const {
 
 Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
                                     const StopFlag& stop) {
+    std::shared_ptr<const Terrain> terrain;
+    if (scenario.gear) {
+        auto made = Terrain::create(scenario);
+        if (!made) return made.error();
+        terrain = *std::move(made);
+    }
     std::optional<TruthLog> log;
     if (!options.log_folder.empty()) {
         auto made = TruthLog::create(options.log_folder);
         if (!made) return made.error();
         log.emplace(std::move(*made));
     }
-    Node node(scenario, options, std::move(log), bus, stop);
+    Node node(scenario, options, std::move(terrain), std::move(log), bus, stop);
     const Status flown = node.run();
     if (!flown) return flown.error();
     nlohmann::json document = node.report();
@@ -309,10 +315,14 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
 namespace {
 
 std::string ending_in_words(const std::string& ending) {
-    constexpr std::array<std::string_view, kEndings.size()> kWords{
-        "not over",           "docked",
-        "bounced off",        "the scenario's time is over",
-        "navigation is done", "the chaser has flown off"};
+    constexpr std::array<std::string_view, kEndings.size()> kWords{"not over",
+                                                                   "docked",
+                                                                   "bounced off",
+                                                                   "the scenario's time is over",
+                                                                   "navigation is done",
+                                                                   "the chaser has flown off",
+                                                                   "landed",
+                                                                   "crashed"};
     const auto at = std::find(kEndings.begin(), kEndings.end(), ending);
     return at == kEndings.end() ? ending : std::string(kWords[static_cast<std::size_t>(at - kEndings.begin())]);
 }

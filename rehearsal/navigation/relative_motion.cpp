@@ -1,5 +1,7 @@
 #include "rehearsal/navigation/relative_motion.h"
 
+#include <cmath>
+
 namespace narpa::rehearsal {
 namespace {
 
@@ -64,7 +66,20 @@ Vec3 nominal_target_rate_rad_s(const Scenario& scenario) {
     return rate + conjugate(scenario.q_world_target) * orbital;
 }
 
+GroundField ground_field(const Orbit& orbit) {
+    const Vec3 axis{0, 0, 1}, rate = orbit.rotation_rad_s * axis;
+    const Vec3 out = conjugate(orbit.q_world_lvlh(0)) * normalized(orbit.up), ground = orbit.radius_m * out;
+    GroundField field{orbit.gravity_m_s2(ground, axis) - cross(rate, cross(rate, ground)), {}};
+    const Eigen::Vector3d u = to_eigen(out);
+    const Eigen::Matrix3d turn = skew(to_eigen(rate));
+    field.gradient_s2 =
+        orbit.mu_m3_s2 / std::pow(orbit.radius_m, 3) * (3 * u * u.transpose() - Eigen::Matrix3d::Identity()) -
+        turn * turn;
+    return field;
+}
+
 Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m) {
+    if (orbit.model == Orbit::Model::surface) return orbit.fall_m_s2(t_s, position_m);
     const double n = orbit.rate_rad_s();
     const Vec3 up = orbit.q_world_lvlh(t_s) * Vec3{1, 0, 0};
     return n * n * (3 * dot(position_m, up) * up - position_m);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/scene/based_on.h"
@@ -46,16 +47,27 @@ Rigid3 read_port(TableReader& table) {
 void read_orbit(TableReader& root, Orbit& orbit) {
     auto table = root.table("orbit");
     if (!table) return;
-    static constexpr std::array<std::pair<std::string_view, Orbit::Model>, 3> kModels{
+    static constexpr std::array<std::pair<std::string_view, Orbit::Model>, 4> kModels{
         {{"free", Orbit::Model::free},
          {"clohessy-wiltshire", Orbit::Model::clohessy_wiltshire},
-         {"two-body", Orbit::Model::two_body}}};
+         {"two-body", Orbit::Model::two_body},
+         {"surface", Orbit::Model::surface}}};
     orbit.model = table->choice<Orbit::Model>("model", kModels).value_or(orbit.model);
     read(*table, "radius_m", orbit.radius_m, kPositive);
     read(*table, "mu_m3_s2", orbit.mu_m3_s2, kPositive);
     orbit.up = table->direction("up").value_or(orbit.up);
     orbit.along = table->direction("along").value_or(orbit.along);
-    if (std::abs(dot(orbit.up, orbit.along)) > 1e-6)
+    if (orbit.model == Orbit::Model::surface) {
+        orbit.axis = table->direction("axis").value_or(orbit.axis);
+        read(*table, "rotation_rad_s", orbit.rotation_rad_s, kNotNegative);
+        read(*table, "j2", orbit.j2);
+        orbit.equatorial_radius_m = table->number("equatorial_radius_m", kPositive).value_or(orbit.radius_m);
+        table->refuse("along", "belongs to orbits, [orbit] has model \"surface\"");
+    } else {
+        for (const char* key : {"axis", "rotation_rad_s", "j2", "equatorial_radius_m"})
+            table->refuse(key, "belongs to model \"surface\"");
+    }
+    if (orbit.model != Orbit::Model::surface && std::abs(dot(orbit.up, orbit.along)) > 1e-6)
         table->fail("along", "expected a direction at right angles to `up`: the orbit is circular");
     table->finish();
 }
@@ -117,6 +129,8 @@ void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
         table->fail("body", fmt::format("\"{}\" is no body with a can_id of {}", name, scene.file));
     if (s.orbit.model == Orbit::Model::free)
         table->fail("body", "[orbit] has model \"free\", expected none: nothing attracts");
+    if (s.orbit.model == Orbit::Model::surface)
+        table->fail("body", "[orbit] has model \"surface\", expected none: the target is the attractor's ground");
     table->finish();
 }
 
@@ -134,6 +148,26 @@ void read_start(TableReader& root, Start& start) {
     table->finish();
 }
 
+LandingGear read_gear(TableReader& table, const Scenario& s) {
+    LandingGear g;
+    table.require("radius_m", "the distance of the feet from the port's axis");
+    const auto feet = table.integer("feet", 3, 16).value_or(4);
+    const double radius_m = table.number("radius_m", kPositive).value_or(1);
+    for (std::int64_t i = 0; i < feet; ++i) {
+        const double at_rad = 2 * kPi * (static_cast<double>(i) + 0.5) / static_cast<double>(feet);
+        g.feet_m.push_back({0, radius_m * std::cos(at_rad), radius_m * std::sin(at_rad)});
+    }
+    read(table, "stiffness_n_m", g.stiffness_n_m, kPositive);
+    read(table, "damping_n_s_m", g.damping_n_s_m, kNotNegative);
+    read(table, "friction", g.friction, kNotNegative);
+    read(table, "stroke_m", g.stroke_m, kPositive);
+    read(table, "tipped_deg", g.tipped_deg, {.low = 1, .high = 89});
+    if (s.orbit.model != Orbit::Model::surface)
+        table.fail("radius_m", "there is no ground, expected [orbit] with model \"surface\"");
+    table.finish();
+    return g;
+}
+
 void read_actuators(TableReader& root, Scenario& s) {
     if (auto table = root.table("thrusters")) {
         Thrusters& t = s.thrusters;
@@ -144,6 +178,26 @@ void read_actuators(TableReader& root, Scenario& s) {
         read(*table, "misalignment_sigma_deg", t.misalignment_sigma_deg, {.low = 0, .high = 20});
         table->finish();
     }
+    if (auto table = root.table("engine")) {
+        Engine e;
+        table->require("axis", "\"+fx\", \"-fx\" ... \"-fz\": the force of the engine");
+        table->require("most_n", "a number > 0");
+        const std::string axis = table->text("axis").value_or("+fz");
+        e.group =
+            static_cast<std::size_t>(std::ranges::find(kThrusterGroupNames, axis) - kThrusterGroupNames.begin());
+        if (e.group >= kThrusterGroupNames.size() / 2)
+            table->fail("axis", fmt::format("\"{}\" is no force, expected one of {}", axis,
+                                            fmt::join(std::span(kThrusterGroupNames).first(6), ", ")));
+        read(*table, "most_n", e.most_n, kPositive);
+        read(*table, "least_n", e.least_n, kNotNegative);
+        if (e.least_n > e.most_n) table->fail("least_n", "expected at most `most_n`");
+        read(*table, "gain_sigma", e.gain_sigma, {.low = 0, .high = 0.5});
+        read(*table, "specific_impulse_s", e.specific_impulse_s, kNotNegative);
+        read(*table, "tilt_most_deg", e.tilt_most_deg, {.low = 0, .high = 89});
+        table->finish();
+        s.engine = e;
+    }
+    if (auto table = root.table("landing_gear")) s.gear = read_gear(*table, s);
     if (auto table = root.table("attitude_sensor")) {
         AttitudeSensor& a = s.attitude_sensor;
         read(*table, "attitude_sigma_deg", a.attitude_sigma_deg, kNotNegative);
@@ -159,6 +213,15 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
         Leg leg;
         leg.name = table.text("name").value_or(fmt::format("leg {}", legs.size() + 1));
         leg.arc_deg = table.number("arc_deg", {.low = -3600, .high = 3600});
+        leg.descent_s = table.number("descent_s", kPositive);
+        if (leg.descent_s) {
+            read(table, "end_velocity_m_s", leg.end_velocity_m_s);
+            table.refuse("speed_m_s", "belongs to legs without `descent_s`");
+            table.refuse("arc_deg", "this leg is a descent, expected `to_m`");
+            leg.arc_deg.reset();
+        } else {
+            table.refuse("end_velocity_m_s", "belongs to `descent_s`");
+        }
         if (leg.arc_deg) {
             leg.axis = table.direction("axis").value_or(leg.axis);
             table.refuse("to_m", "this leg is an arc, expected either `to_m` or `arc_deg`");
@@ -172,6 +235,7 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
         read(table, "within_m", leg.within_m, kPositive);
         read(table, "contact", leg.contact);
         read(table, "look_at_target", leg.look_at_target);
+        if (leg.contact && leg.descent_s) table.fail("contact", "a descent ends before, expected a leg of its own");
         if (leg.contact && legs.size() + 1 != tables.size())
             table.fail("contact", "only the last leg may end with contact");
         table.finish();
@@ -212,7 +276,8 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     n.cameras = read_sensors(*table, "cameras", scene.cameras, scene, s.chaser.body);
     n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
     n.velocimeters = read_velocimeters(*table, scene, s.chaser.body);
-    if (n.cameras.empty() && n.lidars.empty())
+    const bool over_ground = s.orbit.model == Orbit::Model::surface && !n.velocimeters.empty();
+    if (n.cameras.empty() && n.lidars.empty() && !over_ground)
         table->require("cameras", "`cameras` or `lidars`: what it navigates by");
     read(*table, "period_s", n.period_s, {.low = 0.01, .high = 100});
     read(*table, "acceleration_psd", n.acceleration_psd, kPositive);
@@ -234,16 +299,18 @@ void read_control(TableReader& root, Control& c) {
     read(*table, "attitude_bandwidth_rad_s", c.attitude_bandwidth_rad_s, kPositive);
     read(*table, "damping", c.damping, {.low = 0.1, .high = 10});
     read(*table, "retreat_m_s", c.retreat_m_s, kPositive);
+    read(*table, "turn_deg_s", c.turn_deg_s, kPositive);
     table->finish();
 }
 
-void read_faults(TableReader& root, std::vector<Fault>& faults) {
-    static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 5> kKinds{
+void read_faults(TableReader& root, bool has_engine, std::vector<Fault>& faults) {
+    static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 6> kKinds{
         {{"thruster_off", Fault::Kind::thruster_off},
          {"thruster_stuck", Fault::Kind::thruster_stuck},
          {"attitude_bias", Fault::Kind::attitude_bias},
          {"target_rate", Fault::Kind::target_rate},
-         {"commands_lost", Fault::Kind::commands_lost}}};
+         {"commands_lost", Fault::Kind::commands_lost},
+         {"throttle_stuck", Fault::Kind::throttle_stuck}}};
     for (TableReader& table : root.tables("fault")) {
         Fault fault;
         table.require("kind", "what goes wrong");
@@ -252,6 +319,8 @@ void read_faults(TableReader& root, std::vector<Fault>& faults) {
         read(table, "until_s", fault.until_s, kPositive);
         const bool thruster = fault.kind == Fault::Kind::thruster_off || fault.kind == Fault::Kind::thruster_stuck;
         const bool turns = fault.kind == Fault::Kind::attitude_bias || fault.kind == Fault::Kind::target_rate;
+        if (fault.kind == Fault::Kind::throttle_stuck && !has_engine)
+            table.fail("kind", "there is no throttle, expected a table [engine]");
         if (thruster) table.require("axis", "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters");
         if (turns) table.require("value", "[x, y, z]");
         if (!thruster) table.refuse("axis", "belongs to faults of thrusters");
@@ -283,6 +352,22 @@ void read_contact(TableReader& gates, Gates& out) {
     out.contact = c;
 }
 
+void read_landing(TableReader& gates, const Scenario& s, Gates& out) {
+    auto table = gates.table("landing");
+    if (!table) return;
+    LandingLimits l;
+    read(*table, "vertical_m_s", l.vertical_m_s, kNotNegative);
+    read(*table, "horizontal_m_s", l.horizontal_m_s, kNotNegative);
+    read(*table, "tilt_deg", l.tilt_deg, kNotNegative);
+    read(*table, "rate_deg_s", l.rate_deg_s, kNotNegative);
+    read(*table, "from_site_m", l.from_site_m, kNotNegative);
+    read(*table, "slope_deg", l.slope_deg, kNotNegative);
+    read(*table, "step_m", l.step_m, kNotNegative);
+    table->finish();
+    if (!s.gear) gates.fail("landing", "nothing lands, expected a table [landing_gear]");
+    out.landing = l;
+}
+
 void read_gates(TableReader& root, Scenario& s) {
     auto table = root.table("gates");
     if (!table) return;
@@ -312,6 +397,8 @@ void read_gates(TableReader& root, Scenario& s) {
         g.navigation = n;
     }
     read_contact(*table, g);
+    read_landing(*table, s, g);
+    if (g.contact && s.gear) table->fail("contact", "belongs to docking ports, expected `landing`");
     if (g.contact && !s.legs.back().contact)
         table->fail("contact", "no leg has contact = true, expected the last one to have it");
     read(*table, "complete", g.complete);
@@ -359,7 +446,7 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
     read_legs(root, s.legs);
     read_navigation(root, s, *scene);
     read_control(root, s.control);
-    read_faults(root, s.faults);
+    read_faults(root, s.engine.has_value(), s.faults);
     if (!s.legs.empty()) read_gates(root, s);
     root.finish();
 }

@@ -12,7 +12,8 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     a->model_ = *std::move(model);
     for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
     for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
-    for (const std::size_t lidar : a->model_->velocimeters()) a->velocimeters_.emplace_back(*a->model_, lidar);
+    for (const std::size_t lidar : a->model_->velocimeters())
+        a->velocimeters_.emplace_back(*a->model_, lidar, scenario.navigation);
     return a;
 }
 
@@ -71,7 +72,7 @@ void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const
 }
 
 void Autopilot::take_beam(const LidarBeamReport& report) {
-    for (const Velocimeter& velocimeter : velocimeters_) {
+    for (Velocimeter& velocimeter : velocimeters_) {
         if (velocimeter.index() != report.lidar) continue;
         const std::lock_guard lock(mutex_);
         const auto note = [&](const UpdateResult& result) {

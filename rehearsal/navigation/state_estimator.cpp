@@ -294,8 +294,14 @@ TargetEstimate StateEstimator::estimate() const {
         pose.covariance +
         star_tracker_covariance(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
     // The chaser's centre of mass only shifts the origin: the covariance is the same.
-    return {Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
-            covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
+    TargetEstimate out{Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
+                       covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
+    // The filter's position is against the map, whose error below the chaser stays the same for many measurements.
+    const Eigen::Vector3d map_error =
+        scenario_.navigation.map_sigma_m *
+        to_eigen(out.T_chaser_target.q * (scenario_.target.T_body_port.q * Vec3{1, 0, 0}));
+    out.covariance.bottomRightCorner<3, 3>() += map_error * map_error.transpose();
+    return out;
 }
 
 Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {

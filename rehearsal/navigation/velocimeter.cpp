@@ -11,8 +11,12 @@ constexpr double kLeastWidth_m = 0.2;  ///< of the surface that stands for a pla
 
 }  // namespace
 
-Velocimeter::Velocimeter(const SceneModel& model, std::size_t lidar)
-    : model_(model), lidar_(model.scene().lidars[lidar]), index_(lidar) {
+Velocimeter::Velocimeter(const SceneModel& model, std::size_t lidar, const Navigation& map)
+    : model_(model),
+      lidar_(model.scene().lidars[lidar]),
+      index_(lidar),
+      map_sigma_m_(map.map_sigma_m),
+      map_correlation_m_(map.map_correlation_m) {
     const BodyBounds& target = model.tracer().bounds(model.target());
     target_centre_m_ = target.centre_m;
     target_radius_m_ = std::max({target.semi_axes_m.x, target.semi_axes_m.y, target.semi_axes_m.z});
@@ -25,6 +29,7 @@ Velocimeter::Velocimeter(const SceneModel& model, std::size_t lidar)
             beams_[beam] = shot;
         }
     }
+    measured_m_.resize(beams_.size());
 }
 
 std::optional<TargetVelocity> Velocimeter::measure(const LidarBeamReport& report,
@@ -45,7 +50,7 @@ std::optional<TargetVelocity> Velocimeter::measure(const LidarBeamReport& report
 }
 
 std::optional<TargetRange> Velocimeter::measure_range(const LidarBeamReport& report, const Rigid3& T_chaser_target,
-                                                      double position_sigma_m) const {
+                                                      double position_sigma_m) {
     if (!(report.range_m > 0) || report.beam >= beams_.size()) return std::nullopt;
     const LidarShot& shot = beams_[report.beam];
     TargetRange r{.t_ns = report.t_ns,
@@ -68,11 +73,14 @@ std::optional<TargetRange> Velocimeter::measure_range(const LidarBeamReport& rep
     const Vec3 mean = 0.25 * (points[1] + points[2] + points[3] + points[4]);
     r.normal = normalized(cross(points[1] - points[2], points[3] - points[4]));
     r.point_m = points[0];
+    std::optional<Vec3>& measured = measured_m_[report.beam];
+    if (measured && norm(points[0] - *measured) < map_correlation_m_) return std::nullopt;
+    measured = points[0];
     // Second differences: how much the surface bends within that width.
     const double bend_m = std::abs(dot(mean - points[0], u));
     const double twist_m = 0.25 * std::abs(dot(points[1] + points[2] - points[3] - points[4], u));
     r.sigma_m = std::hypot(lidar_.receiver.range_noise_m, lidar_.model->spec().range_resolution_m / std::sqrt(12.0),
-                           std::hypot(bend_m, twist_m));
+                           std::hypot(bend_m, twist_m, map_sigma_m_));
     return r;
 }
 

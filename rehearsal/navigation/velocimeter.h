@@ -14,7 +14,7 @@ namespace narpa::rehearsal {
 class Velocimeter {
 public:
     /// `model` outlives it. `lidar`: index in the scene.
-    Velocimeter(const SceneModel& model, std::size_t lidar);
+    Velocimeter(const SceneModel& model, std::size_t lidar, const Navigation& map = {});
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
     [[nodiscard]] std::size_t index() const noexcept { return index_; }
@@ -24,10 +24,10 @@ public:
                                                         const Rigid3& T_chaser_target) const;
     /// The range, with the model's surface where the beam is expected to meet it. How far that departs from a plane
     /// within `position_sigma_m`, the uncertainty of the pose, is part of the standard deviation. None where there
-    /// is no range, or no surface.
+    /// is no range, or no surface, or the beam meets nearly the same place as when it was last measured: there the
+    /// map has the same error.
     [[nodiscard]] std::optional<TargetRange> measure_range(const LidarBeamReport& report,
-                                                           const Rigid3& T_chaser_target,
-                                                           double position_sigma_m) const;
+                                                           const Rigid3& T_chaser_target, double position_sigma_m);
 
 private:
     [[nodiscard]] std::optional<double> range_in_model(const Vec3& origin_m, const Vec3& direction) const;
@@ -36,6 +36,8 @@ private:
     Lidar lidar_;
     std::size_t index_;
     std::vector<LidarShot> beams_;  ///< by their number
+    double map_sigma_m_, map_correlation_m_;
+    std::vector<std::optional<Vec3>> measured_m_;  ///< by each beam last, target's axes
     Vec3 target_centre_m_;
     double target_radius_m_;
 };

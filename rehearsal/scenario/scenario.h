@@ -133,6 +133,9 @@ struct Leg {
 };
 
 struct Navigation {
+    std::string scene;  ///< path of the scene as the navigation knows it: with a map in place of the ground
+    double map_sigma_m = 0,
+           map_correlation_m = 0;              ///< errors of its heights, and over which distance they are alike
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
     std::vector<std::string> velocimeters;     ///< LiDARs whose velocities come over CAN, beside the others
     double period_s = 1;                       ///< of measurements and of control

@@ -268,6 +268,27 @@ std::vector<std::string> read_velocimeters(TableReader& table, const Scene& scen
     return names;
 }
 
+template <class Named>
+bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
+    return std::ranges::equal(a, b, {}, &Named::name, &Named::name);
+}
+
+/// Another scene with the same bodies and sensors, of which only the shapes differ.
+std::string read_map(TableReader& table, const Scene& scene) {
+    const auto map = table.text("map");
+    if (!map) return "";
+    const std::string path = beside(*table.place("map").path, *map);
+    const auto known = read_scene(path);
+    if (!known) {
+        table.fail("map", known.error().text());
+    } else if (!same_names(known->bodies, scene.bodies) || !same_names(known->cameras, scene.cameras) ||
+               !same_names(known->lidars, scene.lidars)) {
+        table.fail("map", fmt::format("{} has other bodies or sensors, expected those of {} in the same order",
+                                      path, scene.file));
+    }
+    return path;
+}
+
 void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     root.require("navigation", "a table [navigation]");
     auto table = root.table("navigation");
@@ -279,6 +300,9 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     const bool over_ground = s.orbit.model == Orbit::Model::surface && !n.velocimeters.empty();
     if (n.cameras.empty() && n.lidars.empty() && !over_ground)
         table->require("cameras", "`cameras` or `lidars`: what it navigates by");
+    n.scene = read_map(*table, scene);
+    read(*table, "map_sigma_m", n.map_sigma_m, kNotNegative);
+    read(*table, "map_correlation_m", n.map_correlation_m, kNotNegative);
     read(*table, "period_s", n.period_s, {.low = 0.01, .high = 100});
     read(*table, "acceleration_psd", n.acceleration_psd, kPositive);
     read(*table, "angular_acceleration_psd", n.angular_acceleration_psd, kPositive);

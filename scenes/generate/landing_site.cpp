@@ -10,18 +10,24 @@
 namespace narpa::scenes {
 namespace {
 
-// Rings about the site whose spacing grows with their distance: a camera that comes down on it sees equally many
-// triangles from every height.
-constexpr int kSectors = 256;
-constexpr double kFirstRing_m = 0.3, kSpacingPart = 2 * kPi / kSectors;
-const int kRings = static_cast<int>(std::ceil(std::log(kLandingReach_m / kFirstRing_m) / std::log1p(kSpacingPart)));
+/// Rings about the site whose spacing grows with their distance: a camera that comes down on it sees equally many
+/// triangles from every height.
+struct Rings {
+    int sectors;
+    double least_m;  ///< between rings, and the finest detail
 
-double ring_m(int j) {
-    return j == 0 ? 0 : kFirstRing_m * std::pow(1 + kSpacingPart, j - 1);
-}
-double spacing_m(double r) {
-    return kSpacingPart * std::max(r, kFirstRing_m);
-}
+    [[nodiscard]] double part() const { return 2 * kPi / sectors; }
+    [[nodiscard]] double spacing_m(double r) const { return std::max(least_m, part() * r); }
+    /// Distances from the site.
+    [[nodiscard]] std::vector<double> radii() const {
+        std::vector<double> all{0};
+        while (all.back() < kLandingReach_m) all.push_back(all.back() + spacing_m(all.back()));
+        return all;
+    }
+};
+constexpr Rings kGround{256, 0.08}, kMap{256, 0.5};
+constexpr double kMapError_m = 0.15, kMapErrorLength_m = 20;  // of heights: about twice the standard deviation
+
 /// From 0 at the site to 1 far beyond `within_m`.
 double away(double r, double within_m) {
     return r * r / (r * r + within_m * within_m);
@@ -29,11 +35,12 @@ double away(double r, double within_m) {
 
 constexpr double kHillRatio = 0.045;  // of an octave's height to its wavelength, at 10 m
 constexpr double kClear_m = 7;        // about the site: no rock, and no rim of a crater
+constexpr double kShown = 6;          // vertices across a bump
 
-double relief_m(double x, double y, double r) {
+double relief_m(double x, double y, double r, double spacing_m) {
     double sum = 0, wavelength = 900;
     for (std::uint64_t octave = 0; octave < 12; ++octave, wavelength *= 0.5) {
-        const double resolved = std::clamp(0.5 * wavelength / spacing_m(r) - 1, 0.0, 1.0);
+        const double resolved = std::clamp(0.5 * wavelength / spacing_m - 1, 0.0, 1.0);
         const double height = kHillRatio * wavelength * std::pow(wavelength / 10, -0.25);
         const double here = wavelength > 6 ? away(r, 0.5 * wavelength) : 0.25 + 0.75 * away(r, 12);
         if (resolved > 0)
@@ -50,12 +57,12 @@ struct Bump {
 
 /// In octaves of size; each as far from the site as the mesh can show it. Half as large, four times as many.
 std::vector<Bump> all_bumps() {
-    constexpr double kCraters = 0.05, kRocks = 0.012, kShown = 6;
+    constexpr double kCraters = 0.05, kRocks = 0.012;
     std::vector<Bump> all;
     Random random(23);
     const auto scatter = [&](double smallest_m, double largest_m, double share, bool rock) {
         for (double d = smallest_m; d < largest_m; d *= 2) {
-            const double reach = std::min(kLandingReach_m, d / (kShown * kSpacingPart));
+            const double reach = std::min(kLandingReach_m, d / (kShown * kGround.part()));
             const int count = static_cast<int>(0.75 * share / (d * d) * kPi * reach * reach);
             for (int i = 0; i < count; ++i) {
                 const double r = reach * std::sqrt(random.uniform()), at = random.uniform(0, 2 * kPi);
@@ -84,29 +91,44 @@ std::vector<MaterialSpec> landing_materials() {
     return {{"ground", {0.25, 0.22, 0.19}}, {"gold", {0.6, 0.45, 0.2}}, {"metal", {0.5, 0.5, 0.5}}};
 }
 
-Mesh build_landing_site() {
+namespace {
+
+Mesh site_mesh(const Rings& rings, double error_m) {
     const auto bumps = all_bumps();
     const auto height = [&](double x, double y) {
-        const double r = std::hypot(x, y);
-        double z = relief_m(x, y, r);
-        for (const Bump& f : bumps)
-            if (const double d = std::hypot(x - f.x, y - f.y); d < 2.5 * f.radius_m) z += bump_height_m(f, d);
+        const double r = std::hypot(x, y), spacing = rings.spacing_m(r);
+        double z =
+            relief_m(x, y, r, spacing) + error_m * value_noise(x / kMapErrorLength_m, y / kMapErrorLength_m, 7700);
+        for (const Bump& b : bumps)
+            if (const double d = std::hypot(x - b.x, y - b.y); d < 2.5 * b.radius_m && 2 * b.radius_m > 4 * spacing)
+                z += bump_height_m(b, d);
         return z;
     };
+    const std::vector<double> radii = rings.radii();
     const double site = height(0, 0);
     Mesh mesh;
     mesh.begin("landing_site", "ground");
     mesh.grid(
-        kSectors, kRings, true,
+        rings.sectors, static_cast<int>(radii.size()) - 1, true,
         [&](int i, int j) {
-            const double at = -2 * kPi * i / kSectors, r = ring_m(j);
+            const double at = -2 * kPi * i / rings.sectors, r = radii[static_cast<std::size_t>(j)];
             const double x = r * std::cos(at), y = r * std::sin(at);
             return Vec3{x, y, height(x, y) - site};
         },
-        [](int i, int j) {
-            return Uv{static_cast<double>(i) / kSectors, static_cast<double>(j) / kRings};
+        [&](int i, int j) {
+            return Uv{static_cast<double>(i) / rings.sectors, static_cast<double>(j)};
         });
     return mesh;
+}
+
+}  // namespace
+
+Mesh build_landing_site() {
+    return site_mesh(kGround, 0);
+}
+
+Mesh build_landing_map() {
+    return site_mesh(kMap, kMapError_m);
 }
 
 Mesh build_lander() {

@@ -37,6 +37,7 @@ bool write_scene(std::string_view scene, const Output& out) {
         out.mesh("small_body", build_small_body(), small_body_materials());
     } else if (scene == "landing") {
         out.mesh("landing_site", build_landing_site(), landing_materials());
+        out.mesh("landing_map", build_landing_map(), landing_materials());
         out.mesh("lander", build_lander(), landing_materials());
     } else {
         return false;

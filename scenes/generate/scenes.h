@@ -64,6 +64,9 @@ inline constexpr double kLanderFeet_m = -1.3, kLanderFeetRadius_m = 1.6;
 std::vector<MaterialSpec> landing_materials();
 /// An open sheet, facing up.
 Mesh build_landing_site();
+/// The same ground as a map from orbit has it: posts half a metre apart at best, no bump below two metres, heights
+/// off by some centimetres.
+Mesh build_landing_map();
 Mesh build_lander();
 
 }  // namespace narpa::scenes

@@ -22,24 +22,25 @@ GroundForces GroundContact::press(const PortState& lander) {
     for (std::size_t i = 0; i < feet.size(); ++i) {
         const Vec3& foot = feet[i];
         const auto ground = terrain_->below(foot);
-        const double deep_m = ground ? ground->height_m - foot.x : -1;
+        const double deep_m = ground ? (ground->height_m - foot.x) * ground->normal.x : -1;
         if (deep_m <= 0) {
             held_[i].reset();
             continue;
         }
         sum.deepest_m = std::max(sum.deepest_m, deep_m);
-        const Vec3 arm = foot - lander.position_m();
-        const Vec3 velocity = lander.velocity_m_s + cross(rate, arm);
-        const double push_n = std::max(0.0, gear_.stiffness_n_m * deep_m - gear_.damping_n_s_m * velocity.x);
+        const Vec3& up = ground->normal;
+        const auto along_ground = [&](const Vec3& v) { return v - dot(v, up) * up; };
+        const Vec3 arm = foot - lander.position_m(), velocity = lander.velocity_m_s + cross(rate, arm);
+        const double push_n = std::max(0.0, gear_.stiffness_n_m * deep_m - gear_.damping_n_s_m * dot(velocity, up));
         if (!held_[i]) held_[i] = foot;
-        const Vec3 off{0, foot.y - held_[i]->y, foot.z - held_[i]->z}, slide{0, velocity.y, velocity.z};
-        Vec3 across = -gear_.stiffness_n_m * off - gear_.damping_n_s_m * slide;
+        Vec3 across =
+            -gear_.stiffness_n_m * along_ground(foot - *held_[i]) - gear_.damping_n_s_m * along_ground(velocity);
         const double most_n = gear_.friction * push_n;
         if (const double n = norm(across); n > most_n) {  // slips: what it holds on to follows
             across = across * (most_n / n);
             held_[i] = foot + across / gear_.stiffness_n_m;
         }
-        const Vec3 force{push_n, across.y, across.z};
+        const Vec3 force = push_n * up + across;
         sum.force_n += force;
         sum.torque_n_m += cross(arm, force);
     }

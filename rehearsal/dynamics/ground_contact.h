@@ -1,6 +1,6 @@
 /// rehearsal/dynamics/ground_contact.h - forces between the feet of a lander and the ground.
 ///
-/// Each foot is a spring and a damper along the local vertical, which push and never pull, and a spring and a
+/// Each foot is a spring and a damper along the ground's normal, which push and never pull, and a spring and a
 /// damper across it that hold the foot where it met the ground until friction slips (P. Cundall, O. Strack,
 /// Geotechnique 29, 1979).
 #pragma once

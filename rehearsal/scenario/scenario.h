@@ -92,7 +92,7 @@ struct Engine {
     [[nodiscard]] double sign() const { return group % 2 == 0 ? 1.0 : -1.0; }  ///< of the force along it
 };
 
-/// Legs that meet the ground: each foot is a spring with a damper along the vertical, and friction.
+/// Legs that meet the ground: each foot is a spring with a damper along the ground's normal, and friction.
 struct LandingGear {
     std::vector<Vec3> feet_m;  ///< chaser's port axes: evenly on a circle about its x
     double stiffness_n_m = 40e3, damping_n_s_m = 6e3, friction = 0.6;  ///< of each

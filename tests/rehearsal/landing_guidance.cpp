@@ -114,6 +114,7 @@ TEST(EngineControl, TiltsToWhereTheForceIsNeededAndNoFurtherThanItMay) {
     Scenario s = landing();
     s.control.turn_deg_s = 1e3;
     s.thrusters.torque_n_m = 1e6;
+    s.thrusters.min_on_s = 0;
     for (const double far_m : {2.0, 1e4}) {
         FlightControl control(s);
         Reference r;

@@ -22,6 +22,7 @@ namespace {
 constexpr std::int64_t kShortWaitNs = 20'000'000;
 /// In real time poses are sent so long before their time of validity: a frame of that time then has that pose.
 constexpr std::int64_t kLeadNs = 5'000'000;
+constexpr double kSiteOff_m = 0.5;
 constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
 
 /// A body's pose commands.
@@ -291,6 +292,13 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
         auto made = Terrain::create(scenario);
         if (!made) return made.error();
         terrain = *std::move(made);
+        const auto site = terrain->below({});
+        if (!site || std::abs(site->height_m) > kSiteOff_m)
+            return Error{site ? fmt::format("the port of [target], the landing site, is {:.2f} m off the ground, "
+                                            "expected {:g} m at most",
+                                            -site->height_m, kSiteOff_m)
+                              : "there is no ground at the port of [target], the landing site",
+                         scenario.file};
     }
     std::optional<TruthLog> log;
     if (!options.log_folder.empty()) {

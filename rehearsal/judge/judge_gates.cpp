@@ -252,8 +252,14 @@ std::optional<Footing> Judge::footing_at_end() const {
 void Judge::add_landing_gates(Verdict& v) const {
     const LandingLimits& limits = *scenario_.gates.landing;
     if (v.contact) {
-        v.contact->conditions = landing_conditions(limits, v.contact->state, footing_at_end());
+        const auto ground = footing_at_end();
+        v.contact->conditions = landing_conditions(limits, v.contact->state, ground);
         for (const ContactCondition& c : v.contact->conditions) v.gates.push_back(landing(*v.contact, c));
+        if (!ground)
+            v.gates.push_back({.name = "slope",
+                               .asked = "ground under the feet",
+                               .state = GateState::failed,
+                               .reason = "there is none where the lander came to rest"});
         return;
     }
     for (const ContactCondition& c : landing_conditions(limits, {}, Footing{}))

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "estimator/pose/pose_estimate.h"
 #include "tests/rehearsal/judge_support.h"
 
 namespace narpa::rehearsal {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "base/time.h"
 #include "rehearsal/navigation/relative_motion.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/support/temporary_folder.h"

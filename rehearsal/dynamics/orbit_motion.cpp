@@ -29,17 +29,17 @@ Translation clohessy_wiltshire_push(double n, double t, const Vec3& a) {
 Translation clohessy_wiltshire(const Orbit& orbit, double t, double dt, const Vec3& a, const Translation& x) {
     const double n = orbit.rate_rad_s();
     const Vec3 rate{0, 0, n};
-    const Quat q_lvlh_world = conjugate(orbit.q_world_lvlh(t));
+    const Quat q_lvlh_world = conjugate(orbit.q_world_frame(t));
     const Vec3 position = q_lvlh_world * x.position_m;
     const Vec3 velocity = q_lvlh_world * x.velocity_m_s - cross(rate, position);
     Vector6 state;
     state << to_eigen(position), to_eigen(velocity);
     state = (clohessy_wiltshire_transition(n, dt) * state).eval();
-    const Translation pushed = clohessy_wiltshire_push(n, dt, conjugate(orbit.q_world_lvlh(t + 0.5 * dt)) * a);
+    const Translation pushed = clohessy_wiltshire_push(n, dt, conjugate(orbit.q_world_frame(t + 0.5 * dt)) * a);
     const Vec3 position_then = Vec3{state[0], state[1], state[2]} + pushed.position_m;
     const Vec3 velocity_then = Vec3{state[3], state[4], state[5]} + pushed.velocity_m_s;
-    const Quat q_world_lvlh = orbit.q_world_lvlh(t + dt);
-    return {q_world_lvlh * position_then, q_world_lvlh * (velocity_then + cross(rate, position_then))};
+    const Quat q_world_frame = orbit.q_world_frame(t + dt);
+    return {q_world_frame * position_then, q_world_frame * (velocity_then + cross(rate, position_then))};
 }
 
 /// Gravity at the chaser minus gravity at the target, which is at R from the attractor.
@@ -66,7 +66,7 @@ Translation runge_kutta(double h, const Translation& x, const Rates& rates) {
 
 Translation two_body_step(const Orbit& orbit, double t, double h, const Vec3& a, const Translation& x) {
     return runge_kutta(h, x, [&](double after_s, const Translation& s) {
-        const Vec3 R = orbit.q_world_lvlh(t + after_s) * Vec3{orbit.radius_m, 0, 0};
+        const Vec3 R = orbit.q_world_frame(t + after_s) * Vec3{orbit.radius_m, 0, 0};
         return Translation{s.velocity_m_s, gravity_difference(orbit.mu_m3_s2, R, s.position_m) + a};
     });
 }
@@ -100,9 +100,9 @@ Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& 
 }
 
 Motion attractor_motion(const Orbit& orbit, const Quat& q_world_attractor, double t_s) {
-    const Quat q_world_lvlh = orbit.q_world_lvlh(t_s);
-    return {{q_world_attractor, q_world_lvlh * Vec3{-orbit.radius_m, 0, 0}},
-            q_world_lvlh * Vec3{0, -orbit.radius_m * orbit.rate_rad_s(), 0},
+    const Quat q_world_frame = orbit.q_world_frame(t_s);
+    return {{q_world_attractor, q_world_frame * Vec3{-orbit.radius_m, 0, 0}},
+            q_world_frame * Vec3{0, -orbit.radius_m * orbit.rate_rad_s(), 0},
             {}};
 }
 

@@ -59,7 +59,7 @@ void Simulation::place_bodies(std::uint64_t seed) {
     state_.target.q_world_body = normalized(scenario_.q_world_target);
     state_.target.rate_rad_s = kDegree * scenario_.target_motion.rate_deg_s;
     if (scenario_.target_motion.with_lvlh) {
-        const Vec3 orbit_rate = scenario_.orbit.q_world_lvlh(0) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
+        const Vec3 orbit_rate = scenario_.orbit.q_world_frame(0) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
         state_.target.rate_rad_s += conjugate(state_.target.q_world_body) * orbit_rate;
     }
 
@@ -170,10 +170,10 @@ Attitude Simulation::target_after(const State& from, double dt_s) const {
     if (!scenario_.target_motion.with_lvlh) return target_body_.turned(from.target, {}, dt_s);
     const Vec3 orbit_rate{0, 0, scenario_.orbit.rate_rad_s()};
     const Quat q_lvlh_body =
-        conjugate(scenario_.orbit.q_world_lvlh(to_seconds(from.t_ns))) * from.target.q_world_body;
+        conjugate(scenario_.orbit.q_world_frame(to_seconds(from.t_ns))) * from.target.q_world_body;
     const Vec3 rate = from.target.rate_rad_s - conjugate(q_lvlh_body) * orbit_rate;
     const Quat q_lvlh_then = q_lvlh_body * exp_rotation(dt_s * rate);
-    return {normalized(scenario_.orbit.q_world_lvlh(to_seconds(from.t_ns) + dt_s) * q_lvlh_then),
+    return {normalized(scenario_.orbit.q_world_frame(to_seconds(from.t_ns) + dt_s) * q_lvlh_then),
             rate + conjugate(q_lvlh_then) * orbit_rate};
 }
 

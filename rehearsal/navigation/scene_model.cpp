@@ -39,7 +39,8 @@ const BodyPoses& SceneModel::place(double t_s, const Quat& q_world_target, const
     const Rigid3 T_world_target{q_world_target, -(q_world_target * target_centre_of_mass_m_)};
     at_.set(target_, T_world_target);
     at_.set(chaser_, T_world_target * T_target_chaser);
-    if (attractor_) at_.T_world_body[*attractor_].t = -orbit_.radius_m * (orbit_.q_world_lvlh(t_s) * Vec3{1, 0, 0});
+    if (attractor_)
+        at_.T_world_body[*attractor_].t = -orbit_.radius_m * (orbit_.q_world_frame(t_s) * Vec3{1, 0, 0});
     return at_;
 }
 

@@ -88,7 +88,7 @@ FilterSettings filter_settings(const Scenario& s) {
 }
 
 Matrix12 first_covariance(const Scenario& s, const RelativeMotion& motion) {
-    const Quat q_frame_port = conjugate(s.orbit.q_world_lvlh(0)) * motion.q_world_target * s.target.T_body_port.q;
+    const Quat q_frame_port = conjugate(s.orbit.q_world_frame(0)) * motion.q_world_target * s.target.T_body_port.q;
     const Quat q_target_chaser_port =
         conjugate(motion.q_world_target) * motion.q_world_chaser * s.chaser.T_body_port.q;
     Matrix12 P = Matrix12::Zero();
@@ -147,7 +147,7 @@ Result<StateEstimator> StateEstimator::create(const Scenario& s, std::int64_t t_
 }
 
 Quat StateEstimator::q_frame_chaser(std::int64_t t_ns) const {
-    return normalized(conjugate(scenario_.orbit.q_world_lvlh(t_s(t_ns))) * attitude_.at(t_ns).q_world_chaser);
+    return normalized(conjugate(scenario_.orbit.q_world_frame(t_s(t_ns))) * attitude_.at(t_ns).q_world_chaser);
 }
 
 void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {

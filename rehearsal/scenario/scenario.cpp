@@ -9,7 +9,7 @@ double Orbit::rate_rad_s() const {
     return model == Model::free ? 0 : std::sqrt(mu_m3_s2 / (radius_m * radius_m * radius_m));
 }
 
-Quat Orbit::q_world_lvlh(double t_s) const {
+Quat Orbit::q_world_frame(double t_s) const {
     if (model == Model::surface) {
         const Vec3 z = normalized(axis);
         Vec3 x = up - dot(up, z) * z;  // where the ground is
@@ -30,7 +30,7 @@ Vec3 Orbit::gravity_m_s2(const Vec3& from_centre_m, const Vec3& unit_axis) const
 }
 
 Vec3 Orbit::fall_m_s2(double t_s, const Vec3& position_m) const {
-    const Quat turned = q_world_lvlh(t_s) * conjugate(q_world_lvlh(0));
+    const Quat turned = q_world_frame(t_s) * conjugate(q_world_frame(0));
     const Vec3 z = normalized(axis), ground = radius_m * (turned * normalized(up)), rate = rotation_rad_s * z;
     return gravity_m_s2(ground + position_m, z) - cross(rate, cross(rate, ground));
 }

@@ -44,8 +44,8 @@ struct Orbit {
 
     /// 0 where the model is free; of the planet's rotation where it is surface.
     [[nodiscard]] double rate_rad_s() const;
-    /// LVLH axes, or those that turn with the planet, to world axes.
-    [[nodiscard]] Quat q_world_lvlh(double t_s) const;
+    /// The frame of relative motion, LVLH or axes that turn with the planet, to world axes.
+    [[nodiscard]] Quat q_world_frame(double t_s) const;
     /// Surface: gravity at `from_centre_m` of a planet with the given axis of rotation, in the axes of both: of a
     /// point mass and J2 (O. Montenbruck, E. Gill, Satellite Orbits, 2000, section 3.2).
     [[nodiscard]] Vec3 gravity_m_s2(const Vec3& from_centre_m, const Vec3& unit_axis) const;

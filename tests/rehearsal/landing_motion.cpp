@@ -73,7 +73,7 @@ TEST(SurfaceMotion, ADroppedBodyTakesTheTimeOfFreeFallAndDriftsEast) {
     const Vec3 axis = normalized(o.axis), rate = w * axis;
     Translation x{{0, 0, height}, cross(rate, Vec3{0, 0, height})};
     const GroundField field = ground_field(o);
-    const double g = -dot(o.q_world_lvlh(0) * field.gravity_m_s2, o.up), t_s = std::sqrt(2 * height / g);
+    const double g = -dot(o.q_world_frame(0) * field.gravity_m_s2, o.up), t_s = std::sqrt(2 * height / g);
     x = propagated(o, 0, t_s, {}, x);
     const Vec3 at = exp_rotation(-t_s * rate) * x.position_m;
     EXPECT_NEAR(at.z, 0, 0.01);  // gravity grows by 6e-5 over that height

@@ -12,11 +12,25 @@ namespace narpa {
 /// What the dynamics are doing.
 enum class DynamicsPhase : std::uint8_t {
     flying,
-    captured,  ///< contact within the envelope: the docking system holds
-    bounced,   ///< contact outside the envelope: the bodies separate again
-    finished,  ///< the run is over; the last report
+    captured,      ///< contact within the envelope: the docking system holds
+    bounced,       ///< contact outside the envelope: the bodies separate again
+    finished,      ///< the run is over; the last report
+    touched_down,  ///< a foot of the lander has met the ground
+    landed,        ///< the lander stands still on its feet
+    crashed,       ///< too hard for the landing gear, or tipped over
 };
-inline constexpr std::array<std::string_view, 4> kDynamicsPhases{"flying", "captured", "bounced", "finished"};
+inline constexpr std::array<std::string_view, 7> kDynamicsPhases{"flying",       "captured", "bounced", "finished",
+                                                                 "touched_down", "landed",   "crashed"};
+
+/// The chaser has met the target, or the ground.
+[[nodiscard]] constexpr bool is_contact(DynamicsPhase phase) noexcept {
+    return phase == DynamicsPhase::captured || phase == DynamicsPhase::bounced ||
+           phase == DynamicsPhase::touched_down;
+}
+/// It stays there: docked, or landed.
+[[nodiscard]] constexpr bool is_held(DynamicsPhase phase) noexcept {
+    return phase == DynamicsPhase::captured || phase == DynamicsPhase::landed;
+}
 
 /// Sent before the pose commands of the same time, at every control period and when the phase changes.
 struct DynamicsReport {
@@ -35,9 +49,9 @@ struct AttitudeReport {
 };
 
 /// What the navigation is doing.
-enum class GuidancePhase : std::uint8_t { moving, holding, closing, docked, retreating, done };
-inline constexpr std::array<std::string_view, 6> kGuidancePhases{"moving", "holding",    "closing",
-                                                                 "docked", "retreating", "done"};
+enum class GuidancePhase : std::uint8_t { moving, holding, closing, docked, retreating, done, landed };
+inline constexpr std::array<std::string_view, 7> kGuidancePhases{"moving",     "holding", "closing", "docked",
+                                                                 "retreating", "done",    "landed"};
 
 /// Why the navigation aborts.
 enum class AbortReason : std::uint8_t { none, lost, uncertain, off_reference, bounced };

@@ -15,13 +15,18 @@ namespace {
 constexpr double kTumbleStepRad = 0.02;
 
 /// Of (position, velocity).
-Matrix6 translation_rates(double n) {
+Matrix6 translation_rates(const MotionModel& model) {
+    const double n = model.orbit_rate_rad_s;
     Matrix6 F = Matrix6::Zero();
     F.topRightCorner<3, 3>().setIdentity();
-    F(3, 0) = 3 * n * n;
+    if (model.ground) {
+        F.bottomLeftCorner<3, 3>() = model.ground->gradient_s2;
+    } else {
+        F(3, 0) = 3 * n * n;
+        F(5, 2) = -n * n;
+    }
     F(3, 4) = 2 * n;
     F(4, 3) = -2 * n;
-    F(5, 2) = -n * n;
     return F;
 }
 
@@ -110,6 +115,8 @@ Status check(const MotionModel& m) {
         return wrong("acceleration_psd", m.acceleration_psd, "0 m^2 s^-3 or more");
     if (!(m.angular_acceleration_psd >= 0 && std::isfinite(m.angular_acceleration_psd)))
         return wrong("angular_acceleration_psd", m.angular_acceleration_psd, "0 rad^2 s^-3 or more");
+    if (m.ground && !(is_finite(m.ground->gravity_m_s2) && m.ground->gradient_s2.allFinite()))
+        return Error{"ground: expected finite numbers"};
     if (m.inertia_kg_m2) {
         const Eigen::Matrix3d& J = *m.inertia_kg_m2;
         if (!J.allFinite() || !J.isApprox(J.transpose(), 1e-9) ||
@@ -123,10 +130,12 @@ void propagate(const MotionModel& model, double dt_s, const Vec3& acceleration_m
                Matrix12& covariance) {
     if (dt_s <= 0) return;
     const double n = model.orbit_rate_rad_s;
-    const Discrete<6> moving = discretise<6>(translation_rates(n), driven(model.acceleration_psd), dt_s);
+    const Discrete<6> moving = discretise<6>(translation_rates(model), driven(model.acceleration_psd), dt_s);
     Vector6 x, driving = Vector6::Zero();
     x << to_eigen(state.position_m), to_eigen(state.velocity_m_s);
     driving.tail<3>() = to_eigen(acceleration_m_s2);
+    if (model.ground)
+        driving.tail<3>() -= to_eigen(model.ground->gravity_m_s2);  // the chaser falls, not the target
     x = (moving.transition * x + moving.integral * driving).eval();
     state.position_m = {x[0], x[1], x[2]};
     state.velocity_m_s = {x[3], x[4], x[5]};

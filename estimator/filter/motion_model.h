@@ -2,7 +2,7 @@
 ///
 /// The frame is either inertial or LVLH, that of W. Clohessy and R. Wiltshire (1960): x up, away from the Earth, y
 /// along the circular orbit, z along its momentum; it turns about z with the orbit's rate. The chaser is its
-/// origin.
+/// origin. Over the ground of a planet it turns with the planet, whose axis is z.
 #pragma once
 
 #include <cstdint>
@@ -34,9 +34,17 @@ struct RelativeState {
 /// positive definite.
 [[nodiscard]] double normalised_error_squared(const Vector12& error, const Matrix12& covariance);
 
+/// Where the target is ground that the chaser falls to: gravity and centrifugal force, linear about the target.
+struct GroundField {
+    Vec3 gravity_m_s2{};                                    ///< at the target, frame axes
+    Eigen::Matrix3d gradient_s2 = Eigen::Matrix3d::Zero();  ///< change of `gravity_m_s2` with the chaser's position
+};
+
 struct MotionModel {
-    /// 0: a free body, the frame is inertial, velocities stay. > 0: Clohessy and Wiltshire's equations, frame LVLH.
+    /// 0: a free body, the frame is inertial, velocities stay. > 0: Clohessy and Wiltshire's equations, frame LVLH;
+    /// with `ground` the planet's rotation.
     double orbit_rate_rad_s = 0;
+    std::optional<GroundField> ground{};
     /// The target's, about its centre of mass in its body axes: it tumbles as a rigid body without a torque. None:
     /// its rate stays as it is in its own axes.
     std::optional<Eigen::Matrix3d> inertia_kg_m2{};

@@ -46,6 +46,16 @@ const char* fault(const BeamVelocity& m) {
     return nullptr;
 }
 
+const char* fault(const BeamRange& m) {
+    if (!is_finite(m.origin_m) || !is_finite(m.point_m)) return "expected finite positions";
+    if (!is_unit(m.q_frame_chaser) || !(std::abs(norm(m.direction) - 1) < 1e-6) ||
+        !(std::abs(norm(m.normal) - 1) < 1e-6))
+        return "expected a quaternion and directions of length 1";
+    if (!std::isfinite(m.range_m) || !(m.sigma_m > 0 && std::isfinite(m.sigma_m)))
+        return "expected a finite range with a standard deviation > 0";
+    return nullptr;
+}
+
 /// Of a measurement that observes all six motions; else 0.
 Matrix6 covariance_of(const PoseMeasurement& m) {
     if (!m.root_information) return m.covariance;
@@ -94,6 +104,22 @@ std::pair<double, Eigen::Matrix<double, 1, 12>> expected_velocity(const Relative
     return {velocity, H};
 }
 
+/// The range that the state expects along the beam, and how it depends on the state's error. With n the plane's
+/// normal, c its point from the target's centre of mass, r that centre, all in frame axes: n . (r + c - o) / n . u.
+std::pair<double, Eigen::Matrix<double, 1, 12>> expected_range(const RelativeState& state, const BeamRange& m) {
+    const Vec3 u = m.q_frame_chaser * m.direction, origin = m.q_frame_chaser * m.origin_m;
+    const Vec3 n = state.q_frame_target * m.normal, plane = state.q_frame_target * m.point_m;
+    const double along = dot(n, u), range_m = dot(n, state.position_m + plane - origin) / along;
+    const Vec3 by_position = n / along;
+    // The plane turns about the target's centre: its point moves, and its normal turns about where the beam ends.
+    const Vec3 met = origin + range_m * u - state.position_m;
+    const Vec3 by_attitude = conjugate(state.q_frame_target) * cross(met, by_position);
+    Eigen::Matrix<double, 1, 12> H = Eigen::Matrix<double, 1, 12>::Zero();
+    H.segment<3>(0) = to_eigen(by_position).transpose();
+    H.segment<3>(6) = to_eigen(by_attitude).transpose();
+    return {range_m, H};
+}
+
 /// The innovation of a measurement of N numbers, and the factor of its covariance.
 template <int N>
 struct Innovation {
@@ -129,6 +155,15 @@ Innovation<1> innovation_of(const MotionModel& motion, const RelativeState& stat
     Innovation<1> i{.H = H, .z{}, .R{}};
     i.z(0) = m.velocity_m_s - velocity_m_s;
     i.R(0) = m.sigma_m_s * m.sigma_m_s;
+    i.form(P);
+    return i;
+}
+
+Innovation<1> innovation_of(const MotionModel&, const RelativeState& state, const Matrix12& P, const BeamRange& m) {
+    const auto [range_m, H] = expected_range(state, m);
+    Innovation<1> i{.H = H, .z{}, .R{}};
+    i.z(0) = m.range_m - range_m;
+    i.R(0) = m.sigma_m * m.sigma_m;
     i.form(P);
     return i;
 }
@@ -281,6 +316,10 @@ UpdateResult PoseFilter::update(const BeamVelocity& m) {
     return take(m, settings_.beam_gate);
 }
 
+UpdateResult PoseFilter::update(const BeamRange& m) {
+    return take(m, settings_.beam_gate);
+}
+
 PoseFilter::Pose PoseFilter::pose(const Quat& q_frame_chaser) const {
     const Matrix6x12 J = pose_jacobian(q_frame_chaser, now_.state);
     return {
@@ -315,6 +354,11 @@ UpdateResult PoseTracker::update(const PoseMeasurement& measurement) {
 UpdateResult PoseTracker::update(const BeamVelocity& measurement) {
     if (filter_) return filter_->update(measurement);
     return {UpdateOutcome::bad, 0, "a velocity cannot start a filter"};
+}
+
+UpdateResult PoseTracker::update(const BeamRange& measurement) {
+    if (filter_) return filter_->update(measurement);
+    return {UpdateOutcome::bad, 0, "a range cannot start a filter"};
 }
 
 }  // namespace narpa

@@ -21,7 +21,7 @@ struct FilterSettings {
     /// Gate of the normalised innovation squared (NIS): the 0.9999 quantile of chi-square with six degrees of
     /// freedom.
     double gate = 27.86;
-    /// The same for the velocity along a beam, one degree of freedom.
+    /// The same for velocity or range along a beam, one degree of freedom.
     double beam_gate = 15.14;
     /// Measurements and changes of the known acceleration that are kept for late measurements; >= 2.
     std::size_t history = 32;
@@ -50,6 +50,18 @@ struct BeamVelocity {
     double sigma_m_s = 0;      ///< standard deviation, > 0
     Quat q_frame_chaser{};     ///< the chaser's attitude then, taken as exact
     Vec3 chaser_rate_rad_s{};  ///< against inertial space, chaser axes, taken as exact
+};
+
+/// An altimeter's measurement of the range along a beam. The target's surface is a plane about where the beam is
+/// expected to meet it.
+struct BeamRange {
+    std::int64_t t_ns = 0;
+    Vec3 origin_m{},
+        direction{};           ///< chaser axes, from its centre of mass: where the beam starts, its unit direction
+    Vec3 point_m{}, normal{};  ///< of the plane: target axes, from its centre of mass; unit
+    double range_m = 0;
+    double sigma_m = 0;     ///< standard deviation, > 0, of the instrument and of the surface about the plane
+    Quat q_frame_chaser{};  ///< the chaser's attitude then, taken as exact
 };
 
 enum class UpdateOutcome : std::uint8_t {
@@ -93,6 +105,7 @@ public:
     /// Updates with a measurement; propagates to its time where that is later.
     UpdateResult update(const PoseMeasurement& measurement);
     UpdateResult update(const BeamVelocity& measurement);
+    UpdateResult update(const BeamRange& measurement);
 
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_; }
     [[nodiscard]] const RelativeState& state() const noexcept { return now_.state; }
@@ -121,8 +134,8 @@ private:
     struct Event {
         std::int64_t t_ns = 0;
         Estimate after;
-        Thrust thrust;                                                            ///< from then on
-        std::variant<std::monostate, PoseMeasurement, BeamVelocity> measurement;  ///< none: a change of thrust
+        Thrust thrust;                                                                       ///< from then on
+        std::variant<std::monostate, PoseMeasurement, BeamVelocity, BeamRange> measurement;  ///< none: of thrust
     };
     explicit PoseFilter(const FilterSettings& settings) : settings_(settings) {}
 
@@ -159,6 +172,7 @@ public:
     UpdateResult update(const PoseMeasurement& measurement);
     /// Bad before the filter has started.
     UpdateResult update(const BeamVelocity& measurement);
+    UpdateResult update(const BeamRange& measurement);
     /// The next measurement starts the filter.
     void stop() noexcept { filter_.reset(); }
 

@@ -22,6 +22,7 @@ namespace {
 constexpr std::int64_t kShortWaitNs = 20'000'000;
 /// In real time poses are sent so long before their time of validity: a frame of that time then has that pose.
 constexpr std::int64_t kLeadNs = 5'000'000;
+constexpr double kSiteOff_m = 0.5;
 constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
 
 /// A body's pose commands.
@@ -41,11 +42,11 @@ struct CommandCounts {
 
 class Node {
 public:
-    Node(const Scenario& scenario, const DynamicsOptions& options, std::optional<TruthLog> log, CanBus& bus,
-         const StopFlag& stop)
+    Node(const Scenario& scenario, const DynamicsOptions& options, std::shared_ptr<const Terrain> terrain,
+         std::optional<TruthLog> log, CanBus& bus, const StopFlag& stop)
         : scenario_(scenario),
           options_(options),
-          simulation_(scenario, options.seed),
+          simulation_(scenario, options.seed, std::move(terrain)),
           log_(std::move(log)),
           bus_(bus),
           stop_(stop),
@@ -286,13 +287,26 @@ nlohmann::json Node::report() const {
 
 Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
                                     const StopFlag& stop) {
+    std::shared_ptr<const Terrain> terrain;
+    if (scenario.gear) {
+        auto made = Terrain::create(scenario);
+        if (!made) return made.error();
+        terrain = *std::move(made);
+        const auto site = terrain->below({});
+        if (!site || std::abs(site->height_m) > kSiteOff_m)
+            return Error{site ? fmt::format("the port of [target], the landing site, is {:.2f} m off the ground, "
+                                            "expected {:g} m at most",
+                                            -site->height_m, kSiteOff_m)
+                              : "there is no ground at the port of [target], the landing site",
+                         scenario.file};
+    }
     std::optional<TruthLog> log;
     if (!options.log_folder.empty()) {
         auto made = TruthLog::create(options.log_folder);
         if (!made) return made.error();
         log.emplace(std::move(*made));
     }
-    Node node(scenario, options, std::move(log), bus, stop);
+    Node node(scenario, options, std::move(terrain), std::move(log), bus, stop);
     const Status flown = node.run();
     if (!flown) return flown.error();
     nlohmann::json document = node.report();
@@ -309,10 +323,14 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
 namespace {
 
 std::string ending_in_words(const std::string& ending) {
-    constexpr std::array<std::string_view, kEndings.size()> kWords{
-        "not over",           "docked",
-        "bounced off",        "the scenario's time is over",
-        "navigation is done", "the chaser has flown off"};
+    constexpr std::array<std::string_view, kEndings.size()> kWords{"not over",
+                                                                   "docked",
+                                                                   "bounced off",
+                                                                   "the scenario's time is over",
+                                                                   "navigation is done",
+                                                                   "the chaser has flown off",
+                                                                   "landed",
+                                                                   "crashed"};
     const auto at = std::find(kEndings.begin(), kEndings.end(), ending);
     return at == kEndings.end() ? ending : std::string(kWords[static_cast<std::size_t>(at - kEndings.begin())]);
 }

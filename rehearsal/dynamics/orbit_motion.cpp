@@ -29,17 +29,17 @@ Translation clohessy_wiltshire_push(double n, double t, const Vec3& a) {
 Translation clohessy_wiltshire(const Orbit& orbit, double t, double dt, const Vec3& a, const Translation& x) {
     const double n = orbit.rate_rad_s();
     const Vec3 rate{0, 0, n};
-    const Quat q_lvlh_world = conjugate(orbit.q_world_lvlh(t));
+    const Quat q_lvlh_world = conjugate(orbit.q_world_frame(t));
     const Vec3 position = q_lvlh_world * x.position_m;
     const Vec3 velocity = q_lvlh_world * x.velocity_m_s - cross(rate, position);
     Vector6 state;
     state << to_eigen(position), to_eigen(velocity);
     state = (clohessy_wiltshire_transition(n, dt) * state).eval();
-    const Translation pushed = clohessy_wiltshire_push(n, dt, conjugate(orbit.q_world_lvlh(t + 0.5 * dt)) * a);
+    const Translation pushed = clohessy_wiltshire_push(n, dt, conjugate(orbit.q_world_frame(t + 0.5 * dt)) * a);
     const Vec3 position_then = Vec3{state[0], state[1], state[2]} + pushed.position_m;
     const Vec3 velocity_then = Vec3{state[3], state[4], state[5]} + pushed.velocity_m_s;
-    const Quat q_world_lvlh = orbit.q_world_lvlh(t + dt);
-    return {q_world_lvlh * position_then, q_world_lvlh * (velocity_then + cross(rate, position_then))};
+    const Quat q_world_frame = orbit.q_world_frame(t + dt);
+    return {q_world_frame * position_then, q_world_frame * (velocity_then + cross(rate, position_then))};
 }
 
 /// Gravity at the chaser minus gravity at the target, which is at R from the attractor.
@@ -51,25 +51,38 @@ Vec3 gravity_difference(double mu, const Vec3& R, const Vec3& r) {
     return (-mu / (square * std::sqrt(square))) * (r + f * (R + r));
 }
 
-Translation two_body_step(const Orbit& orbit, double t, double h, const Vec3& a, const Translation& x) {
-    const auto rates = [&](double at_s, const Translation& s) {
-        const Vec3 R = orbit.q_world_lvlh(at_s) * Vec3{orbit.radius_m, 0, 0};
-        return Translation{s.velocity_m_s, gravity_difference(orbit.mu_m3_s2, R, s.position_m) + a};
-    };
+/// `rates(after_s, state)`: derivatives so long after the start of the step h.
+template <class Rates>
+Translation runge_kutta(double h, const Translation& x, const Rates& rates) {
     const auto moved = [&](const Translation& rate, double by) {
         return Translation{x.position_m + by * rate.position_m, x.velocity_m_s + by * rate.velocity_m_s};
     };
-    const Translation k1 = rates(t, x), k2 = rates(t + 0.5 * h, moved(k1, 0.5 * h));
-    const Translation k3 = rates(t + 0.5 * h, moved(k2, 0.5 * h)), k4 = rates(t + h, moved(k3, h));
+    const Translation k1 = rates(0, x), k2 = rates(0.5 * h, moved(k1, 0.5 * h));
+    const Translation k3 = rates(0.5 * h, moved(k2, 0.5 * h)), k4 = rates(h, moved(k3, h));
     return {x.position_m + h / 6 * (k1.position_m + 2.0 * k2.position_m + 2.0 * k3.position_m + k4.position_m),
             x.velocity_m_s +
                 h / 6 * (k1.velocity_m_s + 2.0 * k2.velocity_m_s + 2.0 * k3.velocity_m_s + k4.velocity_m_s)};
 }
 
-Translation two_body(const Orbit& orbit, double t, double dt, const Vec3& a, Translation x) {
+Translation two_body_step(const Orbit& orbit, double t, double h, const Vec3& a, const Translation& x) {
+    return runge_kutta(h, x, [&](double after_s, const Translation& s) {
+        const Vec3 R = orbit.q_world_frame(t + after_s) * Vec3{orbit.radius_m, 0, 0};
+        return Translation{s.velocity_m_s, gravity_difference(orbit.mu_m3_s2, R, s.position_m) + a};
+    });
+}
+
+/// Over the ground of a planet that turns.
+Translation surface_step(const Orbit& orbit, double t, double h, const Vec3& a, const Translation& x) {
+    return runge_kutta(h, x, [&](double after_s, const Translation& s) {
+        return Translation{s.velocity_m_s, orbit.fall_m_s2(t + after_s, s.position_m) + a};
+    });
+}
+
+template <class Step>
+Translation in_steps(const Step& step, const Orbit& orbit, double t, double dt, const Vec3& a, Translation x) {
     const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(dt) / kLongestStepS)));
     const double h = dt / steps;
-    for (int i = 0; i < steps; ++i) x = two_body_step(orbit, t + i * h, h, a, x);
+    for (int i = 0; i < steps; ++i) x = step(orbit, t + i * h, h, a, x);
     return x;
 }
 
@@ -80,15 +93,16 @@ Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& 
     switch (orbit.model) {
         case Orbit::Model::free: break;
         case Orbit::Model::clohessy_wiltshire: return clohessy_wiltshire(orbit, t_s, dt_s, acceleration_m_s2, from);
-        case Orbit::Model::two_body: return two_body(orbit, t_s, dt_s, acceleration_m_s2, from);
+        case Orbit::Model::two_body: return in_steps(two_body_step, orbit, t_s, dt_s, acceleration_m_s2, from);
+        case Orbit::Model::surface: return in_steps(surface_step, orbit, t_s, dt_s, acceleration_m_s2, from);
     }
     return free_motion(dt_s, acceleration_m_s2, from);
 }
 
 Motion attractor_motion(const Orbit& orbit, const Quat& q_world_attractor, double t_s) {
-    const Quat q_world_lvlh = orbit.q_world_lvlh(t_s);
-    return {{q_world_attractor, q_world_lvlh * Vec3{-orbit.radius_m, 0, 0}},
-            q_world_lvlh * Vec3{0, -orbit.radius_m * orbit.rate_rad_s(), 0},
+    const Quat q_world_frame = orbit.q_world_frame(t_s);
+    return {{q_world_attractor, q_world_frame * Vec3{-orbit.radius_m, 0, 0}},
+            q_world_frame * Vec3{0, -orbit.radius_m * orbit.rate_rad_s(), 0},
             {}};
 }
 

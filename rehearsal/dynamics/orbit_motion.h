@@ -1,5 +1,5 @@
 /// rehearsal/dynamics/orbit_motion.h - relative motion of the chaser's centre of mass about the target's, which is
-/// on a circular orbit.
+/// on a circular orbit, or fixed to the ground of a rotating planet.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,6 +20,7 @@ struct Translation {
 /// target's circle is exact; the gravity difference has the form of R. Battin ("An Introduction to the Mathematics
 /// and Methods of Astrodynamics", 1999, section 8.5), which does not cancel against the orbit's radius, and is
 /// integrated by RK4 in steps of at most a second: error 1e-12 of the distance after an orbit at 400 km.
+/// Surface: gravity with J2 less the acceleration of the ground, by the same steps.
 [[nodiscard]] Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
                                      const Translation& from);
 

@@ -15,7 +15,14 @@ constexpr std::int64_t kLongestStepNs = 50'000'000;  // error: forces rotate wit
 constexpr double kPortRadiusM = 1;                   // with more lateral distance the ports pass each other
 constexpr double kRestitution = 0.3;
 constexpr std::int64_t kAfterCaptureNs = 2'000'000'000, kAfterBounceNs = 10'000'000'000;
-constexpr double kLeftDistances = 2;  // of the start's distance
+constexpr double kLeftDistances = 2;   // of the start's distance
+constexpr double kGravity0 = 9.80665;  // m/s^2, by which specific impulses are given
+
+// Feet on the ground: the period of a lander's springs is some hundred of these steps.
+constexpr std::int64_t kContactStepNs = 1'000'000;
+constexpr double kNearGroundM = 0.1;
+constexpr double kStillM_s = 0.02, kStillRad_s = 0.2 * kDegree;
+constexpr std::int64_t kStillNs = 1'000'000'000, kAfterLandingNs = 1'000'000'000;
 
 /// A motion in the steps of a pose command; as it is where it does not fit one.
 Motion as_transmitted(const Motion& motion) {
@@ -28,12 +35,13 @@ Motion as_transmitted(const Motion& motion) {
 
 }  // namespace
 
-Simulation::Simulation(const Scenario& scenario, std::uint64_t seed)
+Simulation::Simulation(const Scenario& scenario, std::uint64_t seed, std::shared_ptr<const Terrain> terrain)
     : scenario_(scenario),
       target_body_(scenario.target.inertia_kg_m2),
       chaser_body_(scenario.chaser.inertia_kg_m2),
       thrusters_(scenario, seed),
       sensor_(engine(seed, Stream::attitude_sensor)) {
+    if (scenario.gear && terrain) ground_.emplace(*scenario.gear, std::move(terrain));
     place_bodies(seed);
 }
 
@@ -51,7 +59,7 @@ void Simulation::place_bodies(std::uint64_t seed) {
     state_.target.q_world_body = normalized(scenario_.q_world_target);
     state_.target.rate_rad_s = kDegree * scenario_.target_motion.rate_deg_s;
     if (scenario_.target_motion.with_lvlh) {
-        const Vec3 orbit_rate = scenario_.orbit.q_world_lvlh(0) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
+        const Vec3 orbit_rate = scenario_.orbit.q_world_frame(0) * Vec3{0, 0, scenario_.orbit.rate_rad_s()};
         state_.target.rate_rad_s += conjugate(state_.target.q_world_body) * orbit_rate;
     }
 
@@ -65,6 +73,7 @@ void Simulation::place_bodies(std::uint64_t seed) {
     port.rate_rad_s = conjugate(scenario_.chaser.T_body_port.q) * rate_body;
     const Motion chaser = chaser_motion(port, scenario_.target, target_motion(state_), scenario_.chaser);
     const Vec3& centre = scenario_.chaser.centre_of_mass_m;
+    state_.mass_kg = scenario_.chaser.mass_kg;
     state_.chaser = {chaser.T_world_body.q, chaser.rate_rad_s};
     state_.translation = {chaser.T_world_body * centre,
                           chaser.velocity_m_s + chaser.T_world_body.q * cross(chaser.rate_rad_s, centre)};
@@ -82,6 +91,7 @@ bool Simulation::apply(const ActuatorCommand& command) {
 
 /// In steps over which forces are constant.
 void Simulation::advance_to(std::int64_t t_ns) {
+    if (ground_) return advance_lander(t_ns);
     if (at_contact_) part_or_hold();
     while (state_.t_ns < t_ns) {
         const std::int64_t from_ns = state_.t_ns;
@@ -133,6 +143,10 @@ Simulation::State Simulation::after(const State& from, const Loads& loads, std::
     const double dt_s = to_seconds(dt_ns);
     State to;
     to.t_ns = from.t_ns + dt_ns;
+    to.mass_kg = from.mass_kg;
+    if (const auto& e = scenario_.engine; e && e->specific_impulse_s > 0)
+        to.mass_kg -=
+            std::max(0.0, e->sign() * loads.force_n[e->axis()]) * dt_s / (e->specific_impulse_s * kGravity0);
     to.target = target_after(from, dt_s);
     if (T_held_) {
         to.chaser.q_world_body = normalized(to.target.q_world_body * T_held_->q);
@@ -145,7 +159,7 @@ Simulation::State Simulation::after(const State& from, const Loads& loads, std::
     Vec3 acceleration_m_s2;
     if (loads.force_n != Vec3{}) {
         const Attitude middle = chaser_body_.turned(from.chaser, loads.torque_n_m, 0.5 * dt_s);
-        acceleration_m_s2 = middle.q_world_body * loads.force_n / scenario_.chaser.mass_kg;
+        acceleration_m_s2 = middle.q_world_body * loads.force_n / from.mass_kg;
     }
     to.translation = propagated(scenario_.orbit, to_seconds(from.t_ns), dt_s, acceleration_m_s2, from.translation);
     return to;
@@ -156,10 +170,10 @@ Attitude Simulation::target_after(const State& from, double dt_s) const {
     if (!scenario_.target_motion.with_lvlh) return target_body_.turned(from.target, {}, dt_s);
     const Vec3 orbit_rate{0, 0, scenario_.orbit.rate_rad_s()};
     const Quat q_lvlh_body =
-        conjugate(scenario_.orbit.q_world_lvlh(to_seconds(from.t_ns))) * from.target.q_world_body;
+        conjugate(scenario_.orbit.q_world_frame(to_seconds(from.t_ns))) * from.target.q_world_body;
     const Vec3 rate = from.target.rate_rad_s - conjugate(q_lvlh_body) * orbit_rate;
     const Quat q_lvlh_then = q_lvlh_body * exp_rotation(dt_s * rate);
-    return {normalized(scenario_.orbit.q_world_lvlh(to_seconds(from.t_ns) + dt_s) * q_lvlh_then),
+    return {normalized(scenario_.orbit.q_world_frame(to_seconds(from.t_ns) + dt_s) * q_lvlh_then),
             rate + conjugate(q_lvlh_then) * orbit_rate};
 }
 
@@ -218,6 +232,79 @@ void Simulation::touch(const State& met, const Loads& loads) {
 void Simulation::part_or_hold() {
     at_contact_ = false;
     if (phase_ != DynamicsPhase::captured) return rebound(state_);
+    hold();
+}
+
+// --- Landing --------------------------------------------------------------------------------------------------
+
+std::optional<double> Simulation::clearance_m() const {
+    if (!ground_) return std::nullopt;
+    return ground_->clearance_m(port());
+}
+
+/// As advance_to; in short steps where the feet may meet the ground within a long one.
+void Simulation::advance_lander(std::int64_t t_ns) {
+    while (state_.t_ns < t_ns) {
+        const std::int64_t from_ns = state_.t_ns;
+        Loads loads = thrusters_.loads(from_ns);
+        std::int64_t step_ns = kLongestStepNs;
+        if (!T_held_) {
+            const PortState p = port();
+            const double reach_m = kNearGroundM + to_seconds(kLongestStepNs) * 2 * norm(p.velocity_m_s);
+            if (ground_->clearance_m(p) < reach_m) {
+                step_ns = kContactStepNs;
+                const Loads pushed = ground_loads();
+                if (judge_landing(deepest_m_)) return;
+                loads.force_n += pushed.force_n, loads.torque_n_m += pushed.torque_n_m;
+            }
+        }
+        const std::int64_t until_ns =
+            std::min({t_ns, from_ns + step_ns, next_fault_ns(from_ns), thrusters_.next_change_ns(from_ns)});
+        State next = after(state_, loads, until_ns - from_ns);
+        fire_for(thrusters_.loads(from_ns), until_ns - from_ns);
+        state_ = next;
+        change_target_rate(from_ns, until_ns);
+    }
+}
+
+/// Of the ground on the chaser, body axes, about its centre of mass.
+Loads Simulation::ground_loads() {
+    const PortState p = port();
+    const GroundForces f = ground_->press(p);
+    deepest_m_ = f.deepest_m;
+    const Quat q_body_site = scenario_.chaser.T_body_port.q * conjugate(p.T_port_chaser_port.q);
+    const Vec3 force = q_body_site * f.force_n;
+    const Vec3 arm = scenario_.chaser.T_body_port.t - scenario_.chaser.centre_of_mass_m;
+    return {force, q_body_site * f.torque_n_m + cross(arm, force)};
+}
+
+/// True where the phase changes.
+bool Simulation::judge_landing(double deepest_m) {
+    const PortState p = port();
+    if (phase_ == DynamicsPhase::flying) {
+        if (deepest_m <= 0) return false;
+        contact_ = ContactEvent{state_.t_ns, p, false};
+        phase_ = DynamicsPhase::touched_down;
+        return true;
+    }
+    if (deepest_m > scenario_.gear->stroke_m || p.pitch_yaw_rad() > kDegree * scenario_.gear->tipped_deg) {
+        phase_ = DynamicsPhase::crashed;
+        hold();
+        return true;
+    }
+    const bool still = deepest_m > 0 && norm(p.velocity_m_s) < kStillM_s && norm(p.rate_rad_s) < kStillRad_s;
+    if (!still) still_ns_.reset();
+    if (still && !still_ns_) still_ns_ = state_.t_ns;
+    if (!still || state_.t_ns - *still_ns_ < kStillNs) return false;
+    phase_ = DynamicsPhase::landed;
+    contact_->captured = true;
+    hold();
+    return true;
+}
+
+/// On the target from now on.
+void Simulation::hold() {
+    settled_ns_ = state_.t_ns;
     const Quat q_target_world = conjugate(state_.target.q_world_body);
     T_held_ = Rigid3{q_target_world * state_.chaser.q_world_body, q_target_world * state_.translation.position_m};
 }
@@ -255,7 +342,11 @@ PortState Simulation::port() const {
 }
 
 Ending Simulation::ending() const {
-    if (contact_ && t_ns() >= contact_->t_ns + (contact_->captured ? kAfterCaptureNs : kAfterBounceNs))
+    if (phase_ == DynamicsPhase::landed || phase_ == DynamicsPhase::crashed) {
+        if (t_ns() < settled_ns_ + kAfterLandingNs) return Ending::not_yet;
+        return phase_ == DynamicsPhase::landed ? Ending::landed : Ending::crashed;
+    }
+    if (!ground_ && contact_ && t_ns() >= contact_->t_ns + (contact_->captured ? kAfterCaptureNs : kAfterBounceNs))
         return contact_->captured ? Ending::captured : Ending::bounced;
     if (t_ns() >= to_ns(scenario_.duration_s)) return Ending::duration;
     if (command_.phase == GuidancePhase::done) return Ending::navigation_done;

@@ -3,7 +3,7 @@
 /// numbers.
 ///
 /// Contact does not move the target: its centre of mass is the world's origin, and only the relative motion
-/// matters.
+/// matters. Contact is between docking ports, or of a landing gear with the ground.
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "protocols/closed_loop.h"
+#include "rehearsal/dynamics/ground_contact.h"
 #include "rehearsal/dynamics/orbit_motion.h"
 #include "rehearsal/dynamics/thruster_model.h"
 #include "rehearsal/scenario/scenario.h"
@@ -32,25 +33,26 @@ struct StartDraws {
 
 struct ContactEvent {
     std::int64_t t_ns = 0;
-    PortState port;  ///< just before
-    bool captured = false;
+    PortState port;         ///< just before
+    bool captured = false;  ///< or landed
 };
 
 /// Why a run is over; left: the chaser has retreated far beyond its start.
-enum class Ending : std::uint8_t { not_yet, captured, bounced, duration, navigation_done, left };
-inline constexpr std::array<std::string_view, 6> kEndings{"not_yet",  "captured",        "bounced",
-                                                          "duration", "navigation_done", "left"};
+enum class Ending : std::uint8_t { not_yet, captured, bounced, duration, navigation_done, left, landed, crashed };
+inline constexpr std::array<std::string_view, 8> kEndings{"not_yet",         "captured", "bounced", "duration",
+                                                          "navigation_done", "left",     "landed",  "crashed"};
 
 class Simulation {
 public:
-    Simulation(const Scenario& scenario, std::uint64_t seed);
+    /// `terrain`: the ground, where the scenario has a landing gear.
+    Simulation(const Scenario& scenario, std::uint64_t seed, std::shared_ptr<const Terrain> terrain = {});
 
     /// The scenario's time.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return state_.t_ns; }
     /// The thruster command from now on; false: lost by a fault.
     bool apply(const ActuatorCommand& command);
-    /// Advances to t_ns, or to contact if that is before: then phase() has changed, and the motion is the one just
-    /// before contact. The next call continues from there.
+    /// Advances to t_ns, or to a change of phase() if that is before; at contact of ports the motion is the one
+    /// just before. The next call continues from there.
     void advance_to(std::int64_t t_ns);
     /// Star tracker and gyroscope, with noise.
     [[nodiscard]] AttitudeReport measure_attitude();
@@ -61,6 +63,10 @@ public:
     /// The first.
     [[nodiscard]] const std::optional<ContactEvent>& contact() const noexcept { return contact_; }
     [[nodiscard]] Ending ending() const;
+    /// Of the chaser; an engine burns propellant.
+    [[nodiscard]] double mass_kg() const noexcept { return state_.mass_kg; }
+    /// Height of the lowest foot above the ground, where there is a landing gear.
+    [[nodiscard]] std::optional<double> clearance_m() const;
 
     /// Impulse and angular impulse since the start, body axes.
     [[nodiscard]] const Loads& fired() const noexcept { return fired_; }
@@ -74,6 +80,7 @@ private:
         std::int64_t t_ns = 0;
         Attitude target, chaser;
         Translation translation;
+        double mass_kg = 1;
     };
 
     void place_bodies(std::uint64_t seed);
@@ -91,6 +98,10 @@ private:
     void touch(const State& met, const Loads& loads);
     void part_or_hold();
     void rebound(State& state) const;
+    void advance_lander(std::int64_t t_ns);
+    [[nodiscard]] Loads ground_loads();
+    [[nodiscard]] bool judge_landing(double deepest_m);
+    void hold();
 
     Scenario scenario_;
     RigidBody target_body_, chaser_body_;
@@ -102,6 +113,10 @@ private:
     bool at_contact_ = false;       // at a contact from which advance_to has yet to continue
     std::optional<Rigid3> T_held_;  // captured: chaser's body at its centre of mass, in the target's
     std::optional<ContactEvent> contact_;
+    std::optional<GroundContact> ground_;
+    double deepest_m_ = 0;                  // of the feet in the step that follows
+    std::optional<std::int64_t> still_ns_;  // on its feet, since then
+    std::int64_t settled_ns_ = 0;           // landed or crashed
     Loads fired_{};
     ActuatorCommand command_{};
 };

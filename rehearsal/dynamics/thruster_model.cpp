@@ -12,7 +12,10 @@ constexpr int kForceGroups = 6;
 }  // namespace
 
 ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
-    : thrusters_(scenario.thrusters), period_ns_(scenario.period_ns()), gains_(engine(seed, Stream::pulses)) {
+    : thrusters_(scenario.thrusters),
+      engine_(scenario.engine),
+      period_ns_(scenario.period_ns()),
+      gains_(engine(seed, Stream::pulses)) {
     std::mt19937_64 draws = engine(seed, Stream::misalignment);
     for (int group = 0; group < kThrusterGroups; ++group) {
         Vec3 axis;
@@ -21,6 +24,8 @@ ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
             exp_rotation((thrusters_.misalignment_sigma_deg * kDegree) * draw_normal(draws)) * axis;
     }
     for (const Fault& fault : scenario.faults) {
+        if (fault.kind == Fault::Kind::throttle_stuck)
+            stuck_throttle_.push_back({to_ns(fault.from_s), to_ns(fault.until_s)});
         const bool stuck = fault.kind == Fault::Kind::thruster_stuck;
         if (!stuck && fault.kind != Fault::Kind::thruster_off) continue;
         const auto group = std::ranges::find(kThrusterGroupNames, fault.axis) - kThrusterGroupNames.begin();
@@ -32,7 +37,11 @@ void ThrusterModel::fire(const ActuatorCommand& command, std::int64_t t_ns) {
     pulses_ = {};
     for (int axis = 0; axis < 3; ++axis) {
         const double impulse = command.impulse_n_s[axis];
-        fire(2 * axis + (impulse < 0), std::abs(impulse), t_ns);
+        const int group = 2 * axis + (impulse < 0);
+        if (engine_ && group == static_cast<int>(engine_->group))
+            burn(std::abs(impulse), t_ns);
+        else
+            fire(group, std::abs(impulse), t_ns);
     }
     for (int axis = 0; axis < 3; ++axis) {
         const double impulse = command.angular_impulse_n_m_s[axis];
@@ -50,7 +59,16 @@ void ThrusterModel::fire(int group, double impulse, std::int64_t t_ns) {
     pulses_[group] = {t_ns, t_ns + on_ns, full(group) * even_out * std::max(gain, 0.0)};
 }
 
+void ThrusterModel::burn(double impulse, std::int64_t t_ns) {
+    if (!(impulse > 0)) return;
+    const double force_n =
+        std::clamp(1e9 * impulse / static_cast<double>(period_ns_), engine_->least_n, engine_->most_n);
+    const double gain = 1 + engine_->gain_sigma * std::normal_distribution<double>()(gains_);
+    pulses_[engine_->group] = {t_ns, t_ns + period_ns_, force_n * std::max(gain, 0.0)};
+}
+
 double ThrusterModel::full(int group) const noexcept {
+    if (engine_ && group == static_cast<int>(engine_->group)) return engine_->most_n;
     return group < kForceGroups ? thrusters_.force_n : thrusters_.torque_n_m;
 }
 
@@ -68,7 +86,13 @@ double ThrusterModel::strength(int group, std::int64_t t_ns) const {
     if (off) return 0;
     if (stuck) return full(group);
     const Pulse& p = pulses_[group];
+    if (engine_ && group == static_cast<int>(engine_->group) && throttle_is_stuck(t_ns))
+        return p.strength > 0 ? engine_->least_n : 0;
     return t_ns >= p.from_ns && t_ns < p.until_ns ? p.strength : 0;
+}
+
+bool ThrusterModel::throttle_is_stuck(std::int64_t t_ns) const {
+    return std::ranges::any_of(stuck_throttle_, [&](const auto& s) { return t_ns >= s.first && t_ns < s.second; });
 }
 
 std::int64_t ThrusterModel::next_change_ns(std::int64_t t_ns) const {
@@ -78,6 +102,7 @@ std::int64_t ThrusterModel::next_change_ns(std::int64_t t_ns) const {
     };
     for (const Pulse& p : pulses_) consider(p.until_ns);
     for (const GroupFault& f : faults_) consider(f.from_ns), consider(f.until_ns);
+    for (const auto& [from_ns, until_ns] : stuck_throttle_) consider(from_ns), consider(until_ns);
     return next;
 }
 

@@ -47,7 +47,9 @@ inline constexpr int kThrusterGroups = static_cast<int>(kThrusterGroupNames.size
 
 /// A group fires with its full force or not at all. Of a command, each of the six impulses is for the group in its
 /// direction, which fires for |impulse| / force seconds from the command's time on: not at all where that is less
-/// than min_on_s, for the control period at most. A pulse has its own error of force, a group one of direction.
+/// than min_on_s, for the control period at most. A pulse has its own error of force, a group one of direction. An
+/// engine in a group's place burns for the whole period with the force impulse / period, within its limits; it is
+/// off where the impulse is 0.
 class ThrusterModel {
 public:
     /// Faults of other kinds are passed over; those of thrusters name a group.
@@ -75,10 +77,14 @@ private:
     [[nodiscard]] double full(int group) const noexcept;
     [[nodiscard]] double strength(int group, std::int64_t t_ns) const;
     void fire(int group, double impulse, std::int64_t t_ns);
+    void burn(double impulse, std::int64_t t_ns);
+    [[nodiscard]] bool throttle_is_stuck(std::int64_t t_ns) const;
 
     Thrusters thrusters_;
+    std::optional<Engine> engine_;
     std::int64_t period_ns_;
     std::vector<GroupFault> faults_;
+    std::vector<std::pair<std::int64_t, std::int64_t>> stuck_throttle_;  ///< from, until
     std::mt19937_64 gains_;
     std::array<Vec3, kThrusterGroups> directions_{};
     std::array<Pulse, kThrusterGroups> pulses_{};

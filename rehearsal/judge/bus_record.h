@@ -17,7 +17,7 @@
 #include "protocols/can/messages.h"
 #include "protocols/closed_loop.h"
 #include "protocols/ledger.h"
-#include "rehearsal/docking/port_state.h"
+#include "rehearsal/contact/port_state.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {

@@ -29,18 +29,24 @@ void Judge::report(const GateResult& result) {
 }
 
 void Judge::check(const DynamicsReport& report) {
-    if (report.phase != DynamicsPhase::captured && report.phase != DynamicsPhase::bounced) return;
-    if (!t_contact_ns_) t_contact_ns_ = report.t_ns;
-    if (report.phase == DynamicsPhase::captured && !t_captured_ns_) t_captured_ns_ = report.t_ns;
+    if (is_contact(report.phase) && !t_contact_ns_) t_contact_ns_ = report.t_ns;
+    if (is_held(report.phase) && !t_captured_ns_) t_captured_ns_ = report.t_ns;
+    if (!t_last_judged_ns_ && (is_held(report.phase) || report.phase == DynamicsPhase::touched_down))
+        t_last_judged_ns_ = report.t_ns;
 }
 
 void Judge::check(const TruthState& state) {
     if (t_contact_ns_ && !contact_judged_ && state.t_ns >= *t_contact_ns_) {
         contact_judged_ = true;
-        const GateResult result = contact();
-        if (result.state == GateState::failed) report(result);
+        if (scenario_.gates.landing) {
+            if (const auto touchdown = contact_made())
+                for (const ContactCondition& c : touchdown->conditions)
+                    if (!c.within()) report(landing(*touchdown, c));
+        } else if (const GateResult result = contact(); result.state == GateState::failed) {
+            report(result);
+        }
     }
-    if (t_captured_ns_ && state.t_ns > *t_captured_ns_) return;
+    if (t_last_judged_ns_ && state.t_ns > *t_last_judged_ns_) return;
     const Gates& gates = scenario_.gates;
     const double wall_m = gates.corridor ? corridor_clearance_m(*gates.corridor, state.position_m())
                                          : -std::numeric_limits<double>::infinity();
@@ -56,7 +62,7 @@ void Judge::check(const TruthState& state) {
 }
 
 void Judge::check(const JudgedEstimate& estimate) {
-    if (t_captured_ns_ && estimate.t_ns > *t_captured_ns_) return;
+    if (t_last_judged_ns_ && estimate.t_ns > *t_last_judged_ns_) return;
     const Gates::NavigationError limits = scenario_.gates.navigation.value_or(Gates::NavigationError{});
     const bool reported = position_.first || attitude_.first;
     sigmas_.check(estimate, limits.sigmas - estimate.largest_in_sigmas());
@@ -78,7 +84,7 @@ NavigationStatistics Judge::navigation_statistics() const {
     std::size_t within = 0;
     bool measured = false;
     for (const JudgedEstimate& e : bus_.estimates) {
-        if (t_captured_ns_ && e.t_ns > *t_captured_ns_) continue;
+        if (t_last_judged_ns_ && e.t_ns > *t_last_judged_ns_) continue;
         ++s.estimates;
         s.with_frames += e.frames > 0;
         s.with_sweeps += e.sweeps > 0;
@@ -125,7 +131,8 @@ LedgerStatistics Judge::ledger_statistics() const {
 std::string Judge::headline(const Verdict& v, const std::string& trouble) const {
     const auto failed = std::find_if(v.gates.begin(), v.gates.end(),
                                      [](const GateResult& g) { return g.state == GateState::failed; });
-    const std::string what = t_captured_ns_ ? fmt::format("Docked after {:.1f} s", bus_.seconds(*t_captured_ns_))
+    const std::string what = t_captured_ns_ ? fmt::format("{} after {:.1f} s", scenario_.gear ? "Landed" : "Docked",
+                                                          bus_.seconds(*t_captured_ns_))
                                             : fmt::format("Flown for {:.1f} s", v.t_end_s);
     if (!trouble.empty()) return fmt::format("{}, but {}", what, trouble);
     if (failed == v.gates.end()) return what + ", all gates passed";
@@ -151,11 +158,12 @@ Verdict Judge::finish(const std::string& trouble) const {
         v.gates.back().reason = trouble + "; " + v.gates.back().reason;
     }
     if (gates.complete) v.gates.push_back(duration());
+    v.contact = contact_made();
+    if (gates.landing) add_landing_gates(v);
     v.passed = std::none_of(v.gates.begin(), v.gates.end(),
                             [](const GateResult& g) { return g.state == GateState::failed; });
     v.t_end_s = bus_.truth.empty() ? 0 : bus_.seconds(bus_.truth.back().t_ns);
     v.lockstep = bus_.heartbeats.lockstep;
-    v.contact = contact_made();
     v.navigation = navigation_statistics();
     v.ledger = ledger_statistics();
     v.poses = bus_.truth.size();

@@ -39,7 +39,8 @@ struct LimitMonitor {
 /// Frames in, a verdict out. Its only inputs are the scenario and the bus: a log gives the same verdict as the live
 /// bus.
 ///
-/// After capture the two are one body: corridor, distances and estimates are judged up to that instant.
+/// After capture the two are one body: corridor, distances and estimates are judged up to that instant. A lander is
+/// judged up to its touchdown, and then by the ground that it stands on, for which the scene is read.
 class Judge {
 public:
     using Failure = std::function<void(const GateResult&)>;
@@ -72,6 +73,9 @@ private:
     [[nodiscard]] GateResult distance() const;
     [[nodiscard]] GateResult navigation() const;
     [[nodiscard]] GateResult contact() const;
+    [[nodiscard]] GateResult landing(const Contact& touchdown, const ContactCondition& condition) const;
+    void add_landing_gates(Verdict& verdict) const;
+    [[nodiscard]] std::optional<Footing> footing_at_end() const;
     [[nodiscard]] GateResult complete() const;
     [[nodiscard]] GateResult duration() const;
     [[nodiscard]] std::optional<Contact> contact_made() const;
@@ -83,8 +87,9 @@ private:
     const Failure on_failure_;
     BusRecord bus_{scenario_};
     std::size_t failures_ = 0;
-    std::optional<std::int64_t> t_captured_ns_;
-    std::optional<std::int64_t> t_contact_ns_;  ///< captured or bounced, whichever came first
+    std::optional<std::int64_t> t_captured_ns_;     ///< or landed
+    std::optional<std::int64_t> t_contact_ns_;      ///< captured, bounced or touched down, whichever came first
+    std::optional<std::int64_t> t_last_judged_ns_;  ///< nothing that moves is judged later
     bool abort_reported_ = false, contact_judged_ = false, measured_ = false;
 
     LimitMonitor<TruthState> corridor_, keep_out_, distance_;

@@ -191,6 +191,9 @@ std::optional<Contact> Judge::contact_made() const {
     if (!t_contact_ns_) return std::nullopt;
     const auto state = bus_.truth_at(*t_contact_ns_);
     if (!state) return std::nullopt;
+    if (scenario_.gear)
+        return Contact{bus_.seconds(*t_contact_ns_), t_captured_ns_.has_value(), *state,
+                       landing_conditions(scenario_.gates.landing.value_or(LandingLimits{}), *state, {})};
     const CaptureEnvelope limits = scenario_.gates.contact.value_or(CaptureEnvelope{});
     return Contact{bus_.seconds(*t_contact_ns_), t_captured_ns_ == t_contact_ns_, *state,
                    contact_conditions(limits, *state)};
@@ -237,10 +240,51 @@ GateResult Judge::contact() const {
     return gate;
 }
 
+/// Under the feet where the lander came to rest, or where the run ended.
+std::optional<Footing> Judge::footing_at_end() const {
+    if (!t_contact_ns_ || bus_.truth.empty()) return std::nullopt;
+    const auto terrain = Terrain::create(scenario_);
+    if (!terrain) return std::nullopt;
+    return footing(**terrain, feet_at_site(scenario_.gear->feet_m, bus_.truth.back()));
+}
+
+/// A gate for each condition at touchdown, and for the ground.
+void Judge::add_landing_gates(Verdict& v) const {
+    const LandingLimits& limits = *scenario_.gates.landing;
+    if (v.contact) {
+        const auto ground = footing_at_end();
+        v.contact->conditions = landing_conditions(limits, v.contact->state, ground);
+        for (const ContactCondition& c : v.contact->conditions) v.gates.push_back(landing(*v.contact, c));
+        if (!ground)
+            v.gates.push_back({.name = "slope",
+                               .asked = "ground under the feet",
+                               .state = GateState::failed,
+                               .reason = "there is none where the lander came to rest"});
+        return;
+    }
+    for (const ContactCondition& c : landing_conditions(limits, {}, Footing{}))
+        v.gates.push_back({.name = c.name,
+                           .asked = fmt::format("{} at most {:g} {}", c.title, c.max, c.unit),
+                           .reason = "it did not touch down"});
+}
+
+GateResult Judge::landing(const Contact& touchdown, const ContactCondition& c) const {
+    GateResult gate{.name = c.name, .asked = fmt::format("{} at most {:g} {}", c.title, c.max, c.unit)};
+    gate.state = c.within() ? GateState::passed : GateState::failed;
+    gate.margin = c.max - c.value;
+    gate.unit = c.unit;
+    gate.t_worst_s = touchdown.t_s;
+    if (!c.within()) gate.t_first_s = touchdown.t_s;
+    gate.reason =
+        fmt::format("{:.3f} {} at the touchdown {}", c.value, c.unit, when(scenario_, bus_, *t_contact_ns_));
+    return gate;
+}
+
 GateResult Judge::complete() const {
     const bool docks = !scenario_.legs.empty() && scenario_.legs.back().contact;
     GateResult gate{.name = "complete",
                     .asked = !scenario_.gates.complete ? "to the end, whatever it is"
+                             : docks && scenario_.gear ? "all legs flown and landed, without an abort"
                              : docks                   ? "all legs flown and docked, without an abort"
                                                        : "all legs flown, without an abort"};
     gate.state = GateState::failed;
@@ -266,7 +310,8 @@ GateResult Judge::complete() const {
     const bool flown = docks ? t_captured_ns_.has_value() : done != bus_.commands.end();
     if (flown || !scenario_.gates.complete) gate.state = GateState::passed;
     if (flown) {
-        gate.reason = docks ? fmt::format("docked at t = {:.2f} s", bus_.seconds(*t_captured_ns_))
+        gate.reason = docks ? fmt::format("{} at t = {:.2f} s", scenario_.gear ? "landed" : "docked",
+                                          bus_.seconds(*t_captured_ns_))
                             : fmt::format("all {} legs flown by t = {:.2f} s", scenario_.legs.size(),
                                           bus_.seconds(done->t_ns));
         return gate;
@@ -275,7 +320,10 @@ GateResult Judge::complete() const {
     gate.reason += fmt::format("over at t = {:.2f} s", t_end_s);
     if (!bus_.commands.empty()) gate.reason += " in " + leg_text(scenario_, bus_.commands.back().leg);
     if (!bus_.truth.empty()) gate.reason += fmt::format(", the ports {:.2f} m apart", bus_.truth.back().range_m());
-    if (docks && t_contact_ns_) gate.reason += ", after a contact that bounced";
+    if (docks && t_contact_ns_)
+        gate.reason += bus_.first_report(DynamicsPhase::crashed) ? ", it crashed"
+                       : scenario_.gear                          ? ", it came to no rest"
+                                                                 : ", after a contact that bounced";
     return gate;
 }
 

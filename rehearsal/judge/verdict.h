@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "rehearsal/docking/port_state.h"
+#include "rehearsal/contact/port_state.h"
 
 namespace narpa::rehearsal {
 

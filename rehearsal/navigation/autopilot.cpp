@@ -1,6 +1,7 @@
 #include "rehearsal/navigation/autopilot.h"
 
 #include <cmath>
+#include <utility>
 
 namespace narpa::rehearsal {
 Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, std::uint64_t seed) {
@@ -11,7 +12,8 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     a->model_ = *std::move(model);
     for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
     for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
-    for (const std::size_t lidar : a->model_->velocimeters()) a->velocimeters_.emplace_back(*a->model_, lidar);
+    for (const std::size_t lidar : a->model_->velocimeters())
+        a->velocimeters_.emplace_back(*a->model_, lidar, scenario.navigation);
     return a;
 }
 
@@ -33,9 +35,13 @@ void Autopilot::take(const AttitudeReport& report) {
 void Autopilot::take(DynamicsPhase phase, std::int64_t t_ns) {
     const std::lock_guard lock(mutex_);
     if (phase == dynamics_) return;
-    dynamics_ = phase;
+    const DynamicsPhase before = std::exchange(dynamics_, phase);
+    const auto on_ground = [](DynamicsPhase p) {
+        return p == DynamicsPhase::touched_down || p == DynamicsPhase::landed || p == DynamicsPhase::crashed;
+    };
     if (phase == DynamicsPhase::captured || phase == DynamicsPhase::bounced)
         estimator_->on_contact(t_ns, phase == DynamicsPhase::captured);
+    if (on_ground(phase) && !on_ground(before)) estimator_->on_touchdown(t_ns);
 }
 
 Autopilot::Prediction Autopilot::predict(std::int64_t t_ns) {
@@ -66,15 +72,25 @@ void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const
 }
 
 void Autopilot::take_beam(const LidarBeamReport& report) {
-    for (const Velocimeter& velocimeter : velocimeters_) {
+    for (Velocimeter& velocimeter : velocimeters_) {
         if (velocimeter.index() != report.lidar) continue;
         const std::lock_guard lock(mutex_);
+        const auto note = [&](const UpdateResult& result) {
+            measurements_.push_back({velocimeter.lidar().name, report.t_ns,
+                                     static_cast<MeasurementRecord::Outcome>(result.outcome), result.nis,
+                                     result.why, 1, 0});
+        };
+        if (scenario_.orbit.model == Orbit::Model::surface) {
+            const double sigma_m = position_sigma(estimator_->estimate().covariance);
+            if (const auto range = velocimeter.measure_range(report, estimator_->predicted(report.t_ns), sigma_m)) {
+                const UpdateResult result = estimator_->take(*range);
+                note(result);
+                if (result.outcome == UpdateOutcome::taken && sweeps_ < 255) ++sweeps_;
+            }
+        }
         const auto shot = velocimeter.measure(report, estimator_->predicted(report.t_ns));
         if (!shot) return;
-        if (const auto result = estimator_->take(*shot))
-            measurements_.push_back({velocimeter.lidar().name, report.t_ns,
-                                     static_cast<MeasurementRecord::Outcome>(result->outcome), result->nis,
-                                     result->why, 1, 0});
+        if (const auto result = estimator_->take(*shot)) note(*result);
     }
 }
 
@@ -111,6 +127,7 @@ CycleRecord Autopilot::cycle(std::int64_t t_ns) {
     if (guidance_->thrusters_off()) {
         control_->reset();
     } else {
+        control_->set_mass(estimator_->mass_kg());
         impulses = control_->step(out.t_s, motion, out.reference);
     }
     estimator_->thrust(t_ns, impulses.linear_n_s);

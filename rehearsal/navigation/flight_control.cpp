@@ -6,13 +6,16 @@
 namespace narpa::rehearsal {
 namespace {
 
-constexpr double kTurnMost_rad_s = 1 * kDegree;
 /// Share of the torque that may go into stopping a rotation.
 constexpr double kShareToStop = 0.5;
 
 std::array<PulseAxis, 3> axes(double strength, const Thrusters& thrusters, double period_s) {
     const PulseAxis axis(strength * thrusters.min_on_s, strength * period_s);
     return {axis, axis, axis};
+}
+
+double angle_between_directions(const Vec3& a, const Vec3& b) {
+    return std::atan2(norm(cross(a, b)), dot(a, b));
 }
 
 Vec3 modulate(std::array<PulseAxis, 3>& axes, const Vec3& wanted) {
@@ -28,7 +31,7 @@ Vec3 push_lag(const Vec3& steady, double most, double period_s) {
 
 double most_turn_rad_s(const Scenario& s, const SampledGains& gains) {
     const double least = s.thrusters.torque_n_m / s.chaser.inertia_kg_m2.diagonal().maxCoeff();
-    return std::min(kTurnMost_rad_s, kShareToStop * least / gains.velocity_s);
+    return std::min(kDegree * s.control.turn_deg_s, kShareToStop * least / gains.velocity_s);
 }
 
 }  // namespace
@@ -54,6 +57,7 @@ double PulseAxis::modulate(double wanted) noexcept {
 
 FlightControl::FlightControl(const Scenario& s)
     : orbit_(s.orbit),
+      engine_(s.engine),
       target_(s.target),
       chaser_(s.chaser),
       period_s_(s.navigation.period_s),
@@ -71,17 +75,52 @@ void FlightControl::reset() noexcept {
 }
 
 Impulses FlightControl::step(double t_s, const RelativeMotion& m, const Reference& reference) {
-    const Vec3 turn = angular_acceleration(m, reference);
+    if (engine_) return step_with_engine(t_s, m, reference);
+    const Vec3 turn = angular_acceleration(m, reference, q_world_wanted(m, reference));
     const Vec3 push = conjugate(m.q_world_chaser) * acceleration(t_s, m, reference, turn);
     const Vec3 momentum = to_vec3(chaser_.inertia_kg_m2 * to_eigen(m.chaser_rate_rad_s));
     const Vec3 torque = to_vec3(chaser_.inertia_kg_m2 * to_eigen(turn)) + cross(m.chaser_rate_rad_s, momentum);
     return {modulate(force_, chaser_.mass_kg * period_s_ * push), modulate(torque_, period_s_ * torque)};
 }
 
+Quat FlightControl::q_world_wanted(const RelativeMotion& m, const Reference& reference) const {
+    return m.q_world_target * target_.T_body_port.q * reference.q_port_chaser_port *
+           conjugate(chaser_.T_body_port.q);
+}
+
+/// The force is that of the engine along its axis, which turns to where it is wanted, at most so far from upright.
+Impulses FlightControl::step_with_engine(double t_s, const RelativeMotion& m, const Reference& reference) {
+    const Quat q_world_upright = q_world_wanted(m, reference);
+    // With the lander upright: a turn that the engine needs is no reason to push its feet aside.
+    RelativeMotion upright = m;
+    upright.q_world_chaser = q_world_upright;
+    upright.chaser_rate_rad_s = {};
+    const Vec3 wanted = acceleration(t_s, upright, reference, {});
+    Vec3 engine_axis;
+    engine_axis[engine_->axis()] = engine_->sign();
+    const Vec3 up = q_world_upright * engine_axis;
+    const double tilt = std::min(angle_between_directions(up, wanted), kDegree * engine_->tilt_most_deg);
+    const Vec3 about = cross(up, wanted);
+    const Quat tilted = norm(about) > 0 ? exp_rotation((tilt / norm(about)) * about) : Quat{};
+
+    const Vec3 turn = angular_acceleration(m, reference, normalized(tilted * q_world_upright));
+    const Vec3 momentum = to_vec3(chaser_.inertia_kg_m2 * to_eigen(m.chaser_rate_rad_s));
+    const Vec3 torque = to_vec3(chaser_.inertia_kg_m2 * to_eigen(turn)) + cross(m.chaser_rate_rad_s, momentum);
+
+    const Vec3 force = chaser_.mass_kg * (conjugate(m.q_world_chaser) * wanted);
+    Vec3 across = period_s_ * force;
+    across[engine_->axis()] = 0;
+    Vec3 impulse = modulate(force_, across);
+    impulse[engine_->axis()] =
+        engine_->sign() * period_s_ *
+        std::clamp(engine_->sign() * force[engine_->axis()], engine_->least_n, engine_->most_n);
+    return {impulse, modulate(torque_, period_s_ * torque)};
+}
+
 /// Chaser's body axes.
-Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Reference& reference) const {
+Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Reference& reference,
+                                         const Quat& q_world_wanted) const {
     const Quat q_world_port = m.q_world_target * target_.T_body_port.q;
-    const Quat q_world_wanted = q_world_port * reference.q_port_chaser_port * conjugate(chaser_.T_body_port.q);
     const Vec3 port_rate = m.q_world_target * m.target_rate_rad_s;
     const Vec3 turning = q_world_port * reference.rate_rad_s;
     const Vec3 wanted_rate = port_rate + turning;
@@ -114,7 +153,8 @@ Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Refe
     const Vec3 by_turning =
         cross(m.q_world_chaser * angular_acceleration_rad_s2, arm) + cross(turn, cross(turn, arm));
     const Vec3 steady = wanted_acceleration - gravity_difference_m_s2(orbit_, t_s, m.position_m);
-    const Vec3 velocity = wanted_velocity - push_lag(steady, acceleration_most_m_s2_, period_s_);
+    const Vec3 lag = engine_ ? Vec3{} : push_lag(steady, acceleration_most_m_s2_, period_s_);
+    const Vec3 velocity = wanted_velocity - lag;
     return position_.position_s2 * (wanted - (m.position_m + arm)) +
            position_.velocity_s * (velocity - (m.velocity_m_s + cross(turn, arm))) + steady - by_turning;
 }

@@ -1,5 +1,6 @@
 /// rehearsal/navigation/flight_control.h - feedback control of the chaser's port to the reference, and thrust
-/// allocation.
+/// allocation. A chaser with an engine tilts it to where the force is needed; thrusters add what is missing across
+/// it.
 #pragma once
 
 #include <array>
@@ -42,15 +43,21 @@ public:
     /// from the chaser's rotation compensated. Feeds forward gravity and the acceleration of the rotating port
     /// axes.
     [[nodiscard]] Impulses step(double t_s, const RelativeMotion& motion, const Reference& reference);
+    /// Of the chaser, which changes where an engine burns propellant.
+    void set_mass(double mass_kg) noexcept { chaser_.mass_kg = mass_kg; }
     /// Clears the accumulated impulses.
     void reset() noexcept;
 
 private:
-    [[nodiscard]] Vec3 angular_acceleration(const RelativeMotion& m, const Reference& reference) const;
+    [[nodiscard]] Impulses step_with_engine(double t_s, const RelativeMotion& motion, const Reference& reference);
+    [[nodiscard]] Quat q_world_wanted(const RelativeMotion& m, const Reference& reference) const;
+    [[nodiscard]] Vec3 angular_acceleration(const RelativeMotion& m, const Reference& reference,
+                                            const Quat& q_world_wanted) const;
     [[nodiscard]] Vec3 acceleration(double t_s, const RelativeMotion& m, const Reference& reference,
                                     const Vec3& angular_acceleration_rad_s2) const;
 
     Orbit orbit_;
+    std::optional<Engine> engine_;
     Vehicle target_, chaser_;
     double period_s_;
     SampledGains position_, attitude_;

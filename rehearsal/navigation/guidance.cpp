@@ -64,7 +64,35 @@ Vec3 LegPath::velocity_m_s(double t_s) const {
     return p.speed_m_s * direction_;
 }
 
+DescentPath::DescentPath(const Vec3& from_m, const Vec3& from_m_s, const Vec3& to_m, const Vec3& to_m_s,
+                         double to_go_s)
+    : to_m_(to_m), to_m_s_(to_m_s) {
+    const double t = -to_go_s;
+    const Vec3 position = from_m - to_m - t * to_m_s, velocity = from_m_s - to_m_s;
+    // position = jerk t^3 / 6 + snap t^4 / 24, velocity = jerk t^2 / 2 + snap t^3 / 6
+    snap_ = (24 * velocity * t - 72 * position) / (t * t * t * t);
+    jerk_ = (24 * position - 6 * velocity * t) / (t * t * t);
+}
+
+Vec3 DescentPath::position_m(double t_s) const {
+    const double t = std::min(t_s, 0.0);
+    return to_m_ + t_s * to_m_s_ + (t * t * t / 6) * jerk_ + (t * t * t * t / 24) * snap_;
+}
+
+Vec3 DescentPath::velocity_m_s(double t_s) const {
+    const double t = std::min(t_s, 0.0);
+    return to_m_s_ + (0.5 * t * t) * jerk_ + (t * t * t / 6) * snap_;
+}
+
+Vec3 DescentPath::acceleration_m_s2(double t_s) const {
+    const double t = std::min(t_s, 0.0);
+    return t * jerk_ + (0.5 * t * t) * snap_;
+}
+
 namespace {
+
+/// A descent is planned anew from each estimate until so long before its end; then it is followed.
+constexpr double kPlanned_s = 12;
 
 /// Shares of the thrusters' acceleration that the reference uses; the rest is left to the controller. A retreat
 /// must stop before the port.
@@ -95,10 +123,15 @@ double Scenario::legs_duration_s() const {
     double t_s = 0;
     Vec3 at = start.position_m;
     for (const Leg& leg : legs) {
-        const double acceleration_m_s2 = kShareOfThrust * thrusters.force_n / chaser.mass_kg;
+        if (leg.descent_s) {
+            t_s += *leg.descent_s;
+            at = leg.to_m;
+            continue;
+        }
+        const double acceleration_m_s2 = kShareOfThrust * thrust_n() / chaser.mass_kg;
         const LegPath path = LegPath::along(leg, at, acceleration_m_s2);
-        t_s +=
-            leg.contact ? from_rest_s(norm(at), leg.speed_m_s, acceleration_m_s2) : path.duration_s() + leg.hold_s;
+        t_s += leg.contact ? from_rest_s(norm(leg.to_m - at), leg.speed_m_s, acceleration_m_s2)
+                           : path.duration_s() + leg.hold_s;
         if (!leg.contact) at = path.end_m();
     }
     return t_s;
@@ -109,20 +142,30 @@ Guidance::Guidance(const Scenario& scenario, double t_s)
       limits_(scenario.navigation),
       control_(scenario.control),
       period_s_(scenario.navigation.period_s),
-      thrust_m_s2_(scenario.thrusters.force_n / scenario.chaser.mass_kg) {
+      thrust_m_s2_(scenario.thrust_n() / scenario.chaser.mass_kg) {
     begin_leg(scenario.start.position_m, t_s);
 }
 
 void Guidance::begin_leg(const Vec3& from_m, double t_s) {
     const Leg& leg = legs_[leg_];
     path_ = LegPath::along(leg, from_m, kShareOfThrust * thrust_m_s2_);
+    if (leg.contact && leg_ > 0 && legs_[leg_ - 1].descent_s) {
+        const Vec3 way = leg.to_m - from_m;
+        const Vec3 direction = way / norm(way);
+        path_ = LegPath::away(from_m, direction, dot(legs_[leg_ - 1].end_velocity_m_s, direction), leg.speed_m_s,
+                              kShareOfThrust * thrust_m_s2_);
+    }
     leg_from_s_ = t_s;
     phase_ = leg.contact ? GuidancePhase::closing : GuidancePhase::moving;
 }
 
 void Guidance::step(const GuidanceInput& input) {
-    if (phase_ == GuidancePhase::docked || phase_ == GuidancePhase::retreating) return;
-    if (input.dynamics == DynamicsPhase::captured) {
+    if (thrusters_off() || phase_ == GuidancePhase::retreating) return;
+    if (input.dynamics == DynamicsPhase::touched_down || input.dynamics == DynamicsPhase::landed ||
+        input.dynamics == DynamicsPhase::crashed) {
+        phase_ = GuidancePhase::landed;
+        path_ = LegPath::along({}, {}, kShareOfThrust * thrust_m_s2_);
+    } else if (input.dynamics == DynamicsPhase::captured) {
         phase_ = GuidancePhase::docked;
         path_ = LegPath::along({}, {}, kShareOfThrust * thrust_m_s2_);  // at rest, port to port
     } else if (input.dynamics == DynamicsPhase::bounced) {
@@ -137,6 +180,7 @@ void Guidance::step(const GuidanceInput& input) {
 AbortReason Guidance::reason_to_abort(const GuidanceInput& input) const {
     if (input.unmeasured_s > limits_.abort_lost_s) return AbortReason::lost;
     if (!(input.position_sigma_m <= limits_.abort_sigma_m)) return AbortReason::uncertain;
+    if (descends()) return AbortReason::none;  // planned from where it is
     if (!(norm(input.port_m - path_.position_m(input.t_s - leg_from_s_)) <= limits_.abort_off_m))
         return AbortReason::off_reference;
     return AbortReason::none;
@@ -156,7 +200,26 @@ void Guidance::retreat(const GuidanceInput& input, AbortReason reason) {
     abort_ = reason;
 }
 
+/// From the estimate, while its noise divided by the time to go is small.
+void Guidance::plan_descent(const GuidanceInput& input) {
+    const Leg& leg = legs_[leg_];
+    const double left_s = to_go_s(input.t_s);
+    if (left_s >= std::min(kPlanned_s, *leg.descent_s))
+        descent_ = DescentPath(input.port_m, input.port_velocity_m_s, leg.to_m, leg.end_velocity_m_s, left_s);
+}
+
 void Guidance::fly(const GuidanceInput& input) {
+    if (descends()) {
+        plan_descent(input);
+        if (to_go_s(input.t_s) > 0) return;
+        if (leg_ + 1 == legs_.size()) {
+            phase_ = GuidancePhase::done;
+        } else {
+            ++leg_;
+            begin_leg(legs_[leg_ - 1].to_m, input.t_s);
+        }
+        return;
+    }
     const double flown_s = input.t_s - leg_from_s_;
     if (phase_ == GuidancePhase::done || flown_s < path_.duration_s()) return;
     const Leg& leg = legs_[leg_];
@@ -173,6 +236,10 @@ void Guidance::fly(const GuidanceInput& input) {
 
 Guidance::Pose Guidance::pose(double t_s) const {
     const double t = t_s - leg_from_s_;
+    if (descends()) {
+        const double left_s = to_go_s(t_s);
+        return {descent_.position_m(-left_s), descent_.velocity_m_s(-left_s), T_port_docked().q};
+    }
     Pose p{path_.position_m(t), path_.velocity_m_s(t), T_port_docked().q};
     if (legs_[leg_].look_at_target) p.q = looking_at_origin(p.position_m);
     return p;

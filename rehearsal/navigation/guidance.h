@@ -1,5 +1,5 @@
 /// rehearsal/navigation/guidance.h - the reference trajectory of the chaser's port: along the scenario's legs, to
-/// contact, or in retreat.
+/// contact, in powered descent, or in retreat.
 #pragma once
 
 #include <vector>
@@ -41,6 +41,24 @@ private:
     double first_m_s_ = 0, speed_m_s_ = 0, acceleration_m_s2_ = 1;
 };
 
+/// Powered descent: the polynomial of fourth order from a position and velocity to a position, a velocity and no
+/// acceleration after a given time (the quadratic guidance of A. Klumpp, "Apollo lunar descent guidance",
+/// Automatica 10, 1974).
+class DescentPath {
+public:
+    DescentPath() = default;
+    /// `to_go_s` > 0. Times count from the end, and are negative before.
+    DescentPath(const Vec3& from_m, const Vec3& from_m_s, const Vec3& to_m, const Vec3& to_m_s, double to_go_s);
+
+    /// After the end, steadily on.
+    [[nodiscard]] Vec3 position_m(double t_s) const;
+    [[nodiscard]] Vec3 velocity_m_s(double t_s) const;
+    [[nodiscard]] Vec3 acceleration_m_s2(double t_s) const;
+
+private:
+    Vec3 to_m_{}, to_m_s_{}, jerk_{}, snap_{};  ///< at the end
+};
+
 /// Reference state of the chaser's port, in the (rotating) axes of the target's port.
 struct Reference {
     Vec3 position_m{}, velocity_m_s{};
@@ -63,15 +81,17 @@ public:
     /// Legs begin at t_s from the nominal start.
     Guidance(const Scenario& scenario, double t_s);
 
-    /// Once each control period: switches legs, aborts, ends at capture. A contact without capture is a reason to
-    /// retreat.
+    /// Once each control period: switches legs, plans a descent anew, aborts, ends at capture or touchdown. A
+    /// contact without capture is a reason to retreat.
     void step(const GuidanceInput& input);
 
     [[nodiscard]] GuidancePhase phase() const noexcept { return phase_; }
     [[nodiscard]] std::size_t leg() const noexcept { return leg_; }
     [[nodiscard]] AbortReason abort() const noexcept { return abort_; }
-    /// After capture.
-    [[nodiscard]] bool thrusters_off() const noexcept { return phase_ == GuidancePhase::docked; }
+    /// After capture or touchdown.
+    [[nodiscard]] bool thrusters_off() const noexcept {
+        return phase_ == GuidancePhase::docked || phase_ == GuidancePhase::landed;
+    }
     /// At any time of the current leg.
     [[nodiscard]] Reference reference(double t_s) const;
 
@@ -86,6 +106,11 @@ private:
     void retreat(const GuidanceInput& input, AbortReason reason);
     void begin_leg(const Vec3& from_m, double t_s);
     void fly(const GuidanceInput& input);
+    void plan_descent(const GuidanceInput& input);
+    [[nodiscard]] double to_go_s(double t_s) const { return leg_from_s_ + *legs_[leg_].descent_s - t_s; }
+    [[nodiscard]] bool descends() const {
+        return phase_ == GuidancePhase::moving && legs_[leg_].descent_s.has_value();
+    }
 
     std::vector<Leg> legs_;
     Navigation limits_;
@@ -93,6 +118,7 @@ private:
     double period_s_, thrust_m_s2_;
     std::size_t leg_ = 0;
     LegPath path_;
+    DescentPath descent_;
     double leg_from_s_ = 0;
     GuidancePhase phase_ = GuidancePhase::moving;
     AbortReason abort_ = AbortReason::none;

@@ -83,7 +83,7 @@ void NavigationLog::cycle(const CycleRecord& r) {
     phase_ = r.command.phase, abort_ = r.command.abort;
     if (!changed) return;
     if (phase_ == GuidancePhase::holding) pictures("hold_" + file_name_part(legs_[r.command.leg]));
-    if (phase_ == GuidancePhase::docked) pictures("contact");
+    if (phase_ == GuidancePhase::docked || phase_ == GuidancePhase::landed) pictures("contact");
     if (abort_ != AbortReason::none) pictures("abort");
 }
 

@@ -1,5 +1,7 @@
 #include "rehearsal/navigation/relative_motion.h"
 
+#include <cmath>
+
 namespace narpa::rehearsal {
 namespace {
 
@@ -20,7 +22,7 @@ Rigid3 port_from_mass(const Vehicle& vehicle) {
 
 RelativeMotion in_world(const RelativeState& state, const Orbit& orbit, double t_s, const Quat& q_world_chaser,
                         const Vec3& chaser_rate_rad_s) {
-    const Quat q_world_frame = orbit.q_world_lvlh(t_s);
+    const Quat q_world_frame = orbit.q_world_frame(t_s);
     const Vec3 frame_rate{0, 0, orbit.rate_rad_s()};
     RelativeMotion out;
     out.position_m = -(q_world_frame * state.position_m);
@@ -33,7 +35,7 @@ RelativeMotion in_world(const RelativeState& state, const Orbit& orbit, double t
 }
 
 RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double t_s) {
-    const Quat q_frame_world = conjugate(orbit.q_world_lvlh(t_s));
+    const Quat q_frame_world = conjugate(orbit.q_world_frame(t_s));
     const Vec3 frame_rate{0, 0, orbit.rate_rad_s()};
     RelativeState out;
     out.position_m = -(q_frame_world * motion.position_m);
@@ -60,13 +62,26 @@ void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle
 Vec3 nominal_target_rate_rad_s(const Scenario& scenario) {
     const Vec3 rate = kDegree * scenario.target_motion.rate_deg_s;
     if (!scenario.target_motion.with_lvlh) return rate;
-    const Vec3 orbital = scenario.orbit.q_world_lvlh(0) * Vec3{0, 0, scenario.orbit.rate_rad_s()};
+    const Vec3 orbital = scenario.orbit.q_world_frame(0) * Vec3{0, 0, scenario.orbit.rate_rad_s()};
     return rate + conjugate(scenario.q_world_target) * orbital;
 }
 
+GroundField ground_field(const Orbit& orbit) {
+    const Vec3 axis{0, 0, 1}, rate = orbit.rotation_rad_s * axis;
+    const Vec3 out = conjugate(orbit.q_world_frame(0)) * normalized(orbit.up), ground = orbit.radius_m * out;
+    GroundField field{orbit.gravity_m_s2(ground, axis) - cross(rate, cross(rate, ground)), {}};
+    const Eigen::Vector3d u = to_eigen(out);
+    const Eigen::Matrix3d turn = skew(to_eigen(rate));
+    field.gradient_s2 =
+        orbit.mu_m3_s2 / std::pow(orbit.radius_m, 3) * (3 * u * u.transpose() - Eigen::Matrix3d::Identity()) -
+        turn * turn;
+    return field;
+}
+
 Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m) {
+    if (orbit.model == Orbit::Model::surface) return orbit.fall_m_s2(t_s, position_m);
     const double n = orbit.rate_rad_s();
-    const Vec3 up = orbit.q_world_lvlh(t_s) * Vec3{1, 0, 0};
+    const Vec3 up = orbit.q_world_frame(t_s) * Vec3{1, 0, 0};
     return n * n * (3 * dot(position_m, up) * up - position_m);
 }
 

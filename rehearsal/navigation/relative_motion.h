@@ -3,7 +3,7 @@
 #pragma once
 
 #include "estimator/filter/motion_model.h"
-#include "rehearsal/docking/port_state.h"
+#include "rehearsal/contact/port_state.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
@@ -33,7 +33,11 @@ void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle
 /// The target's rate at time 0, against inertial space, body axes.
 [[nodiscard]] Vec3 nominal_target_rate_rad_s(const Scenario& scenario);
 
-/// Gravity at the chaser minus gravity at the target, inertial axes: linear about the target's circular orbit.
+/// Surface: what the chaser falls in, for the filter; of the point mass linear about the target.
+[[nodiscard]] GroundField ground_field(const Orbit& orbit);
+
+/// Acceleration of the chaser by gravity minus that of the target, inertial axes: linear about the target's
+/// circular orbit; over ground exact.
 [[nodiscard]] Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m);
 
 }  // namespace narpa::rehearsal

@@ -6,13 +6,13 @@
 
 namespace narpa::rehearsal {
 Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario) {
-    auto scene = read_scene(scenario.scene);
+    auto scene = read_scene(scenario.navigation.scene.empty() ? scenario.scene : scenario.navigation.scene);
     if (!scene) return scene.error();
     std::unique_ptr<SceneModel> m(new SceneModel);
     m->scene_ = *std::move(scene);
     m->orbit_ = scenario.orbit;
     m->target_centre_of_mass_m_ = scenario.target.centre_of_mass_m;
-    // read_scenario has found all of them in the scene.
+    // read_scenario has found all of them in the scene, and the same names in the navigation's.
     const auto index_of = [](const auto& all, const std::string& name) {
         const auto has_name = [&](const auto& named) { return named.name == name; };
         return static_cast<std::size_t>(std::ranges::find_if(all, has_name) - all.begin());
@@ -39,7 +39,8 @@ const BodyPoses& SceneModel::place(double t_s, const Quat& q_world_target, const
     const Rigid3 T_world_target{q_world_target, -(q_world_target * target_centre_of_mass_m_)};
     at_.set(target_, T_world_target);
     at_.set(chaser_, T_world_target * T_target_chaser);
-    if (attractor_) at_.T_world_body[*attractor_].t = -orbit_.radius_m * (orbit_.q_world_lvlh(t_s) * Vec3{1, 0, 0});
+    if (attractor_)
+        at_.T_world_body[*attractor_].t = -orbit_.radius_m * (orbit_.q_world_frame(t_s) * Vec3{1, 0, 0});
     return at_;
 }
 

@@ -13,7 +13,7 @@ namespace narpa::rehearsal {
 
 class SceneModel {
 public:
-    /// Reads the scenario's scene and builds its tracer. Errors: of the scene.
+    /// Reads the scenario's scene, or that of its [navigation], and builds its tracer. Errors: of the scene.
     static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }

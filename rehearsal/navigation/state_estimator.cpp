@@ -47,9 +47,13 @@ constexpr double kRestartVelocity_m_s = 0.2, kRestartRate_rad_s = 0.2 * kDegree;
 /// Standard deviations that contact adds.
 constexpr double kMetPosition_m = 0.05, kMetAttitude_rad = 0.3 * kDegree, kMetRate_rad_s = 0.1 * kDegree,
                  kHeldVelocity_m_s = 0.01, kBouncedVelocity_m_s = 0.2;
+constexpr double kGravity0_m_s2 = 9.80665;  ///< by which specific impulses are given
 /// Lower bounds of the standard deviations at the start.
 constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
                  kLeastRate_rad_s = 2e-3 * kDegree;
+
+/// Of the map, to the stars; of the planet's rotation.
+constexpr double kGroundAttitude_rad = 1e-5, kGroundRate_rad_s = 1e-9;
 
 /// A star tracker's error rotates the target about the chaser.
 Eigen::Matrix<double, 6, 3> star_tracker_jacobian(const Vec3& target_from_chaser_m) {
@@ -76,6 +80,7 @@ FilterSettings filter_settings(const Scenario& s) {
     FilterSettings f;
     f.history = kHistory;
     f.motion.orbit_rate_rad_s = s.orbit.rate_rad_s();
+    if (s.orbit.model == Orbit::Model::surface) f.motion.ground = ground_field(s.orbit);
     if (!s.target_motion.with_lvlh) f.motion.inertia_kg_m2 = s.target.inertia_kg_m2;
     f.motion.acceleration_psd = s.navigation.acceleration_psd;
     f.motion.angular_acceleration_psd = s.navigation.angular_acceleration_psd;
@@ -83,12 +88,18 @@ FilterSettings filter_settings(const Scenario& s) {
 }
 
 Matrix12 first_covariance(const Scenario& s, const RelativeMotion& motion) {
-    const Quat q_frame_port = conjugate(s.orbit.q_world_lvlh(0)) * motion.q_world_target * s.target.T_body_port.q;
+    const Quat q_frame_port = conjugate(s.orbit.q_world_frame(0)) * motion.q_world_target * s.target.T_body_port.q;
     const Quat q_target_chaser_port =
         conjugate(motion.q_world_target) * motion.q_world_chaser * s.chaser.T_body_port.q;
     Matrix12 P = Matrix12::Zero();
     P.block<3, 3>(0, 0) = spread(q_frame_port, s.start.position_sigma_m, kLeastPosition_m);
     P.block<3, 3>(3, 3) = spread(q_frame_port, s.start.velocity_sigma_m_s, kLeastVelocity_m_s);
+    if (s.orbit.model ==
+        Orbit::Model::surface) {  // how the planet turns is known; the chaser's attitude is measured
+        P.block<3, 3>(6, 6) = kGroundAttitude_rad * kGroundAttitude_rad * Eigen::Matrix3d::Identity();
+        P.block<3, 3>(9, 9) = kGroundRate_rad_s * kGroundRate_rad_s * Eigen::Matrix3d::Identity();
+        return 0.5 * (P + P.transpose());
+    }
     P.block<3, 3>(6, 6) = spread(q_target_chaser_port, kDegree * s.start.attitude_sigma_deg, kLeastAttitude_rad);
     P.block<3, 3>(9, 9) = spread(conjugate(motion.q_world_target) * motion.q_world_chaser,
                                  kDegree * s.start.rate_sigma_deg_s, kLeastRate_rad_s);
@@ -136,35 +147,48 @@ Result<StateEstimator> StateEstimator::create(const Scenario& s, std::int64_t t_
 }
 
 Quat StateEstimator::q_frame_chaser(std::int64_t t_ns) const {
-    return normalized(conjugate(scenario_.orbit.q_world_lvlh(t_s(t_ns))) * attitude_.at(t_ns).q_world_chaser);
+    return normalized(conjugate(scenario_.orbit.q_world_frame(t_s(t_ns))) * attitude_.at(t_ns).q_world_chaser);
 }
 
 void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
     advance(t_ns);
     pulses_.clear();
+    if (resting_) return;
     const Thrusters& thrusters = scenario_.thrusters;
+    const std::optional<Engine>& engine = scenario_.engine;
     const double sigma = std::hypot(thrusters.gain_sigma, kDegree * thrusters.misalignment_sigma_deg);
-    const Quat q = q_frame_chaser(t_ns);
+    // An engine burns for the whole period, in which the chaser may turn: its attitude in the middle is the mean.
+    const std::int64_t period_ns = scenario_.period_ns();
+    const Quat q = q_frame_chaser(engine ? t_ns + period_ns / 2 : t_ns);
+    const auto burns = [&](int axis) { return engine && axis == engine->axis() && impulse_n_s[axis] != 0; };
+    const double engine_sigma =
+        engine ? std::hypot(engine->gain_sigma, kDegree * thrusters.misalignment_sigma_deg) : 0;
     // The axes' pulses end one after another; the force is constant between two of these times.
     std::array<std::int64_t, 4> edges{t_ns, t_ns, t_ns, t_ns};
     for (int i = 0; i < 3; ++i)
-        edges[static_cast<std::size_t>(i + 1)] += std::llround(1e9 * std::abs(impulse_n_s[i]) / thrusters.force_n);
+        edges[static_cast<std::size_t>(i + 1)] +=
+            burns(i) ? period_ns : std::llround(1e9 * std::abs(impulse_n_s[i]) / thrusters.force_n);
     const auto ends = edges;
     std::ranges::sort(edges);
     for (const std::int64_t from_ns : edges) {
         Vec3 force;
         for (int i = 0; i < 3; ++i)
             if (from_ns < ends[static_cast<std::size_t>(i + 1)])
-                force[i] = std::copysign(thrusters.force_n, impulse_n_s[i]);
+                force[i] = burns(i) ? 1e9 * impulse_n_s[i] / static_cast<double>(period_ns)
+                                    : std::copysign(thrusters.force_n, impulse_n_s[i]);
         // A pulse of on-time T and error s dv spreads the velocity by (s dv)^2 = psd T.
         double error2 = 0;
         for (int i = 0; i < 3; ++i)
             if (force[i] != 0) {
                 const double on_s = 1e-9 * static_cast<double>(ends[static_cast<std::size_t>(i + 1)] - t_ns);
-                error2 += std::pow(sigma * force[i] / scenario_.chaser.mass_kg, 2) * on_s;
+                const double part = burns(i) ? engine_sigma : sigma;
+                error2 += std::pow(part * force[i] / mass_kg_, 2) * on_s;
             }
-        pulses_.push_back({from_ns, -(q * force) / scenario_.chaser.mass_kg, error2});
+        pulses_.push_back({from_ns, -(q * force) / mass_kg_, error2});
     }
+    if (engine && engine->specific_impulse_s > 0)
+        mass_kg_ -= std::max(0.0, engine->sign() * impulse_n_s[engine->axis()]) /
+                    (engine->specific_impulse_s * kGravity0_m_s2);
     advance(t_ns);
 }
 
@@ -196,6 +220,22 @@ void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
     (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
 }
 
+void StateEstimator::on_touchdown(std::int64_t t_ns) {
+    advance(t_ns);
+    pulses_.clear();
+    RelativeMotion m = motion();
+    const Vec3 at = port_state(m, scenario_.target, scenario_.chaser).position_m();
+    place_port(at, {}, scenario_.target, scenario_.chaser, m);
+    Vector12 more = Vector12::Zero();
+    more.segment<3>(0).setConstant(kMetPosition_m);
+    more.segment<3>(3).setConstant(kBouncedVelocity_m_s);
+    const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
+    (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
+    // The ground carries it.
+    tracker_.filter().accelerate(ground_field(scenario_.orbit).gravity_m_s2);
+    resting_ = true;
+}
+
 UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     if (measurement.t_ns > t_ns()) advance(measurement.t_ns);
     const PoseMeasurement m = at_centres_of_mass(
@@ -206,18 +246,38 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     return result;
 }
 
+UpdateResult StateEstimator::take(const TargetRange& r) {
+    if (r.t_ns > t_ns()) advance(r.t_ns);
+    const Vec3 origin = r.origin_m - scenario_.chaser.centre_of_mass_m;
+    const UpdateResult result = tracker_.update(BeamRange{
+        .t_ns = r.t_ns,
+        .origin_m = origin,
+        .direction = r.direction,
+        .point_m = r.point_m - scenario_.target.centre_of_mass_m,
+        .normal = r.normal,
+        .range_m = r.range_m,
+        .sigma_m = std::hypot(r.sigma_m, kDegree * scenario_.attitude_sensor.attitude_sigma_deg * r.range_m),
+        .q_frame_chaser = q_frame_chaser(r.t_ns)});
+    if (result.outcome == UpdateOutcome::taken) taken_ns_ = std::max(taken_ns_, r.t_ns);
+    return result;
+}
+
 std::optional<UpdateResult> StateEstimator::take(const TargetVelocity& v) {
     if (!attitude_.has(v.t_ns)) return std::nullopt;
     if (v.t_ns > t_ns()) advance(v.t_ns);
     const AttitudeTrack::At chaser = attitude_.at(v.t_ns);
     const Vec3 origin = v.origin_m - scenario_.chaser.centre_of_mass_m;
+    // The star tracker's error turns the beam, over ground into the velocity across it.
+    const double across_m_s =
+        scenario_.orbit.model == Orbit::Model::surface ? norm(filter().state().velocity_m_s) : 0;
     return tracker_.update(BeamVelocity{
         .t_ns = v.t_ns,
         .origin_m = origin,
         .direction = v.direction,
         .point_m = origin + v.range_m * v.direction,
         .velocity_m_s = v.velocity_m_s,
-        .sigma_m_s = std::hypot(v.sigma_m_s, kDegree * scenario_.attitude_sensor.rate_sigma_deg_s * norm(origin)),
+        .sigma_m_s = std::hypot(v.sigma_m_s, kDegree * scenario_.attitude_sensor.rate_sigma_deg_s * norm(origin),
+                                kDegree * scenario_.attitude_sensor.attitude_sigma_deg * across_m_s),
         .q_frame_chaser = q_frame_chaser(v.t_ns),
         .chaser_rate_rad_s = chaser.rate_rad_s});
 }
@@ -234,8 +294,14 @@ TargetEstimate StateEstimator::estimate() const {
         pose.covariance +
         star_tracker_covariance(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
     // The chaser's centre of mass only shifts the origin: the covariance is the same.
-    return {Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
-            covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
+    TargetEstimate out{Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
+                       covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
+    // The filter's position is against the map, whose error below the chaser stays the same for many measurements.
+    const Eigen::Vector3d map_error =
+        scenario_.navigation.map_sigma_m *
+        to_eigen(out.T_chaser_target.q * (scenario_.target.T_body_port.q * Vec3{1, 0, 0}));
+    out.covariance.bottomRightCorner<3, 3>() += map_error * map_error.transpose();
+    return out;
 }
 
 Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {

@@ -55,6 +55,15 @@ struct TargetVelocity {
     double range_m = 0, velocity_m_s = 0, sigma_m_s = 0;
 };
 
+/// A range along a beam of the chaser to the plane that is the target's surface there
+/// (estimator/filter/pose_filter.h).
+struct TargetRange {
+    std::int64_t t_ns = 0;
+    Vec3 origin_m{}, direction{};  ///< of the beam, body axes
+    Vec3 point_m{}, normal{};      ///< of the plane, target's body axes
+    double range_m = 0, sigma_m = 0;
+};
+
 /// Pose of the target in the chaser's axes, body axes of both as in the scene; covariance in chaser axes.
 struct TargetEstimate {
     Rigid3 T_chaser_target{};
@@ -85,9 +94,12 @@ public:
     /// Counts neither for restarts nor as a measurement of the pose. None, and nothing is done, unless the chaser
     /// reported its rate at that time: between reports thrusters change it, and with the beam's lever the velocity.
     std::optional<UpdateResult> take(const TargetVelocity& velocity);
+    UpdateResult take(const TargetRange& range);
     /// The ports touched shortly before t_ns. `held`: captured, the ports rest in one plane; otherwise they
     /// separate at an unknown speed.
     void on_contact(std::int64_t t_ns, bool held);
+    /// A foot met the ground shortly before t_ns: from then on it stands there.
+    void on_touchdown(std::int64_t t_ns);
     /// Predicts to t_ns.
     void advance(std::int64_t t_ns);
 
@@ -105,6 +117,8 @@ public:
     }
 
     [[nodiscard]] std::uint64_t restarts() const noexcept { return tracker_.restarts(); }
+    /// Of the chaser, less the propellant that the commands have burnt.
+    [[nodiscard]] double mass_kg() const noexcept { return mass_kg_; }
     /// Time of the last accepted measurement; at first the start.
     [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
 
@@ -115,7 +129,11 @@ private:
         double psd = 0;
     };
     StateEstimator(const Scenario& scenario, std::int64_t t_start_ns, PoseTracker tracker)
-        : scenario_(scenario), t_start_ns_(t_start_ns), tracker_(std::move(tracker)), taken_ns_(t_start_ns) {}
+        : scenario_(scenario),
+          t_start_ns_(t_start_ns),
+          tracker_(std::move(tracker)),
+          taken_ns_(t_start_ns),
+          mass_kg_(scenario.chaser.mass_kg) {}
     [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
 
@@ -125,6 +143,8 @@ private:
     AttitudeTrack attitude_;
     std::deque<Pulse> pulses_;  ///< that start after the filter's time
     std::int64_t taken_ns_;
+    double mass_kg_;
+    bool resting_ = false;
 };
 
 }  // namespace narpa::rehearsal

@@ -1,4 +1,5 @@
-/// rehearsal/navigation/velocimeter.h - velocities along the beams of a Doppler LiDAR, which come over CAN.
+/// rehearsal/navigation/velocimeter.h - velocities along the beams of a Doppler LiDAR, and over ground their
+/// ranges, which come over CAN.
 #pragma once
 
 #include <optional>
@@ -12,8 +13,8 @@ namespace narpa::rehearsal {
 
 class Velocimeter {
 public:
-    /// `lidar`: index in the scene.
-    Velocimeter(const SceneModel& model, std::size_t lidar);
+    /// `model` outlives it. `lidar`: index in the scene.
+    Velocimeter(const SceneModel& model, std::size_t lidar, const Navigation& map = {});
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
     [[nodiscard]] std::size_t index() const noexcept { return index_; }
@@ -21,11 +22,22 @@ public:
     /// target at `T_chaser_target` (predicted, body axes).
     [[nodiscard]] std::optional<TargetVelocity> measure(const LidarBeamReport& report,
                                                         const Rigid3& T_chaser_target) const;
+    /// The range, with the model's surface where the beam is expected to meet it. How far that departs from a plane
+    /// within `position_sigma_m`, the uncertainty of the pose, is part of the standard deviation. None where there
+    /// is no range, or no surface, or the beam meets nearly the same place as when it was last measured: there the
+    /// map has the same error.
+    [[nodiscard]] std::optional<TargetRange> measure_range(const LidarBeamReport& report,
+                                                           const Rigid3& T_chaser_target, double position_sigma_m);
 
 private:
+    [[nodiscard]] std::optional<double> range_in_model(const Vec3& origin_m, const Vec3& direction) const;
+
+    const SceneModel& model_;
     Lidar lidar_;
     std::size_t index_;
     std::vector<LidarShot> beams_;  ///< by their number
+    double map_sigma_m_, map_correlation_m_;
+    std::vector<std::optional<Vec3>> measured_m_;  ///< by each beam last, target's axes
     Vec3 target_centre_m_;
     double target_radius_m_;
 };

@@ -163,9 +163,10 @@ std::string campaign_page(const Scenario& scenario, const json& s, const std::st
                        value(c, "mean", 4), value(c, "sigma", 4), value(c, "min", 4), value(c, "p99", 4),
                        value(c, "max", 4), c["unit"]});
         body += "<h2>Contact</h2>\n" +
-                charts_of(folder, {{"where", "Where the ports met"},
+                charts_of(folder, {{"where", scenario.gear ? "Where they touched down" : "Where the ports met"},
                                    {"rates", "Rates at contact"},
-                                   {"angles", "Angles at contact"}}) +
+                                   {"angles", "Angles at contact"},
+                                   {"tilt", "Tilt and angular rate at the touchdown"}}) +
                 table.html();
     }
     HtmlTable navigation{"of each run", "#mean", "#p50", "#p99", "#most"};

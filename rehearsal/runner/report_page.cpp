@@ -51,7 +51,20 @@ std::string gates(const Run& run) {
     return "<h2>Gates</h2>\n" + table.html();
 }
 
+std::string descent(const Run& run) {
+    return "<h2>Descent</h2>\n<p>The middle of the lander's feet about the site. The line is the truth, as the "
+           "dynamics "
+           "sent it; the circles are the navigation's estimates, a few of them.</p>\n" +
+           charts_of(run.folder, {{"profile", "From the side"}, {"track", "From above"}}) +
+           "<h2>Height, velocity, distance from the site</h2>\n<p>Shaded: phase of the guidance and number of the "
+           "leg.</p>\n" +
+           charts_of(run.folder, {{"height", "Height over time"},
+                                  {"velocity", "Velocity over time"},
+                                  {"site", "Distance from the site over time"}});
+}
+
 std::string approach(const Run& run) {
+    if (run.scenario.gear) return descent(run);
     return "<h2>Approach</h2>\n<p>The chaser's port in the target's port axes: x out of the docking interface. "
            "Scales differ across and along. The line is the truth, as the dynamics sent it; the circles are the "
            "navigation's estimates, a few of them.</p>\n" +
@@ -116,6 +129,10 @@ std::string contact_bars(const ContactConditions& conditions) {
 std::string contact(const Run& run) {
     if (!run.verdict.contact) return "";
     const Contact& c = *run.verdict.contact;
+    if (run.scenario.gear)
+        return fmt::format(
+            "<h2>Touchdown</h2>\n<p>At t = {:.2f} s; {}. Green: what the scenario's gates allow.</p>\n{}", c.t_s,
+            c.captured ? "it came to rest" : "it came to no rest", contact_bars(c.conditions));
     return fmt::format(
         "<h2>Contact</h2>\n<p>At t = {:.2f} s, {}. Green: what the International Docking System "
         "Standard's initial contact conditions allow (Interface Definition Document, revision E), or "
@@ -241,8 +258,8 @@ std::string events(const Run& run) {
             all.emplace_back(
                 bus.seconds(bus.reports[i].t_ns),
                 fmt::format("dynamics: {}", kDynamicsPhases[static_cast<std::size_t>(bus.reports[i].phase)]));
-    constexpr const char* kFaults[] = {"thruster off", "thruster stuck", "attitude sensor turned",
-                                       "target's rate changed", "thruster commands lost"};
+    constexpr const char* kFaults[] = {"thruster off",          "thruster stuck",         "attitude sensor turned",
+                                       "target's rate changed", "thruster commands lost", "throttle stuck"};
     for (const Fault& f : run.scenario.faults) {
         const std::string what = fmt::format("fault: {} {}", kFaults[static_cast<std::size_t>(f.kind)], f.axis);
         all.emplace_back(f.from_s, what);

@@ -72,6 +72,14 @@ json of_limits(const CaptureEnvelope& c) {
             {"roll_deg", c.roll_deg}};
 }
 
+json of_limits(const LandingLimits& l) {
+    return {{"from_site_m", l.from_site_m},
+            {"vertical_m_s", l.vertical_m_s},
+            {"horizontal_m_s", l.horizontal_m_s},
+            {"tilt_deg", l.tilt_deg},
+            {"rate_deg_s", l.rate_deg_s}};
+}
+
 json of_gates(const Gates& g) {
     json out{{"corridor", nullptr}, {"keep_out_m", nullptr}, {"distance_m", nullptr}, {"contact", nullptr}};
     if (g.corridor)
@@ -124,17 +132,19 @@ json rehearsal_plot(const Scenario& scenario, const BusRecord& bus, const Verdic
         contact = {{"t_s", verdict.contact->t_s},
                    {"captured", verdict.contact->captured},
                    {"position_m", of(verdict.contact->state.position_m())}};
-    return {{"plot", "rehearsal"},
-            {"title", scenario.title},
-            {"t_end_s", verdict.t_end_s},
-            {"truth", truth},
-            {"estimates", of_estimates(bus)},
-            {"thrusters", of_thrusters(scenario, bus)},
-            {"holds_m", holds},
-            {"phases", of_phases(bus)},
-            {"gates", of_gates(scenario.gates)},
-            {"contact", contact},
-            {"latency", of_latency(bus, verdict.lockstep)}};
+    json document = {{"plot", "rehearsal"},
+                     {"title", scenario.title},
+                     {"t_end_s", verdict.t_end_s},
+                     {"truth", truth},
+                     {"estimates", of_estimates(bus)},
+                     {"thrusters", of_thrusters(scenario, bus)},
+                     {"holds_m", holds},
+                     {"phases", of_phases(bus)},
+                     {"gates", of_gates(scenario.gates)},
+                     {"contact", contact},
+                     {"latency", of_latency(bus, verdict.lockstep)}};
+    if (scenario.gear) document["landing"] = of_limits(scenario.gates.landing.value_or(LandingLimits{}));
+    return document;
 }
 
 json campaign_plot(const Scenario& scenario, std::span<const json> contacts) {
@@ -147,9 +157,14 @@ json campaign_plot(const Scenario& scenario, std::span<const json> contacts) {
                         {"position_m", c["position_m"]},
                         {"closing_m_s", value(0)},
                         {"lateral_m_s", value(1)},
-                        {"pitch_yaw_deg", value(3)},
-                        {"roll_deg", value(4)}});
+                        {scenario.gear ? "tilt_deg" : "pitch_yaw_deg", value(scenario.gear ? 2 : 3)},
+                        {scenario.gear ? "rate_deg_s" : "roll_deg", value(scenario.gear ? 3 : 4)}});
     }
+    if (scenario.gear)
+        return {{"plot", "campaign"},
+                {"title", scenario.title},
+                {"landing", of_limits(scenario.gates.landing.value_or(LandingLimits{}))},
+                {"runs", runs}};
     return {{"plot", "campaign"},
             {"title", scenario.title},
             {"limits", of_limits(scenario.gates.contact.value_or(CaptureEnvelope{}))},

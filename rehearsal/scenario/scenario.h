@@ -5,6 +5,10 @@
 /// R. Wiltshire, 1960): x up, away from the attractor, y along the circular orbit, z along its momentum, rotating
 /// about z with the orbit's rate. Port: a docking interface's, x out of it. Docked, the chaser's port is the
 /// target's turned by 180 degrees about z. All times are seconds after the scenario's time 0.
+///
+/// A landing has the same form. The target is the ground, its centre of mass a point that is fixed to it, its port
+/// the landing site with x up; the chaser's port is in the plane of its feet, x down. In place of LVLH are axes
+/// that turn with the planet, z along its axis of rotation.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +23,8 @@
 
 #include "base/pose.h"
 #include "base/result.h"
-#include "rehearsal/docking/port_state.h"
+#include "rehearsal/contact/landing.h"
+#include "rehearsal/contact/port_state.h"
 
 namespace narpa::rehearsal {
 
@@ -28,15 +33,25 @@ struct Orbit {
         free,                ///< no attractor: the world is inertial, and so is "LVLH"
         clohessy_wiltshire,  ///< linear, about a circular orbit
         two_body,            ///< both bodies about a point mass
+        surface,             ///< the target is ground of a rotating planet, with J2
     };
     Model model = Model::clohessy_wiltshire;
     double radius_m = 6'778'137, mu_m3_s2 = 3.986004418e14;
     Vec3 up{0, 0, 1}, along{1, 0, 0};  ///< world axes at time 0: away from the attractor, and the target's velocity
+    /// Surface: radius_m is the target's centre of mass' from the planet's, `up` points away from it.
+    Vec3 axis{0, 1, 0};  ///< of the planet's rotation, world axes
+    double rotation_rad_s = 0, j2 = 0, equatorial_radius_m = 0;
 
-    /// 0 where the model is free.
+    /// 0 where the model is free; of the planet's rotation where it is surface.
     [[nodiscard]] double rate_rad_s() const;
-    /// LVLH axes to world axes.
-    [[nodiscard]] Quat q_world_lvlh(double t_s) const;
+    /// The frame of relative motion, LVLH or axes that turn with the planet, to world axes.
+    [[nodiscard]] Quat q_world_frame(double t_s) const;
+    /// Surface: gravity at `from_centre_m` of a planet with the given axis of rotation, in the axes of both: of a
+    /// point mass and J2 (O. Montenbruck, E. Gill, Satellite Orbits, 2000, section 3.2).
+    [[nodiscard]] Vec3 gravity_m_s2(const Vec3& from_centre_m, const Vec3& unit_axis) const;
+    /// Surface: acceleration of a free body at `position_m` from the target's centre of mass, which moves with the
+    /// ground; world axes (inertial).
+    [[nodiscard]] Vec3 fall_m_s2(double t_s, const Vec3& position_m) const;
 };
 
 /// A rigid body of the scene that the dynamics command.
@@ -65,6 +80,26 @@ struct Thrusters {
     double misalignment_sigma_deg = 0.5;     ///< of each group, drawn once a run
 };
 
+/// An engine whose force can be throttled, in place of one of the force groups. It burns for whole control periods.
+struct Engine {
+    std::size_t group = 4;  ///< index in kThrusterGroupNames, of a force
+    double least_n = 0, most_n = 0;
+    double gain_sigma = 0.005;      ///< of the force, drawn for each period
+    double specific_impulse_s = 0;  ///< 0: the mass stays
+    double tilt_most_deg = 30;      ///< of its axis from the vertical, as commanded
+
+    [[nodiscard]] int axis() const { return static_cast<int>(group / 2); }     ///< 0 to 2: x, y, z
+    [[nodiscard]] double sign() const { return group % 2 == 0 ? 1.0 : -1.0; }  ///< of the force along it
+};
+
+/// Legs that meet the ground: each foot is a spring with a damper along the ground's normal, and friction.
+struct LandingGear {
+    std::vector<Vec3> feet_m;  ///< chaser's port axes: evenly on a circle about its x
+    double stiffness_n_m = 40e3, damping_n_s_m = 6e3, friction = 0.6;  ///< of each
+    double stroke_m = 0.3;                                             ///< a foot that goes deeper breaks
+    double tipped_deg = 45;  ///< further from the vertical it has tipped over
+};
+
 /// Star tracker and gyroscope of the chaser.
 struct AttitudeSensor {
     double attitude_sigma_deg = 0.005;
@@ -91,9 +126,16 @@ struct Leg {
     double within_m = std::numeric_limits<double>::infinity();  ///< the hold lasts until the estimate is so near
     bool contact = false;         ///< continues at this speed until contact; the last leg only
     bool look_at_target = false;  ///< x towards the target's port origin; otherwise the docked attitude
+    /// Powered descent instead: from the estimated state to `to_m` in so many seconds after the leg's start, to
+    /// arrive with `end_velocity_m_s`, without acceleration.
+    std::optional<double> descent_s;
+    Vec3 end_velocity_m_s{};
 };
 
 struct Navigation {
+    std::string scene;  ///< path of the scene as the navigation knows it: with a map in place of the ground
+    double map_sigma_m = 0,
+           map_correlation_m = 0;              ///< errors of its heights, and over which distance they are alike
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
     std::vector<std::string> velocimeters;     ///< LiDARs whose velocities come over CAN, beside the others
     double period_s = 1;                       ///< of measurements and of control
@@ -108,6 +150,7 @@ struct Control {
     double bandwidth_rad_s = 0.08, attitude_bandwidth_rad_s = 0.25;
     double damping = 0.9;
     double retreat_m_s = 0.3;  ///< away from the port, after an abort
+    double turn_deg_s = 1;     ///< largest rate of attitude corrections
 };
 
 struct Fault {
@@ -117,6 +160,7 @@ struct Fault {
         attitude_bias,   ///< the attitude sensor is turned by `value` (deg, body axes)
         target_rate,     ///< the target's rate changes by `value` (deg/s, body axes)
         commands_lost,   ///< no actuator command gets through
+        throttle_stuck,  ///< the engine burns with its least force whenever it burns
     };
     Kind kind{};
     double from_s = 0, until_s = std::numeric_limits<double>::infinity();
@@ -142,6 +186,7 @@ struct Gates {
     std::optional<std::pair<double, double>> distance_m;  ///< of the ports' origins, all the time
     std::optional<NavigationError> navigation;
     std::optional<CaptureEnvelope> contact;  ///< asks for contact
+    std::optional<LandingLimits> landing;    ///< asks for a landing
     bool complete = true;                    ///< all legs flown, without an abort
 };
 
@@ -158,6 +203,8 @@ struct Scenario {
         attractor;  ///< scene body and can_id of the Earth, commanded too
     Start start;
     Thrusters thrusters;
+    std::optional<Engine> engine;
+    std::optional<LandingGear> gear;  ///< it lands
     AttitudeSensor attitude_sensor;
     std::vector<Leg> legs;
     Navigation navigation;
@@ -170,6 +217,8 @@ struct Scenario {
     /// The attractor's, which keeps it: the scene's.
     Quat q_world_attractor{};
 
+    /// Largest, of the engine or of a force group.
+    [[nodiscard]] double thrust_n() const { return engine ? engine->most_n : thrusters.force_n; }
     [[nodiscard]] std::int64_t period_ns() const;  ///< of navigation and control
     [[nodiscard]] std::int64_t pose_period_ns() const;
     /// The time that the legs and their holds take at their speeds; may exceed duration_s.

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "protocols/lidar/lidar_model.h"
-#include "rehearsal/scenario/scenario.h"
+#include "rehearsal/scenario/scenario_tables.h"
 #include "renderer/scene/based_on.h"
 #include "renderer/scene/scene_file.h"
 #include "renderer/scene/toml_reader.h"
@@ -16,17 +16,6 @@ namespace {
 
 constexpr double kLongest_s = 1e6;
 constexpr Range kAngle_deg{.low = -360, .high = 360};
-
-/// Sets `value` where the table has the key.
-void read(TableReader& table, std::string_view key, double& value, const Range& range = kAnyNumber) {
-    value = table.number(key, range).value_or(value);
-}
-void read(TableReader& table, std::string_view key, Vec3& value, const Range& range = kAnyNumber) {
-    value = table.vec3(key, range).value_or(value);
-}
-void read(TableReader& table, std::string_view key, bool& value) {
-    value = table.boolean(key).value_or(value);
-}
 
 const Body* body_named(const Scene& scene, const std::string& name) {
     const auto body = std::ranges::find(scene.bodies, name, &Body::name);
@@ -46,16 +35,27 @@ Rigid3 read_port(TableReader& table) {
 void read_orbit(TableReader& root, Orbit& orbit) {
     auto table = root.table("orbit");
     if (!table) return;
-    static constexpr std::array<std::pair<std::string_view, Orbit::Model>, 3> kModels{
+    static constexpr std::array<std::pair<std::string_view, Orbit::Model>, 4> kModels{
         {{"free", Orbit::Model::free},
          {"clohessy-wiltshire", Orbit::Model::clohessy_wiltshire},
-         {"two-body", Orbit::Model::two_body}}};
+         {"two-body", Orbit::Model::two_body},
+         {"surface", Orbit::Model::surface}}};
     orbit.model = table->choice<Orbit::Model>("model", kModels).value_or(orbit.model);
     read(*table, "radius_m", orbit.radius_m, kPositive);
     read(*table, "mu_m3_s2", orbit.mu_m3_s2, kPositive);
     orbit.up = table->direction("up").value_or(orbit.up);
     orbit.along = table->direction("along").value_or(orbit.along);
-    if (std::abs(dot(orbit.up, orbit.along)) > 1e-6)
+    if (orbit.model == Orbit::Model::surface) {
+        orbit.axis = table->direction("axis").value_or(orbit.axis);
+        read(*table, "rotation_rad_s", orbit.rotation_rad_s, kNotNegative);
+        read(*table, "j2", orbit.j2);
+        orbit.equatorial_radius_m = table->number("equatorial_radius_m", kPositive).value_or(orbit.radius_m);
+        table->refuse("along", "belongs to orbits, [orbit] has model \"surface\"");
+    } else {
+        for (const char* key : {"axis", "rotation_rad_s", "j2", "equatorial_radius_m"})
+            table->refuse(key, "belongs to model \"surface\"");
+    }
+    if (orbit.model != Orbit::Model::surface && std::abs(dot(orbit.up, orbit.along)) > 1e-6)
         table->fail("along", "expected a direction at right angles to `up`: the orbit is circular");
     table->finish();
 }
@@ -117,6 +117,8 @@ void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
         table->fail("body", fmt::format("\"{}\" is no body with a can_id of {}", name, scene.file));
     if (s.orbit.model == Orbit::Model::free)
         table->fail("body", "[orbit] has model \"free\", expected none: nothing attracts");
+    if (s.orbit.model == Orbit::Model::surface)
+        table->fail("body", "[orbit] has model \"surface\", expected none: the target is the attractor's ground");
     table->finish();
 }
 
@@ -144,6 +146,8 @@ void read_actuators(TableReader& root, Scenario& s) {
         read(*table, "misalignment_sigma_deg", t.misalignment_sigma_deg, {.low = 0, .high = 20});
         table->finish();
     }
+    if (auto table = root.table("engine")) s.engine = read_engine(*table);
+    if (auto table = root.table("landing_gear")) s.gear = read_gear(*table, s);
     if (auto table = root.table("attitude_sensor")) {
         AttitudeSensor& a = s.attitude_sensor;
         read(*table, "attitude_sigma_deg", a.attitude_sigma_deg, kNotNegative);
@@ -159,6 +163,15 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
         Leg leg;
         leg.name = table.text("name").value_or(fmt::format("leg {}", legs.size() + 1));
         leg.arc_deg = table.number("arc_deg", {.low = -3600, .high = 3600});
+        leg.descent_s = table.number("descent_s", kPositive);
+        if (leg.descent_s) {
+            read(table, "end_velocity_m_s", leg.end_velocity_m_s);
+            table.refuse("speed_m_s", "belongs to legs without `descent_s`");
+            table.refuse("arc_deg", "this leg is a descent, expected `to_m`");
+            leg.arc_deg.reset();
+        } else {
+            table.refuse("end_velocity_m_s", "belongs to `descent_s`");
+        }
         if (leg.arc_deg) {
             leg.axis = table.direction("axis").value_or(leg.axis);
             table.refuse("to_m", "this leg is an arc, expected either `to_m` or `arc_deg`");
@@ -172,6 +185,7 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
         read(table, "within_m", leg.within_m, kPositive);
         read(table, "contact", leg.contact);
         read(table, "look_at_target", leg.look_at_target);
+        if (leg.contact && leg.descent_s) table.fail("contact", "a descent ends before, expected a leg of its own");
         if (leg.contact && legs.size() + 1 != tables.size())
             table.fail("contact", "only the last leg may end with contact");
         table.finish();
@@ -204,6 +218,27 @@ std::vector<std::string> read_velocimeters(TableReader& table, const Scene& scen
     return names;
 }
 
+template <class Named>
+bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
+    return std::ranges::equal(a, b, {}, &Named::name, &Named::name);
+}
+
+/// Another scene with the same bodies and sensors, of which only the shapes differ.
+std::string read_map(TableReader& table, const Scene& scene) {
+    const auto map = table.text("map");
+    if (!map) return "";
+    const std::string path = beside(*table.place("map").path, *map);
+    const auto known = read_scene(path);
+    if (!known) {
+        table.fail("map", known.error().text());
+    } else if (!same_names(known->bodies, scene.bodies) || !same_names(known->cameras, scene.cameras) ||
+               !same_names(known->lidars, scene.lidars)) {
+        table.fail("map", fmt::format("{} has other bodies or sensors, expected those of {} in the same order",
+                                      path, scene.file));
+    }
+    return path;
+}
+
 void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     root.require("navigation", "a table [navigation]");
     auto table = root.table("navigation");
@@ -212,8 +247,12 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     n.cameras = read_sensors(*table, "cameras", scene.cameras, scene, s.chaser.body);
     n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
     n.velocimeters = read_velocimeters(*table, scene, s.chaser.body);
-    if (n.cameras.empty() && n.lidars.empty())
+    const bool over_ground = s.orbit.model == Orbit::Model::surface && !n.velocimeters.empty();
+    if (n.cameras.empty() && n.lidars.empty() && !over_ground)
         table->require("cameras", "`cameras` or `lidars`: what it navigates by");
+    n.scene = read_map(*table, scene);
+    read(*table, "map_sigma_m", n.map_sigma_m, kNotNegative);
+    read(*table, "map_correlation_m", n.map_correlation_m, kNotNegative);
     read(*table, "period_s", n.period_s, {.low = 0.01, .high = 100});
     read(*table, "acceleration_psd", n.acceleration_psd, kPositive);
     read(*table, "angular_acceleration_psd", n.angular_acceleration_psd, kPositive);
@@ -234,16 +273,18 @@ void read_control(TableReader& root, Control& c) {
     read(*table, "attitude_bandwidth_rad_s", c.attitude_bandwidth_rad_s, kPositive);
     read(*table, "damping", c.damping, {.low = 0.1, .high = 10});
     read(*table, "retreat_m_s", c.retreat_m_s, kPositive);
+    read(*table, "turn_deg_s", c.turn_deg_s, kPositive);
     table->finish();
 }
 
-void read_faults(TableReader& root, std::vector<Fault>& faults) {
-    static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 5> kKinds{
+void read_faults(TableReader& root, bool has_engine, std::vector<Fault>& faults) {
+    static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 6> kKinds{
         {{"thruster_off", Fault::Kind::thruster_off},
          {"thruster_stuck", Fault::Kind::thruster_stuck},
          {"attitude_bias", Fault::Kind::attitude_bias},
          {"target_rate", Fault::Kind::target_rate},
-         {"commands_lost", Fault::Kind::commands_lost}}};
+         {"commands_lost", Fault::Kind::commands_lost},
+         {"throttle_stuck", Fault::Kind::throttle_stuck}}};
     for (TableReader& table : root.tables("fault")) {
         Fault fault;
         table.require("kind", "what goes wrong");
@@ -252,6 +293,8 @@ void read_faults(TableReader& root, std::vector<Fault>& faults) {
         read(table, "until_s", fault.until_s, kPositive);
         const bool thruster = fault.kind == Fault::Kind::thruster_off || fault.kind == Fault::Kind::thruster_stuck;
         const bool turns = fault.kind == Fault::Kind::attitude_bias || fault.kind == Fault::Kind::target_rate;
+        if (fault.kind == Fault::Kind::throttle_stuck && !has_engine)
+            table.fail("kind", "there is no throttle, expected a table [engine]");
         if (thruster) table.require("axis", "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters");
         if (turns) table.require("value", "[x, y, z]");
         if (!thruster) table.refuse("axis", "belongs to faults of thrusters");
@@ -312,6 +355,8 @@ void read_gates(TableReader& root, Scenario& s) {
         g.navigation = n;
     }
     read_contact(*table, g);
+    read_landing(*table, s, g);
+    if (g.contact && s.gear) table->fail("contact", "belongs to docking ports, expected `landing`");
     if (g.contact && !s.legs.back().contact)
         table->fail("contact", "no leg has contact = true, expected the last one to have it");
     read(*table, "complete", g.complete);
@@ -359,7 +404,7 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
     read_legs(root, s.legs);
     read_navigation(root, s, *scene);
     read_control(root, s.control);
-    read_faults(root, s.faults);
+    read_faults(root, s.engine.has_value(), s.faults);
     if (!s.legs.empty()) read_gates(root, s);
     root.finish();
 }

@@ -53,4 +53,20 @@ std::vector<MaterialSpec> small_body_materials();
 /// Closed; about 0.4 m between vertices.
 Mesh build_small_body();
 
+// --- Landing site: cratered ground with rocks about a clear place, a few hundredths of the distance from it
+// between vertices. Origin on the ground at the site, z up. And a lander with four feet: origin in its middle, z up
+// ---
+
+/// Of the ground from the site.
+inline constexpr double kLandingReach_m = 2500;
+/// The lander's feet, in its z and from that axis.
+inline constexpr double kLanderFeet_m = -1.3, kLanderFeetRadius_m = 1.6;
+std::vector<MaterialSpec> landing_materials();
+/// An open sheet, facing up.
+Mesh build_landing_site();
+/// The same ground as a map from orbit has it: posts half a metre apart at best, no bump below two metres, heights
+/// off by some centimetres.
+Mesh build_landing_map();
+Mesh build_lander();
+
 }  // namespace narpa::scenes

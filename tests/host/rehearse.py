@@ -4,6 +4,9 @@
 Usage: rehearse.py docks       the last ten metres: docks within the docking standard's limits, byte for byte the same on 1 and 2 threads
        rehearse.py fails       the three scenarios that must fail do so, each at its gate
        rehearse.py another     with the Python navigation of examples/ in place of narpa's, as docs/interfaces.md says
+       rehearse.py lands       from 1200 m to the site within the gates, byte for byte the same on 1 and 2 threads; and a stuck
+                               throttle that fails at the vertical velocity
+       rehearse.py gale        on the elevation model of Gale crater, where ../shared/assets has it
        rehearse.py flies       around the shape of Itokawa, where ../shared/assets has it"""
 import json
 import os
@@ -32,12 +35,30 @@ def failed_gates(verdict):
 
 
 def docks():
+    passes_the_same_on_two_threads("dispersions")
+
+
+def lands():
+    passes_the_same_on_two_threads("landing")
+    status, verdict = rehearse(SCENARIOS / "fails-throttle.toml", support.work_folder() / "fails")
+    failed = failed_gates(verdict)
+    expect(status == 1 and "vertical_velocity" in failed, f"a stuck throttle fails at the vertical velocity: {failed}")
+
+
+def gale():
+    if not (MESH.parents[2] / "dem/mars_gale/missionDEM.tif").exists():
+        support.skip("no ../shared/assets/dem/mars_gale/missionDEM.tif")
+    status, verdict = rehearse(SCENARIOS / "landing-gale.toml", support.work_folder() / "gale")
+    expect(status == 0, f"it lands in Gale crater: {verdict['headline']}")
+
+
+def passes_the_same_on_two_threads(name):
     folder = support.work_folder()
-    status, verdict = rehearse(SCENARIOS / "dispersions.toml", folder / "one", "--threads", "1")
-    expect(status == 0, f"it docks and passes all gates: {failed_gates(verdict)}")
+    status, verdict = rehearse(SCENARIOS / f"{name}.toml", folder / "one", "--threads", "1")
+    expect(status == 0, f"{name} passes all gates: {failed_gates(verdict)}")
     for c in verdict["contact"]["conditions"]:
         print(f"    {c['name']} {c['value']:.4g} {c['unit']}")
-    rehearse(SCENARIOS / "dispersions.toml", folder / "two", "--threads", "2")
+    rehearse(SCENARIOS / f"{name}.toml", folder / "two", "--threads", "2")
     for file in ["emulator/can.log", "emulator/nav.ledger.csv", "dynamics/truth.csv", "navigation/navigation.csv"]:
         one, two = ((folder / run / file).read_bytes() for run in ("one", "two"))
         if file.endswith("ledger.csv"):  # its render times are wall times
@@ -114,4 +135,4 @@ complete = false
     expect(n["with_frames"] >= 38 and n["with_sweeps"] >= 38, f"frames and sweeps are taken: {n['with_frames']}, {n['with_sweeps']} of {n['estimates']}")
 
 
-{"docks": docks, "fails": fails, "another": another, "flies": flies}[sys.argv[1]]()
+{"docks": docks, "lands": lands, "gale": gale, "fails": fails, "another": another, "flies": flies}[sys.argv[1]]()

@@ -200,6 +200,17 @@ class Plots(unittest.TestCase):
         lockstep = {file.stem for file in self.draw("rehearsal", rehearsal(lockstep=True), "lockstep")}
         self.assertEqual(names - lockstep, {"latency"})
 
+    def test_a_landing_has_charts_of_its_own(self):
+        limits = {"from_site_m": 4, "vertical_m_s": 1.5, "horizontal_m_s": 0.5, "tilt_deg": 5, "rate_deg_s": 3}
+        names = {file.stem for file in self.draw("rehearsal", {**rehearsal(lockstep=True), "landing": limits}, "landing")}
+        self.assertEqual(names, {"profile", "track", "height", "velocity", "site", "position_x", "position_y", "position_z",
+                                 "attitude_x", "attitude_y", "attitude_z", "impulses", "delta_v"})  # fmt: skip
+        nothing = self.draw("rehearsal", {**rehearsal(lockstep=True, flown=False), "landing": limits}, "no-landing")
+        self.assertTrue(all(file.exists() for file in nothing))
+        run = {"within": True, "position_m": [0, 1, 2], "closing_m_s": 1, "lateral_m_s": 0.1, "tilt_deg": 1, "rate_deg_s": 0.2}
+        names = {file.stem for file in self.draw("campaign", {"landing": limits, "runs": [run, {**run, "within": False}]}, "landings")}
+        self.assertEqual(names, {"where", "rates", "tilt"})
+
     def test_a_map_labels_its_lines(self):
         file = self.folder / "map.svg"
         plots.draw({"plot": "map", "title": "a < b", **surface_map()}, file)

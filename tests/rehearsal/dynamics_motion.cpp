@@ -22,11 +22,11 @@ double period_s(const Orbit& orbit) {
 
 /// As LVLH sees it at time 0, in world axes.
 Translation from_lvlh(const Orbit& orbit, const Vec3& position, const Vec3& velocity) {
-    const Quat q = orbit.q_world_lvlh(0);
+    const Quat q = orbit.q_world_frame(0);
     return {q * position, q * (velocity + cross(Vec3{0, 0, orbit.rate_rad_s()}, position))};
 }
 Vec3 position_in_lvlh(const Orbit& orbit, double t_s, const Translation& x) {
-    return conjugate(orbit.q_world_lvlh(t_s)) * x.position_m;
+    return conjugate(orbit.q_world_frame(t_s)) * x.position_m;
 }
 
 TEST(OrbitMotion, AFreeBodyFollowsItsVelocityAndAcceleration) {
@@ -51,7 +51,7 @@ TEST(OrbitMotion, ClohessyWiltshireUnderThrustEqualsNumericalIntegration) {
     const double n = orbit.rate_rad_s(), dt_s = 600;
     const Vec3 push{1e-3, -2e-3, 5e-4};
     // In LVLH axes, which is where it is constant: given as it is in the middle of the time.
-    const Translation x = propagated(orbit, 0, dt_s, orbit.q_world_lvlh(dt_s / 2) * push,
+    const Translation x = propagated(orbit, 0, dt_s, orbit.q_world_frame(dt_s / 2) * push,
                                      from_lvlh(orbit, {10, -20, 30}, {0.1, 0.2, -0.3}));
     Vec3 r{10, -20, 30}, v{0.1, 0.2, -0.3};
     const auto acceleration = [&](const Vec3& p, const Vec3& u) {
@@ -74,9 +74,9 @@ TEST(OrbitMotion, TwoBodyOrbitClosesAndKeepsEnergyAndMomentum) {
     // An ellipse with the same major axis comes back when the target does: at the same radius, as fast, but
     // steeper.
     const double v = std::sqrt(mu / R), tilt = 1e-4;
-    const Quat q = orbit.q_world_lvlh(0);
+    const Quat q = orbit.q_world_frame(0);
     const auto absolute = [&](double t_s, const Translation& x) {
-        const Quat now = orbit.q_world_lvlh(t_s);
+        const Quat now = orbit.q_world_frame(t_s);
         return Translation{now * Vec3{R, 0, 0} + x.position_m, now * Vec3{0, v, 0} + x.velocity_m_s};
     };
     const Translation start{{}, q * Vec3{v * std::sin(tilt), v * (std::cos(tilt) - 1), 0}};
@@ -186,8 +186,8 @@ TEST(TargetMotion, WithLvlhItRotatesAtTheOrbitsRatePlusItsOwn) {
     s.q_world_target = normalized(Quat{1, 0.2, -0.3, 0.4});
     Simulation simulation = simulate(s);
     simulation.advance_to(ns(100));
-    const Quat q_lvlh_body0 = conjugate(s.orbit.q_world_lvlh(0)) * s.q_world_target;
-    const Quat expected = s.orbit.q_world_lvlh(100) * q_lvlh_body0 * exp_rotation({0, 50 * kRadPerDeg, 0});
+    const Quat q_lvlh_body0 = conjugate(s.orbit.q_world_frame(0)) * s.q_world_target;
+    const Quat expected = s.orbit.q_world_frame(100) * q_lvlh_body0 * exp_rotation({0, 50 * kRadPerDeg, 0});
     EXPECT_NEAR(angle_between(simulation.truth().target.T_world_body.q, expected), 0, 1e-12);
     // The centre of mass is the world's origin all the time.
     expect_near(simulation.truth().target.T_world_body * s.target.centre_of_mass_m, {}, 1e-12);

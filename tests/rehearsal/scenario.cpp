@@ -23,10 +23,10 @@ std::string text_of(const std::string& path) {
 TEST(Orbit, LvlhRotatesAboutTheMomentum) {
     const Orbit orbit;
     const double quarter_s = 0.5 * 3.14159265358979323846 / orbit.rate_rad_s();
-    EXPECT_NEAR(norm(orbit.q_world_lvlh(0) * Vec3{1, 0, 0} - orbit.up), 0, 1e-12);
-    EXPECT_NEAR(norm(orbit.q_world_lvlh(0) * Vec3{0, 1, 0} - orbit.along), 0, 1e-12);
-    EXPECT_NEAR(norm(orbit.q_world_lvlh(quarter_s) * Vec3{1, 0, 0} - orbit.along), 0, 1e-12);
-    EXPECT_NEAR(norm(orbit.q_world_lvlh(quarter_s) * Vec3{0, 1, 0} + orbit.up), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_frame(0) * Vec3{1, 0, 0} - orbit.up), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_frame(0) * Vec3{0, 1, 0} - orbit.along), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_frame(quarter_s) * Vec3{1, 0, 0} - orbit.along), 0, 1e-12);
+    EXPECT_NEAR(norm(orbit.q_world_frame(quarter_s) * Vec3{0, 1, 0} + orbit.up), 0, 1e-12);
 }
 
 TEST(Scenario, NavigatesByVelocimetersThatMeasureVelocities) {

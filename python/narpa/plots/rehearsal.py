@@ -91,6 +91,52 @@ def last_metres(document):
     return labelled(drawn, axes, "The last three metres, from the front", "y [m]", "z [m]")
 
 
+def profile(document):
+    """The descent from the side: height over the horizontal distance from the site."""
+    drawn = figure(HALF, 3.4)
+    axes = drawn.subplots()
+    truth = thin(document["truth"]["position_m"]).reshape(-1, 3)
+    estimated = np.array(document["estimates"]["port_position_m"], float).reshape(-1, 3)
+    estimated = estimated[:: max(1, len(estimated) // CIRCLES)]
+    axes.plot(np.hypot(truth[:, 1], truth[:, 2]), truth[:, 0], color=BLUE, linewidth=1.8, label="true")
+    axes.plot(np.hypot(estimated[:, 1], estimated[:, 2]), estimated[:, 0], "o", color=VERMILION, markersize=4, markerfacecolor="none",
+              markeredgewidth=0.9, label="estimated")  # fmt: skip
+    return labelled(drawn, axes, "From the side", "horizontal distance from the site [m]", "height [m]")
+
+
+def track(document):
+    """The last of the descent from above, with the circle about the site that it may land in."""
+    drawn = figure(HALF, 3.4)
+    axes = drawn.subplots()
+    limit = document["landing"]["from_site_m"]
+    truth = np.array(document["truth"]["position_m"], float).reshape(-1, 3)
+    truth = truth[np.hypot(truth[:, 1], truth[:, 2]) < 5 * limit]
+    axes.plot(truth[:, 2], -truth[:, 1], color=BLUE, linewidth=1.8, label="true")
+    circle(axes, limit, GREEN, "allowed at the touchdown")
+    if document["contact"]:
+        _, y, z = document["contact"]["position_m"]
+        axes.plot(z, -y, "o", color=VERMILION, markersize=6, label="touchdown")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlim(-2.5 * limit, 2.5 * limit)
+    return labelled(drawn, axes, "The site, from above", "z of the site [m]", "-y of the site [m]")
+
+
+def landing(document):
+    limits = document["landing"]
+    position = np.array(document["truth"]["position_m"], float).reshape(-1, 3)
+    document["truth"]["height_m"] = position[:, 0]
+    document["truth"]["site_m"] = np.hypot(position[:, 1], position[:, 2])
+    allowed = "vertical velocity allowed at the touchdown"
+    return {
+        "profile": profile(document),
+        "track": track(document),
+        "height": over_time(document, "Height above the site", "[m]", [("height_m", BLUE, None)]),
+        "velocity": over_time(document, "Velocity", "[m/s]", [("closing_m_s", BLUE, "downwards"), ("lateral_m_s", VERMILION, "horizontal")],
+                              [limits["vertical_m_s"]], allowed),
+        "site": over_time(document, "Horizontal distance from the site", "[m]", [("site_m", BLUE, None)]),
+    }  # fmt: skip
+
+
 def shade_phases(document, axes):
     """The guidance's phases behind the curves, with the number of the leg where there is room for it."""
     span = max(1e-9, document["t_end_s"])
@@ -104,7 +150,7 @@ def shade_phases(document, axes):
     axes.set_xlim(0, span)
 
 
-def over_time(document, title, unit, curves, limits=()):
+def over_time(document, title, unit, curves, limits=(), allowed="closing rate allowed at contact"):
     drawn = figure(WIDE, 2.7)
     axes = drawn.subplots()
     shade_phases(document, axes)
@@ -112,7 +158,7 @@ def over_time(document, title, unit, curves, limits=()):
         t, values = thin(np.column_stack([document["truth"]["t_s"], document["truth"][key]])).T
         axes.plot(t, values, color=colour, label=label)
     for k, limit in enumerate(limits):
-        axes.axhline(limit, color=GREEN, linestyle="--", linewidth=1, label=None if k else "closing rate allowed at contact")
+        axes.axhline(limit, color=GREEN, linestyle="--", linewidth=1, label=None if k else allowed)
     return labelled(drawn, axes, title, "t [s]", unit)
 
 
@@ -169,7 +215,7 @@ def latency_chart(document):
     return labelled(drawn, axes, "Pose command to hand-over", "t [s]", "[ms]")
 
 
-def rehearsal(document):
+def approach(document):
     contact_limits = document["gates"]["contact"]
     charts = {
         "above": view(document, "From above", 0, 1),
@@ -181,6 +227,11 @@ def rehearsal(document):
     charts["range"] = over_time(document, "Range", "between the ports [m]", [("range_m", BLUE, None)])
     limits = contact_limits["closing_m_s"] if contact_limits else ()
     charts["rates"] = over_time(document, "Rates", "[m/s]", [("closing_m_s", BLUE, "closing"), ("lateral_m_s", VERMILION, "lateral")], limits)
+    return charts
+
+
+def rehearsal(document):
+    charts = landing(document) if "landing" in document else approach(document)
     if document["estimates"]["t_s"]:
         for quantity in ("position", "attitude"):
             for axis in range(3):
@@ -194,7 +245,7 @@ def rehearsal(document):
 
 def campaign(document):
     """States at contact over all runs, with the limits."""
-    limits, charts = document["limits"], {}
+    charts = {}
 
     def chart(name, title, x, y, points, outline):
         drawn = charts[name] = figure(3.7, 3.6)
@@ -208,6 +259,18 @@ def campaign(document):
         labelled(drawn, axes, title, x, y)
 
     angle, runs = np.linspace(0, 2 * np.pi, 181), document["runs"]
+    if "landing" in document:
+        limits = document["landing"]
+        site, down, across = limits["from_site_m"], limits["vertical_m_s"], limits["horizontal_m_s"]
+        chart("where", "Where they touched down", "z of the site [m]", "-y of the site [m]",
+              [(run["position_m"][2], -run["position_m"][1]) for run in runs], (site * np.cos(angle), site * np.sin(angle)))  # fmt: skip
+        chart("rates", "Velocities", "vertical [m/s]", "horizontal [m/s]", [(run["closing_m_s"], run["lateral_m_s"]) for run in runs],
+              ([0, down, down, 0, 0], [0, 0, across, across, 0]))  # fmt: skip
+        tilt, rate = limits["tilt_deg"], limits["rate_deg_s"]
+        chart("tilt", "Tilt and angular rate", "tilt [deg]", "rate [deg/s]", [(run["tilt_deg"], run["rate_deg_s"]) for run in runs],
+              ([0, tilt, tilt, 0, 0], [0, 0, rate, rate, 0]))  # fmt: skip
+        return charts
+    limits = document["limits"]
     lateral = 100 * limits["lateral_m"]
     low, high = (100 * v for v in limits["closing_m_s"])
     rate, pitch, roll = 100 * limits["lateral_m_s"], limits["pitch_yaw_deg"], limits["roll_deg"]

@@ -1,4 +1,4 @@
-#include "rehearsal/docking/port_state.h"
+#include "rehearsal/contact/port_state.h"
 
 #include <algorithm>
 #include <cmath>
@@ -87,7 +87,7 @@ Motion chaser_motion(const PortState& state, const Vehicle& target, const Motion
 }
 
 ContactConditions contact_conditions(const CaptureEnvelope& limits, const PortState& s) {
-    return {{
+    return {
         {"closing_rate", "closing rate", "m/s", s.closing_m_s(), limits.closing_min_m_s, limits.closing_max_m_s},
         {"lateral_rate", "lateral rate", "m/s", s.lateral_m_s(), 0, limits.lateral_rate_m_s},
         {"lateral", "lateral misalignment", "m", s.lateral_m(), 0, limits.lateral_m},
@@ -96,7 +96,7 @@ ContactConditions contact_conditions(const CaptureEnvelope& limits, const PortSt
         {"pitch_yaw_rate", "pitch and yaw rate", "deg/s", s.pitch_yaw_rad_s() * kDegPerRad, 0,
          limits.pitch_yaw_rate_deg_s},
         {"roll_rate", "roll rate", "deg/s", s.roll_rad_s() * kDegPerRad, 0, limits.roll_rate_deg_s},
-    }};
+    };
 }
 
 bool within(const CaptureEnvelope& limits, const PortState& state) {

@@ -1,4 +1,4 @@
-/// rehearsal/docking/port_state.h - the chaser's docking port relative to the target's: pose, velocity, rate, and
+/// rehearsal/contact/port_state.h - the chaser's docking port relative to the target's: pose, velocity, rate, and
 /// the scalars that limits are set on. Dynamics, navigation and judge use these functions alone, so they agree bit
 /// for bit on equal inputs.
 ///
@@ -6,7 +6,7 @@
 /// about z.
 #pragma once
 
-#include <array>
+#include <vector>
 
 #include "base/pose.h"
 
@@ -68,8 +68,8 @@ struct ContactCondition {
     [[nodiscard]] bool within() const { return value >= min && value <= max; }
 };
 
+using ContactConditions = std::vector<ContactCondition>;
 /// In the order of the standard's table.
-using ContactConditions = std::array<ContactCondition, 7>;
 [[nodiscard]] ContactConditions contact_conditions(const CaptureEnvelope& limits, const PortState& state);
 
 /// All of them.

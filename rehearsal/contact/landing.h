@@ -1,0 +1,26 @@
+/// rehearsal/contact/landing.h - the limits of a landing and how they are measured.
+#pragma once
+
+#include "rehearsal/contact/port_state.h"
+#include "rehearsal/contact/terrain.h"
+
+namespace narpa::rehearsal {
+
+/// Of the chaser's port (the middle of its feet) when the first foot meets the ground; slope and step are those of
+/// the ground that it stands on.
+struct LandingLimits {
+    double vertical_m_s = 1.5, horizontal_m_s = 0.5;
+    double tilt_deg = 5, rate_deg_s = 3;
+    double from_site_m = 10;
+    double slope_deg = 10, step_m = 0.3;
+};
+
+/// `touchdown`: when the first foot meets the ground. `ground`: where the feet stand; none: slope and step are left
+/// out.
+[[nodiscard]] ContactConditions landing_conditions(const LandingLimits& limits, const PortState& touchdown,
+                                                   const std::optional<Footing>& ground);
+
+/// Where the feet are, in the site's axes.
+[[nodiscard]] std::vector<Vec3> feet_at_site(std::span<const Vec3> feet_m, const PortState& state);
+
+}  // namespace narpa::rehearsal

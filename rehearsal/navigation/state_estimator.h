@@ -118,6 +118,7 @@ private:
         : scenario_(scenario), t_start_ns_(t_start_ns), tracker_(std::move(tracker)), taken_ns_(t_start_ns) {}
     [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
+    [[nodiscard]] Matrix6 covariance_of_model(const Rigid3& T_chaser_target) const;
 
     Scenario scenario_;
     std::int64_t t_start_ns_;

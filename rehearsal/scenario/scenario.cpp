@@ -14,6 +14,12 @@ Quat Orbit::q_world_lvlh(double t_s) const {
     return quat_from_columns(x, cross(z, x), z) * exp_rotation({0, 0, rate_rad_s() * t_s});
 }
 
+ModelUncertainty ModelError::uncertainty() const {
+    ModelUncertainty u = error;
+    for (const ModelErrorName& name : kModelErrors) u.*name.field *= told;
+    return u;
+}
+
 std::int64_t Scenario::period_ns() const {
     return std::llround(navigation.period_s * 1e9);
 }

@@ -350,6 +350,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
             estimate.status = FeatureStatus::settled;
             break;
         }
+        // Where the views end, what the pose still moves by is part of its error.
+        if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
     estimate.bound =

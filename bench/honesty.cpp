@@ -151,8 +151,9 @@ private:
         return {within(0.1), within(0.02)};
     }
     KnownTarget& another(const KnownTarget& target, Draw& d) {
-        KnownTarget* other = targets_[d.index(targets_.size())].get();
-        return other == &target ? *targets_[(d.index(targets_.size() - 1) + 1) % targets_.size()] : *other;
+        std::size_t index = 0;
+        while (targets_[index].get() != &target) ++index;
+        return *targets_[(index + 1 + d.index(targets_.size() - 1)) % targets_.size()];
     }
 
     TrialResult frame(KnownTarget& target, const std::string& method, std::string_view condition,

@@ -54,14 +54,17 @@ double root_mean_square(const std::vector<double>& lengths) {
     return lengths.empty() ? 0 : std::sqrt(all.squaredNorm() / static_cast<double>(lengths.size()));
 }
 
-/// The frame is clipped within the window of a match there: the gradients are not the light's.
-bool any_clipped(const MeasuredImage& frame, double u, double v) {
+/// More than half of a match's window is clipped in the frame: its gradients are not the light's.
+bool is_clipped(const MeasuredImage& frame, double u, double v) {
     if (frame.clipped.empty()) return false;
     const int x0 = static_cast<int>(std::lround(u)), y0 = static_cast<int>(std::lround(v));
+    int clipped = 0, all = 0;
     for (int y = std::max(0, y0 - kHalfWindow_px); y <= std::min(frame.height - 1, y0 + kHalfWindow_px); ++y)
-        for (int x = std::max(0, x0 - kHalfWindow_px); x <= std::min(frame.width - 1, x0 + kHalfWindow_px); ++x)
-            if (frame.clipped[frame.index(x, y)] != 0) return true;
-    return false;
+        for (int x = std::max(0, x0 - kHalfWindow_px); x <= std::min(frame.width - 1, x0 + kHalfWindow_px); ++x) {
+            clipped += frame.clipped[frame.index(x, y)] != 0;
+            ++all;
+        }
+    return 2 * clipped > all;
 }
 
 /// Standard deviation of residuals in u and in v, from the median of their lengths.
@@ -245,8 +248,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
                                                       {u, v + kNeighbour_px},
                                                       {u, v - kNeighbour_px}}},
                            hits);
-        if (hits.body[0] != target || !on_smooth_surface(hits) || any_clipped(frame, m.frame_u, m.frame_v))
-            continue;
+        if (hits.body[0] != target || !on_smooth_surface(hits) || is_clipped(frame, m.frame_u, m.frame_v)) continue;
         const Eigen::Matrix2d C =
             flow_covariance(toned_frame, tones.variance(), m.frame_u, m.frame_v, kHalfWindow_px);
         if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;

@@ -9,6 +9,8 @@
 #include "apps/cli.h"
 #include "bench/approach.h"
 #include "bench/filter.h"
+#include "bench/honesty.h"
+#include "bench/honesty_scenes.h"
 #include "bench/icp.h"
 #include "bench/pnp.h"
 #include "bench/statistics.h"
@@ -28,6 +30,9 @@ struct EstimateBenchOptions {
     double turn_deg_s = 0;
     PnpBenchOptions pnp;
     ApproachOptions approach;
+    HonestyOptions honesty;
+    int first_trial = 0;
+    std::string model_error, told;
 };
 
 /// What the parts put together: what is wrong, and what goes on the plot of all.
@@ -200,11 +205,61 @@ Outcome bench_filter(const EstimateBenchOptions& o, Findings& findings) {
     return document;
 }
 
-constexpr std::pair<const char*, Part> kParts[] = {{"pnp", bench_pnp},
-                                                   {"approach", bench_approach},
-                                                   {"stereo", bench_stereo},
-                                                   {"icp", bench_icp},
-                                                   {"filter", bench_filter}};
+/// NAME=VALUE, separated by commas.
+Result<ModelUncertainty> model_uncertainty(const std::string& text, const char* option, double* distortion) {
+    ModelUncertainty u;
+    for (std::size_t from = 0; from < text.size();) {
+        const std::size_t end = std::min(text.find(',', from), text.size());
+        const std::string item = text.substr(from, end - from);
+        from = end + 1;
+        const std::size_t equals = item.find('=');
+        const std::string name = item.substr(0, equals);
+        double value = 0;
+        std::size_t read = 0;
+        try {
+            if (equals != std::string::npos) value = std::stod(item.substr(equals + 1), &read);
+        } catch (const std::exception&) {
+            read = 0;
+        }
+        const bool number = read > 0 && equals + 1 + read == item.size() && std::isfinite(value);
+        const auto field = std::ranges::find(kModelErrors, name, &ModelErrorName::name);
+        const bool known = field != std::end(kModelErrors) || (distortion && name == "distortion");
+        if (!number || !known || (value < 0 && name != "distortion")) {
+            std::string names;
+            for (const ModelErrorName& n : kModelErrors) names += (names.empty() ? "" : ", ") + std::string(n.name);
+            return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item, names,
+                                     distortion ? ", distortion" : "")};
+        }
+        if (field != std::end(kModelErrors))
+            u.*(field->field) = field->unit * value;
+        else
+            *distortion = value;
+    }
+    return u;
+}
+
+Outcome bench_honesty(const EstimateBenchOptions& o, Findings& findings) {
+    HonestyOptions options = o.honesty;
+    auto world = model_uncertainty(o.model_error, "--model-error", &options.distortion);
+    if (!world) return world.error();
+    auto told = model_uncertainty(o.told, "--told", nullptr);
+    if (!told) return told.error();
+    options.world = *world, options.told = *told;
+    if (o.quick) options.trials = 5;
+    TracingThreads threads(o.threads);
+    Progress progress("honesty");
+    const auto rows = run_honesty(
+        options, o.first_trial, threads, [&](const std::string& step) { progress.show(step); }, stop_flag());
+    say(in_words(rows));
+    int beyond = 0;
+    for (const HonestyRow& row : rows) beyond += row.beyond;
+    if (beyond > 0) findings.faults.push_back(fmt::format("honesty: {} good answers beyond 6 sigma", beyond));
+    return to_json(rows);
+}
+
+constexpr std::pair<const char*, Part> kParts[] = {{"pnp", bench_pnp},       {"approach", bench_approach},
+                                                   {"stereo", bench_stereo}, {"icp", bench_icp},
+                                                   {"filter", bench_filter}, {"honesty", bench_honesty}};
 
 Outcome bench_estimates(const EstimateBenchOptions& o) {
     stop_on_signals();
@@ -293,6 +348,28 @@ Command add_bench_estimate(Parser bench_command) {
     c.option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")
         .range(0.01, 1e7)
         .finite();
+    c.option("--honesty-trials", o->honesty.trials, "honesty: frames, sweeps or sets of points of each method")
+        .range(1, 1'000'000)
+        .shows_default();
+    c.option("--methods", o->honesty.methods, fmt::format("honesty: {}", fmt::join(kHonestyMethods, ", ")))
+        .comma_separated()
+        .one_of({kHonestyMethods.begin(), kHonestyMethods.end()})
+        .type_name("LIST");
+    const auto targets = honesty_targets();
+    c.option("--targets", o->honesty.targets, fmt::format("honesty: {} (default: all)", fmt::join(targets, ", ")))
+        .comma_separated()
+        .one_of({targets.begin(), targets.end()})
+        .type_name("LIST");
+    c.option("--conditions", o->honesty.conditions,
+             fmt::format("honesty: {} (default: all)", fmt::join(kHonestyConditions, ", ")))
+        .comma_separated()
+        .one_of({kHonestyConditions.begin(), kHonestyConditions.end()})
+        .type_name("LIST");
+    c.option("--first-trial", o->first_trial, "honesty: number of the first").range(0, 1'000'000'000);
+    c.option("--model-error", o->model_error,
+             "honesty: how the world differs from the believed model, standard deviations (docs/estimation.md)")
+        .type_name("NAME=VALUE,...");
+    c.option("--told", o->told, "honesty: what the estimators are told of it").type_name("NAME=VALUE,...");
     c.flag("--quick", o->quick, "Few draws of all, to see that it works");
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
     c.option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error").type_name("DIR");

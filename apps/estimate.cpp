@@ -118,13 +118,9 @@ Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t
     return world;
 }
 
-nlohmann::json pose_json(const Rigid3& T) {
-    return {{"position_m", {T.t.x, T.t.y, T.t.z}}, {"attitude_wxyz", {T.q.w, T.q.x, T.q.y, T.q.z}}};
-}
-
-/// Prints an estimate beside the truth; returns the document.
+/// Prints an estimate beside the truth; returns the document, which has passed where the pose is usable.
 nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
-                    const Rigid3& truth) {
+                    const Rigid3& truth, const Answer& answer) {
     const Vector6 error = error_between(T, truth);
     const double nees = normalised_error_squared(error, covariance);
     say(
@@ -135,12 +131,15 @@ nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& cov
                     error.tail<3>().norm(), rotation_sigma(covariance) / kDegree, position_sigma(covariance),
                     rotation_sigma(bound) / kDegree, position_sigma(bound), nees, kNeesLow, kNeesHigh,
                     nees_verdict(nees, kNeesLow, kNeesHigh)));
+    say(fmt::format("  {}{}{}", kAnswerKinds[static_cast<std::size_t>(answer.kind)], answer.why.empty() ? "" : ": ",
+                    answer.why));
     std::array<std::array<double, 6>, 6> rows{};
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) rows[std::size_t(i)][std::size_t(j)] = covariance(i, j);
-    return {{"passed", true},
-            {"pose", pose_json(T)},
-            {"truth", pose_json(truth)},
+    return {{"passed", answer.usable()},
+            {"answer", to_json(answer)},
+            {"pose", to_json(T)},
+            {"truth", to_json(truth)},
             {"covariance", rows},
             {"error_rotation_rad", error.head<3>().norm()},
             {"error_position_m", error.tail<3>().norm()},
@@ -215,10 +214,14 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
         const Progress progress("estimating the pose in " + o.frame);
         threads.arena.execute([&] { tracked = (*tracker)->take(taken, *bytes, at); });
     }
-    if (!tracked.measured) return Error{"gives no pose: " + tracked.why, o.frame, 0, 0, ErrorKind::failed};
+    if (!tracked.measured) {
+        say(fmt::format("{} gives no pose: {}: {}", o.frame,
+                        kAnswerKinds[static_cast<std::size_t>(tracked.answer.kind)], tracked.why));
+        return nlohmann::json{{"passed", false}, {"answer", to_json(tracked.answer)}};
+    }
     nlohmann::json document =
         show(fmt::format("{} in camera {}", scene.bodies[(*tracker)->target()].name, scene.cameras[*camera].name),
-             *tracked.measured, tracked.covariance, tracked.bound, tracked.truth);
+             *tracked.measured, tracked.covariance, tracked.bound, tracked.truth, tracked.answer);
     document["matches"] = tracked.matches;
     document["renders"] = tracked.renders;
     return document;
@@ -264,18 +267,12 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
     nlohmann::json document = show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name),
-                                   e.T_lidar_target, e.covariance, e.bound, truth);
+                                   e.T_lidar_target, e.covariance, e.bound, truth, e.answer);
     const int unobserved = e.observability.unobserved;
     say(
         fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
                     "cannot be seen; {} iterations",
                     e.points, e.used, e.explained, unobserved, e.iterations));
-    if (e.ambiguous)
-        say("  not credible: another pose explains the points nearly as well");
-    else if (!e.credible)
-        say("  not credible: the pose does not explain its points, or did not settle");
-    document["passed"] = document["credible"] = e.credible;
-    document["ambiguous"] = e.ambiguous;
     document["points"] = e.points;
     document["used"] = e.used;
     document["explained"] = e.explained;
@@ -343,7 +340,7 @@ Command add_estimate(Parser app) {
     for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
-    c.footer("Exit status 1 if no frame gave a pose, or a sweep's pose is not credible.");
+    c.footer("Exit status 1 if no frame gave a pose, or that of a single frame or sweep is ambiguous or refused.");
     c.group("Results");
     c.examples(
         {"narpa estimate out/first-flight -o out/errors.png", "narpa estimate docking --frame out/frame.raw"});

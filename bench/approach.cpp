@@ -72,10 +72,10 @@ public:
         Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
         if (method_ == EstimateMethod::features) {
             const FeatureEstimate e = points_->align(view.image, view.at, guess, view.motion);
-            out.claimed = e.ok(), out.renders = static_cast<int>(e.rounds.size());
+            out.claimed = e.answer.usable(), out.renders = static_cast<int>(e.rounds.size());
             T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
         } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
-            out.claimed = e->status == DenseStatus::converged, out.renders = e->renders;
+            out.claimed = e->answer.usable(), out.renders = e->renders;
             T = e->T_camera_body, covariance = e->covariance;
         }
         out.ms = seconds_since(start_ns) * 1e3;

@@ -4,13 +4,18 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "bench/approach.h"
 #include "bench/filter.h"
+#include "bench/honesty.h"
 #include "bench/icp.h"
 #include "bench/pnp.h"
+#include "bench/statistics.h"
 #include "bench/stereo.h"
+#include "emulator/log/estimate_report.h"
 
 namespace narpa {
 namespace {
@@ -213,6 +218,50 @@ std::string in_words(const std::vector<FilterRun>& runs) {
             1e3 * last.attitude_sigma_rad, r.update_microseconds);
     }
     return text;
+}
+
+// Honesty
+
+json to_json(const std::vector<HonestyRow>& rows) {
+    json all = json::array();
+    for (const HonestyRow& r : rows) {
+        json answers;
+        for (std::size_t i = 0; i < kAnswerKinds.size(); ++i) answers[std::string(kAnswerKinds[i])] = r.answers[i];
+        all.push_back({{"method", r.method},
+                       {"target", r.target},
+                       {"condition", r.condition},
+                       {"answers", answers},
+                       {"good_beyond_six_sigma", r.beyond},
+                       {"beyond_trials", r.beyond_trials},
+                       {"nees", r.nees},
+                       {"rotation_rad", r.rotation_rad},
+                       {"position_of_range", r.position_of_range}});
+    }
+    return all;
+}
+
+std::string in_words(const std::vector<HonestyRow>& rows) {
+    std::string out =
+        fmt::format("{:<30} {:>7} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9}\n", "", "trials", "good",
+                    "ambig.", "unobs.", "refused", "beyond", "NEES", "median", "RMS deg", "% range");
+    const auto line = [&](const std::string& name, const HonestyRow& r) {
+        Mean nees, turn, shift;
+        for (const double v : r.nees) nees.add(std::min(v, kBeyondNees));
+        for (const double v : r.rotation_rad) turn.add(v);
+        for (const double v : r.position_of_range) shift.add(v);
+        out += fmt::format("{:<30} {:>7} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7.2f} {:>7.2f} {:>9.4f} {:>9.4f}\n", name,
+                           r.trials(), r.answers[0], r.answers[1], r.answers[2], r.answers[3], r.beyond,
+                           nees.mean(), quantile(r.nees, 0.5), turn.rms() / kDegree, 100 * shift.rms());
+    };
+    using Key = std::function<std::string(const HonestyRow&)>;
+    for (const Key& key : {Key([](const HonestyRow& r) { return r.method; }),
+                           Key([](const HonestyRow& r) { return r.method + ", " + r.target; }),
+                           Key([](const HonestyRow& r) { return r.method + ", " + r.condition; })}) {
+        std::map<std::string, HonestyRow> sums;
+        for (const HonestyRow& r : rows) sums[key(r)].add(r);
+        for (const auto& [name, sum] : sums) line(name, sum);
+    }
+    return out;
 }
 
 }  // namespace narpa

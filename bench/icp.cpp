@@ -174,7 +174,7 @@ std::vector<IcpRun> run_icp(const World& world, std::size_t target, const std::v
             sums.iterations.add(e->iterations);
             const Vector6 error = error_between(e->T_lidar_target, truth);
             if (!(normalised_error_squared(error, known->bound) < kFoundSigma * kFoundSigma)) {
-                run.told += !e->credible;
+                run.told += !e->answer.usable();
                 continue;
             }
             ++run.found;

@@ -16,7 +16,7 @@ namespace {
 constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
 /// Standard deviations beyond which the target is lost: a render there would show something else. Shift is a part
 /// of the range.
-constexpr double kMostTurn_rad = 0.5, kMostShift = 0.2;
+constexpr double kLostTurn_rad = 0.5, kLostShift = 0.2;
 
 PoseTrackerSettings tracker_settings(const TrackerOptions& options) {
     PoseTrackerSettings settings;
@@ -60,6 +60,7 @@ EstimateReport TrackedFrame::report(std::uint8_t camera) const {
     return {frame,
             camera,
             state,
+            answer.kind,
             t_ns,
             filtered,
             {deviation(0), deviation(1), deviation(2)},
@@ -147,10 +148,11 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     else
         out.why = usable.error().what;
     if (out.measured) {
-        const UpdateResult update =
-            tracker_.update({t_ns, *out.measured, out.covariance, T_chaser_camera(), q_frame_chaser});
+        PoseMeasurement measurement{t_ns, *out.measured, out.covariance, T_chaser_camera(), q_frame_chaser};
+        if (out.answer.kind == AnswerKind::unobservable) measurement.root_information = out.answer.root_information;
+        const UpdateResult update = tracker_.update(measurement);
         out.nis = update.nis;
-        out.why = update.why;
+        if (update.outcome != UpdateOutcome::taken) out.why = update.why;
         if (update.outcome == UpdateOutcome::taken) out.state = EstimateState::measured;
     }
     if (tracker_.started()) {
@@ -183,10 +185,9 @@ void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPos
     const FeatureEstimate e = features_->align(image, at, out.guess, motion);
     out.matches = e.agreeing;
     out.renders = static_cast<int>(e.rounds.size());
-    if (!e.ok()) {
-        out.why = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
-        return;
-    }
+    out.answer = e.answer;
+    out.why = e.answer.why;
+    if (!e.answer.usable()) return;
     out.measured = e.T_camera_target;
     out.covariance = e.covariance;
     out.bound = e.bound;
@@ -205,10 +206,9 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
     }
     out.matches = static_cast<int>(e->pixels);
     out.renders += e->renders;
-    if (e->status != DenseStatus::converged) {
-        out.why = std::string(name(e->status));
-        return;
-    }
+    out.answer = e->answer;
+    out.why = e->answer.why;
+    if (!e->answer.usable()) return;
     out.measured = e->T_camera_body;
     out.covariance = e->covariance;
 }
@@ -224,8 +224,8 @@ DenseOptions FrameTracker::dense_options(const ApparentMotion& motion) const {
 
 bool FrameTracker::is_tracked(const Quat& q_frame_chaser) const {
     const PoseFilter::Pose known = tracker_.filter().pose(q_frame_chaser);
-    return rotation_sigma(known.covariance) < kMostTurn_rad &&
-           position_sigma(known.covariance) < kMostShift * norm(known.T_chaser_target.t);
+    return rotation_sigma(known.covariance) < kLostTurn_rad &&
+           position_sigma(known.covariance) < kLostShift * norm(known.T_chaser_target.t);
 }
 
 }  // namespace narpa

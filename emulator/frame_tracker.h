@@ -14,6 +14,7 @@
 #include "base/result.h"
 #include "emulator/world.h"
 #include "estimator/filter/pose_filter.h"
+#include "estimator/pose/answer.h"
 #include "estimator/pose/apparent_motion.h"
 #include "protocols/estimate.h"
 #include "protocols/ledger.h"
@@ -54,9 +55,10 @@ struct TrackedFrame {
     std::int64_t t_ns = 0;
     EstimateState state = EstimateState::lost;
     std::string why;  ///< why the frame gave no pose
+    Answer answer;    ///< of this frame alone
     Rigid3 truth{};
     Rigid3 guess{};                        ///< the pose of the first render
-    std::optional<Rigid3> measured;        ///< by this frame alone
+    std::optional<Rigid3> measured;        ///< by this frame alone, where the answer is usable
     Matrix6 covariance = Matrix6::Zero();  ///< of `measured`
     Matrix6 bound = Matrix6::Zero();       ///< Cramer-Rao, for the sensor's noise and the method's measurements
     Rigid3 filtered{};                     ///< by all frames so far; where the state is not lost

@@ -17,11 +17,21 @@ enum class EstimateState : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 3> kEstimateStates{"lost", "predicted", "measured"};
 
+/// What a pose is worth that was estimated from one frame or sweep (estimator/pose/answer.h).
+enum class AnswerKind : std::uint8_t {
+    good,          ///< right within its covariance
+    ambiguous,     ///< another pose explains the measurement nearly as well
+    unobservable,  ///< the measurement does not hold all motions; right in the others
+    refused,       ///< no pose
+};
+inline constexpr std::array<std::string_view, 4> kAnswerKinds{"good", "ambiguous", "unobservable", "refused"};
+
 struct EstimateReport {
     std::uint32_t frame = 0;
     std::uint8_t camera = 0;  ///< index of the camera in the scene
     EstimateState state = EstimateState::lost;
-    std::int64_t t_ns = 0;  ///< simulation clock: the middle of the exposure
+    AnswerKind answer = AnswerKind::good;  ///< of the frame alone
+    std::int64_t t_ns = 0;                 ///< simulation clock: the middle of the exposure
     Rigid3 T_camera_target{};
     Vec3 sigma_rotation_rad{}, sigma_position_m{};  ///< standard deviations, camera axes
 };

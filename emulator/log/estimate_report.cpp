@@ -53,7 +53,28 @@ std::string estimate_row(const TrackedFrame& f) {
         position_sigma(f.bound));
     std::string why = f.why;  // one field
     std::replace(why.begin(), why.end(), ',', ';');
-    return row + fmt::format("{},{},{:.3f},{}\n", f.matches, f.renders, f.ms, why);
+    return row + fmt::format("{},{},{:.3f},{},{}\n", f.matches, f.renders, f.ms,
+                             kAnswerKinds[static_cast<std::size_t>(f.answer.kind)], why);
+}
+
+nlohmann::json to_json(const Rigid3& T) {
+    return {{"position_m", {T.t.x, T.t.y, T.t.z}}, {"attitude_wxyz", {T.q.w, T.q.x, T.q.y, T.q.z}}};
+}
+
+nlohmann::json to_json(const Answer& answer) {
+    nlohmann::json motions = nlohmann::json::array(), rivals = nlohmann::json::array();
+    for (int i = 0; i < answer.observability.unobserved; ++i) {
+        const Vector6 m = answer.observability.motions.col(i);
+        motions.push_back({{"rotation_rad", {m[0], m[1], m[2]}}, {"translation_m", {m[3], m[4], m[5]}}});
+    }
+    for (const Rival& r : answer.rivals) {
+        rivals.push_back(to_json(r.T_sensor_target));
+        rivals.back()["worse_chi2"] = r.worse_chi2;
+    }
+    return {{"class", kAnswerKinds[static_cast<std::size_t>(answer.kind)]},
+            {"why", answer.why},
+            {"unobserved_motions", motions},
+            {"alternatives", rivals}};
 }
 
 std::string nees_verdict(double nees, double low, double high) {
@@ -73,6 +94,9 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
     for (const TrackedFrame& f : frames) {
         ms.push_back(f.ms);
         const Errors e(f);
+        ++s.answers[static_cast<std::size_t>(f.answer.kind)];
+        if (f.answer.kind == AnswerKind::good && f.measured)
+            s.beyond += !(normalised_error_squared(e.vector, f.covariance) <= kBeyondNees);
         if (f.state != EstimateState::lost)
             filtered_turn.add(e.filtered_rotation()), filtered_shift.add(e.filtered_position());
         if (f.state != EstimateState::measured || !f.measured) continue;
@@ -105,8 +129,12 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
 }
 
 nlohmann::json to_json(const EstimateSummary& s) {
+    nlohmann::json answers;
+    for (std::size_t i = 0; i < kAnswerKinds.size(); ++i) answers[std::string(kAnswerKinds[i])] = s.answers[i];
     return {{"frames", s.frames},
             {"measured", s.measured},
+            {"answers", answers},
+            {"good_beyond_six_sigma", s.beyond},
             {"rotation_rms_rad", s.rotation_rms_rad},
             {"position_rms_m", s.position_rms_m},
             {"position_rms_of_range", s.position_rms_of_range},
@@ -125,6 +153,10 @@ nlohmann::json to_json(const EstimateSummary& s) {
 
 std::string in_words(const EstimateSummary& s) {
     std::string out = fmt::format("{} of {} frames gave a pose that the filter accepted\n", s.measured, s.frames);
+    out += fmt::format(
+        "    answers: {} good, {} ambiguous, {} unobservable in some motions, {} refused; {} good ones "
+        "beyond 6 sigma\n",
+        s.answers[0], s.answers[1], s.answers[2], s.answers[3], s.beyond);
     if (s.measured == 0) return out;
     out += fmt::format(
         "    single frame: RMS {:.4f} deg, {:.3g} m ({:.3g} % of the range); {:.1f} and {:.1f} times the bound\n",

@@ -55,6 +55,11 @@ public:
     /// The derivative of distance_m with an error of the pose (pose_estimate.h), for point `i` of the sweep.
     [[nodiscard]] Vector6 derivative(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const;
 
+    /// The derivative of distance_m with the range, for the same point.
+    [[nodiscard]] double along_beam(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const {
+        return dot(p.normal, in_target(T_lidar_target, beams_[i]).direction);
+    }
+
 private:
     /// A beam relative to a target at rest: compensated for the target's motion since the time of the pose.
     struct Beam {

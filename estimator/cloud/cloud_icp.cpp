@@ -1,11 +1,14 @@
 #include "estimator/cloud/cloud_icp.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "base/constants.h"
 #include "estimator/pose/median.h"
+#include "estimator/pose/root_information.h"
 
 namespace narpa {
 namespace {
@@ -22,8 +25,8 @@ constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
 /// of the points lies elsewhere.
 constexpr std::size_t kManyPoints = 150;
 constexpr double kWeak = 0.01, kFewElsewhere = 0.02;
-/// A rival is elsewhere, so many variances away; as likely, or better, by these differences of the costs.
-constexpr double kElsewhere = 100, kAsLikely = 8, kBetter = 0.5;
+/// A rival is better by this difference of the costs, each half a chi-square.
+constexpr double kBetter = 0.5;
 /// Of a search about a minimum at which points lie beside the model, in parts of the points' spread.
 constexpr double kBesideCircle = 0.15;
 
@@ -82,6 +85,8 @@ struct CloudIcp::Pass {
     Matrix6 hessian = Matrix6::Zero();            ///< sum of weight * J J' / sigma^2
     Vector6 gradient = Vector6::Zero();           ///< -sum of weight * J distance / sigma^2
     Matrix6 information = Matrix6::Zero();        ///< sum of J J' / sigma^2 of the points used
+    Vector6 by_range = Vector6::Zero();           ///< the gradient for a metre more of range,
+    Vector6 by_scale = Vector6::Zero();           ///< and for a model twice as large
     double scores2 = 0, slopes = 0, slopes2 = 0;  ///< sums of psi^2, psi', psi'^2 of the points used
     PointSpread spread;
     double scatter = 1;
@@ -99,6 +104,16 @@ double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
     const double correction = 1 + kUnknowns / n * slope_variance / (slope * slope);
     const double mean_square = pass.scores2 / (n - kUnknowns);
     return std::max(1.0, std::pow(correction * pass.scatter / slope, 2) * mean_square);
+}
+
+/// By what is not known of the model: of the ranges' bias and the model's size as the points weigh them.
+PoseShifts CloudIcp::shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const {
+    const ModelUncertainty& u = settings_.model;
+    if (u == ModelUncertainty{}) return PoseShifts::Zero(6, 0);
+    PoseShifts of_ranges = PoseShifts::Zero(6, 2);
+    of_ranges.col(0) = u.range_bias_m * observability.solve(pass.hessian, pass.by_range);
+    of_ranges.col(1) = u.scale * observability.solve(pass.hessian, pass.by_scale);
+    return joined(pose_shifts(u, T, motion_), of_ranges);
 }
 
 CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
@@ -136,6 +151,9 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
         pass.hessian += robust.weight * JJ;
         pass.gradient -= robust.weight * e * J;
         pass.information += JJ;
+        const double along = association_.along_beam(T, k * stride, p);
+        pass.by_range -= robust.weight * along / p.sigma_m * J;
+        pass.by_scale -= robust.weight * dot(p.normal, p.surface_m) / p.sigma_m * J;
         pass.scores2 += std::pow(robust.weight * u, 2);
         pass.slopes += robust.slope;
         pass.slopes2 += robust.slope * robust.slope;
@@ -182,10 +200,13 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         const Pass pass = linearise(T, 0, 1, out);
         if (!pass.enough) break;
         if (out.settled || i == settings_.iterations) {
-            out.bound = out.observability.covariance(pass.information, 1);
             const double factor = variance_factor(pass, out.used);
-            out.covariance = out.observability.covariance(pass.information, factor);
-            out.root_information = out.observability.root_information(pass.information, factor);
+            const PoseShifts by_model = shifts(T, pass, out.observability);
+            const Matrix6 of_model = by_model * by_model.transpose();
+            out.bound = out.observability.covariance(pass.information, 1) + of_model;
+            out.covariance = out.observability.covariance(pass.information, factor) + of_model;
+            out.root_information =
+                root_information_with(out.observability.root_information(pass.information, factor), by_model);
             break;
         }
         Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
@@ -199,7 +220,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         last = step;
     }
     out.T_lidar_target = T;
-    out.credible = out.settled && share_is_more(out.explained, out.points - out.edges, settings_.explained_least);
+    out.on_model = share_is_more(out.explained, out.points - out.edges, settings_.explained_least);
     return out;
 }
 
@@ -246,15 +267,27 @@ void CloudIcp::compete(CloudEstimate& found, double search_m) {
             const Matrix6& root = better ? rival.root_information : found.root_information;
             const Vector6 apart = error_between(found.T_lidar_target, rival.T_lidar_target);
             const bool elsewhere = (root * apart).squaredNorm() > kElsewhere;
-            const bool as_likely = std::abs(rival.cost - found.cost) < kAsLikely;
-            const bool ambiguous = elsewhere ? as_likely || (found.ambiguous && !better) : found.ambiguous;
+            const double worse_chi2 = 2 * std::abs(rival.cost - found.cost);
             if (better) {
                 rival.iterations = found.iterations;
-                found = rival;
+                std::swap(rival, found);
+                if (!elsewhere) found.rivals = std::move(rival.rivals);
             }
-            found.ambiguous = ambiguous;
+            if (elsewhere && worse_chi2 < kAsLikely) found.rivals.push_back({rival.T_lidar_target, worse_chi2});
         }
-    found.credible = found.credible && !found.ambiguous;
+}
+
+Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start) const {
+    Fit fit;
+    compare_with_guess(e.T_lidar_target, start, fit);
+    if (!e.settled)
+        fit.failed = fmt::format("still moving after {} iterations", e.iterations);
+    else if (!e.on_model)
+        fit.failed = fmt::format("{} of {} points lie on the model", e.explained, e.points - e.edges);
+    fit.observability = e.observability;
+    fit.root_information = e.root_information;
+    fit.rivals = e.rivals;
+    return judge(std::move(fit));
 }
 
 Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const ApparentMotion& motion,
@@ -264,11 +297,12 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
     if (!(search_m >= 0 && std::isfinite(search_m)))
         return Error{"search_m = " + std::to_string(search_m) + ": expected a distance >= 0 m"};
     association_.take(points, motion);
+    motion_ = motion;
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
 
     CloudEstimate out = attempt(start, search_m, kSearchPoints, kSearchIterations);
-    if (search_m > 0 && !out.credible) {
+    if (search_m > 0 && !(out.settled && out.on_model)) {
         CloudEstimate again = attempt(start, search_m, 4 * kSearchPoints, 3 * kSearchIterations / 2);
         again.iterations += out.iterations;
         if (again.explained > out.explained) out = again;
@@ -280,6 +314,7 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
                              " beams meet the target where it is taken to be, expected at least " +
                              std::to_string(kFewestBeams),
                      .kind = ErrorKind::failed};
+    out.answer = answer_of(out, start);
     return out;
 }
 

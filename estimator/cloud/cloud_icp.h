@@ -12,7 +12,8 @@
 
 #include "base/result.h"
 #include "estimator/cloud/beam_association.h"
-#include "estimator/cloud/observability.h"
+#include "estimator/pose/answer.h"
+#include "estimator/pose/model_uncertainty.h"
 
 namespace narpa {
 
@@ -24,23 +25,25 @@ struct IcpSettings {
     /// minimum, or too few points to tell (29, all on the model, are enough for 0.9). The search is then repeated
     /// with four times the points.
     double explained_least = 0.9;
+    ModelUncertainty model{};
 };
 
 struct CloudEstimate {
     Rigid3 T_lidar_target{};
     /// Of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
-    /// section 7.6), for the residuals' own scatter, at least that of the noise.
+    /// section 7.6), for the residuals' own scatter, at least that of the noise, and of the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
     /// Of the covariance, for filters: rows of zeros for motions that are not observed (root_information.h).
     Matrix6 root_information = Matrix6::Zero();
-    /// Cramer-Rao bound for the points used and the noise of the settings.
+    /// Cramer-Rao bound for the points used and the noise of the settings, and the model's uncertainty.
     Matrix6 bound = Matrix6::Zero();
     Observability observability{};
     int iterations = 0;     ///< with those of the search
     bool settled = false;   ///< the last step was small
-    bool credible = false;  ///< settled, enough points are explained, and not ambiguous
-    /// Another pose explains the points nearly as well: a near symmetry of the model, or few points.
-    bool ambiguous = false;
+    bool on_model = false;  ///< enough points are explained
+    /// Other poses that explain the points nearly as well: a near symmetry of the model, or few points.
+    std::vector<Rival> rivals;
+    Answer answer;
     /// The first is the sum of the others.
     std::size_t points = 0, used = 0, missed = 0, edges = 0, grazing = 0, rejected = 0;
     /// Points within four standard deviations of the noise from the model.
@@ -66,6 +69,8 @@ public:
 
 private:
     struct Pass;  ///< sums over the points at one pose
+    [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start) const;
+    [[nodiscard]] PoseShifts shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const;
     [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
     [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
@@ -78,6 +83,7 @@ private:
 
     IcpSettings settings_;
     BeamAssociation association_;
+    ApparentMotion motion_{};  ///< of the sweep
     std::vector<PointToPlane> planes_;
     std::vector<double> magnitudes_;
 };

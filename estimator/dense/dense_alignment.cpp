@@ -6,12 +6,15 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "estimator/dense/level_solver.h"
 
 namespace narpa {
 namespace {
 
+/// Two answers are the same within so many variances: five sigma.
+constexpr double kAgree = 25;
 /// The coarsest level shows the target no smaller than this.
 constexpr double kLeastExtent_px = 16;
 
@@ -66,12 +69,12 @@ Status DenseAlignment::check(const MeasuredImage& frame, std::span<const float> 
 }
 
 LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
-                                 const ApparentMotion& motion, const MeasuredImage& frame,
+                                 const DenseOptions& options, const MeasuredImage& frame,
                                  std::span<const float> frame_variance) {
     auto& kept = levels_[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
     if (!kept || kept->window() != window)
         kept.emplace(render_scene_, camera, sensor_, static_cast<double>(factor) * factor, window, target_, at);
-    kept->begin_frame(at, motion, times_.scaled(factor));
+    kept->begin_frame(at, options.motion, times_.scaled(factor), options.model);
     kept->measure(coarser_image(frame, factor), coarser_variance(frame_variance, camera_, factor));
     return *kept;
 }
@@ -80,10 +83,55 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
                                             const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                             std::span<const float> frame_variance) {
     if (auto good = check(frame, frame_variance, at, T_camera_body_guess); !good) return good.error();
+    DenseEstimate e = descend(frame, at, T_camera_body_guess, options, frame_variance);
+    Fit fit;
+    if (e.status == DenseStatus::converged && options.rivals > 0)
+        compete(frame, at, T_camera_body_guess, options, frame_variance, e, fit);
+    if (e.status == DenseStatus::converged) {
+        observe(e.T_camera_body, e.covariance, fit);
+        compare_with_guess(e.T_camera_body, T_camera_body_guess, fit);
+        const bool known = !frame_variance.empty() && options.model == ModelUncertainty{};
+        fit.residual = e.residual;
+        fit.residual_most = known ? options.residual_most : options.residual_most_unknown;
+    } else {
+        fit.failed = name(e.status);
+    }
+    e.answer = judge(std::move(fit));
+    return e;
+}
+
+/// The first of the mirrored starts that converges decides. The answer with the smaller loss stays; how far they
+/// are apart is part of its error.
+void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                             const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e,
+                             Fit& fit) {
+    for (int k = 0; k < options.rivals; ++k) {
+        const Vector6 beyond = std::pow(0.5, k) * error_between(guess, e.T_camera_body);
+        DenseEstimate other = descend(frame, at, displaced(e.T_camera_body, beyond), options, frame_variance);
+        e.renders += other.renders;
+        if (other.status != DenseStatus::converged) continue;
+        other.renders = e.renders;
+        if (other.excess_loss < e.excess_loss) std::swap(e, other);
+        const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
+        const double worse = other.excess_loss - e.excess_loss;
+        const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
+        if (agree)
+            e.covariance += 0.5 * apart * apart.transpose();
+        else if (worse < kAsLikely)
+            fit.rivals.push_back({other.T_camera_body, worse});
+        else
+            fit.failed = "two starts lead to different poses";
+        return;
+    }
+    fit.failed = "no second start leads to the same pose";
+}
+
+DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                      const DenseOptions& options, std::span<const float> frame_variance) {
     DenseEstimate e;
-    e.T_camera_body = T_camera_body_guess;
+    e.T_camera_body = guess;
     const Tracer& tracer = render_scene_.tracer();
-    const std::optional<Window> about = window_about(tracer, camera_, target_, T_camera_body_guess);
+    const std::optional<Window> about = window_about(tracer, camera_, target_, guess);
     if (!about) {
         e.status = DenseStatus::left_the_picture;
         return e;
@@ -99,7 +147,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         }
         // From a guess the target may have far to go.
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
-        LevelView& view = level(factor, camera, *window, at, options.motion, frame, frame_variance);
+        LevelView& view = level(factor, camera, *window, at, options, frame, frame_variance);
         LevelSolver solver(camera, render_scene_, target_, factor, view, options, e);
         e.status = solver.run(first);
         if (factor != options.finest || e.status != DenseStatus::converged) continue;
@@ -118,7 +166,7 @@ Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camer
     const Camera camera = coarser_camera(camera_, options.finest);
     const std::optional<Window> window = window_about(render_scene_.tracer(), camera, target_, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
-    LevelView& view = level(options.finest, camera, *window, at, options.motion, none, frame_variance);
+    LevelView& view = level(options.finest, camera, *window, at, options, none, frame_variance);
     DenseEstimate e;
     e.T_camera_body = T_camera_body;
     return LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).bound();

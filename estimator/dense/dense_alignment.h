@@ -15,6 +15,8 @@
 
 #include "base/result.h"
 #include "estimator/dense/level_view.h"
+#include "estimator/pose/answer.h"
+#include "estimator/pose/model_uncertainty.h"
 
 namespace narpa {
 
@@ -30,7 +32,15 @@ struct DenseOptions {
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
-    ApparentMotion motion{};  ///< the target's during the exposure, in camera axes, for cameras with a shutter
+    ApparentMotion motion{};  ///< the target's, in camera axes: during the exposure, for cameras with a shutter
+    ModelUncertainty model{};
+    /// An answer counts that two starts lead to, the guess and the guess mirrored in the first answer: false minima
+    /// and valleys in which steps end early are met from both sides. At most so many mirrored starts; 0: no such
+    /// test.
+    int rivals = 2;
+    /// Largest residuals of a right pose (DenseEstimate::residual): of frames whose noise is known, that is, where
+    /// `frame_variance` is given and the model is exact; and of others.
+    double residual_most = 1.15, residual_most_unknown = 6;
 };
 
 enum class DenseStatus : std::uint8_t {
@@ -46,12 +56,18 @@ enum class DenseStatus : std::uint8_t {
 struct DenseEstimate {
     DenseStatus status = DenseStatus::converged;
     Rigid3 T_camera_body{};
-    Matrix6 covariance = Matrix6::Zero();  ///< PhotometricEquations::pose_covariance; zero unless converged
+    /// PhotometricEquations::pose_covariance and the model's uncertainty; zero unless converged.
+    Matrix6 covariance = Matrix6::Zero();
     Exposure exposure{};
     std::size_t pixels = 0;  ///< of the last level that show the target
     int renders = 0;         ///< images that were compared with the frame
     double misfit =
         0;  ///< loss of the residuals beyond that of noise, per pixel of the target: Robustness{1, 3, 0}
+    /// RMS over that which noise makes, without a robust loss: of the target's pixels, or of those that hold the
+    /// pose (PhotometricEquations::residual), whichever is larger.
+    double residual = 0;
+    double excess_loss = 0;  ///< misfit of all pixels together, about a chi-square
+    Answer answer;
 };
 
 class DenseAlignment {
@@ -63,8 +79,8 @@ public:
 
     /// `at`: poses of all bodies in the middle of the exposure; the target's attitude determines its illumination,
     /// its position and the camera's are not used. `frame_variance`: DN^2 of the frame in addition to the sensor's
-    /// noise, or empty. Memory is kept between frames while the target's window stays. Errors: sizes, options or a
-    /// guess that is unusable.
+    /// noise, zeros for a real sensor; empty: there is more noise, and it is not known. Memory is kept between
+    /// frames while the target's window stays. Errors: sizes, options or a guess that is unusable.
     [[nodiscard]] Result<DenseEstimate> align(const MeasuredImage& frame, const BodyPoses& at,
                                               const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                               std::span<const float> frame_variance = {});
@@ -79,10 +95,14 @@ public:
                                         const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:
+    [[nodiscard]] DenseEstimate descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                        const DenseOptions& options, std::span<const float> frame_variance);
+    void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
+                 std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
                                const BodyPoses& at, const Rigid3& guess) const;
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
-                     const ApparentMotion& motion, const MeasuredImage& frame,
+                     const DenseOptions& options, const MeasuredImage& frame,
                      std::span<const float> frame_variance);
 
     const RenderScene& render_scene_;

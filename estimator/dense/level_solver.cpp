@@ -47,6 +47,9 @@ constexpr double kCoarseRays = 0.125;
 constexpr int kCoarseFineness = 3;
 /// The last step uses this many times the rays.
 constexpr double kPolishRays = 8;
+/// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
+constexpr int kMostPolishes = 5;
+constexpr double kPolished_sigmas = 1;
 /// Part of the window that the target is assumed to fill at first.
 constexpr double kFirstPart = 0.25;
 constexpr int kMostShift_px = 12;
@@ -134,20 +137,32 @@ DenseStatus LevelSolver::run(bool first) {
 
 void LevelSolver::polish() {
     rays_ *= kPolishRays;
-    render(e_.T_camera_body);
-    differentiate();
-    stride_ = 1;
-    if (linearise()) try_step(next_step(kLeastDamping));
+    for (int k = 0; k < kMostPolishes; ++k) {
+        render(e_.T_camera_body);
+        differentiate();
+        stride_ = 1;
+        if (!linearise()) return;
+        const Step step = next_step(kLeastDamping);
+        const bool last = step.size * kConverged_sigmas < kPolished_sigmas || k == kMostPolishes - 1;
+        if (!try_step(step) || last) return;
+    }
 }
 
 void LevelSolver::finish() {
     const PhotometricImages images = view_.images();
-    e_.covariance = equations(images, e_.exposure, robust_).pose_covariance();
+    const PhotometricEquations last = equations(images, e_.exposure, robust_);
+    // What the equations say is still to go belongs to the error too.
+    const Vector6 to_go = last.pose_information().ldlt().solve(last.pose_gradient());
+    e_.covariance = last.pose_covariance() + covariance_of_model(last) + to_go * to_go.transpose();
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
     const PhotometricCost loss = cost(images, e_.exposure, {});
-    e_.misfit = (loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels)) /
-                static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
+    e_.excess_loss = loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels);
+    e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
+    const double of_information =
+        equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0}).residual();
+    e_.residual =
+        std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
     const double off = std::abs(e_.exposure.gain - 1);
     if (robust_.scale > kNoFit || e_.misfit > kMostMisfit ||
         off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
@@ -163,7 +178,23 @@ Result<Matrix6> LevelSolver::bound() {
     const auto all = equations(images, {}, {1, std::numeric_limits<double>::infinity(), 0});
     const Matrix6 information = all.pose_information();
     if (!is_observable(information)) return Error{"too few pixels show the target to determine its pose"};
-    return Matrix6(information.inverse());
+    return Matrix6(information.inverse() + covariance_of_model(all));
+}
+
+Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) {
+    PoseShifts shifts = image_shifts(o_.model, e_.T_camera_body, o_.motion);
+    if (o_.model.light_rad > 0) {
+        PoseShifts by_light(6, 3);
+        const PhotometricImages images = view_.images();
+        for (int axis = 0; axis < 3; ++axis) {
+            Vec3 turn{};
+            turn[axis] = o_.model.light_rad;
+            const auto change = view_.change_with_light(e_.T_camera_body, settings_, turn);
+            by_light.col(axis) = equations.pose_step(response(images, e_.exposure, robust_, change));
+        }
+        shifts = joined(shifts, by_light);
+    }
+    return shifts * shifts.transpose();
 }
 
 void LevelSolver::shift() {

@@ -40,6 +40,8 @@ private:
     [[nodiscard]] Step next_step(double damping) const;
     bool try_step(const Step& step);
     void adapt_stride(const Step& step);
+    /// By what is not known of the model, at the last rendered pose.
+    [[nodiscard]] Matrix6 covariance_of_model(const PhotometricEquations& equations);
 
     const Camera& camera_;
     const double pixels_per_radian_;

@@ -83,6 +83,8 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
     : sensor_(sensor),
       pixels_averaged_(pixels_averaged),
       window_(window),
+      target_(target),
+      at_(at),
       view_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at),
       derivative_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at) {
     const std::size_t n = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
@@ -91,10 +93,11 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
     signal_variance_.resize(n);
 }
 
-void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
-    const RowTimes in_window = times.from(window_.y);
-    view_.begin_frame(at, motion, in_window);
-    derivative_.begin_frame(at, motion, in_window);
+void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
+                            const ModelUncertainty& model) {
+    at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model;
+    view_.begin_frame(at_, motion_, times_);
+    derivative_.begin_frame(at_, motion_, times_);
 }
 
 void LevelView::measure(const MeasuredImage& image, std::span<const float> variance) {
@@ -116,10 +119,28 @@ void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
     const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
-        const Vec3 L = vec_cast<double>(view_.radiance().pixels[i]);
-        signal_[i] = static_cast<float>(k[0] * L.x + k[1] * L.y + k[2] * L.z);
+        signal_[i] = signal_of(view_.radiance().pixels[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
+}
+
+float LevelView::signal_of(const Rgb& radiance) const {
+    const auto& k = sensor_.dn_per_radiance;
+    const Vec3 L = vec_cast<double>(radiance);
+    return static_cast<float>(k[0] * L.x + k[1] * L.y + k[2] * L.z);
+}
+
+std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
+                                                const Vec3& turn_rad) {
+    BodyPoses turned = at_;
+    turned.T_world_body[target_].q = normalized(at_.T_world_body[target_].q * exp_rotation(turn_rad));
+    view_.begin_frame(turned, motion_, times_);
+    view_.render(T_camera_target, settings, true);
+    std::vector<float> change;
+    for (std::size_t i = 0; i < signal_.size(); ++i)
+        change.push_back(signal_of(view_.radiance().pixels[i]) - signal_[i]);
+    view_.begin_frame(at_, motion_, times_);
+    return change;
 }
 
 void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
@@ -136,7 +157,9 @@ PhotometricImages LevelView::images() const {
             .signal_variance = signal_variance_,
             .derivative = columns_,
             .pixels_averaged = pixels_averaged_,
-            .measured_clipped = measured_clipped_};
+            .prior = {.gain_sigma = std::hypot(ExposurePrior{}.gain_sigma, model_.albedo)},
+            .measured_clipped = measured_clipped_,
+            .model_part = model_.light_rad};
 }
 
 }  // namespace narpa

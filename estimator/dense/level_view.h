@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/dense/photometric_fit.h"
+#include "estimator/pose/model_uncertainty.h"
 #include "estimator/view/model_view.h"
 
 namespace narpa {
@@ -32,19 +33,32 @@ public:
               double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
-    /// As ModelView::begin_frame; `times`: of the rows of `camera`.
-    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times);
+    /// As ModelView::begin_frame; `times`: of the rows of `camera`. Of `model` brightness and light widen what is
+    /// expected of the pixels.
+    void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
+                     const ModelUncertainty& model);
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);
+    /// Changes of the latest render's signal, DN, were the target turned under its light by `turn_rad`, target
+    /// axes, and seen at the same pose.
+    [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
+                                                       const Vec3& turn_rad);
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
     /// The latest of each.
     [[nodiscard]] PhotometricImages images() const;
 
 private:
+    [[nodiscard]] float signal_of(const Rgb& radiance) const;
+
     const SensorModel& sensor_;
     double pixels_averaged_;
     Window window_;
+    std::size_t target_;
+    BodyPoses at_;
+    ApparentMotion motion_{};
+    RowTimes times_{};
+    ModelUncertainty model_{};
     ModelView view_;
     ImageDerivative derivative_;
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;

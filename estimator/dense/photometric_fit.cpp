@@ -42,7 +42,8 @@ public:
         Residual out;
         if (clipped && expected >= measured) return out;
         const double variance = i_.sensor.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
-                                model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance);
+                                model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance) +
+                                i_.model_part * i_.model_part * signal * signal;
         out.counts = variance > 0;
         if (!out.counts) return out;
         out.inverse_s = 1 / std::sqrt(variance);
@@ -50,6 +51,7 @@ public:
         out.shows_target = signal > 0 || (!i_.derivative.empty() && !i_.derivative[p].isZero(0));
         return out;
     }
+    [[nodiscard]] const Exposure& exposure() const noexcept { return e_; }
     /// The outermost pixels have no Jacobian.
     template <class Do>
     void each(int y, Do&& act) const {
@@ -78,6 +80,34 @@ Sum sum_rows(const PhotometricImages& images, Add&& add) {
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 
+/// Derivative of a pixel's expected DN by pose, gain and offset.
+Vector8 design(const PhotometricImages& images, const Exposure& exposure, std::size_t p) {
+    Vector8 J;
+    J << exposure.gain * images.derivative[p].cast<double>(), static_cast<double>(images.signal[p]), 1;
+    return J;
+}
+
+/// Of blocks of kBlock_px x kBlock_px pixels. k: scale of Cauchy's loss.
+Matrix8 scatter_of_blocks(const PhotometricImages& images, const Residuals& residuals, double k) {
+    constexpr int kBlock_px = 8;
+    const auto across = static_cast<std::size_t>(images.width / kBlock_px + 1);
+    std::vector<Matrix8> rows(static_cast<std::size_t>(images.height / kBlock_px + 1), Matrix8::Zero());
+    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t row) {
+        std::vector<Vector8> pulls(across, Vector8::Zero());
+        const int first = static_cast<int>(row) * kBlock_px;
+        for (int y = std::max(1, first); y < std::min(first + kBlock_px, images.height - 1); ++y)
+            residuals.each(y, [&](const Residual& r, std::size_t p) {
+                const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
+                const std::size_t x = p % static_cast<std::size_t>(images.width);
+                pulls[x / kBlock_px] += weight * r.r * r.inverse_s * design(images, residuals.exposure(), p);
+            });
+        for (const Vector8& pull : pulls) rows[row] += pull * pull.transpose();
+    });
+    Matrix8 sum = Matrix8::Zero();
+    for (const Matrix8& row : rows) sum += row;
+    return sum;
+}
+
 }  // namespace
 
 PhotometricCost& PhotometricCost::operator+=(const PhotometricCost& b) {
@@ -86,7 +116,7 @@ PhotometricCost& PhotometricCost::operator+=(const PhotometricCost& b) {
 }
 
 PhotometricEquations& PhotometricEquations::operator+=(const PhotometricEquations& b) {
-    information += b.information, scatter += b.scatter, gradient += b.gradient;
+    information += b.information, scatter += b.scatter, block_scatter += b.block_scatter, gradient += b.gradient;
     return *this;
 }
 
@@ -160,14 +190,13 @@ PhotometricEquations equations(const PhotometricImages& images, const Exposure& 
     auto out = sum_rows<PhotometricEquations>(images, [&](int y, PhotometricEquations& row) {
         residuals.each(y, [&](const Residual& r, std::size_t p) {
             const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
-            Vector8 J;
-            J << exposure.gain * images.derivative[p].cast<double>(), static_cast<double>(images.signal[p]), 1;
-            J *= r.inverse_s;
+            const Vector8 J = r.inverse_s * design(images, exposure, p);
             row.information.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
             row.scatter.selfadjointView<Eigen::Lower>().rankUpdate(J, weight * weight * r.r * r.r);
             row.gradient += weight * r.r * J;
         });
     });
+    out.block_scatter = scatter_of_blocks(images, residuals, k);
     out.information = Matrix8(out.information.selfadjointView<Eigen::Lower>());
     out.scatter = Matrix8(out.scatter.selfadjointView<Eigen::Lower>());
     // The prior in the units of residuals that are `scale` times their noise.
@@ -176,6 +205,7 @@ PhotometricEquations equations(const PhotometricImages& images, const Exposure& 
         unit * Eigen::Vector2d(precision(images.prior.gain_sigma), precision(images.prior.offset_sigma_dn));
     out.information.diagonal().tail<2>() += prior;
     out.scatter.diagonal().tail<2>() += prior;
+    out.block_scatter.diagonal().tail<2>() += prior;
     out.gradient.tail<2>() -= prior.cwiseProduct(Eigen::Vector2d(exposure.gain - 1, exposure.offset_dn));
     return out;
 }
@@ -188,9 +218,41 @@ Matrix6 PhotometricEquations::pose_information() const {
 
 Matrix6 PhotometricEquations::pose_covariance() const {
     const Matrix8 inverse = information.inverse();
-    const bool as_expected = (inverse * scatter).trace() <= 8;
-    const Matrix6 C = (as_expected ? inverse : Matrix8(inverse * scatter * inverse)).topLeftCorner<6, 6>();
+    const Matrix8& larger =
+        (inverse * block_scatter).trace() > (inverse * scatter).trace() ? block_scatter : scatter;
+    const bool as_expected = (inverse * larger).trace() <= 8;
+    const Matrix6 C = (as_expected ? inverse : Matrix8(inverse * larger * inverse)).topLeftCorner<6, 6>();
     return 0.5 * (C + C.transpose());  // but for rounding
+}
+
+double PhotometricEquations::residual() const {
+    return std::sqrt((information.inverse() * scatter).trace() / 8);
+}
+
+Vector6 PhotometricEquations::pose_step(const Vector8& response) const {
+    return (information.inverse() * response).head<6>();
+}
+
+Vector8 response(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust,
+                 std::span<const float> change) {
+    struct Sum {
+        Vector8 gradient = Vector8::Zero();
+        Sum& operator+=(const Sum& b) {
+            gradient += b.gradient;
+            return *this;
+        }
+    };
+    const Residuals residuals(images, exposure, robust.model_dn2);
+    const double k = robust.cauchy * robust.scale;
+    return sum_rows<Sum>(images,
+                         [&](int y, Sum& row) {
+                             residuals.each(y, [&](const Residual& r, std::size_t p) {
+                                 const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
+                                 const double e = exposure.gain * static_cast<double>(change[p]) * r.inverse_s;
+                                 row.gradient += weight * e * r.inverse_s * design(images, exposure, p);
+                             });
+                         })
+        .gradient;
 }
 
 Vector6 PhotometricEquations::pose_gradient() const {

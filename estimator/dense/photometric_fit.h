@@ -2,8 +2,8 @@
 /// weights, and the normal equations of the pose with gain and offset marginalised.
 ///
 /// I(x) = black + gain * S(x; pose) + offset + noise. Each pixel weighs 1 / s^2, s^2 = the sensor's variance at the
-/// predicted DN + gain^2 times the variance of the prediction + the frame's own variance. Gain and offset have
-/// Gaussian priors and are eliminated by the Schur complement.
+/// predicted DN + gain^2 times the variance of the prediction + the frame's own variance + that of the model's
+/// error. Gain and offset have Gaussian priors and are eliminated by the Schur complement.
 ///
 /// A clipped pixel is a lower limit of the light: its residual is what the prediction is too dark by, and it says
 /// nothing where the prediction is as bright (censored data; J. Tobin, Econometrica 26, 1958). Predictions are
@@ -39,6 +39,7 @@ struct PhotometricImages {
     double pixels_averaged = 1;  ///< each pixel is the mean of so many of the sensor's
     ExposurePrior prior{};
     std::span<const std::uint8_t> measured_clipped{};  ///< MeasuredImage::clipped; empty: nowhere
+    double model_part = 0;  ///< standard deviation of the prediction's model error, as a part of the signal
 };
 
 struct PhotometricCost {
@@ -72,8 +73,10 @@ struct Robustness {
 struct PhotometricEquations {
     Eigen::Matrix<double, 8, 8> information = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 1> gradient = Eigen::Matrix<double, 8, 1>::Zero();
-    /// Empirical covariance of the gradient, from the residuals, and the prior.
+    /// Empirical covariance of the gradient, from the residuals, and the prior: of pixels that are independent, and
+    /// of blocks of pixels whose residuals share an error of the model.
     Eigen::Matrix<double, 8, 8> scatter = Eigen::Matrix<double, 8, 8>::Zero();
+    Eigen::Matrix<double, 8, 8> block_scatter = Eigen::Matrix<double, 8, 8>::Zero();
 
     PhotometricEquations& operator+=(const PhotometricEquations& b);
     /// Information of the pose with gain and offset marginalised.
@@ -81,12 +84,20 @@ struct PhotometricEquations {
     [[nodiscard]] Vector6 pose_gradient() const;
     /// Inverse information where residuals are no larger than their noise; else the sandwich estimator (P. J.
     /// Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 5th Berkeley Symposium,
-    /// 1967), which holds for larger residuals that are independent between pixels.
+    /// 1967), of independent pixels or of blocks (K.-Y. Liang, S. Zeger, Biometrika 73, 1986), whichever is larger.
     [[nodiscard]] Matrix6 pose_covariance() const;
+    /// Size of the residuals of the pixels that hold the pose, over that which noise makes: root of the mean of
+    /// their squares, weighed by information.
+    [[nodiscard]] double residual() const;
+    /// Step of the pose that answers a change of the measured image whose `response` this is.
+    [[nodiscard]] Vector6 pose_step(const Eigen::Matrix<double, 8, 1>& response) const;
     /// Step of gain and offset for a step of the pose (back substitution).
     [[nodiscard]] Eigen::Vector2d exposure_step(const Vector6& pose_step) const;
 };
 [[nodiscard]] PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure,
                                              const Robustness& robust);
+/// The gradient that a change of the predicted signal, DN, of each pixel would make, were it the measured image's.
+[[nodiscard]] Eigen::Matrix<double, 8, 1> response(const PhotometricImages& images, const Exposure& exposure,
+                                                   const Robustness& robust, std::span<const float> change);
 
 }  // namespace narpa

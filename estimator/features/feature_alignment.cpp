@@ -1,5 +1,7 @@
 #include "estimator/features/feature_alignment.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -50,6 +52,19 @@ double mahalanobis(double du, double dv, const PixelCovariance& c) {
 double root_mean_square(const std::vector<double>& lengths) {
     const Eigen::Map<const Eigen::VectorXd> all(lengths.data(), static_cast<Eigen::Index>(lengths.size()));
     return lengths.empty() ? 0 : std::sqrt(all.squaredNorm() / static_cast<double>(lengths.size()));
+}
+
+/// More than half of a match's window is clipped in the frame: its gradients are not the light's.
+bool is_clipped(const MeasuredImage& frame, double u, double v) {
+    if (frame.clipped.empty()) return false;
+    const int x0 = static_cast<int>(std::lround(u)), y0 = static_cast<int>(std::lround(v));
+    int clipped = 0, all = 0;
+    for (int y = std::max(0, y0 - kHalfWindow_px); y <= std::min(frame.height - 1, y0 + kHalfWindow_px); ++y)
+        for (int x = std::max(0, x0 - kHalfWindow_px); x <= std::min(frame.width - 1, x0 + kHalfWindow_px); ++x) {
+            clipped += frame.clipped[frame.index(x, y)] != 0;
+            ++all;
+        }
+    return 2 * clipped > all;
 }
 
 /// Standard deviation of residuals in u and in v, from the median of their lengths.
@@ -108,6 +123,38 @@ struct FeatureAlignment::Points {
                 middle += pair + pair.transpose();
             }
         return floor_px * floor_px * C * middle * C;
+    }
+    /// How much larger the errors of the pose may be than `covariance` says, in variance, at least 1: by the
+    /// scatter of the pulls of parts of the target, whose matches share errors of model and light (clustered
+    /// residuals: K.-Y. Liang, S. Zeger, Biometrika 73, 1986). C: the inverse of the matches' information.
+    [[nodiscard]] double inflation(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
+                                   const Matrix6& covariance, double floor_px) const {
+        constexpr int kParts = 4;  // each way
+        double left = kInfinity, top = kInfinity, right = -kInfinity, bottom = -kInfinity;
+        for (const Pixel& p : pixels)
+            left = std::min(left, p.u), right = std::max(right, p.u), top = std::min(top, p.v),
+            bottom = std::max(bottom, p.v);
+        const double side = std::max({right - left, bottom - top, 1.0}) * (1 + 1e-9) / kParts;
+        std::array<Vector6, kParts * kParts> pulls;
+        std::array<int, kParts * kParts> members{};
+        pulls.fill(Vector6::Zero());
+        for (std::size_t i = 0; i < size(); ++i) {
+            const auto part = static_cast<std::size_t>((pixels[i].v - top) / side) * kParts +
+                              static_cast<std::size_t>((pixels[i].u - left) / side);
+            const PixelCovariance c = with_floor(noise[i], floor_px);
+            Eigen::Matrix2d S;
+            S << c.uu, c.uv, c.uv, c.vv;
+            const Pixel p = project(camera, T * body_m[i]);
+            const Eigen::Vector2d r(pixels[i].u - p.u, pixels[i].v - p.v);
+            pulls[part] += reprojection_jacobian(camera, T, body_m[i]).transpose() * S.inverse() * r;
+            ++members[part];
+        }
+        Matrix6 scatter = Matrix6::Zero();
+        for (const Vector6& pull : pulls) scatter += pull * pull.transpose();
+        const auto parts = static_cast<double>(std::ranges::count_if(members, [](int n) { return n > 0; }));
+        constexpr double kUnknowns = 6;
+        const double few = parts / std::max(1.0, parts - kUnknowns);
+        return std::max(1.0, few * (covariance.inverse() * C * scatter * C).trace() / kUnknowns);
     }
     /// The excess error of a match beyond the sensor's noise that makes chi^2 equal to its degrees of freedom; 0
     /// where the noise suffices.
@@ -201,7 +248,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
                                                       {u, v + kNeighbour_px},
                                                       {u, v - kNeighbour_px}}},
                            hits);
-        if (hits.body[0] != target || !on_smooth_surface(hits)) continue;
+        if (hits.body[0] != target || !on_smooth_surface(hits) || is_clipped(frame, m.frame_u, m.frame_v)) continue;
         const Eigen::Matrix2d C =
             flow_covariance(toned_frame, tones.variance(), m.frame_u, m.frame_v, kHalfWindow_px);
         if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;
@@ -213,6 +260,24 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
 
 FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                         const ApparentMotion& motion) {
+    FeatureEstimate e = estimate(frame, at, guess, motion);
+    const PoseShifts by_model = image_shifts(settings_.model, e.T_camera_target, motion);
+    const Matrix6 of_model = by_model * by_model.transpose();
+    e.covariance += of_model, e.bound += of_model;
+    Fit fit;
+    if (e.status == FeatureStatus::few_matches || e.status == FeatureStatus::no_pose)
+        fit.failed = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
+    else
+        observe(e.T_camera_target, e.covariance, fit), compare_with_guess(e.T_camera_target, guess, fit);
+    if (fit.failed.empty() && e.floor_px > settings_.floor_most_px)
+        fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
+                                 settings_.floor_most_px);
+    e.answer = judge(std::move(fit));
+    return e;
+}
+
+FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                           const ApparentMotion& motion) {
     FeatureEstimate estimate;
     estimate.T_camera_target = guess;
     view_.begin_frame(at, motion, times_);
@@ -279,13 +344,18 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         floor_px = points.floor_px(camera, fit.T_camera_body);
         estimate.covariance = fit.covariance + points.covariance_of_shared_errors(camera, fit.T_camera_body,
                                                                                   fit.covariance, floor_px);
+        estimate.covariance *=
+            points.inflation(camera, fit.T_camera_body, fit.covariance, estimate.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
         if (root_mean_square(moved) < settings_.settled_px ||
             normalised_error_squared(step, estimate.covariance) < kSettledSquared) {
             estimate.status = FeatureStatus::settled;
             break;
         }
+        // Where the views end, what the pose still moves by is part of its error.
+        if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
+    estimate.floor_px = floor_px;
     estimate.bound =
         refiner.refine({model, points.body_m, points.pixels, 1, points.noise}, estimate.T_camera_target).covariance;
     return estimate;

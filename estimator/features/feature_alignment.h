@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "estimator/features/feature_matcher.h"
+#include "estimator/pose/answer.h"
+#include "estimator/pose/model_uncertainty.h"
 #include "estimator/pose/pnp_refine.h"
 #include "estimator/view/model_view.h"
 
@@ -22,6 +24,8 @@ struct FeatureSettings {
     int spp = 4;               ///< of the views
     int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
+    double floor_most_px = 1;  ///< refused where matches scatter by more: the model is not what the frame shows
+    ModelUncertainty model{};  ///< of it the light and the albedo are not used: matches that they move scatter
 };
 
 enum class FeatureStatus : std::uint8_t {
@@ -42,16 +46,14 @@ struct FeatureEstimate {
     FeatureStatus status = FeatureStatus::few_matches;
     Rigid3 T_camera_target{};
     /// From the sensor's noise and the excess scatter of the matches, which is correlated between
-    /// matches whose windows overlap, in proportion to the overlap.
+    /// matches whose windows overlap, in proportion to the overlap; and from the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
-    /// Cramer-Rao for these points with the sensor's noise alone.
+    /// Cramer-Rao for these points with the sensor's noise and the model's uncertainty alone.
     Matrix6 bound = Matrix6::Zero();
     int agreeing = 0;
+    double floor_px = 0;  ///< of the matches: their scatter beyond the sensor's noise
     std::vector<FeatureRound> rounds;
-
-    [[nodiscard]] bool ok() const noexcept {
-        return status == FeatureStatus::settled || status == FeatureStatus::unsettled;
-    }
+    Answer answer;
 };
 
 /// Keeps its memory from frame to frame.
@@ -71,6 +73,8 @@ public:
 
 private:
     struct Points;
+    [[nodiscard]] FeatureEstimate estimate(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                           const ApparentMotion& motion);
     void gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones, Points& points);
     void find_target();
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;

@@ -84,11 +84,13 @@ private:
 };
 
 /// Of residuals e = measured - predicted with weights W: A = J' W J, g = J' W e, chi2 = e' W e (or the robust
-/// cost). Of A the lower triangle is read.
+/// cost). Of A the lower triangle is read. `rounding`: the part of chi2 that the rounding of the residuals makes, a
+/// noise of its own: no step can be told from it that promises less.
 struct NormalEquations {
     Matrix6 A = Matrix6::Zero();
     Vector6 g = Vector6::Zero();
     double chi2 = 0;
+    double rounding = 0;
 };
 
 enum class Damping : std::uint8_t { diagonal, identity };  ///< D = diag(A) or I
@@ -126,8 +128,9 @@ struct DampedStep {
 inline constexpr std::size_t kLmIterationsMax = 200;
 inline constexpr int kLmPatience = 6;
 
-/// Converged: the undamped step is shorter than step_sigma; or, in a curved valley, a step was taken and chi2 fell
-/// by less than chi2_settled, far below its noise, over the last kLmPatience iterations.
+/// Converged: the undamped step is shorter than step_sigma, or promises less than rounding makes; or, in a curved
+/// valley, a step was taken and chi2 fell by less than chi2_settled, far below its noise, over the last kLmPatience
+/// iterations.
 struct LmOptions {
     double lambda = 1e-3;      ///< at the start
     double gain_min = 1e-3;    ///< a step is taken where the gain ratio exceeds this
@@ -166,8 +169,12 @@ void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& 
     summary.chi2_at[0] = now.chi2;
     summary.status = LmStatus::no_convergence;
     double lambda = o.lambda;
+    // Rounding changes chi2 by itself, and by its product with the residuals. Of a pose that does not fit, whose
+    // residuals are large, that is no excuse to end early.
+    constexpr double kChi2OfAFit = 1e3;
     const auto small = [&](const DampedStep& s) {
-        return s.predicted_reduction <= std::max(o.step_sigma * o.step_sigma, kRounding * now.chi2);
+        const double unresolved = now.rounding + 2 * std::sqrt(std::min(now.chi2, kChi2OfAFit) * now.rounding);
+        return s.predicted_reduction <= std::max({o.step_sigma * o.step_sigma, kRounding * now.chi2, unresolved});
     };
     while (summary.iterations < iterations_max) {
         const DampedStep step = damped_step(now, lambda, o.damping);

@@ -1,6 +1,7 @@
 #include "estimator/pose/pnp.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace narpa {
 namespace {
@@ -82,15 +83,16 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, bool outliers) {
 void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread) {
     const double depth = depth_in_sigma(input, gathered_, spread);
     const bool few = points_.size() < kSurePoints;
+    const auto fits = [&] { return fits_the_noise(solution_.fit.chi2, solution_.fit.degrees_of_freedom); };
     const InitialPoses starts = orthographic_poses(gathered_, spread, depth < kFlatSigma);
     for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i]);
     if (few) consider_triples();
-    if (!fits_the_noise()) {
+    if (!fits()) {
         starts_.clear();
         opencv_poses(gathered_, depth < kFlatSigma, starts_);
         for (const CentredPose& start : starts_) consider(start);
     }
-    if (few || depth < kReversibleSigma || !fits_the_noise()) consider_reversed(spread);
+    if (few || depth < kReversibleSigma || !fits()) consider_reversed(spread);
 }
 
 // Four or five points fit several poses within the noise: the poses of triples are tried too.
@@ -142,9 +144,23 @@ void PnpSolver::consider_reversed(const PointExtent& spread) {
     consider(depth_reversed(points_.centred(solution_.fit.T_camera_body), spread));
 }
 
-bool PnpSolver::fits_the_noise() const {
-    const double freedom = solution_.fit.degrees_of_freedom;
-    return solution_.fit.chi2 < freedom + 5 * std::sqrt(2 * freedom);
+bool fits_the_noise(double chi2, double degrees_of_freedom) noexcept {
+    return chi2 < degrees_of_freedom + kMostChi2Sigmas * std::sqrt(2 * degrees_of_freedom);
+}
+
+Answer PnpSolution::answer() const {
+    Fit f;
+    if (!ok()) {
+        f.failed = in_words(status);
+        return judge(std::move(f));
+    }
+    const double freedom = std::max(1, fit.degrees_of_freedom);
+    f.residual = std::sqrt(fit.chi2 / freedom);
+    f.residual_most = std::sqrt(1 + kMostChi2Sigmas * std::sqrt(2 / freedom));
+    observe(fit.T_camera_body, fit.covariance, f);
+    const double worse = second.chi2 - fit.chi2;
+    if (has_second && worse < kAsLikely) f.rivals.push_back({second.T_camera_body, worse});
+    return judge(std::move(f));
 }
 
 }  // namespace narpa

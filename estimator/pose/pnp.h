@@ -8,12 +8,15 @@
 
 #include <vector>
 
+#include "estimator/pose/answer.h"
 #include "estimator/pose/pnp_refine.h"
 #include "estimator/pose/pnp_start.h"
 
 namespace narpa {
 
-inline constexpr double kAmbiguousChi2 = 9;             ///< three standard deviations
+inline constexpr double kAmbiguousChi2 = 9;  ///< three standard deviations
+/// Residuals of so many standard deviations of their sum of squares beyond its mean are not noise.
+inline constexpr double kMostChi2Sigmas = 5;
 inline constexpr double kImpreciseSigma = 0.01;         ///< of the range
 inline constexpr double kInlierSquaredResidual = 13.8;  ///< 99.9 % of chi-square with two degrees of freedom
 
@@ -31,7 +34,12 @@ struct PnpSolution {
     [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
     /// The second pose may be the true one: its chi2 is less than 9 above the first's.
     [[nodiscard]] bool ambiguous() const noexcept { return has_second && second.chi2 - fit.chi2 < kAmbiguousChi2; }
+    /// By chi2 at the given noise, the second pose and what the points hold (answer.h).
+    [[nodiscard]] Answer answer() const;
 };
+
+/// Whether chi2 of so many degrees of freedom is as noise makes it.
+[[nodiscard]] bool fits_the_noise(double chi2, double degrees_of_freedom) noexcept;
 
 class PnpSolver {
 public:
@@ -48,7 +56,6 @@ private:
     void consider(const CentredPose& start);
     void consider_triples();
     void consider_reversed(const PointExtent& spread);
-    [[nodiscard]] bool fits_the_noise() const;
     [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);
     [[nodiscard]] bool find_consensus(bool orthographic);
     void try_hypothesis(const CentredPose& pose);

@@ -63,6 +63,7 @@ PnpPoints::PnpPoints(std::size_t points_max) : groups_((points_max + kGroup - 1)
 template <class Chosen>
 void PnpPoints::assign_if(const PnpInput& input, const Chosen& chosen) {
     size_ = 0;
+    rounding_ = 0;
     Vec3 sum{};
     for (std::size_t i = 0; i < input.body_m.size(); ++i)
         if (chosen(i)) sum += input.body_m[i], ++size_;
@@ -108,6 +109,11 @@ void PnpPoints::put(std::size_t i, const PnpInput& input, const Model& model, st
         const double r = std::hypot(a00, a10), c = a00 / r, s = a10 / r;
         to.l00[k] = r, to.l10[k] = c * a01 + s * a11, to.l11[k] = c * a11 - s * a01;
     }
+    // A residual is off by some last digits of the numbers that it is the difference of.
+    constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
+    const double size2 = 1 + on_plane.x * on_plane.x + on_plane.y * on_plane.y;
+    rounding_ +=
+        kDigits * kDigits * size2 * (to.l00[k] * to.l00[k] + to.l10[k] * to.l10[k] + to.l11[k] * to.l11[k]);
 }
 
 void PnpPoints::pad() {
@@ -244,6 +250,7 @@ bool PnpPoints::evaluate(const CentredPose& pose, const RobustLoss& loss, Normal
         for (int j = 0; j <= i; ++j, ++entry) out.A(i, j) = out.A(j, i) = total(sums.A[entry]);
     }
     out.chi2 = total(sums.chi2);
+    out.rounding = rounding_;
     return std::isfinite(out.chi2);
 }
 

@@ -135,6 +135,7 @@ private:
 
     std::size_t size_ = 0;
     Vec3 centroid_{};
+    double rounding_ = 0;  ///< NormalEquations::rounding
     std::vector<Group> groups_;
 };
 

@@ -11,9 +11,9 @@ Matrix6 root_information_of_product(const Rigid3& T_a_b, const Matrix6& root_of_
     return root_of_a_b * J;
 }
 
-Matrix6 root_information_with(const Matrix6& root, const Eigen::Matrix<double, 6, 3>& J, double sigma) {
-    // W (e + J n) has the covariance S = 1 + (sigma W J) (sigma W J)', at least 1: its factor whitens again.
-    const Eigen::Matrix<double, 6, 3> spread = sigma * root * J;
+Matrix6 root_information_with(const Matrix6& root, const PoseShifts& shifts) {
+    // W (e + J n) has the covariance S = 1 + (W J) (W J)', at least 1: its factor whitens again.
+    const PoseShifts spread = root * shifts;
     const Matrix6 S = Matrix6::Identity() + spread * spread.transpose();
     return S.llt().matrixL().solve(root);
 }

@@ -6,7 +6,7 @@
 /// Sequential Estimation, 1977).
 #pragma once
 
-#include "estimator/pose/pose_estimate.h"
+#include "estimator/pose/model_uncertainty.h"
 
 namespace narpa {
 
@@ -14,8 +14,7 @@ namespace narpa {
 [[nodiscard]] Matrix6 root_information_of_product(const Rigid3& T_a_b, const Matrix6& root_of_a_b,
                                                   const Rigid3& T_b_c);
 
-/// After a further, independent error J n of the pose, n white with this standard deviation.
-[[nodiscard]] Matrix6 root_information_with(const Matrix6& root, const Eigen::Matrix<double, 6, 3>& J,
-                                            double sigma);
+/// After a further, independent error of the pose, shifts * n with n white and of variance 1.
+[[nodiscard]] Matrix6 root_information_with(const Matrix6& root, const PoseShifts& shifts);
 
 }  // namespace narpa

@@ -368,8 +368,9 @@ struct Codec<R> : MemberCodec<R, kCameraReplyLayout, kCameraReplyBaseId, &R::cou
 // --- Estimate: a lost one has no pose ---------------------------------------------------------------------------
 
 using E = EstimateReport;
-using EstimateMembers = MemberCodec<E, kEstimateLayout, kEstimateBaseId, &E::frame, &E::t_ns, &E::T_camera_target,
-                                    &E::sigma_position_m, &E::sigma_rotation_rad, &E::frame, &E::camera, &E::state>;
+using EstimateMembers =
+    MemberCodec<E, kEstimateLayout, kEstimateBaseId, &E::frame, &E::t_ns, &E::T_camera_target, &E::sigma_position_m,
+                &E::sigma_rotation_rad, &E::frame, &E::camera, &E::state, &E::answer>;
 
 template <>
 struct Codec<EstimateReport> : EstimateMembers {

@@ -135,6 +135,7 @@ inline constexpr SetLayout kPoseLayout{
 
 inline constexpr double kSigmaRotationSteps_per_rad = 1e7;
 inline constexpr auto kEstimateStateChoices = numbered(kEstimateStates);
+inline constexpr auto kAnswerChoices = numbered(kAnswerKinds);
 
 /// Classic frames 6 to 8: of the position, and of the attitude about the axes that `about` names.
 [[nodiscard]] constexpr std::array<Signal, 6> sigma_signals(std::string_view about) {
@@ -161,6 +162,7 @@ inline constexpr auto kEstimateSignals =
                  {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}},
                  {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}},
                  {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {}, kEstimateStateChoices},
+                 {"Answer", "", "What the frame's own pose is worth", 1, false, {9, 43, 3}, {}, kAnswerChoices},
              }));
 
 inline constexpr SetLayout kEstimateLayout{"Estimate",

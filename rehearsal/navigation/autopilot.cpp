@@ -66,8 +66,10 @@ void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<cons
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {
     const Prediction p = predict(t_ns);
     LidarPoseEstimator& estimator = lidars_[lidar];
+    std::vector<RangePoint> believed(points.begin(), points.end());
+    for (RangePoint& point : believed) point.range_m += scenario_.model_error.error.range_bias_m;
     take(estimator.lidar().name, t_ns,
-         estimator.measure(points, t_ns, p.motion, p.T_chaser_target, p.position_sigma_m, p.rotation_sigma_rad),
+         estimator.measure(believed, t_ns, p.motion, p.T_chaser_target, p.position_sigma_m, p.rotation_sigma_rad),
          sweeps_);
 }
 
@@ -96,14 +98,22 @@ void Autopilot::take_beam(const LidarBeamReport& report) {
 
 void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,
                      std::uint8_t& count) {
-    MeasurementRecord record{
-        sensor, t_ns, MeasurementRecord::Outcome::no_pose, 0, measurement.why, measurement.points, measurement.ms};
+    MeasurementRecord record{sensor,
+                             t_ns,
+                             MeasurementRecord::Outcome::no_pose,
+                             0,
+                             measurement.why,
+                             measurement.points,
+                             measurement.ms,
+                             measurement.answer};
     const std::lock_guard lock(mutex_);
     if (measurement.pose) {
-        const UpdateResult result = estimator_->take(*measurement.pose);
+        TargetMeasurement pose = *measurement.pose;
+        pose.t_ns += std::llround(1e9 * scenario_.model_error.error.clock_s);
+        const UpdateResult result = estimator_->take(pose);
         record.outcome = static_cast<MeasurementRecord::Outcome>(result.outcome);
         record.nis = result.nis;
-        record.why = result.why;
+        if (result.outcome != UpdateOutcome::taken) record.why = result.why;
         if (result.outcome == UpdateOutcome::taken && count < 255) ++count;
     }
     measurements_.push_back(std::move(record));

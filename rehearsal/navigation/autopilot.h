@@ -26,6 +26,7 @@ struct MeasurementRecord {
     std::string why;  ///< empty where it was taken
     int points = 0;
     double ms = 0;
+    AnswerKind answer = AnswerKind::good;  ///< what the measurement's own pose is worth
 };
 inline constexpr std::array<std::string_view, 5> kMeasurementOutcomes{"taken", "gated", "too_late", "bad",
                                                                       "no_pose"};

@@ -11,8 +11,9 @@
 namespace narpa::rehearsal {
 namespace {
 
-FeatureSettings feature_settings(std::uint64_t seed) {
+FeatureSettings feature_settings(std::uint64_t seed, const ModelUncertainty& model) {
     FeatureSettings f;
+    f.model = model;
     f.seed = ~seed;  // not the random numbers of the frames, whose seed may be the same
     f.renders_max = 4;
     f.settled_px = 0.1;  // the filter's prediction is usually so near that one render is enough
@@ -35,7 +36,7 @@ CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, 
     : model_(model),
       camera_(model.scene().cameras[camera]),
       alignment_(model.render_scene(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
-                 feature_settings(seed)) {}
+                 feature_settings(seed, model.uncertainty())) {}
 
 MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
                                                const Quat& q_world_chaser, const Rigid3& T_chaser_target,
@@ -54,11 +55,12 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
         alignment_.align(*image, at, guess, rotated(conjugate(camera_.T_mount_camera.q), motion));
     out.points = e.agreeing;
     out.ms = seconds_since(start_ns) * 1e3;
-    if (!e.ok()) {
-        out.why = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
-        return out;
-    }
+    out.answer = e.answer.kind;
+    out.why = e.answer.why;
+    if (!e.answer.usable()) return out;
     out.pose = {t_ns, e.T_camera_target, kMatchVariance * e.covariance, camera_.T_mount_camera};
+    if (e.answer.kind == AnswerKind::unobservable)
+        out.pose->root_information = e.answer.root_information / std::sqrt(kMatchVariance);
     return out;
 }
 
@@ -107,12 +109,10 @@ MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points
         return out;
     }
     out.points = static_cast<int>(e->used);
-    if (!e->credible) {
-        out.why = e->ambiguous ? "another pose is nearly as likely"
-                               : fmt::format("{} of {} points lie on the model", e->explained, e->points);
-        return out;
-    }
-    out.pose = {t_ns, e->T_lidar_target, e->covariance, lidar_.T_mount_lidar, e->root_information};
+    out.answer = e->answer.kind;
+    out.why = e->answer.why;
+    if (!e->answer.usable()) return out;
+    out.pose = {t_ns, e->T_lidar_target, e->covariance, lidar_.T_mount_lidar, e->answer.root_information};
     return out;
 }
 

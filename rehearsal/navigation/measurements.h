@@ -16,6 +16,7 @@ namespace narpa::rehearsal {
 /// The pose; or none, and why, where no reliable one was found.
 struct MeasurementResult {
     std::optional<TargetMeasurement> pose;
+    AnswerKind answer = AnswerKind::refused;
     std::string why;
     int points = 0;  ///< feature matches that agree, or returns used
     double ms = 0;   ///< wall time
@@ -48,7 +49,7 @@ public:
     LidarPoseEstimator(SceneModel& model, std::size_t lidar)
         : model_(&model),
           lidar_(model.scene().lidars[lidar]),
-          icp_(model.tracer(), model.target(), {.noise = range_noise_of(lidar_)}) {}
+          icp_(model.tracer(), model.target(), {.noise = range_noise_of(lidar_), .model = model.uncertainty()}) {}
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
     /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.

@@ -15,7 +15,7 @@ constexpr const char* kCycleHeader =
     "ref_z_m,off_x_m,off_y_m,off_z_m,off_attitude_deg,sigma_position_m,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_deg,"
     "sigma_ry_deg,sigma_rz_deg,impulse_x_n_s,impulse_y_n_s,impulse_z_n_s,angular_x_n_m_s,angular_y_n_m_s,"
     "angular_z_n_m_s,frames,sweeps\n";
-constexpr const char* kMeasurementHeader = "t_ns,sensor,outcome,nis,points,ms,why\n";
+constexpr const char* kMeasurementHeader = "t_ns,sensor,outcome,nis,points,ms,answer,why\n";
 
 std::string csv_numbers(const Vec3& v, const char* form = "{:.6g}") {
     return fmt::format(fmt::runtime(fmt::format("{0},{0},{0}", form)), v.x, v.y, v.z);
@@ -64,8 +64,9 @@ void NavigationLog::cycle(const CycleRecord& r) {
     for (const MeasurementRecord& s : r.measurements) {
         const auto outcome = static_cast<std::size_t>(s.outcome);
         ++outcomes_[s.sensor][outcome];
-        measurements_ << fmt::format("{},{},{},{:.3f},{},{:.2f},\"{}\"\n", s.t_ns, s.sensor,
-                                     kMeasurementOutcomes[outcome], s.nis, s.points, s.ms, s.why);
+        measurements_ << fmt::format("{},{},{},{:.3f},{},{:.2f},{},\"{}\"\n", s.t_ns, s.sensor,
+                                     kMeasurementOutcomes[outcome], s.nis, s.points, s.ms,
+                                     kAnswerKinds[static_cast<std::size_t>(s.answer)], s.why);
     }
     const Rigid3& port = r.port.T_port_chaser_port;
     const auto phase = static_cast<std::size_t>(r.command.phase), abort = static_cast<std::size_t>(r.command.abort);

@@ -1,10 +1,32 @@
 #include "rehearsal/navigation/scene_model.h"
 
 #include <algorithm>
+#include <variant>
 
 #include "renderer/scene/scene_file.h"
 
 namespace narpa::rehearsal {
+namespace {
+
+/// Changes the scene to what the navigation believes.
+void believe(const ModelUncertainty& e, std::size_t target, Scene& scene) {
+    if (e == ModelUncertainty{}) return;
+    const Vec3 along = normalized(Vec3{1, 1, 1});
+    if (const int* mesh = std::get_if<int>(&scene.bodies[target].shape))
+        for (Vec3f& p : scene.meshes[static_cast<std::size_t>(*mesh)].positions)
+            p = vec_cast<float>((1 + e.scale) * vec_cast<double>(p) + e.mesh_m * along);
+    for (Material& m : scene.materials) m.diffuse = static_cast<float>(1 + e.albedo) * m.diffuse;
+    if (scene.sun) scene.sun->direction = exp_rotation(e.light_rad * along) * scene.sun->direction;
+    const Quat turn = exp_rotation(e.boresight_rad * along);
+    for (Camera& c : scene.cameras) {
+        c.fx *= 1 + e.focal, c.fy *= 1 + e.focal;  // of pinholes; a calibrated lens keeps its own
+        c.T_mount_camera.q = c.T_mount_camera.q * turn;
+    }
+    for (Lidar& l : scene.lidars) l.T_mount_lidar.q = l.T_mount_lidar.q * turn;
+}
+
+}  // namespace
+
 Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario) {
     auto scene = read_scene(scenario.navigation.scene.empty() ? scenario.scene : scenario.navigation.scene);
     if (!scene) return scene.error();
@@ -26,6 +48,8 @@ Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario)
         m->lidars_.push_back(index_of(m->scene_.lidars, name));
     for (const std::string& name : scenario.navigation.velocimeters)
         m->velocimeters_.push_back(index_of(m->scene_.lidars, name));
+    m->uncertainty_ = scenario.model_error.uncertainty();
+    believe(scenario.model_error.error, m->target_, m->scene_);
     auto render_scene = RenderScene::create(m->scene_);
     if (!render_scene) return render_scene.error();
     m->render_scene_.emplace(*std::move(render_scene));

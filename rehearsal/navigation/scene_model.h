@@ -13,7 +13,8 @@ namespace narpa::rehearsal {
 
 class SceneModel {
 public:
-    /// Reads the scenario's scene, or that of its [navigation], and builds its tracer. Errors: of the scene.
+    /// Reads the scenario's scene, or that of its [navigation], with the errors of its `model_error`, and builds
+    /// its tracer. Errors: of the scene.
     static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
@@ -26,6 +27,9 @@ public:
     [[nodiscard]] const std::vector<std::size_t>& lidars() const noexcept { return lidars_; }
     [[nodiscard]] const std::vector<std::size_t>& velocimeters() const noexcept { return velocimeters_; }
 
+    /// What the navigation is told of its model's errors.
+    [[nodiscard]] const ModelUncertainty& uncertainty() const noexcept { return uncertainty_; }
+
     /// Poses at t_s: the target's centre of mass at the world's origin, the attractor at the orbit's radius below
     /// it, the chaser at `T_target_chaser` (body axes of both). Other bodies stay as the scene has them at time 0.
     [[nodiscard]] const BodyPoses& place(double t_s, const Quat& q_world_target, const Rigid3& T_target_chaser);
@@ -34,6 +38,7 @@ private:
     SceneModel() : at_(0) {}
 
     Scene scene_;
+    ModelUncertainty uncertainty_;
     std::optional<RenderScene> render_scene_;
     Orbit orbit_;
     Vec3 target_centre_of_mass_m_{};

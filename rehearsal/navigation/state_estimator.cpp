@@ -121,7 +121,7 @@ PoseMeasurement at_centres_of_mass(const TargetMeasurement& s, const Vec3& chase
     if (s.root_information) {
         m.root_information = root_information_with(
             root_information_of_product(s.T_sensor_target, *s.root_information, T_target_mass),
-            star_tracker_jacobian(from_chaser), attitude_sigma_rad);
+            attitude_sigma_rad * star_tracker_jacobian(from_chaser));
         return m;
     }
     m.covariance = covariance_of_product(s.T_sensor_target, s.covariance, T_target_mass) +
@@ -294,14 +294,26 @@ TargetEstimate StateEstimator::estimate() const {
         pose.covariance +
         star_tracker_covariance(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
     // The chaser's centre of mass only shifts the origin: the covariance is the same.
-    TargetEstimate out{Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target,
-                       covariance_of_product(pose.T_chaser_target, covariance, T_mass_target)};
+    const Rigid3 T = Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target;
+    TargetEstimate out{
+        T, covariance_of_product(pose.T_chaser_target, covariance, T_mass_target) + covariance_of_model(T)};
     // The filter's position is against the map, whose error below the chaser stays the same for many measurements.
     const Eigen::Vector3d map_error =
-        scenario_.navigation.map_sigma_m *
-        to_eigen(out.T_chaser_target.q * (scenario_.target.T_body_port.q * Vec3{1, 0, 0}));
+        scenario_.navigation.map_sigma_m * to_eigen(T.q * (scenario_.target.T_body_port.q * Vec3{1, 0, 0}));
     out.covariance.bottomRightCorner<3, 3>() += map_error * map_error.transpose();
     return out;
+}
+
+/// Errors of the model are the same in all measurements: they stay, however many there are, and the filter's own
+/// covariance does not know them.
+Matrix6 StateEstimator::covariance_of_model(const Rigid3& T_chaser_target) const {
+    ModelUncertainty u = scenario_.model_error.uncertainty();
+    if (u == ModelUncertainty{}) return Matrix6::Zero();
+    // A camera's focal length acts as the size does, and a bias of ranges as a shift at most.
+    u.scale = std::hypot(u.scale, u.focal), u.focal = 0;
+    u.mesh_m = std::hypot(u.mesh_m, u.range_bias_m);
+    const PoseShifts shifts = image_shifts(u, T_chaser_target, motion_in_chaser());
+    return shifts * shifts.transpose();
 }
 
 Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {

@@ -136,6 +136,7 @@ private:
           mass_kg_(scenario.chaser.mass_kg) {}
     [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
+    [[nodiscard]] Matrix6 covariance_of_model(const Rigid3& T_chaser_target) const;
 
     Scenario scenario_;
     std::int64_t t_start_ns_;

@@ -35,6 +35,12 @@ Vec3 Orbit::fall_m_s2(double t_s, const Vec3& position_m) const {
     return gravity_m_s2(ground + position_m, z) - cross(rate, cross(rate, ground));
 }
 
+ModelUncertainty ModelError::uncertainty() const {
+    ModelUncertainty u = error;
+    for (const ModelErrorName& name : kModelErrors) u.*name.field *= told;
+    return u;
+}
+
 std::int64_t Scenario::period_ns() const {
     return std::llround(navigation.period_s * 1e9);
 }

@@ -23,6 +23,7 @@
 
 #include "base/pose.h"
 #include "base/result.h"
+#include "estimator/pose/model_uncertainty.h"
 #include "rehearsal/contact/landing.h"
 #include "rehearsal/contact/port_state.h"
 
@@ -146,6 +147,15 @@ struct Navigation {
     double abort_off_m = 5;                  ///< or so far off the reference
 };
 
+/// What the navigation believes of the world, and the emulator does not render: errors of its model, vectors along
+/// (1, 1, 1). Its estimators take `told` times these values for standard deviations.
+struct ModelError {
+    ModelUncertainty error;
+    double told = 1;
+
+    [[nodiscard]] ModelUncertainty uncertainty() const;
+};
+
 struct Control {
     double bandwidth_rad_s = 0.08, attitude_bandwidth_rad_s = 0.25;
     double damping = 0.9;
@@ -208,6 +218,7 @@ struct Scenario {
     AttitudeSensor attitude_sensor;
     std::vector<Leg> legs;
     Navigation navigation;
+    ModelError model_error;
     Control control;
     std::vector<Fault> faults;
     Gates gates;

@@ -266,6 +266,18 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     table->finish();
 }
 
+void read_model_error(TableReader& root, ModelError& m) {
+    auto table = root.table("model_error");
+    if (!table) return;
+    for (const ModelErrorName& name : kModelErrors) {
+        double value = 0;
+        read(*table, name.name.data(), value, kNotNegative);
+        m.error.*name.field = name.unit * value;
+    }
+    read(*table, "told", m.told, kNotNegative);
+    table->finish();
+}
+
 void read_control(TableReader& root, Control& c) {
     auto table = root.table("control");
     if (!table) return;
@@ -403,6 +415,7 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
     read_actuators(root, s);
     read_legs(root, s.legs);
     read_navigation(root, s, *scene);
+    read_model_error(root, s.model_error);
     read_control(root, s.control);
     read_faults(root, s.engine.has_value(), s.faults);
     if (!s.legs.empty()) read_gates(root, s);

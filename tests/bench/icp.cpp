@@ -62,7 +62,7 @@ TEST(SweepPoints, OfEmulatedPacketsLieOnTheStation) {
     off << 0.03, -0.02, 0.04, 0.5, -0.8, 0.4;
     const auto e = icp.align(points, motion, displaced(truth, off), 1.5);
     ASSERT_TRUE(e) << e.error().text();
-    EXPECT_TRUE(e->credible);
+    EXPECT_TRUE(e->answer.usable());
     const Vector6 error = error_between(e->T_lidar_target, truth);
     EXPECT_LT(error.head<3>().norm(), 1e-4);
     EXPECT_LT(error.tail<3>().norm(), 1e-3) << "half the step of the ranges";

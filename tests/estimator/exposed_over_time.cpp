@@ -191,7 +191,7 @@ TEST_P(ExposedOverTime, FeatureAlignmentFindsThePose) {
     FeatureAlignment features(*render_scene, camera, 0, at);
     const auto error = [&](const ApparentMotion& m) {
         const FeatureEstimate e = features.align(frame, at, guess(), m);
-        EXPECT_TRUE(e.ok()) << name(e.status);
+        EXPECT_TRUE(e.answer.usable()) << e.answer.why;
         return error_between(truth, e.T_camera_target);
     };
     const Vector6 found = error(motion), ignored = error({});

@@ -71,7 +71,7 @@ TEST_F(FeatureAlignmentTest, FindsThePoseFromFiveDegreesAndFivePerCentOff) {
         for (int trial = 0; trial < 2; ++trial, ++frames) {
             const MeasuredImage frame = frame_at(x_m, static_cast<std::uint32_t>(trial));
             const FeatureEstimate e = alignment.align(frame, at_, off_by(5, random));
-            ASSERT_TRUE(e.ok()) << x_m << " m: " << name(e.status);
+            ASSERT_TRUE(e.answer.usable()) << x_m << " m: " << name(e.status);
             const Vector6 error = error_between(e.T_camera_target, truth_);
             EXPECT_LT(error.head<3>().norm(), 0.2 * kRadPerDeg) << x_m;
             EXPECT_LT(error.tail<3>().norm(), 2e-3 * norm(truth_.t)) << x_m;

@@ -121,7 +121,7 @@ TEST(IcpSweeps, FindsThePoseFromFiveDegreesAndFivePercent) {
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_LT(normalised_error_squared(error_between(e->T_lidar_target, T), e->covariance), 40)
             << "start " << k << ": a false minimum";
-        EXPECT_TRUE(e->credible) << "start " << k;
+        EXPECT_TRUE(e->answer.usable()) << "start " << k;
         EXPECT_EQ(e->points, e->used + e->missed + e->grazing + e->rejected);
         if (e->observability.unobserved == 0) all.add(*e, T);  // else it shows a single flat face
     }
@@ -149,7 +149,7 @@ TEST(IcpSweeps, OutliersDoNotMoveIt) {
         ASSERT_TRUE(e) << e.error().text();
         EXPECT_GT(static_cast<double>(e->rejected), 0.2 * static_cast<double>(e->points));
         EXPECT_LT(static_cast<double>(e->explained), 0.8 * static_cast<double>(e->points));
-        EXPECT_TRUE(e->credible) << "start " << k;
+        EXPECT_TRUE(e->answer.usable()) << "start " << k;
         all.add(*e, T);
     }
     for (int i = 0; i < 6; ++i) EXPECT_LT(all.to_bound(i), 1.15 + 4 / std::sqrt(2.0 * all.count)) << i;
@@ -277,7 +277,7 @@ TEST(IcpSweeps, NoAnswerIsWrongAndCredible) {
         for (const std::uint64_t seed : group.seeds) {
             const SparseSweep sweep(seed, group.nearest_m, group.farthest_m);
             const auto e = icp.align(sweep.points, sweep.motion, sweep.start, sweep.search_m);
-            if (!e || !e->credible) continue;
+            if (!e || !e->answer.usable()) continue;
             EXPECT_LT(normalised_error_squared(error_between(e->T_lidar_target, sweep.truth), e->covariance), 50)
                 << "seed " << seed << ", " << e->points << " points, " << e->explained << " on the model";
         }
@@ -291,7 +291,7 @@ TEST(IcpSweeps, SparseSweepsGiveHonestCovariances) {
     for (int seed = 5000; seed < 5000 + kSweeps; ++seed) {
         const SparseSweep sweep(static_cast<std::uint64_t>(seed), 12, 25);
         const auto e = icp.align(sweep.points, sweep.motion, sweep.start, sweep.search_m);
-        if (!e || !e->credible) continue;
+        if (!e || !e->answer.usable()) continue;
         ++credible;
         const double one = normalised_error_squared(error_between(e->T_lidar_target, sweep.truth), e->covariance);
         EXPECT_LT(one, 50) << seed;

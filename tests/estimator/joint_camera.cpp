@@ -192,7 +192,7 @@ TEST_F(EquidistantFrame, DenseAlignmentFindsThePose) {
 TEST_F(EquidistantFrame, FeatureAlignmentFindsThePose) {
     FeatureAlignment features(*render_scene, camera, 0, at);
     const FeatureEstimate e = features.align(frame, at, guess());
-    EXPECT_TRUE(e.ok()) << name(e.status);
+    EXPECT_TRUE(e.answer.usable()) << e.answer.why;
     expect_truth(e.T_camera_target, 0.3 * kRadPerDeg, 0.02);
 }
 

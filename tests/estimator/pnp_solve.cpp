@@ -81,6 +81,22 @@ TEST_F(SolvePnp, ExactPixelsGiveTheExactPose) {
     }
 }
 
+// The rounding of the residuals is then a large part of their noise, or all of it.
+TEST_F(SolvePnp, SettlesWhereRoundingIsTheNoise) {
+    for (const double sigma_px : {1e-6, 1e-9, 1e-12})
+        for (const std::size_t n : {4u, 6u, 10u, 30u, 100u})
+            for (int trial = 0; trial < 200; ++trial) {
+                const test::Seen seen =
+                    test::see(random_, test::random_points(random_, n, 1), some_pose(8), sigma_px);
+                const PnpSolution& s = solver_.solve(seen.input());
+                ASSERT_TRUE(s.ok()) << in_words(s.status) << ": " << n << " points, " << sigma_px << " px";
+                const Vector6 e = error_between(s.fit.T_camera_body, seen.T_camera_body);
+                // Four points have several poses that fit.
+                if (n == 4) continue;
+                ASSERT_LT(e.norm(), std::max(1e-11, 1e4 * sigma_px)) << n << " points, " << sigma_px << " px";
+            }
+}
+
 TEST_F(SolvePnp, HalfATurnIsLikeAnyOther) {
     for (int trial = 0; trial < 200; ++trial) {
         const Rigid3 truth{exp_rotation(test::random_direction(random_) * M_PI), {0.5, 0, 30}};

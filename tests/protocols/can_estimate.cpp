@@ -17,6 +17,7 @@ EstimateReport random_estimate(std::mt19937_64& rng) {
     e.t_ns = static_cast<std::int64_t>(rng() % 1'000'000'000'000);
     e.T_camera_target = {normalized(Quat{some(rng), some(rng), some(rng), some(rng)}),
                          {1e3 * some(rng), 1e3 * some(rng), 1e5 * positive(rng)}};
+    e.answer = static_cast<AnswerKind>(rng() % kAnswerKinds.size());
     e.sigma_position_m = {positive(rng), positive(rng), 10 * positive(rng)};
     e.sigma_rotation_rad = {positive(rng), 1e-3 * positive(rng), 1e-6 * positive(rng)};
     return e;
@@ -44,6 +45,7 @@ TEST(CanEstimate, ClassicAndFdCarryTheSameWithinAStep) {
         EXPECT_EQ(fd.frame, sent.frame);
         EXPECT_EQ(fd.camera, sent.camera);
         EXPECT_EQ(fd.state, sent.state);
+        EXPECT_EQ(fd.answer, sent.answer);
         EXPECT_EQ(fd.t_ns, sent.t_ns);
         EXPECT_LT(norm(fd.T_camera_target.t - sent.T_camera_target.t), 1e-6);
         EXPECT_LT(angle_between(fd.T_camera_target.q, sent.T_camera_target.q), 1e-6);

@@ -114,6 +114,18 @@ TEST(Scenario, ErrorsNameTheFileThatHasThem) {
     EXPECT_NE(self.error().what.find("one on another"), std::string::npos);
 }
 
+TEST(Scenario, ReadsErrorsOfTheModel) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "wrong.toml")
+        << "[scenario]\nbased_on = \"" << kScenarios << "docking.toml\"\nname = \"wrong\"\nscene = \"" << kScenarios
+        << "scene.toml\"\n[model_error]\nscale = 0.01\nlight_deg = 2\ntold = 0.5\n";
+    const auto s = read_scenario(folder / "wrong.toml");
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_EQ(s->model_error.error.scale, 0.01);
+    EXPECT_NEAR(s->model_error.error.light_rad, 0.0349, 1e-4);
+    EXPECT_EQ(s->model_error.uncertainty().scale, 0.005);
+}
+
 struct Bad {
     std::string from, to;  ///< what is changed in the docking scenario
     std::string says;

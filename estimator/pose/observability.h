@@ -1,4 +1,4 @@
-/// estimator/cloud/observability.h - which motions of a target are observable from its surface points.
+/// estimator/pose/observability.h - which motions of a target are observable from its surface points.
 ///
 /// Rotations of a sphere are not observable, nor are translations along a plane. N. Gelfand,
 /// L. Ikemoto, S. Rusinkiewicz, M. Levoy, "Geometrically stable sampling for the ICP algorithm", 3DIM 2003: the

@@ -1,4 +1,4 @@
-#include "estimator/cloud/observability.h"
+#include "estimator/pose/observability.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

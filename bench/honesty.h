@@ -1,0 +1,60 @@
+/// bench/honesty.h - whether answers that claim to be good are: random scenes, conditions and starts, with the
+/// truth beside each answer; on request with a world that differs from the model that the estimators believe in.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/stop.h"
+#include "emulator/threads.h"
+#include "estimator/pose/model_uncertainty.h"
+#include "protocols/estimate.h"
+
+namespace narpa {
+
+inline constexpr std::array<std::string_view, 4> kHonestyMethods{"points", "features", "dense", "icp"};
+/// What is done to a measurement. `wrong`: it shows another target.
+inline constexpr std::array<std::string_view, 7> kHonestyConditions{"plain",  "bright", "dark", "blurred",
+                                                                    "beside", "wrong",  "far"};
+
+struct HonestyOptions {
+    std::vector<std::string> methods{kHonestyMethods.begin(), kHonestyMethods.end()};
+    std::vector<std::string> targets;         ///< empty: all of honesty_scenes.h
+    std::vector<std::string> conditions;      ///< empty: all
+    int trials = 200;                         ///< of each method
+    int size = 96;                            ///< pixels of the camera
+    double start_deg = 5, start_percent = 5;  ///< the largest error of a start; each is drawn below it
+    std::uint64_t seed = 1;
+    ModelUncertainty world;  ///< errors of the believed model, drawn with these standard deviations for each trial
+    double distortion = 0;   ///< k1 of the world's lens, which the estimators do not know
+    ModelUncertainty told;   ///< what the estimators are told of them
+};
+
+struct HonestyRow {
+    std::string method, target, condition;
+    std::array<int, kAnswerKinds.size()> answers{};
+    int beyond = 0;                                       ///< good answers beyond 6 sigma: NEES above kBeyondNees
+    std::vector<double> nees;                             ///< of the good answers
+    std::vector<double> rotation_rad, position_of_range;  ///< their errors
+    std::vector<int> beyond_trials;                       ///< their numbers, to repeat them
+
+    void add(const HonestyRow& other);
+    [[nodiscard]] int trials() const { return answers[0] + answers[1] + answers[2] + answers[3]; }
+};
+
+/// One for each method, target and condition that was drawn. `first`: number of the first trial; a trial depends on
+/// its number and the seed alone.
+[[nodiscard]] std::vector<HonestyRow> run_honesty(const HonestyOptions& options, int first, TracingThreads& threads,
+                                                  const std::function<void(const std::string&)>& progress,
+                                                  const StopFlag& stop);
+
+[[nodiscard]] nlohmann::json to_json(const std::vector<HonestyRow>& rows);
+/// Tables by method, by method and target, and by method and condition.
+[[nodiscard]] std::string in_words(const std::vector<HonestyRow>& rows);
+
+}  // namespace narpa

@@ -1,0 +1,20 @@
+/// bench/honesty_scenes.h - targets made in code for the campaign of honesty.h: with and without symmetries.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// Names of the targets: boxes of several shapes, an n-gonal prism, smooth and rough bodies.
+[[nodiscard]] std::vector<std::string_view> honesty_targets();
+
+/// One body of about 2 m radius about its origin, lit by the Sun and a little light from everywhere; a grey camera
+/// of 12 bits, square, at the world's origin. `size`: its pixels. Errors: no target of this name.
+[[nodiscard]] Result<Scene> honesty_scene(std::string_view target, int size);
+
+}  // namespace narpa

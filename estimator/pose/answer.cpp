@@ -1,0 +1,76 @@
+#include "estimator/pose/answer.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <utility>
+
+namespace narpa {
+namespace {
+
+/// Takes motions in units of the limits to (rotation rad, translation m).
+Vector6 limits(double range_m) {
+    Vector6 most;
+    most << Eigen::Vector3d::Constant(kMostRotation_rad), Eigen::Vector3d::Constant(kMostTranslation * range_m);
+    return most;
+}
+
+std::string in_words(const Observability& o) {
+    return fmt::format("{} of six motions not observed", o.unobserved);
+}
+
+}  // namespace
+
+Answer judge(Fit fit) {
+    Answer answer;
+    answer.observability = fit.observability;
+    answer.root_information = fit.root_information;
+    answer.rivals = std::move(fit.rivals);
+    answer.why.clear();
+    if (!fit.failed.empty()) {
+        answer.why = std::move(fit.failed);
+    } else if (!(fit.residual <= fit.residual_most)) {
+        answer.why = fmt::format("residuals are {:.3g} times what noise explains, expected at most {:.3g}",
+                                 fit.residual, fit.residual_most);
+    } else if (const double turn = fit.moved.head<3>().norm(), shift = fit.moved.tail<3>().norm();
+               turn > kMostTurn_rad || shift > kMostShift * fit.range_m) {
+        answer.why = fmt::format("{:.0f} deg and {:.3g} m from the guess, which cannot be so far off",
+                                 turn / kDegree, shift);
+    } else if (fit.observability.unobserved == 6 || !fit.root_information.allFinite()) {
+        answer.why = "no motion of the target is observed";
+    } else if (!answer.rivals.empty()) {
+        answer.kind = AnswerKind::ambiguous;
+        answer.why = "another pose is nearly as likely";
+    } else if (fit.observability.unobserved > 0) {
+        answer.kind = AnswerKind::unobservable;
+        answer.why = in_words(fit.observability);
+    } else {
+        answer.kind = AnswerKind::good;
+    }
+    return answer;
+}
+
+Observability observability_of(const Matrix6& covariance, double range_m) {
+    const Vector6 most = limits(range_m);
+    const Matrix6 scaled = most.cwiseInverse().asDiagonal() * covariance * most.cwiseInverse().asDiagonal();
+    // Eigenvalues are ascending: the least information first is the largest variance first.
+    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(0.5 * (scaled + scaled.transpose()));
+    Observability o;
+    o.eigenvalues = eigen.eigenvalues().reverse().cwiseInverse();
+    o.motions = most.asDiagonal() * eigen.eigenvectors().rowwise().reverse();
+    while (o.unobserved < 6 && !(o.eigenvalues[o.unobserved] >= 1)) ++o.unobserved;
+    return o;
+}
+
+void observe(const Rigid3& T, const Matrix6& covariance, Fit& fit) {
+    fit.observability = observability_of(covariance, norm(T.t));
+    fit.root_information = fit.observability.root_information(covariance.inverse(), 1);
+}
+
+void compare_with_guess(const Rigid3& T, const Rigid3& guess, Fit& fit) {
+    fit.moved = error_between(guess, T);
+    fit.range_m = norm(guess.t);
+}
+
+}  // namespace narpa

@@ -1,0 +1,31 @@
+#include "estimator/pose/model_uncertainty.h"
+
+namespace narpa {
+
+PoseShifts pose_shifts(const ModelUncertainty& u, const Rigid3& T, const ApparentMotion& motion) {
+    PoseShifts shifts = PoseShifts::Zero(6, 7);
+    shifts.block<3, 3>(3, 0) = u.mesh_m * Eigen::Matrix3d::Identity();
+    shifts.block<3, 3>(0, 3) = u.boresight_rad * Eigen::Matrix3d::Identity();
+    shifts.block<3, 3>(3, 3) = -u.boresight_rad * skew(to_eigen(T.t));
+    shifts.col(6) << u.clock_s * to_eigen(motion.rate_rad_s), u.clock_s * to_eigen(motion.velocity_m_s);
+    return shifts;
+}
+
+PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T, const ApparentMotion& motion) {
+    // The image of a larger body further away is the same. A longer focal length makes it appear nearer: the range
+    // grows along the axis, the point stays beside it, and the line of sight, which attitudes are seen against,
+    // turns.
+    const Eigen::Vector3d t = to_eigen(T.t), along(0, 0, T.t.z);
+    PoseShifts of_camera = PoseShifts::Zero(6, 2);
+    of_camera.col(0).tail<3>() = u.scale * t;
+    of_camera.col(1) << u.focal * t.cross(along) / t.squaredNorm(), u.focal * along;
+    return joined(pose_shifts(u, T, motion), of_camera);
+}
+
+PoseShifts joined(const PoseShifts& a, const PoseShifts& b) {
+    PoseShifts all(6, a.cols() + b.cols());
+    all << a, b;
+    return all;
+}
+
+}  // namespace narpa

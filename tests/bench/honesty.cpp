@@ -1,0 +1,61 @@
+// The campaign of honesty: faults that it found stay found, and of a few trials of each method none lies.
+#include "bench/honesty.h"
+
+#include <gtest/gtest.h>
+
+#include "base/stop.h"
+
+namespace narpa {
+namespace {
+
+std::vector<HonestyRow> run(const HonestyOptions& o, int first) {
+    static TracingThreads threads(0);
+    const StopFlag stop{};
+    return run_honesty(
+        o, first, threads, [](const std::string&) {}, stop);
+}
+
+/// Trials whose good answers were beyond 6 sigma: valleys in which steps ended early, frames blurred by what the
+/// model does not know, and another target.
+TEST(Honesty, DenseTrialsThatLied) {
+    HonestyOptions o;
+    o.methods = {"dense"};
+    o.trials = 1;
+    for (const int trial : {25, 32, 55, 146, 4, 38, 10})
+        for (const HonestyRow& row : run(o, trial))
+            EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
+}
+
+TEST(Honesty, FewTrialsOfEach) {
+    HonestyOptions o;
+    o.conditions = {"plain", "dark", "beside", "far", "wrong"};
+    for (const auto& [method, trials] : {std::pair{"points", 500}, {"icp", 200}, {"features", 8}, {"dense", 8}}) {
+        o.methods = {method};
+        o.trials = trials;
+        int good = 0;
+        for (const HonestyRow& row : run(o, 0)) {
+            EXPECT_EQ(row.beyond, 0) << method << ", " << row.target << ", " << row.condition;
+            good += row.answers[0];
+        }
+        EXPECT_GE(good, std::string_view(method) == "features" ? 0 : trials / 10) << method;
+    }
+}
+
+/// A model that is wrong and told so: the answers are as far off, and say it.
+TEST(Honesty, ToldErrorsOfTheModelAreInTheCovariance) {
+    HonestyOptions o;
+    o.methods = {"points"};
+    o.conditions = {"plain"};
+    o.trials = 400;
+    o.world = {.scale = 0.01, .mesh_m = 0.003, .boresight_rad = 1e-3};
+    int lies = 0, good = 0;
+    for (const HonestyRow& row : run(o, 0)) lies += row.beyond, good += row.answers[0];
+    EXPECT_GT(lies, 0.3 * good) << "untold";
+    o.told = o.world;
+    lies = 0;
+    for (const HonestyRow& row : run(o, 0)) lies += row.beyond;
+    EXPECT_EQ(lies, 0);
+}
+
+}  // namespace
+}  // namespace narpa

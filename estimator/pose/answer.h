@@ -2,10 +2,10 @@
 ///
 /// Each estimator states how its fit went (Fit); judge() decides, in this order:
 ///
-///   refused       it did not converge, its residuals are larger than noise and model explain, or it holds no
-///   motion ambiguous     another pose explains the measurement nearly as well; which one is right it cannot tell
-///   unobservable  the pose is right in some motions, and the measurement does not hold the others
-///   good          the pose is right within its covariance
+/// - refused: it did not converge, its residuals are larger than noise and model explain, or it holds no motion
+/// - ambiguous: another pose explains the measurement nearly as well; which one is right it cannot tell
+/// - unobservable: the pose is right in some motions, and the measurement does not hold the others
+/// - good: the pose is right within its covariance
 ///
 /// Filters take good answers and, by their root information, unobservable ones (root_information.h).
 #pragma once

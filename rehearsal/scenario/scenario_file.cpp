@@ -227,7 +227,7 @@ bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
 std::string read_map(TableReader& table, const Scene& scene) {
     const auto map = table.text("map");
     if (!map) return "";
-    const std::string path = beside(*table.place("map").path, *map);
+    std::string path = beside(*table.place("map").path, *map);
     const auto known = read_scene(path);
     if (!known) {
         table.fail("map", known.error().text());

@@ -12,7 +12,7 @@ constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr std::size_t kFewest = 12;
 constexpr int kMostDivisions = 1;
 /// Ends below this height above the ground, and not too far below the ground, count as there.
-constexpr double kNearGround_m = 10'000, kBelowGround_m = 500;
+constexpr double kNearGround_m = 10'000, kMostBelowGround_m = 500;
 /// Densities of aerosol at the ends that differ by less, as parts of that on the ground, are one.
 constexpr double kLevel = 1e-3;
 /// Of the brightest band, and of what passes a vacuum: what is fainter need not agree as well.
@@ -114,7 +114,7 @@ void RayBundle::place(Index i) noexcept {
     place_[i][2] = std::exp(-height / light_.air().description().aerosol_height_m);
     if (r >= light_.air().top_radius_m() && !falls)
         end_[i] = End::space;
-    else if (falls && height > -kBelowGround_m && height < kNearGround_m)
+    else if (falls && height > -kMostBelowGround_m && height < kNearGround_m)
         end_[i] = End::ground;
 }
 

@@ -46,7 +46,7 @@ Outcome one(const rehearsal::RehearsalOptions& options) {
     }();
     if (!done) return done.error();
     for (const rehearsal::GateResult& g : done->verdict.gates)
-        say(fmt::format("  {:<10} {:<12} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
+        say(fmt::format("  {:<10} {:<19} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
                         g.reason));
     say(done->verdict.headline);
     if (!done->page.empty()) say("wrote " + done->page);

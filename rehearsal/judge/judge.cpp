@@ -41,7 +41,7 @@ void Judge::check(const TruthState& state) {
         if (scenario_.gates.landing) {
             if (const auto touchdown = contact_made())
                 for (const ContactCondition& c : touchdown->conditions)
-                    if (!c.within()) report(landing(*touchdown, c));
+                    if (!c.within()) report(landing(*touchdown, c, true));
         } else if (const GateResult result = contact(); result.state == GateState::failed) {
             report(result);
         }

@@ -73,7 +73,8 @@ private:
     [[nodiscard]] GateResult distance() const;
     [[nodiscard]] GateResult navigation() const;
     [[nodiscard]] GateResult contact() const;
-    [[nodiscard]] GateResult landing(const Contact& touchdown, const ContactCondition& condition) const;
+    [[nodiscard]] GateResult landing(const Contact& touchdown, const ContactCondition& condition,
+                                     bool of_touchdown) const;
     void add_landing_gates(Verdict& verdict) const;
     [[nodiscard]] std::optional<Footing> footing_at_end() const;
     [[nodiscard]] GateResult complete() const;

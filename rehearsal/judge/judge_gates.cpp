@@ -254,7 +254,9 @@ void Judge::add_landing_gates(Verdict& v) const {
     if (v.contact) {
         const auto ground = footing_at_end();
         v.contact->conditions = landing_conditions(limits, v.contact->state, ground);
-        for (const ContactCondition& c : v.contact->conditions) v.gates.push_back(landing(*v.contact, c));
+        const std::size_t of_touchdown = landing_conditions(limits, v.contact->state, {}).size();
+        for (std::size_t i = 0; i < v.contact->conditions.size(); ++i)
+            v.gates.push_back(landing(*v.contact, v.contact->conditions[i], i < of_touchdown));
         if (!ground)
             v.gates.push_back({.name = "slope",
                                .asked = "ground under the feet",
@@ -268,7 +270,7 @@ void Judge::add_landing_gates(Verdict& v) const {
                            .reason = "it did not touch down"});
 }
 
-GateResult Judge::landing(const Contact& touchdown, const ContactCondition& c) const {
+GateResult Judge::landing(const Contact& touchdown, const ContactCondition& c, bool of_touchdown) const {
     GateResult gate{.name = c.name, .asked = fmt::format("{} at most {:g} {}", c.title, c.max, c.unit)};
     gate.state = c.within() ? GateState::passed : GateState::failed;
     gate.margin = c.max - c.value;
@@ -276,7 +278,8 @@ GateResult Judge::landing(const Contact& touchdown, const ContactCondition& c) c
     gate.t_worst_s = touchdown.t_s;
     if (!c.within()) gate.t_first_s = touchdown.t_s;
     gate.reason =
-        fmt::format("{:.3f} {} at the touchdown {}", c.value, c.unit, when(scenario_, bus_, *t_contact_ns_));
+        fmt::format("{:.3f} {} ", c.value, c.unit) +
+        (of_touchdown ? "at the touchdown " + when(scenario_, bus_, *t_contact_ns_) : "where it stood at the end");
     return gate;
 }
 

@@ -42,7 +42,7 @@ TEST(Answer, FarFromTheGuessIsRefused) {
     compare_with_guess({exp_rotation({0, 0, 0.5}), {0, 0, 11}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::good);
     compare_with_guess({exp_rotation({0, 0, 1.5708}), {0, 0, 10}}, guess, fit);
-    EXPECT_EQ(judge(fit).kind, AnswerKind::refused) << "a cube looks the same there";
+    EXPECT_EQ(judge(fit).kind, AnswerKind::refused) << "by a quarter turn, a symmetry of a cube";
     compare_with_guess({{}, {0, 0, 16}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
 }

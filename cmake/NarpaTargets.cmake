@@ -29,7 +29,8 @@ elseif(NARPA_UNITY)
 endif()
 find_program(NARPA_CCACHE ccache)
 if(NARPA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${NARPA_CCACHE})
+  # Paths below the project's folder count as relative: clones in other folders find what this one has compiled.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${NARPA_CCACHE})
 endif()
 
 function(narpa_compile_options target)

@@ -71,7 +71,7 @@ Outcome bench_atmosphere(const AirBenchOptions& o) {
     print_rows(e.steps, "steps", "us a ray");
     print_rows(e.tables, "heights of the tables", "CPU us to make");
     print_rows(e.bands, "wavelengths a band", "us a ray");
-    say("\ntiles of 8 x 8 pixels by interpolation, against each ray by itself");
+    say("\n16 tiles of 8 x 8 pixels by interpolation, against each ray by itself");
     print_rows(e.bundles, "tolerance, 1e-4", "us a ray");
     return nlohmann::json{{"passed", true},
                           {"tiles", air_rows(e.bundles, "tolerance_1e4")},

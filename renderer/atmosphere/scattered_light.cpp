@@ -40,6 +40,20 @@ NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lan
     out = sum;
 }
 
+/// Adds what the aerosol scatters strongly forward out of the direct light, times `facing`.
+NARPA_EACH_ISA void add_forward_peak(const Air& air, const SunBeam& beam, float facing,
+                                     Air::Spectrum& out) noexcept {
+    Air::Spectrum sum = out;
+    const float w = facing * beam.visible;
+    const auto [gas, aerosol, ozone] = beam.columns;
+    for (std::size_t l = 0; l < air.lanes(); ++l) {
+        const float depth = air.gas[l] * gas + air.ozone[l] * ozone;
+        sum[l] += w * (exp_of_negative(-(depth + air.scaled_extinction[l] * aerosol)) -
+                       exp_of_negative(-(depth + air.aerosol_extinction[l] * aerosol)));
+    }
+    out = sum;
+}
+
 }  // namespace
 
 ScatteredLight::ScatteredLight(const Air& air, const AirResolution& resolution, double sun_radius_rad, int threads)
@@ -123,13 +137,13 @@ ScatteredLight::Spectrum ScatteredLight::skylight(const Vec3& position, const Ve
     const auto nz = static_cast<float>(dot(normal, up));
     const auto nx = static_cast<float>((dot(normal, to_sun) - static_cast<double>(nz) * sun) / sun_sine);
     const AirTables& t = tables_;
-    const AirTables::Corners c =
-        t.corners(static_cast<float>(distance_to_horizon_m(air_, h)), static_cast<float>(sun));
+    const auto horizon = static_cast<float>(distance_to_horizon_m(air_, h));
+    const AirTables::Corners c = t.corners(horizon, static_cast<float>(sun));
     add_cosine_lobe(c, t.lanes, std::clamp(nz, -1.0f, 1.0f), nx, out);
     const auto facing = static_cast<float>(std::max(0.0, dot(normal, to_sun)));
     if (facing > 0) {
-        const Spectrum scaled = sunlight(h, sun, true), direct = sunlight(h, sun, false);
-        for (std::size_t l = 0; l < t.lanes; ++l) out[l] += facing * (scaled[l] - direct[l]);
+        const SunBeam beam = t.sun_beam(t.ground_m + static_cast<float>(h), horizon, static_cast<float>(sun));
+        if (beam.visible > 0) add_forward_peak(air_, beam, facing, out);
     }
     for (float& x : out) x = std::max(x, 0.0f);
     return out;

@@ -1,7 +1,6 @@
 #include "renderer/light/atmosphere.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace narpa {
@@ -9,8 +8,13 @@ namespace {
 
 /// Wavelength of the LiDARs' beams.
 constexpr double kLidar_m = 905e-9;
-/// Rays that start so near to each other start at one place: as a lens's do.
-constexpr double kOnePlace_m = 1;
+/// Rays that start so near to each other start at one place, as a lens's do; places are rounded to this part of it,
+/// and directions of the Sun to this, so that they have cells in common (AirCells).
+constexpr double kOnePlace_m = 1, kPlace_m = 0.25, kSunDirection = 0x1p-20;
+
+Vec3 rounded(const Vec3& v, double step) {
+    return {step * std::round(v.x / step), step * std::round(v.y / step), step * std::round(v.z / step)};
+}
 
 AirResolution resolution_of(const Atmosphere& a) {
     AirResolution r;
@@ -63,23 +67,24 @@ MediumSegment AtmosphereMedium::along(const BodyPoses& at, const Ray& ray, doubl
 void AtmosphereMedium::along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                                   std::span<MediumSegment> segments) const noexcept {
     if (rays.empty()) return;
-    const Ray& first = rays.front().ray;
-    const auto beside = [&](const MediumRay& r) {
-        return r.ray.time == first.time && norm(r.ray.origin - first.origin) <= kOnePlace_m;
-    };
-    if (rays.size() > RayBundle::kMost || !std::ranges::all_of(rays, beside))
-        return Medium::along_each(at, rays, segments);
-    const Frame frame = frame_at(at, first.time);
-    std::array<RayBundle::Ray, RayBundle::kMost> bundle;
-    std::array<AirLight, RayBundle::kMost> light;
+    if (rays.size() > RayBundle::kMost) return Medium::along_each(at, rays, segments);
+    double time = rays.front().ray.time;
+    Frame frame = frame_at(at, time);
+    const Vec3 origin = rounded(frame.point(rays.front().ray.origin), kPlace_m);
+    std::optional<Vec3> sun = to_sun(frame);
+    if (sun) sun = normalized(rounded(*sun, kSunDirection));
+    UninitializedArray<RayBundle::Ray, RayBundle::kMost> bundle;
+    UninitializedArray<AirLight, RayBundle::kMost> light;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        const Vec3 toward = frame.direction(rays[i].ray.direction);
+        const auto& [ray, range_m, u] = rays[i];
+        if (ray.time != time) frame = frame_at(at, time = ray.time);
+        if (norm(frame.point(ray.origin) - origin) > kOnePlace_m) return Medium::along_each(at, rays, segments);
+        const Vec3 toward = frame.direction(ray.direction);
         const double metre = norm(toward);
-        bundle[i] = {toward / metre, rays[i].range_m * metre};
+        bundle[i] = {toward / metre, range_m * metre};
     }
-    const std::optional<Vec3> sun = to_sun(frame);
-    RayBundle(light_, frame.point(first.origin), sun ? &*sun : nullptr)
-        .trace(std::span(bundle).first(rays.size()), light);
+    RayBundle(light_, origin, sun ? &*sun : nullptr, *cells_)
+        .trace(bundle.first(rays.size()), light.first(rays.size()));
     for (std::size_t i = 0; i < rays.size(); ++i) segments[i] = segment(light[i]);
 }
 

@@ -6,6 +6,7 @@
 /// apparent places (renderer/atmosphere/refraction.h).
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "renderer/atmosphere/ray_bundle.h"
@@ -22,7 +23,7 @@ public:
     [[nodiscard]] MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                       double u) const noexcept override;
     [[nodiscard]] bool uses_random_numbers() const noexcept override { return false; }
-    /// Camera rays of one moment from one place: by interpolation (renderer/atmosphere/ray_bundle.h).
+    /// Camera rays from one place on the planet: by interpolation (renderer/atmosphere/ray_bundle.h).
     void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                     std::span<MediumSegment> segments) const noexcept override;
     [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;
@@ -54,6 +55,7 @@ private:
     Vec3 scale_{1, 1, 1};
     std::optional<Sun> sun_;
     ScatteredLight light_;
+    std::unique_ptr<AirCells> cells_ = std::make_unique<AirCells>();  ///< what frames have integrated
     Air lidar_air_;
     PanelRule lidar_rule_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "base/constants.h"
 #include "bench/statistics.h"
@@ -65,11 +66,13 @@ void set_error(AirErrorRow& row, const std::vector<Rgb>& found, const std::vecto
     const std::size_t of_sun = exact.size() / kSunElevations_deg.size();
     double squares = 0;
     std::size_t n = 0;
+    float brightest = 0;
     for (std::size_t i = 0; i < exact.size(); ++i) {
-        const auto first = exact.begin() + static_cast<std::ptrdiff_t>(i / of_sun * of_sun);
-        float brightest = 0;
-        for (auto view = first; view != first + static_cast<std::ptrdiff_t>(of_sun); ++view)
-            brightest = std::max({brightest, view->x, view->y, view->z});
+        if (i % of_sun == 0) {
+            brightest = 0;
+            for (const Rgb& view : std::span(exact).subspan(i, of_sun))
+                brightest = std::max({brightest, view.x, view.y, view.z});
+        }
         for (int band = 0; band < 3; ++band) {
             const double truth = static_cast<double>(exact[i][band]);
             if (truth < kFaintest * static_cast<double>(brightest)) continue;
@@ -142,8 +145,9 @@ std::vector<AirErrorRow> bundle_rows(const ScatteredLight& light, const std::vec
     for (const int ten_thousandths : {0, 2, 5, 7, 10, 20, 50}) {
         AirErrorRow row{.setting = ten_thousandths, .is_default = ten_thousandths == usual};
         const double start = cpu_s(CLOCK_THREAD_CPUTIME_ID);
-        set_error(row, seen_in_tiles(light, views, 1e-4f * static_cast<float>(ten_thousandths)), exact);
+        const auto found = seen_in_tiles(light, views, 1e-4f * static_cast<float>(ten_thousandths));
         row.time_s = (cpu_s(CLOCK_THREAD_CPUTIME_ID) - start) / (kViewPixels * static_cast<double>(views.size()));
+        set_error(row, found, exact);
         rows.push_back(row);
     }
     return rows;
@@ -216,13 +220,21 @@ std::vector<SkyComparison> compare_skies(std::size_t paths,
         progress(fmt::format("skies of turbidity {}", turbidity));
         const AirDescription air = earth_air(turbidity);
         const ScatteredLight light(Air(air, kGreen_m), {}, kSunRadius_rad);
-        for (const double elevation : {60.0, 30.0, 10.0, 2.0}) {
+        for (const double elevation : {60.0, 30.0, 10.0, 5.0, 3.0, 1.0}) {
             const HosekWilkieSky sky(turbidity, air.ground_albedo, elevation * kRadPerDeg);
             const Vec3 to_sun = sky_direction(90 - elevation, 0), from{0, 0, air.ground_radius_m + 2};
-            for (const auto& [zenith, azimuth] :
-                 {std::pair{0.0, 0.0}, {45.0, 90.0}, {45.0, 180.0}, {75.0, 90.0}, {87.0, 180.0}}) {
+            const double sun_zenith = 90 - elevation;
+            for (const auto& [zenith, azimuth] : {std::pair{sun_zenith - 1, 0.0},
+                                                  {sun_zenith - 4, 0.0},
+                                                  {sun_zenith, 8.0},
+                                                  {0.0, 0.0},
+                                                  {45.0, 90.0},
+                                                  {45.0, 180.0},
+                                                  {75.0, 90.0},
+                                                  {87.0, 180.0}}) {
                 const Vec3 d = sky_direction(zenith, azimuth);
                 SkyComparison c{turbidity, elevation, zenith, azimuth};
+                c.aureole = dot(d, to_sun) > std::cos(9 * kRadPerDeg);
                 c.physical = static_cast<double>(light.along(from, d, kInfinity, to_sun).in_scattering[0]);
                 c.hosek_wilkie = static_cast<double>(sky.radiance(d.z, dot(d, to_sun)).y);
                 const PathTracedLight brute = path_traced_air(air, kGreen_m, from, d, to_sun, paths);

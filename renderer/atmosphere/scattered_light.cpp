@@ -17,8 +17,10 @@ constexpr float kSqrt4Pi = 3.5449077f;
 /// Adds the irradiance of a surface, whose normal has the components nz along the zenith and nx towards the Sun.
 NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lanes, float nz, float nx,
                                     Air::Spectrum& out) noexcept {
-    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P. Hanrahan, SIGGRAPH 2001).
-    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f, -0.13089969f, 0.0f, 0.04908739f};
+    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64, 0, -pi / 128 (R. Ramamoorthi, P. Hanrahan,
+    // SIGGRAPH 2001).
+    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f,        -0.13089969f,
+                               0.0f,        0.04908739f, 0.0f,        -0.02454369f};
     static_assert(kLobe.size() == kMaxDegree + 1);
     Harmonics y;
     harmonics(nz, nx, kMaxDegree, y);

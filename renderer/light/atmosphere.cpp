@@ -33,8 +33,7 @@ AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)
       sun_(scene.sun),
       light_(Air(scene.atmosphere->air, scene.atmosphere->samples_per_band), resolution_of(*scene.atmosphere),
              radius_of(scene), threads),
-      lidar_air_(scene.atmosphere->air, kLidar_m),
-      lidar_rule_(static_cast<std::size_t>(scene.atmosphere->steps)) {
+      lidar_air_(scene.atmosphere->air, kLidar_m, scene.atmosphere->steps) {
     if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body_].shape)) {
         const double radius = scene.atmosphere->air.ground_radius_m;
         scale_ = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
@@ -109,9 +108,16 @@ double AtmosphereMedium::lidar_transmittance(const BodyPoses& at, const Ray& ray
     const Frame frame = frame_at(at, ray.time);
     const Vec3 toward = frame.direction(ray.direction);
     const double metre = norm(toward);
-    const AirColumns c =
-        columns_along(lidar_air_, lidar_rule_, frame.point(ray.origin), toward / metre, range_m * metre);
-    return static_cast<double>(transmittance_of(lidar_air_, c).x);
+    return lidar_air_.transmittance(frame.point(ray.origin), toward / metre, range_m * metre);
+}
+
+/// Lengths are the world's: the ellipsoid's scale changes them by 0.3 %.
+Medium::Backscatter AtmosphereMedium::lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
+                                                        double to_m) const noexcept {
+    const Frame frame = frame_at(at, ray.time);
+    const auto [light, range_m] =
+        lidar_air_.backscattered(frame.point(ray.origin), normalized(frame.direction(ray.direction)), from_m, to_m);
+    return {light, range_m};
 }
 
 }  // namespace narpa

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "renderer/atmosphere/lidar_air.h"
 #include "renderer/atmosphere/ray_bundle.h"
 #include "renderer/light/medium.h"
 #include "renderer/scene/scene.h"
@@ -31,6 +32,10 @@ public:
                               double time) const noexcept override;
     [[nodiscard]] double lidar_transmittance(const BodyPoses& at, const Ray& ray,
                                              double range_m) const noexcept override;
+    [[nodiscard]] Backscatter lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
+                                                double to_m) const noexcept override;
+    [[nodiscard]] double most_lidar_backscatter_1_m() const noexcept override { return lidar_air_.most_1_m(); }
+    [[nodiscard]] int body() const noexcept override { return static_cast<int>(body_); }
 
     [[nodiscard]] const ScatteredLight& light() const { return light_; }
 
@@ -56,8 +61,7 @@ private:
     std::optional<Sun> sun_;
     ScatteredLight light_;
     std::unique_ptr<AirCells> cells_ = std::make_unique<AirCells>();  ///< what frames have integrated
-    Air lidar_air_;
-    PanelRule lidar_rule_;
+    LidarAir lidar_air_;
 };
 
 }  // namespace narpa

@@ -19,15 +19,6 @@ double mean(const Rgb& c) {
     return static_cast<double>(c.x + c.y + c.z) / 3;
 }
 
-/// Of a body's material point, world.
-Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point, double time) {
-    if (body < 0) return {};
-    const auto i = static_cast<std::size_t>(body);
-    const Motion& m = settings.motions[i];
-    const Rigid3 T = at.T_world_body_at(i, time);
-    return m.velocity_m_s + cross(T.q * m.rate_rad_s, point - T.t);
-}
-
 /// A shot on its way from mirror to mirror.
 struct Path {
     double range_m = 0, throughput = 1;
@@ -115,6 +106,15 @@ NARPA_EACH_ISA void take_to_world(const PoseLanes& T_world_mount, const Rigid3& 
 }
 
 }  // namespace
+
+Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point,
+                 double time) noexcept {
+    if (body < 0) return {};
+    const auto i = static_cast<std::size_t>(body);
+    const Motion& m = settings.motions[i];
+    const Rigid3 T = at.T_world_body_at(i, time);
+    return m.velocity_m_s + cross(T.q * m.rate_rad_s, point - T.t);
+}
 
 void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, RayBatch& beams) noexcept {
     PoseLanes T_world_mount;

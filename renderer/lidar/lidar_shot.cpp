@@ -43,8 +43,7 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
                    const Vec3& direction) {
     const Scene& scene = tracer.scene();
     const Material& m = scene.materials[static_cast<std::size_t>(hits.material[i])];
-    if (m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0)
-        return surface_at(tracer, at, hits[i], direction, 0);
+    if (has_more_than_colour(m)) return surface_at(tracer, at, hits[i], direction, 0);
     Surface s{.diffuse = m.diffuse,
               .specular = m.specular,
               .exponent = m.exponent,

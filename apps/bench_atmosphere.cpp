@@ -1,6 +1,9 @@
 // narpa bench atmosphere - shells, steps, tables and wavelengths of the air against their error and time.
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
+
 #include "apps/cli.h"
 #include "bench/air_error.h"
 
@@ -31,6 +34,33 @@ void print_rows(const std::vector<AirErrorRow>& rows, const char* setting, const
                         r.time_s * 1e6, 1e-3 * static_cast<double>(r.bytes), r.is_default ? "  default" : ""));
 }
 
+/// Root mean squares of the physical sky's difference from the path-traced one, and of the latter's own error, by
+/// turbidity and elevation: of the aureole and of the rest of the sky.
+void print_differences(const std::vector<SkyComparison>& rows) {
+    say("\nphysical over path-traced - 1, RMS (and the path-traced one's error)");
+    say(fmt::format("{:>9} {:>9} {:>20} {:>20}", "turbidity", "elevation", "aureole", "elsewhere"));
+    struct Sum {
+        double off = 0, error = 0;
+        int n = 0;
+        [[nodiscard]] std::string text() const {
+            return fmt::format("{:.1f} % ({:.1f} %)", 100 * std::sqrt(off / n), 100 * std::sqrt(error / n));
+        }
+    };
+    for (auto row = rows.begin(); row != rows.end();) {
+        std::array<Sum, 2> sums;
+        const SkyComparison& first = *row;
+        for (; row != rows.end() && row->turbidity == first.turbidity && row->elevation_deg == first.elevation_deg;
+             ++row) {
+            Sum& sum = sums[row->aureole ? 0 : 1];
+            sum.off += std::pow(row->physical / row->path_traced - 1, 2);
+            sum.error += std::pow(row->path_traced_error / row->path_traced, 2);
+            ++sum.n;
+        }
+        say(fmt::format("{:>9g} {:>9g} {:>20} {:>20}", first.turbidity, first.elevation_deg, sums[0].text(),
+                        sums[1].text()));
+    }
+}
+
 Outcome bench_skies(const AirBenchOptions& o) {
     Progress progress("measuring");
     const auto rows =
@@ -48,10 +78,12 @@ Outcome bench_skies(const AirBenchOptions& o) {
                        {"zenith_deg", c.zenith_deg},
                        {"azimuth_deg", c.azimuth_deg},
                        {"physical", c.physical},
+                       {"aureole", c.aureole},
                        {"path_traced", c.path_traced},
                        {"path_traced_error", c.path_traced_error},
                        {"hosek_wilkie", c.hosek_wilkie}});
     }
+    print_differences(rows);
     return nlohmann::json{{"passed", true}, {"skies", out}};
 }
 
@@ -71,7 +103,7 @@ Outcome bench_atmosphere(const AirBenchOptions& o) {
     print_rows(e.steps, "steps", "us a ray");
     print_rows(e.tables, "heights of the tables", "CPU us to make");
     print_rows(e.bands, "wavelengths a band", "us a ray");
-    say("\ntiles of 8 x 8 pixels by interpolation, against each ray by itself");
+    say("\n16 tiles of 8 x 8 pixels by interpolation, against each ray by itself");
     print_rows(e.bundles, "tolerance, 1e-4", "us a ray");
     return nlohmann::json{{"passed", true},
                           {"tiles", air_rows(e.bundles, "tolerance_1e4")},

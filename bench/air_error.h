@@ -33,6 +33,7 @@ struct AirErrors {
 struct SkyComparison {
     double turbidity = 0, elevation_deg = 0, zenith_deg = 0, azimuth_deg = 0;
     double physical = 0, hosek_wilkie = 0, path_traced = 0, path_traced_error = 0;
+    bool aureole = false;  ///< within 9 degrees of the Sun
 };
 [[nodiscard]] std::vector<SkyComparison> compare_skies(std::size_t paths,
                                                        const std::function<void(const std::string&)>& progress);

@@ -286,8 +286,7 @@ std::uint64_t Loop::render(const Camera& camera, const RawAim& aim, const FrameS
 
 Result<ReferenceLoop> reference_loop(const Scene& scene, const BodyPoses& at) {
     for (const Material& m : scene.materials)
-        if (m.kind > Material::Kind::phong || m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 ||
-            m.height_texture >= 0)
+        if (m.kind > Material::Kind::phong || is_textured(m))
             return Error{"material \"" + m.name + "\", expected Lambert or Phong without textures", scene.file};
     for (const Mesh& m : scene.meshes)
         if (!m.normals.empty())

@@ -33,7 +33,8 @@ std::string plot_program() {
     return program_beside("narpa-plot");
 }
 
-/// Runs a program at the usual priority, its standard output on our standard error. Returns its exit status.
+/// Runs a program at the usual priority, its standard output on our standard error, in a process group of its own:
+/// a request to stop that is sent to ours lets it end its picture. Returns its exit status.
 int run_program(std::vector<std::string> arguments) {
     std::vector<char*> argv;
     argv.reserve(arguments.size() + 1);
@@ -50,7 +51,8 @@ int run_program(std::vector<std::string> arguments) {
     posix_spawnattr_setschedpolicy(&attributes, SCHED_OTHER);
     posix_spawnattr_setschedparam(&attributes, &usual);
     posix_spawnattr_setsigmask(&attributes, &no_signals);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSCHEDULER | POSIX_SPAWN_SETSIGMASK);
+    posix_spawnattr_setflags(&attributes,
+                             POSIX_SPAWN_SETSCHEDULER | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
     pid_t child = 0;
     const int failed = posix_spawnp(&child, argv[0], &files, &attributes, argv.data(), environ);
     posix_spawnattr_destroy(&attributes);

@@ -48,10 +48,23 @@ struct AttitudeReport {
     Vec3 rate_rad_s{};  ///< body axes, against inertial space
 };
 
-/// What the navigation is doing.
-enum class GuidancePhase : std::uint8_t { moving, holding, closing, docked, retreating, done, landed };
-inline constexpr std::array<std::string_view, 7> kGuidancePhases{"moving",     "holding", "closing", "docked",
-                                                                 "retreating", "done",    "landed"};
+/// What the navigation is doing. A powered descent has the phases of Apollo's (F. Bennett, NASA TN D-6846, 1972):
+/// braking to the first target, an approach to each further one, the terminal descent to the ground.
+enum class GuidancePhase : std::uint8_t {
+    moving,
+    holding,
+    closing,
+    docked,
+    retreating,
+    done,
+    landed,
+    braking,
+    approach,
+    terminal_descent,
+};
+inline constexpr std::array<std::string_view, 10> kGuidancePhases{
+    "moving", "holding", "closing", "docked",   "retreating",
+    "done",   "landed",  "braking", "approach", "terminal_descent"};
 
 /// Why the navigation aborts.
 enum class AbortReason : std::uint8_t { none, lost, uncertain, off_reference, bounced };

@@ -239,11 +239,6 @@ void UsbIpServer::wake() noexcept {
     ::eventfd_write(signal_.get(), 1);
 }
 
-void UsbIpServer::unplug() noexcept {
-    unplugging_.store(true, std::memory_order_release);
-    wake();
-}
-
 UsbIpCounters UsbIpServer::counters() const noexcept {
     return {plugged_, transfers_, unlinked_, refused_};
 }
@@ -262,11 +257,9 @@ void UsbIpServer::run() noexcept {
                    std::max<std::int64_t>(0, until_ns - monotonic_ns()));
         eventfd_t count = 0;
         if (fds[0].revents != 0) ::eventfd_read(signal_.get(), &count);
-        const bool unplugs = unplugging_.exchange(false, std::memory_order_acquire);
         try {
             for (std::size_t i = connections_.size(); i-- > 0;)
-                if ((unplugs && connections_[i]->imported()) || !connections_[i]->proceed(fds[2 + i].revents))
-                    drop(i);
+                if (!connections_[i]->proceed(fds[2 + i].revents)) drop(i);
             if (fds[1].revents != 0) accept_one();
         } catch (const std::exception&) {  // no memory left
             while (!connections_.empty()) drop(connections_.size() - 1);

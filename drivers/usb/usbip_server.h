@@ -47,8 +47,6 @@ public:
     [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
     /// Transfers that were pending may go on now. From any thread; neither waits nor allocates.
     void wake() noexcept;
-    /// Ends the connection of the host that has the device: the cable is pulled.
-    void unplug() noexcept;
     [[nodiscard]] UsbIpCounters counters() const noexcept;
 
 private:
@@ -65,7 +63,7 @@ private:
     UsbIpDevice identity_;
     UsbDevice& device_;
     std::vector<std::unique_ptr<Connection>> connections_;
-    std::atomic<bool> ending_{false}, unplugging_{false};
+    std::atomic<bool> ending_{false};
     std::atomic<std::uint64_t> plugged_{0}, transfers_{0}, unlinked_{0}, refused_{0};
     std::thread thread_;
 };

@@ -156,7 +156,14 @@ void Guidance::begin_leg(const Vec3& from_m, double t_s) {
                               kShareOfThrust * thrust_m_s2_);
     }
     leg_from_s_ = t_s;
-    phase_ = leg.contact ? GuidancePhase::closing : GuidancePhase::moving;
+    phase_ = phase_of(leg_);
+}
+
+GuidancePhase Guidance::phase_of(std::size_t leg) const {
+    const bool descent_before = leg > 0 && legs_[leg - 1].descent_s.has_value();
+    if (legs_[leg].descent_s) return descent_before ? GuidancePhase::approach : GuidancePhase::braking;
+    if (legs_[leg].contact) return descent_before ? GuidancePhase::terminal_descent : GuidancePhase::closing;
+    return GuidancePhase::moving;
 }
 
 void Guidance::step(const GuidanceInput& input) {

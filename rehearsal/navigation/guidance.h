@@ -105,11 +105,12 @@ private:
     [[nodiscard]] AbortReason reason_to_abort(const GuidanceInput& input) const;
     void retreat(const GuidanceInput& input, AbortReason reason);
     void begin_leg(const Vec3& from_m, double t_s);
+    [[nodiscard]] GuidancePhase phase_of(std::size_t leg) const;
     void fly(const GuidanceInput& input);
     void plan_descent(const GuidanceInput& input);
     [[nodiscard]] double to_go_s(double t_s) const { return leg_from_s_ + *legs_[leg_].descent_s - t_s; }
     [[nodiscard]] bool descends() const {
-        return phase_ == GuidancePhase::moving && legs_[leg_].descent_s.has_value();
+        return phase_ == GuidancePhase::braking || phase_ == GuidancePhase::approach;
     }
 
     std::vector<Leg> legs_;

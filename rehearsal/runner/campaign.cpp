@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <thread>
+#include <utility>
 
 #include "base/program_beside.h"
 #include "rehearsal/runner/child_process.h"
@@ -66,6 +67,7 @@ struct Running {
     std::size_t run;
     ChildProcess child;
     std::string log;
+    bool asked_to_stop = false;
 };
 
 }  // namespace
@@ -95,7 +97,7 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
             "many runs with a program \"none\" that you start: expected a command that starts it for each run"};
     const auto scenario = read_scenario(o.run.scenario);
     if (!scenario) return scenario.error();
-    const auto texts = scenario_texts(scenario->file, scenario->scene);
+    const auto texts = scenario_texts(*scenario);
     if (!texts) return texts.error();
     const auto lock = claim_folder(o.run.folder, "runs");
     if (!lock) return lock.error();
@@ -145,8 +147,9 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
             shown = now;
             show_progress();
         }
-        if (stop)
-            for (Running& r : running) r.child.terminate();
+        // Once each: a second request makes a run exit before it has written what it has.
+        for (Running& r : running)
+            if (stop && !std::exchange(r.asked_to_stop, true)) r.child.terminate();
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
 

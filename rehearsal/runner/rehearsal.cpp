@@ -79,10 +79,10 @@ private:
     // --- Folder and sensor links ---
 
     /// What a run leaves in its folder.
-    static constexpr std::array kFiles{"emulator",       "dynamics",  "navigation",     "emulator.log",
-                                       "dynamics.log",   "charts",    "navigation.log", "charts.json",
-                                       "result.json",    "junit.xml", "index.html",     "scenario.toml",
-                                       "rehearsal.json", "scene.toml"};
+    static constexpr std::array kFiles{"emulator",       "dynamics",   "navigation",     "emulator.log",
+                                       "dynamics.log",   "charts",     "navigation.log", "charts.json",
+                                       "result.json",    "junit.xml",  "index.html",     "scenario.toml",
+                                       "rehearsal.json", "scene.toml", "map.toml"};
     /// Subfolders: of an earlier run's files until all programs have started, and of a start that failed.
     static constexpr const char *kEarlier = "earlier", *kFailedStart = "failed-start";
 
@@ -128,10 +128,12 @@ private:
             fs::create_directories(in_folder(name), failed);
         // The mark of a rehearsal's folder, even if this one gets no further.
         if (Status good = write_text(in_folder("rehearsal.json"), "{}\n"); !good) return good;
-        const auto texts = scenario_texts(scenario_.file, scenario_.scene);
+        const auto texts = scenario_texts(scenario_);
         if (!texts) return texts.error();
         hash_ = texts->hash;
         if (Status good = write_text(in_folder("scenario.toml"), texts->scenario); !good) return good;
+        if (!texts->map.empty())
+            if (Status good = write_text(in_folder("map.toml"), texts->map); !good) return good;
         return write_text(in_folder("scene.toml"), texts->scene);
     }
 

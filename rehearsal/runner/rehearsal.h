@@ -50,8 +50,8 @@ struct Console {
 
 /// Errors: bad input (status 2), a missing device or program (3), programs that did not get ready; an earlier run's
 /// files are then kept, and those of the failed start are in failed-start/. Later failures are part of the verdict.
-/// Leaves in the folder: scenario.toml and scene.toml as read, emulator/, dynamics/, navigation/ and their .log
-/// files, rehearsal.json, result.json, junit.xml, index.html.
+/// Leaves in the folder: scenario.toml, scene.toml and map.toml as read, emulator/, dynamics/, navigation/ and
+/// their .log files, rehearsal.json, result.json, junit.xml, index.html.
 Result<RehearsalResult> run_rehearsal(const RehearsalOptions& options, const Console& console,
                                       const StopFlag& stop);
 

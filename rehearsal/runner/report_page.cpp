@@ -212,11 +212,12 @@ std::string pictures(const Run& run) {
 
 /// Links to what lies beside the page.
 std::string logs(const Run& run) {
-    constexpr std::array<std::pair<const char*, const char*>, 13> kFiles{
+    constexpr std::array<std::pair<const char*, const char*>, 14> kFiles{
         {{"result.json", "the verdict"},
          {"junit.xml", "the same for CI"},
          {"scenario.toml", "the scenario with all that it is based on"},
          {"scene.toml", "the scene, likewise"},
+         {"map.toml", "the scene as the navigation knows it"},
          {"charts.json", "the data of the charts"},
          {"emulator/can.log", "the CAN bus, as candump writes it"},
          {"emulator/run.json", "settings of the emulator"},

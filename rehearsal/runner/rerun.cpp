@@ -142,7 +142,7 @@ Result<json> rerun(const RerunOptions& options, const Console& console, const St
     if (!navigation) return navigation.error();
     const auto scenario = read_scenario((*record)["scenario"].get<std::string>());
     if (!scenario) return scenario.error();
-    const auto texts = scenario_texts(scenario->file, scenario->scene);
+    const auto texts = scenario_texts(*scenario);
     if (!texts) return texts.error();
     if (texts->hash != (*record)["scenario_hash"])
         return Error{

@@ -26,7 +26,7 @@ std::uint64_t fnv1a(std::string_view text, std::uint64_t hash = 0xcbf29ce4842223
 
 }  // namespace
 
-Result<ScenarioTexts> scenario_texts(const std::string& scenario_file, const std::string& scene_file) {
+Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
     ScenarioTexts texts;
     const auto read = [](const std::string& file, const char* what, std::string& out) -> Status {
         try {
@@ -41,9 +41,11 @@ Result<ScenarioTexts> scenario_texts(const std::string& scenario_file, const std
                          static_cast<int>(e.source().begin.column)};
         }
     };
-    if (Status good = read(scenario_file, "scenario", texts.scenario); !good) return good.error();
-    if (Status good = read(scene_file, "scene", texts.scene); !good) return good.error();
-    texts.hash = fmt::format("{:016x}", fnv1a(texts.scene, fnv1a(texts.scenario)));
+    if (Status good = read(scenario.file, "scenario", texts.scenario); !good) return good.error();
+    if (Status good = read(scenario.scene, "scene", texts.scene); !good) return good.error();
+    if (const std::string& map = scenario.navigation.scene; !map.empty())
+        if (Status good = read(map, "scene", texts.map); !good) return good.error();
+    texts.hash = fmt::format("{:016x}", fnv1a(texts.map, fnv1a(texts.scene, fnv1a(texts.scenario))));
     return texts;
 }
 

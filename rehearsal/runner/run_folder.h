@@ -6,6 +6,7 @@
 
 #include "base/result.h"
 #include "drivers/descriptor.h"
+#include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
 
@@ -14,11 +15,12 @@ Result<Descriptor> lock_folder(const std::string& folder);
 /// The same for a folder that is empty or has `mark` in it; an Error where it holds other files.
 Result<Descriptor> claim_folder(const std::string& folder, const char* mark);
 
-/// Scenario and scene with all that they are based on, as one TOML text each, and 16 hexadecimal digits of both.
+/// Scenario, scene and the navigation's map with all that they are based on, as one TOML text each, and 16
+/// hexadecimal digits of all of it. Without a map its text is empty.
 struct ScenarioTexts {
-    std::string scenario, scene, hash;
+    std::string scenario, scene, map, hash;
 };
-Result<ScenarioTexts> scenario_texts(const std::string& scenario_file, const std::string& scene_file);
+Result<ScenarioTexts> scenario_texts(const Scenario& scenario);
 
 Status write_text(const std::string& file, std::string_view text);
 /// An XML document of test suites.

@@ -98,6 +98,13 @@ AirCoefficients coefficients(const AirDescription& air, double wavelength_m) {
     return c;
 }
 
+AirBackscatter backscatter(const AirDescription& air, const AirCoefficients& at) {
+    const double ratio = air.aerosol_lidar_ratio_sr;
+    return {at.gas_scattering * rayleigh_phase(-1),
+            ratio > 0 ? at.aerosol_extinction / ratio
+                      : at.aerosol_scattering * henyey_greenstein_phase(-1, at.asymmetry)};
+}
+
 namespace {
 
 /// Over the wavelengths that a node stands for: ozone's absorption has more structure than the nodes resolve.

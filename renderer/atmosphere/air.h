@@ -20,6 +20,12 @@ struct AirCoefficients {
 };
 [[nodiscard]] AirCoefficients coefficients(const AirDescription& air, double wavelength_m);
 
+/// Scattering straight back where the density is that at the surface, 1/(m sr).
+struct AirBackscatter {
+    double gas = 0, aerosol = 0;
+};
+[[nodiscard]] AirBackscatter backscatter(const AirDescription& air, const AirCoefficients& at);
+
 /// A wavelength that stands for a part of one of the camera's bands (solar_bands.h).
 struct SpectralNode {
     double wavelength_m = 0;

@@ -17,8 +17,10 @@ struct AirDescription {
     double aerosol_height_m = 1200;
     /// Earth: optical depth of gas and aerosol at 550 nm over that of gas alone, so 1 is clean air.
     double turbidity = 3;
-    double aerosol_depth = 0;    ///< vertical optical depth at 550 nm; Earth's follows from the turbidity
-    double ozone_du = 300;       ///< column, Dobson units; Earth alone
+    double aerosol_depth = 0;  ///< vertical optical depth at 550 nm; Earth's follows from the turbidity
+    double ozone_du = 300;     ///< column, Dobson units; Earth alone
+    /// Extinction over backscatter, at a LiDAR's wavelength; 0: that of the phase function at 180 degrees.
+    double aerosol_lidar_ratio_sr = 0;
     double ground_albedo = 0.1;  ///< of the surface that lights the air from below
 };
 [[nodiscard]] AirDescription earth_air(double turbidity = 3);

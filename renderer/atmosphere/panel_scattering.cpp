@@ -33,6 +33,68 @@ inline Place place_of(const AirTables& t, const AirPanel& p, std::size_t k, cons
     return {radius, std::sqrt(h * (2 * t.ground_m + h)), std::min(1.0f, std::max(-1.0f, sun))};
 }
 
+/// The aerosol's phase function of a ray towards the Sun: what is kept of it when it is cut off at kMaxDegree, and
+/// the forward peak, f of it. Light that the peak has scattered n times has the peak folded n times with itself.
+struct ForwardPeak {
+    static constexpr std::size_t kMostFolds = 5, kTerms = 20;
+    Air::Spectrum rest{};  ///< times scattering
+    Air::Spectrum peak{};  ///< f times scattering: 1/m
+    std::array<Air::Spectrum, kMostFolds> folded{};
+};
+
+/// Legendre polynomials over 4 pi, times 2 l + 1.
+using LegendreTerms = std::array<float, kMaxDegree + 1 + ForwardPeak::kTerms>;
+inline void legendre_terms(float nu, LegendreTerms& out) noexcept {
+    float before = 0, legendre = 1;
+    for (std::size_t degree = 0; degree < out.size(); ++degree) {
+        const auto n = static_cast<float>(degree);
+        out[degree] = kInv4Pi * (2 * n + 1) * legendre;
+        const float next = ((2 * n + 1) * nu * legendre - n * before) / (n + 1);
+        before = legendre, legendre = next;
+    }
+}
+
+/// Moments of the peak: 1 up to kMaxDegree, then g^k. The first is what the phase function has beyond the rest; of
+/// the others the sum converges.
+inline void split(const Air& air, float nu, std::size_t lanes, ForwardPeak& out) noexcept {
+    LegendreTerms terms;
+    legendre_terms(nu, terms);
+    float kept = 0;
+    for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
+        kept += terms[degree];
+        for (std::size_t l = 0; l < lanes; ++l)
+            out.rest[l] += air.scaled_aerosol[l] * air.moment[degree][l] * terms[degree];
+    }
+    for (std::size_t l = 0; l < lanes; ++l) {
+        const float g = air.asymmetry[l], s = 1 + g * g - 2 * g * nu;
+        out.peak[l] = air.aerosol[l] - air.scaled_aerosol[l];
+        const float all = air.aerosol[l] * kInv4Pi * (1 - g * g) / (s * std::sqrt(s));
+        out.folded[0][l] = (all - out.rest[l]) / std::max(out.peak[l], 1e-30f);
+        float power = g;
+        for (std::size_t n = 1; n < ForwardPeak::kMostFolds; ++n) {
+            power *= g;
+            float sum = 0;
+            for (std::size_t k = ForwardPeak::kTerms; k-- > 0;) sum = sum * power + terms[kMaxDegree + 1 + k];
+            out.folded[n][l] = kept + sum;
+        }
+    }
+}
+
+/// Mean of the folded peaks for light that is scattered into the ray once at least: `a` optical depth of the peak
+/// before and after. Poisson's distribution; more folds count as the most.
+inline float mean_fold(const ForwardPeak& p, std::size_t l, float a) noexcept {
+    constexpr float kThin = 1e-3f;
+    if (a < kThin) return p.folded[0][l];
+    const float none = exp_of_negative(-a);
+    float weight = none, left = 1 - none, sum = 0;
+    for (std::size_t n = 0; n + 1 < ForwardPeak::kMostFolds; ++n) {
+        weight *= a / static_cast<float>(n + 1);
+        left -= weight;
+        sum += weight * p.folded[n][l];
+    }
+    return (sum + left * p.folded[ForwardPeak::kMostFolds - 1][l]) / a;
+}
+
 }  // namespace
 
 NARPA_EACH_ISA void attenuate(const Air& air, const AirPanel& p, PanelTransmittance& through) noexcept {
@@ -48,24 +110,11 @@ NARPA_EACH_ISA void attenuate(const Air& air, const AirPanel& p, PanelTransmitta
 NARPA_EACH_ISA void add_once(const AirTables& t, const Air& air, const AirPanel& p,
                              const PanelTransmittance& through, const AirRay& ray, Air::Spectrum& out) noexcept {
     const std::size_t lanes = t.lanes;
-    Air::Spectrum sum = out, aerosol_once;
+    Air::Spectrum sum = out;
     const float nu = ray.sun_nu, gas_phase = 0.0596831037f * (1 + nu * nu);
-    if (ray.exact) {
-        for (std::size_t l = 0; l < lanes; ++l) {
-            const float g = air.asymmetry[l], s = 1 + g * g - 2 * g * nu;
-            aerosol_once[l] = air.aerosol[l] * kInv4Pi * (1 - g * g) / (s * std::sqrt(s));
-        }
-    } else {
-        aerosol_once.fill(0);
-        float before = 0, legendre = 1;
-        for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
-            const auto n = static_cast<float>(degree);
-            for (std::size_t l = 0; l < lanes; ++l)
-                aerosol_once[l] += air.scaled_aerosol[l] * kInv4Pi * (2 * n + 1) * air.moment[degree][l] * legendre;
-            const float next = ((2 * n + 1) * nu * legendre - n * before) / (n + 1);
-            before = legendre, legendre = next;
-        }
-    }
+    ForwardPeak phase;
+    split(air, nu, lanes, phase);
+    if (!ray.exact) phase.peak.fill(0);
     for (std::size_t k = 0; k < p.n; ++k) {
         const Place at = place_of(t, p, k, ray);
         const SunBeam beam = t.sun_beam(at.radius, at.horizon, at.sun);
@@ -75,7 +124,9 @@ NARPA_EACH_ISA void add_once(const AirTables& t, const Air& air, const AirPanel&
         for (std::size_t block = 0; block < lanes; block += kBlock)
             for (std::size_t l = block; l < block + kBlock; ++l) {
                 const float depth = air.gas[l] * cg + air.scaled_extinction[l] * ca + air.ozone[l] * co;
-                sum[l] += (air.gas[l] * gas + aerosol_once[l] * aerosol) * through[k][l] * exp_of_negative(-depth);
+                const float peak = phase.peak[l] * mean_fold(phase, l, phase.peak[l] * (ca + p.aerosol_before[k]));
+                sum[l] +=
+                    (air.gas[l] * gas + (phase.rest[l] + peak) * aerosol) * through[k][l] * exp_of_negative(-depth);
             }
     }
     out = sum;

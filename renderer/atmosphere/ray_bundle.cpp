@@ -1,22 +1,57 @@
 #include "renderer/atmosphere/ray_bundle.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+
+#include "base/each_isa.h"
+#include "renderer/atmosphere/fast_exp.h"
 
 namespace narpa {
 namespace {
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-/// Bundles of fewer rays are not worth the corners.
+/// Bundles of fewer rays are not worth the nodes; nor are cells.
 constexpr std::size_t kFewest = 12;
-constexpr int kMostDivisions = 1;
+constexpr double kFewestInCell = 26;
+constexpr int kMostHalvings = 24;
+/// Undivided cells: their number along a tangent of one, along an octave of ranges and of tangents above the
+/// horizon, from the tangent at which the air begins to fall in inverse proportion; and the height of layers.
+constexpr double kPerTangent = 8, kPerRangeOctave = 2, kPerTangentOctave = 4, kLowTangent = 0.04, kLayer_m = 256;
 /// Ends below this height above the ground, and not too far below the ground, count as there.
 constexpr double kNearGround_m = 10'000, kMostBelowGround_m = 500;
-/// Densities of aerosol at the ends that differ by less, as parts of that on the ground, are one.
-constexpr double kLevel = 1e-3;
+/// Ends so near to a layer stand on it.
+constexpr double kOnLayer_m = 0.5;
 /// Of the brightest band, and of what passes a vacuum: what is fainter need not agree as well.
-constexpr float kFaintest = 1e-3f;
+constexpr float kFaintest = 1e-3f, kFaintestThrough = 1e-2f;
+
+/// The binary logarithm, with a straight line from each power of two to the next; its inverse.
+constexpr std::int64_t kOne = 1023LL << 52;
+double octaves(double x) noexcept {
+    return static_cast<double>(std::bit_cast<std::int64_t>(x) - kOne) * 0x1p-52;
+}
+double from_octaves(double n) noexcept {
+    return std::bit_cast<double>(static_cast<std::int64_t>(n * 0x1p52) + kOne);
+}
+
+/// v of a tangent above the horizon, negative below, and its inverse.
+double from_tangent(double x) noexcept {
+    return std::copysign(kPerTangentOctave * octaves(1 + std::abs(x) / kLowTangent), x);
+}
+double to_tangent(double v) noexcept {
+    return std::copysign(kLowTangent * (from_octaves(std::abs(v) / kPerTangentOctave) - 1), v);
+}
+
+std::int32_t floor_of(double x) noexcept {
+    const auto i = static_cast<std::int32_t>(x);
+    return i - (x < i ? 1 : 0);
+}
+
+/// Steps of a cell's side in that of an undivided one.
+double steps(std::int8_t halvings) noexcept {
+    return static_cast<double>(1 << halvings);
+}
 
 bool agree(const Rgb& a, const Rgb& b, float tolerance, float floor) noexcept {
     for (int band = 0; band < 3; ++band)
@@ -26,6 +61,66 @@ bool agree(const Rgb& a, const Rgb& b, float tolerance, float floor) noexcept {
 
 float brightest(const Rgb& light) noexcept {
     return std::max({light.x, light.y, light.z});
+}
+
+/// Of three equally spaced nodes, in the parabola through them.
+std::array<float, 3> parabola(float x) noexcept {
+    return {(1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)};
+}
+
+/// A place in a cell, 0 to 1 along its sides.
+struct InCell {
+    float u, v, layer;
+};
+using PaddedLight = std::array<float, 8>;
+
+/// `nodes`: those of a cell.
+NARPA_EACH_ISA void blend(const PaddedLight* __restrict nodes, std::size_t layers, const InCell& at,
+                          PaddedLight& __restrict out) noexcept {
+    const std::array<float, 3> wu = parabola(at.u), wv = parabola(at.v);
+    const std::array<float, 2> wl{layers == 2 ? 1 - at.layer : 1, at.layer};
+    PaddedLight sum{};
+    for (std::size_t layer = 0; layer < layers; ++layer)
+        for (std::size_t j = 0; j < 3; ++j)
+            for (std::size_t i = 0; i < 3; ++i) {
+                const float w = wl[layer] * wv[j] * wu[i];
+                const PaddedLight& node = nodes[layer * AirCell::kLayer + 3 * j + i];
+                for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += w * node[k];
+            }
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+        const float x = std::max(sum[k], 0.0f);
+        out[k] = k < 3 ? exp_of_negative(-x) : x;
+    }
+}
+
+/// A cell with its nodes as blend() wants them: the optical depth in place of the transmittance, which falls by
+/// orders of magnitude towards the horizon.
+class Blender {
+public:
+    Blender(const AirCell::Nodes& nodes, std::size_t layers) : layers_(layers) {
+        for (std::size_t i = 0; i < layers * AirCell::kLayer; ++i) {
+            const auto& [t, s] = nodes[i];
+            nodes_[i] = {depth(t.x), depth(t.y), depth(t.z), s.x, s.y, s.z, 0, 0};
+        }
+    }
+    [[nodiscard]] AirLight operator()(const InCell& at) const noexcept {
+        PaddedLight x;
+        blend(nodes_.data(), layers_, at, x);
+        return {{x[0], x[1], x[2]}, {x[3], x[4], x[5]}};
+    }
+
+private:
+    [[nodiscard]] static float depth(float transmittance) noexcept {
+        return -std::log(std::max(transmittance, std::numeric_limits<float>::min()));
+    }
+
+    std::size_t layers_;
+    std::array<PaddedLight, AirCell::kMostNodes> nodes_;
+};
+
+std::uint64_t mixed(std::uint64_t hash, const Vec3& v) noexcept {
+    for (const double x : {v.x, v.y, v.z}) hash = narpa::mixed(hash, std::bit_cast<std::uint64_t>(x));
+    return hash;
 }
 
 }  // namespace
@@ -38,167 +133,219 @@ AirLight air_along(const ScatteredLight& light, const Vec3& origin, const Vec3& 
     return {transmittance_of(air, s.columns), bands_of(air, s.in_scattering)};
 }
 
-/// Values on a grid over a box, 0 to 1 in each dimension: linear across, linear or quadratic upright, linear in
-/// density.
-struct RayBundle::Grid {
-    std::size_t n_upright = 2, n_density = 1;
-    std::array<std::array<std::array<AirLight, 2>, 3>, 2> value;  ///< [density][upright][across]
-
-    [[nodiscard]] AirLight at(const Place& share) const noexcept {
-        const auto u = static_cast<float>(share[0]), v = static_cast<float>(share[1]),
-                   w = static_cast<float>(share[2]);
-        const std::array<float, 2> across{1 - u, u}, density{n_density == 2 ? 1 - w : 1, w};
-        const std::array<float, 3> upright =
-            n_upright == 2 ? std::array{1 - v, v, 0.0f}
-                           : std::array{(1 - v) * (1 - 2 * v), 4 * v * (1 - v), v * (2 * v - 1)};
-        AirLight sum{{}, {}};
-        for (std::size_t i = 0; i < n_density; ++i)
-            for (std::size_t j = 0; j < n_upright; ++j)
-                for (std::size_t k = 0; k < 2; ++k) {
-                    const float weight = density[i] * upright[j] * across[k];
-                    sum.transmittance += weight * value[i][j][k].transmittance;
-                    sum.in_scattering += weight * value[i][j][k].in_scattering;
-                }
-        return sum;
-    }
-};
-
-RayBundle::RayBundle(const ScatteredLight& light, const Vec3& origin, const Vec3* to_sun, float tolerance) noexcept
-    : light_(light), origin_(origin), to_sun_(to_sun), tolerance_(tolerance) {}
+RayBundle::RayBundle(const ScatteredLight& light, const Vec3& origin, const Vec3* to_sun, AirCells& cells,
+                     float tolerance) noexcept
+    : light_(light), origin_(origin), to_sun_(to_sun), cells_(cells), tolerance_(tolerance) {}
 
 void RayBundle::trace(std::span<const Ray> rays, std::span<AirLight> out) noexcept {
     rays_ = rays, out_ = out;
-    std::array<Index, kMost> order;
-    const std::span<Index> all(order.data(), rays.size());
-    for (std::size_t i = 0; i < rays.size(); ++i) all[i] = static_cast<Index>(i);
-    const bool narrow = tolerance_ > 0 && rays.size() >= kFewest;
-    if (narrow) aim();
-    for (const Index i : all) {
-        end_[i] = End::elsewhere;
-        if (narrow) place(i);
-    }
-    Index* from = all.data();
-    Index* const last = from + all.size();
-    for (const End end : {End::space, End::ground, End::elsewhere}) {
-        Index* const to = std::partition(from, last, [&](Index i) { return end_[i] == end; });
-        trace(std::span(from, to), end, 0);
-        from = to;
-    }
-}
-
-/// The axes: light varies most with elevation.
-void RayBundle::aim() noexcept {
-    Vec3 sum{};
-    for (const Ray& ray : rays_) sum += ray.direction;
-    axis_ = normalized(sum);
-    const Vec3 up = normalized(origin_);
-    Vec3 across = cross(axis_, up);
-    if (norm(across) < 1e-3) across = cross(axis_, std::abs(axis_.x) < 0.5 ? Vec3{1, 0, 0} : Vec3{0, 1, 0});
-    across_ = normalized(across);
-    upright_ = cross(across_, axis_);
-}
-
-void RayBundle::place(Index i) noexcept {
-    const auto& [direction, range_m] = rays_[i];
-    const double along = dot(direction, axis_);
-    if (!(along > 0.5)) return;
-    place_[i] = {dot(direction, across_) / along, dot(direction, upright_) / along, 0};
-    if (range_m == kEndless) {
-        end_[i] = End::space;
+    const int halvings = rays.size() < kFewest || tolerance_ <= 0 ? -1 : most_halvings();
+    if (halvings < 0) {
+        for (std::size_t i = 0; i < rays.size(); ++i) out[i] = integrate(rays[i].direction, rays[i].range_m);
         return;
     }
-    const Vec3 to = origin_ + range_m * direction;
-    const double r = norm(to);
-    const double height = r - light_.air().ground_radius_m();
-    const bool falls = dot(to, direction) < 0;
-    place_[i][2] = std::exp(-height / light_.air().description().aerosol_height_m);
-    if (r >= light_.air().top_radius_m() && !falls)
-        end_[i] = End::space;
-    else if (falls && height > -kMostBelowGround_m && height < kNearGround_m)
-        end_[i] = End::ground;
+    aim();
+    std::array<Index, kMost> order;
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        place(i);
+        if (place_[i].end == End::elsewhere)
+            out[i] = integrate(rays[i].direction, rays[i].range_m);
+        else
+            order[n++] = static_cast<Index>(i);
+    }
+    trace(std::span(order.data(), n), {}, halvings);
 }
 
-void RayBundle::trace(std::span<Index> set, End end, int divisions) noexcept {
-    if (set.size() >= kFewest && end != End::elsewhere) {
-        const Box box = bounds(set);
-        if (interpolate(set, end, box)) return;
-        if (divisions < kMostDivisions) {
-            const double middle = 0.5 * (box.low[1] + box.high[1]);
-            Index* const upper =
-                std::partition(set.data(), set.data() + set.size(), [&](Index i) { return place_[i][1] < middle; });
-            trace(std::span(set.data(), upper), end, divisions + 1);
-            trace(std::span(upper, set.data() + set.size()), end, divisions + 1);
-            return;
+/// Until a cell among bundles like this one holds few rays; -1: it does at first.
+int RayBundle::most_halvings() const noexcept {
+    Vec3 low = rays_.front().direction, high = low;
+    for (const Ray& ray : rays_) {
+        const Vec3& d = ray.direction;
+        low = {std::min(low.x, d.x), std::min(low.y, d.y), std::min(low.z, d.z)};
+        high = {std::max(high.x, d.x), std::max(high.y, d.y), std::max(high.z, d.z)};
+    }
+    const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z, 1e-9}) * kPerTangent;
+    const double rays = static_cast<double>(rays_.size()) / (extent * extent);
+    return static_cast<int>(std::clamp(std::floor(std::log2(rays / kFewestInCell)), -1.0, double{kMostHalvings}));
+}
+
+/// The axes, and the part of keys that is the same for all cells.
+void RayBundle::aim() noexcept {
+    up_ = normalized(origin_);
+    Vec3 front = to_sun_ != nullptr ? *to_sun_ - dot(*to_sun_, up_) * up_ : Vec3{};
+    if (norm(front) < 1e-6) front = cross(up_, std::abs(up_.x) < 0.5 ? Vec3{1, 0, 0} : Vec3{0, 1, 0});
+    front_ = normalized(front);
+    left_ = cross(up_, front_);
+    const double sine = std::min(1.0, light_.air().ground_radius_m() / norm(origin_));
+    horizon_ = std::max(-1.0, -std::sqrt(1 - sine * sine) / sine);
+    seed_ = mixed(0, origin_);
+    if (to_sun_ != nullptr) seed_ = mixed(seed_, *to_sun_);
+}
+
+void RayBundle::place(std::size_t i) noexcept {
+    const auto& [direction, range_m] = rays_[i];
+    Place& p = place_[i];
+    p.layer = 0;
+    p.end = End::space;
+    if (range_m != kEndless) {
+        const Vec3 to = origin_ + range_m * direction;
+        const double r = norm(to), height_m = r - light_.air().ground_radius_m();
+        const bool falls = dot(to, direction) < 0;
+        if (r < light_.air().top_radius_m() || falls) {
+            p.layer = height_m / kLayer_m;
+            p.end =
+                falls && height_m > -kMostBelowGround_m && height_m < kNearGround_m ? End::ground : End::elsewhere;
         }
     }
-    for (const Index i : set) out_[i] = integrate(rays_[i].direction, rays_[i].range_m);
+    const double x = dot(direction, front_), y = dot(direction, left_), z = dot(direction, up_);
+    const double level2 = x * x + y * y;
+    if (z * z > level2) {
+        p.chart = z > 0 ? Chart::zenith : Chart::nadir;
+        p.u = kPerTangent * x / std::abs(z), p.v = kPerTangent * y / std::abs(z);
+        return;
+    }
+    const bool along = std::abs(x) >= std::abs(y);
+    p.chart = along ? (x > 0 ? Chart::front : Chart::back) : (y > 0 ? Chart::left : Chart::right);
+    p.u = kPerTangent * (along ? y / x : -x / y);
+    p.v = p.end == End::space ? from_tangent(z / std::sqrt(level2) - horizon_) : kPerRangeOctave * octaves(range_m);
 }
 
-/// First linearly, then with a parabola upright.
-bool RayBundle::interpolate(std::span<const Index> set, End end, const Box& box) noexcept {
-    const auto value_at = [&](double u, double v, double w) {
-        const Place share{u, v, w};
-        Place p;
-        for (std::size_t k = 0; k < 3; ++k) p[k] = box.low[k] + share[k] * (box.high[k] - box.low[k]);
-        return at(p, end);
+RayBundle::Cell RayBundle::cell_of(const Place& p, const Halvings& halved) noexcept {
+    const double layer = p.layer * steps(halved.layer);
+    const std::int32_t nearest = floor_of(layer + 0.5);
+    const bool one_layer = std::abs(layer - nearest) * kLayer_m <= kOnLayer_m * steps(halved.layer);
+    return {floor_of(p.u * steps(halved.u)),
+            floor_of(p.v * steps(halved.v)),
+            one_layer ? nearest : floor_of(layer),
+            p.chart,
+            p.end,
+            one_layer,
+            halved};
+}
+
+std::uint64_t RayBundle::key(const Cell& c) const noexcept {
+    const auto pack = [](auto high, auto low) {
+        return static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | static_cast<std::uint32_t>(low);
     };
-    Grid grid;
-    grid.n_density = end == End::ground && box.high[2] - box.low[2] > kLevel ? 2 : 1;
-    const auto fill = [&](std::size_t row, double v) {
-        for (std::size_t i = 0; i < grid.n_density; ++i)
-            for (std::size_t k = 0; k < 2; ++k) {
-                const auto value =
-                    value_at(static_cast<double>(k), v, grid.n_density == 2 ? static_cast<double>(i) : 0.5);
+    const auto kind = static_cast<std::uint32_t>(c.chart) | static_cast<std::uint32_t>(c.end) << 4 |
+                      static_cast<std::uint32_t>(c.one_layer) << 8 | static_cast<std::uint32_t>(c.halved.u) << 12 |
+                      static_cast<std::uint32_t>(c.halved.v) << 18 |
+                      static_cast<std::uint32_t>(c.halved.layer) << 24;
+    return narpa::mixed(narpa::mixed(seed_, pack(c.u, c.v)), pack(c.layer, kind));
+}
+
+void RayBundle::trace(std::span<Index> set, const Halvings& halved, int more) noexcept {
+    for (const Index i : set) cell_[i] = cell_of(place_[i], halved);
+    while (!set.empty()) {
+        const Cell cell = cell_[set.front()];
+        Index* const end =
+            std::partition(set.data(), set.data() + set.size(), [&](Index i) { return cell_[i] == cell; });
+        const std::span inside(set.data(), end);
+        set = set.subspan(inside.size());
+        AirCell found;
+        const std::uint64_t name = key(cell);
+        if (!cells_.find(name, found)) {
+            make(cell, found);
+            cells_.store(name, found);
+        }
+        const auto halves = [&](std::int8_t n, std::uint32_t side) {
+            return static_cast<std::int8_t>(n + ((found.differs & side) != 0 ? 1 : 0));
+        };
+        const int needs = std::popcount(found.differs);
+        if (needs == 0)
+            interpolate(inside, cell, found);
+        else if (needs <= more)
+            trace(inside,
+                  {halves(halved.u, AirCell::kAlongU), halves(halved.v, AirCell::kAlongV),
+                   halves(halved.layer, AirCell::kAlongHeight)},
+                  more - needs);
+        else
+            for (const Index i : inside) out_[i] = integrate(rays_[i].direction, rays_[i].range_m);
+    }
+}
+
+void RayBundle::interpolate(std::span<const Index> set, const Cell& cell, const AirCell& found) noexcept {
+    const Blender blended(found.nodes, found.layers);
+    for (const Index i : set) {
+        const Place& p = place_[i];
+        out_[i] = blended({static_cast<float>(p.u * steps(cell.halved.u) - cell.u),
+                           static_cast<float>(p.v * steps(cell.halved.v) - cell.v),
+                           static_cast<float>(p.layer * steps(cell.halved.layer) - cell.layer)});
+    }
+}
+
+/// The nodes, where these agree with values between them along each side. Most cells that have to be divided show
+/// it along their first.
+void RayBundle::make(const Cell& cell, AirCell& out) noexcept {
+    out.layers = cell.one_layer ? 1 : 2;
+    out.differs = AirCell::kAlongU | AirCell::kAlongV;
+    const auto fill = [&](std::size_t column) {
+        for (std::size_t layer = 0; layer < out.layers; ++layer)
+            for (std::size_t row = 0; row < 3; ++row) {
+                const auto value = at(cell, 0.5 * static_cast<double>(column), 0.5 * static_cast<double>(row),
+                                      static_cast<double>(layer));
                 if (!value) return false;
-                grid.value[i][row][k] = *value;
+                out.nodes[layer * AirCell::kLayer + 3 * row + column] = *value;
             }
         return true;
     };
-    const auto agrees = [&](double v) {
-        const auto exact = value_at(0.5, v, 0.5);
-        if (!exact) return false;
-        const AirLight found = grid.at({0.5, v, 0.5});
-        return agree(found.in_scattering, exact->in_scattering, tolerance_,
-                     kFaintest * brightest(exact->in_scattering)) &&
-               agree(found.transmittance, exact->transmittance, tolerance_, kFaintest);
+    const auto differs = [&](double u, double v, double layer) {
+        const auto exact = at(cell, u, v, layer);
+        if (!exact) return true;
+        const AirLight near = Blender(
+            out.nodes, out.layers)({static_cast<float>(u), static_cast<float>(v), static_cast<float>(layer)});
+        return !agree(near.transmittance, exact->transmittance, tolerance_, kFaintestThrough) ||
+               !agree(near.in_scattering, exact->in_scattering, tolerance_,
+                      kFaintest * brightest(exact->in_scattering));
     };
-    if (!fill(0, 0) || !fill(1, 1)) return false;
-    if (!agrees(0.5)) {
-        grid.n_upright = 3;
-        for (auto& values : grid.value) values[2] = values[1];
-        if (!fill(1, 0.5) || !agrees(0.25) || !agrees(0.5)) return false;
-    }
-    for (const Index i : set) {
-        Place share{};
-        for (std::size_t k = 0; k < 3; ++k)
-            if (box.high[k] > box.low[k]) share[k] = (place_[i][k] - box.low[k]) / (box.high[k] - box.low[k]);
-        out_[i] = grid.at(share);
-    }
-    return true;
-}
-
-RayBundle::Box RayBundle::bounds(std::span<const Index> set) const noexcept {
-    Box box{place_[set.front()], place_[set.front()]};
-    for (const Index i : set)
-        for (std::size_t k = 0; k < 3; ++k) {
-            box.low[k] = std::min(box.low[k], place_[i][k]);
-            box.high[k] = std::max(box.high[k], place_[i][k]);
+    for (const std::size_t column : {std::size_t{0}, std::size_t{2}}) {
+        if (!fill(column)) return;
+        if (differs(0.5 * static_cast<double>(column), column == 0 ? 0.25 : 0.75, 0)) {
+            out.differs = AirCell::kAlongV;
+            return;
         }
-    return box;
+    }
+    if (!fill(1)) return;
+    out.differs = (differs(0.25, 1, 0) || differs(0.75, 0, 0) ? AirCell::kAlongU : 0) |
+                  (out.layers == 2 && differs(0.5, 0.5, 0.5) ? AirCell::kAlongHeight : 0);
 }
 
-/// None where a ray does not come down to that height.
-std::optional<AirLight> RayBundle::at(const Place& p, End end) noexcept {
-    const Vec3 direction = normalized(axis_ + p[0] * across_ + p[1] * upright_);
-    if (end == End::space) return integrate(direction, kEndless);
-    const double along = dot(origin_, direction),
-                 height = -light_.air().description().aerosol_height_m * std::log(p[2]),
-                 r = light_.air().ground_radius_m() + height;
-    const double discriminant = along * along - (dot(origin_, origin_) - r * r);
-    if (!(along < 0) || !(discriminant > 0)) return std::nullopt;
-    const double range = -along - std::sqrt(discriminant);
-    if (!(range > 0)) return std::nullopt;
-    return integrate(direction, range);
+/// Air along the ray through a place in a cell, 0 to 1 along its sides; none where there is no such ray.
+std::optional<AirLight> RayBundle::at(const Cell& cell, double u, double v, double layer) noexcept {
+    u = (cell.u + u) / steps(cell.halved.u), v = (cell.v + v) / steps(cell.halved.v);
+    const double height_m = (cell.layer + layer) / steps(cell.halved.layer) * kLayer_m;
+    const Vec3 level = level_direction(cell.chart, u / kPerTangent);
+    if (cell.chart == Chart::zenith || cell.chart == Chart::nadir) {
+        const Vec3 up = cell.chart == Chart::zenith ? up_ : -up_;
+        const Vec3 direction = normalized(level + v / kPerTangent * left_ + up);
+        if (cell.end == End::space) return integrate(direction, kEndless);
+        const double range = range_down_to(direction, height_m);
+        if (!(range > 0)) return std::nullopt;
+        return integrate(direction, range);
+    }
+    if (cell.end == End::space) return integrate(normalized(level + (to_tangent(v) + horizon_) * up_), kEndless);
+    const double range = from_octaves(v / kPerRangeOctave), r = norm(origin_),
+                 end = light_.air().ground_radius_m() + height_m;
+    const double sine = ((end - r) * (end + r) - range * range) / (2 * r * range);
+    if (!(std::abs(sine) < 1)) return std::nullopt;
+    return integrate(std::sqrt(1 - sine * sine) * level + sine * up_, range);
+}
+
+Vec3 RayBundle::level_direction(Chart chart, double u) const noexcept {
+    switch (chart) {
+        case Chart::front: return normalized(front_ + u * left_);
+        case Chart::left: return normalized(left_ - u * front_);
+        case Chart::back: return -normalized(front_ + u * left_);
+        case Chart::right: return -normalized(left_ - u * front_);
+        default: return u * front_;
+    }
+}
+
+/// Negative or NaN where the ray does not come down to that height.
+double RayBundle::range_down_to(const Vec3& direction, double height_m) const noexcept {
+    const double r = light_.air().ground_radius_m() + height_m, along = dot(origin_, direction);
+    return -along - std::sqrt(along * along - (dot(origin_, origin_) - r * r));
 }
 
 AirLight RayBundle::integrate(const Vec3& direction, double range_m) noexcept {

@@ -17,8 +17,10 @@ constexpr float kSqrt4Pi = 3.5449077f;
 /// Adds the irradiance of a surface, whose normal has the components nz along the zenith and nx towards the Sun.
 NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lanes, float nz, float nx,
                                     Air::Spectrum& out) noexcept {
-    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P. Hanrahan, SIGGRAPH 2001).
-    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f, -0.13089969f, 0.0f, 0.04908739f};
+    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64, 0, -pi / 128 (R. Ramamoorthi, P. Hanrahan,
+    // SIGGRAPH 2001).
+    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f,        -0.13089969f,
+                               0.0f,        0.04908739f, 0.0f,        -0.02454369f};
     static_assert(kLobe.size() == kMaxDegree + 1);
     Harmonics y;
     harmonics(nz, nx, kMaxDegree, y);
@@ -36,6 +38,20 @@ NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lan
                           (c.weight[0] * c.at[0][at] + c.weight[1] * c.at[1][at] + c.weight[2] * c.at[2][at] +
                            c.weight[3] * c.at[3][at]);
             }
+    }
+    out = sum;
+}
+
+/// Adds what the aerosol scatters strongly forward out of the direct light, times `facing`.
+NARPA_EACH_ISA void add_forward_peak(const Air& air, const SunBeam& beam, float facing,
+                                     Air::Spectrum& out) noexcept {
+    Air::Spectrum sum = out;
+    const float w = facing * beam.visible;
+    const auto [gas, aerosol, ozone] = beam.columns;
+    for (std::size_t l = 0; l < air.lanes(); ++l) {
+        const float depth = air.gas[l] * gas + air.ozone[l] * ozone;
+        sum[l] += w * (exp_of_negative(-(depth + air.scaled_extinction[l] * aerosol)) -
+                       exp_of_negative(-(depth + air.aerosol_extinction[l] * aerosol)));
     }
     out = sum;
 }
@@ -123,13 +139,13 @@ ScatteredLight::Spectrum ScatteredLight::skylight(const Vec3& position, const Ve
     const auto nz = static_cast<float>(dot(normal, up));
     const auto nx = static_cast<float>((dot(normal, to_sun) - static_cast<double>(nz) * sun) / sun_sine);
     const AirTables& t = tables_;
-    const AirTables::Corners c =
-        t.corners(static_cast<float>(distance_to_horizon_m(air_, h)), static_cast<float>(sun));
+    const auto horizon = static_cast<float>(distance_to_horizon_m(air_, h));
+    const AirTables::Corners c = t.corners(horizon, static_cast<float>(sun));
     add_cosine_lobe(c, t.lanes, std::clamp(nz, -1.0f, 1.0f), nx, out);
     const auto facing = static_cast<float>(std::max(0.0, dot(normal, to_sun)));
     if (facing > 0) {
-        const Spectrum scaled = sunlight(h, sun, true), direct = sunlight(h, sun, false);
-        for (std::size_t l = 0; l < t.lanes; ++l) out[l] += facing * (scaled[l] - direct[l]);
+        const SunBeam beam = t.sun_beam(t.ground_m + static_cast<float>(h), horizon, static_cast<float>(sun));
+        if (beam.visible > 0) add_forward_peak(air_, beam, facing, out);
     }
     for (float& x : out) x = std::max(x, 0.0f);
     return out;

@@ -2,12 +2,14 @@
 ///
 /// Along a ray, light scattered once is integrated with the aerosol's own phase function. Light scattered before
 /// comes from a table: at each height and elevation of the Sun the radiance from all directions, as spherical
-/// harmonics to degree 6 about the zenith, even in azimuth from the Sun. Rayleigh's phase function asks for degree
+/// harmonics to degree 8 about the zenith, even in azimuth from the Sun. Rayleigh's phase function asks for degree
 /// 2 alone; of the aerosol's, what is beyond counts as light that goes straight on (delta-M: W. Wiscombe, J. Atmos.
-/// Sci. 34, 1977), with light scattered once corrected for it (T. Nakajima, M. Tanaka, JQSRT 40, 1988). The table
-/// is the fixed point of the equation of transfer, found by iteration: one more order of scattering and of
-/// reflection by the ground each time. The layout, two tables of two dimensions and a march at run time, is that of
-/// S. Hillaire, EGSR 2020.
+/// Sci. 34, 1977), with light scattered once corrected for it, and for what that forward peak has scattered more
+/// than once: the peak folded with itself, as often as Poisson's distribution says for its optical depth along the
+/// way. T. Nakajima and M. Tanaka (JQSRT 40, 1988) have the first two terms of this, for small angles. The table is
+/// the fixed point of the equation of transfer, found by iteration: one more order of scattering and of reflection
+/// by the ground each time. The layout, two tables of two dimensions and a march at run time, is that of S.
+/// Hillaire, EGSR 2020.
 ///
 /// Positions are metres from the planet's centre, directions unit. The Sun's irradiance is 1.
 #pragma once

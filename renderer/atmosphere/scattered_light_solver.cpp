@@ -12,7 +12,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::size_t kAzimuths = 8;
+constexpr std::size_t kAzimuths = 9;
 constexpr double kConverged = 2e-5;
 
 /// A ray's way through the air, ready to be lit.

@@ -9,7 +9,7 @@
 namespace narpa {
 
 /// Of the harmonics, and of the phase functions of light that is scattered again.
-constexpr std::size_t kMaxDegree = 6, kHarmonics = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
+constexpr std::size_t kMaxDegree = 8, kHarmonics = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
 using Harmonics = std::array<float, kHarmonics>;
 
 /// Of the associated Legendre functions over (2 m - 1)!! sin^m, from degree to degree; norms that make the

@@ -12,6 +12,8 @@
 #include <numbers>
 #include <vector>
 
+#include "renderer/dem_reader/one_folder.h"
+
 namespace narpa {
 namespace {
 
@@ -22,6 +24,8 @@ std::string gdal_words() {
     std::string words = CPLGetLastErrorMsg();
     for (char& c : words)
         if (c == '\n' || c == '\r') c = ' ';
+    for (std::size_t at; (at = words.find(kOneFolder)) != std::string::npos;)
+        words.erase(at, std::string_view(kOneFolder).size());
     return words.empty() ? "no reason given" : words;
 }
 
@@ -277,6 +281,7 @@ void start_gdal() {
     CPLSetConfigOption("GDAL_CACHEMAX", "64");  // MiB
     CPLSetConfigOption("GDAL_NUM_THREADS", "1");
     CPLSetConfigOption("GDAL_PAM_ENABLED", "NO");  // no .aux.xml is read or written
+    OSRSetPROJEnableNetwork(FALSE);                // whatever the environment says
     GDALRegister_GTiff(), GDALRegister_PDS(), GDALRegister_PDS4(), GDALRegister_ISIS3(), GDALRegister_PNG();
 }
 
@@ -284,8 +289,8 @@ void start_gdal() {
 
 Result<OpenDem> open_with_gdal(const DemRequest& request) {
     start_gdal();
-    const GDALDatasetH file =
-        GDALOpenEx(request.path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, nullptr, nullptr, nullptr);
+    const GDALDatasetH file = GDALOpenEx(open_in_one_folder(request.path).c_str(),
+                                         GDAL_OF_RASTER | GDAL_OF_READONLY, nullptr, nullptr, nullptr);
     if (file == nullptr)
         return Error{fmt::format("not a DEM that can be read, expected GeoTIFF, PDS3, PDS4, ISIS3 or PNG: {}",
                                  gdal_words())};

@@ -10,7 +10,8 @@ namespace narpa {
 namespace {
 
 Status check_textures(const Scene& s, const Material& m) {
-    for (const int texture : {m.texture, m.emission_texture, m.normal_texture, m.height_texture})
+    for (const int texture :
+         {m.texture, m.emission_texture, m.specular_texture, m.cloud_texture, m.normal_texture, m.height_texture})
         if (texture >= static_cast<int>(s.textures.size()))
             return Error{"material \"" + m.name + "\" names texture " + std::to_string(texture) + " of " +
                          std::to_string(s.textures.size())};

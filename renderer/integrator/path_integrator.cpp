@@ -1,9 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <new>
 
+#include "base/uninitialized_array.h"
 #include "renderer/integrator/integrator.h"
-#include "renderer/integrator/uninitialized_array.h"
 
 namespace narpa {
 namespace {
@@ -23,7 +24,9 @@ void trace_paths(const Frame& f, std::span<CameraBatch> batches, LanesOf&& lanes
     std::size_t n = 0;
     for (const CameraBatch& p : batches)
         for_each_lane(lanes(p), [&](std::size_t i) {
-            rays[n] = p.rays[i], hits[n] = p.hits[i];
+            // In place: a copy of what was just written by parts would wait for it.
+            new (&rays[n]) Ray(p.rays[i]);
+            new (&hits[n]) Hit(p.hits[i]);
             number[n] = p.number[i], sample[n++] = p.sample[i];
         });
     batches.front().rays_traced +=

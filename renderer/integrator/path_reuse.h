@@ -13,9 +13,9 @@
 #include <cstdint>
 #include <span>
 
+#include "base/uninitialized_array.h"
 #include "renderer/integrator/path.h"
 #include "renderer/integrator/path_vertex.h"
-#include "renderer/integrator/uninitialized_array.h"
 
 namespace narpa {
 

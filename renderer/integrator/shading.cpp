@@ -102,6 +102,14 @@ float widened(float exponent, const Rgb& mean_normal) {
     return exponent * length / (length + exponent * (1 - length));
 }
 
+/// Clouds hide this share of the surface, band by band.
+void cover(const Rgb& share, const Rgb& albedo, Surface& s) {
+    const Rgb left = Rgb{1, 1, 1} - share;
+    s.diffuse = left * s.diffuse + share * albedo;
+    s.specular = left * s.specular;
+    s.emission = left * s.emission;
+}
+
 /// A normal that points away from the viewer is turned back just so far that it is seen at a grazing angle: in the
 /// plane of the two, so that the side on which the surface is lit stays the same.
 Vec3 towards_viewer(const Vec3& n, const Vec3& v, const Vec3& geometric) {
@@ -124,10 +132,11 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
         return index < 0 ? nullptr : &scene.textures[static_cast<std::size_t>(index)];
     };
     const Texture *const colour = texture(m.texture), *const glow = texture(m.emission_texture),
+                         *const shine = texture(m.specular_texture), *const clouds = texture(m.cloud_texture),
                          *const normals = texture(m.normal_texture), *const heights = texture(m.height_texture);
     const auto has_levels = [](const Texture* t) { return t != nullptr && !t->coarser.empty(); };
-    const bool filter =
-        width_m > 0 && (has_levels(colour) || has_levels(glow) || has_levels(normals) || has_levels(heights));
+    const bool filter = width_m > 0 && (has_levels(colour) || has_levels(glow) || has_levels(shine) ||
+                                        has_levels(clouds) || has_levels(normals) || has_levels(heights));
     const bool turn = normals != nullptr || heights != nullptr;
 
     const TextureLayout layout = tracer.shape(static_cast<std::size_t>(hit.body)).properties().texture_layout;
@@ -136,6 +145,8 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
 
     if (colour != nullptr) s.diffuse = s.diffuse * texture_lookup(*colour, hit.u, hit.v, seen, layout);
     if (glow != nullptr) s.emission = s.emission * texture_lookup(*glow, hit.u, hit.v, seen, layout);
+    if (shine != nullptr) s.specular = s.specular * texture_lookup(*shine, hit.u, hit.v, seen, layout);
+    if (clouds != nullptr) cover(texture_lookup(*clouds, hit.u, hit.v, seen, layout), m.cloud_albedo, s);
     if (!turn) return;
 
     const double side = hit.outside ? 1 : -1;  // maps describe the outer side

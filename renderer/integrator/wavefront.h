@@ -13,12 +13,12 @@
 
 #include <limits>
 
+#include "base/uninitialized_array.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/path.h"
 #include "renderer/integrator/path_dimensions.h"
 #include "renderer/integrator/path_reuse.h"
 #include "renderer/integrator/path_vertex.h"
-#include "renderer/integrator/uninitialized_array.h"
 #include "renderer/light/small_body_sampling.h"
 
 namespace narpa {

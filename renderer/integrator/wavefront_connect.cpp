@@ -167,7 +167,7 @@ void Wavefront::trace_to_surfaces() {
 
 Rgb Wavefront::emission(const Path& path, const Vec3& direction, const Hit& hit) const {
     const Material& m = render_scene_.scene().materials[static_cast<std::size_t>(hit.material)];
-    if (m.emission_texture < 0) return m.emission;
+    if (!has_emission_map(m)) return m.emission;
     const double width_m = settings_.pixel_angle_rad * (path.length_m + hit.range_m);
     return surface_at(tracer_, at_, hit, direction, width_m).emission;
 }

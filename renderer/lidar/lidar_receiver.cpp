@@ -16,6 +16,9 @@ constexpr double kMeanSpacings = 4;
 /// Random numbers: c2 of the counters, above those of a camera (SensorDraw). One block for each echo of a shot.
 constexpr std::uint32_t kStream = 0x4c000000u, kEchoStream = 0x10000u;
 
+/// Number of the medium's own echo, behind those of surfaces.
+constexpr std::size_t kAirEcho = LidarReceiver::kMostEchoes;
+
 /// Uniform in (0, 1).
 double uniform(std::uint32_t word) {
     return (word + 0.5) * 0x1p-32;
@@ -70,7 +73,7 @@ public:
 private:
     const LidarReceiver& receiver_;
     std::uint64_t first_;
-    std::array<RandomLanes, kMostEchoes> blocks_;
+    std::array<RandomLanes, kAirEcho + 1> blocks_;
     std::size_t made_ = 0;
 };
 
@@ -99,21 +102,17 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
     const std::uint32_t meeting = find_meeting(tracer, at, beams);
     trace(tracer, at, beams, meeting, settings, draws);
     for (std::size_t i = 0; i < beams.n; ++i) {
-        if (!is_set(meeting, i)) {
-            echoes[i] = {};
-            continue;
-        }
-        const auto met = std::span(met_).subspan(first_[i], sub_rays);
         LidarEchoes& out = echoes[i] = {};
-        out.sunlight = met.front().sunlight;
-        const auto sunlight = static_cast<double>(out.sunlight);
+        if (!is_set(meeting, i) && !air_.is_possible()) continue;
+        const auto met =
+            is_set(meeting, i) ? std::span(met_).subspan(first_[i], sub_rays) : std::span<LidarReturn>();
+        if (!met.empty()) out.sunlight = met.front().sunlight;
+        const double noise = noise_in(static_cast<double>(out.sunlight));
         EchoList list;
         const std::size_t n = part(met, list);
         double most = -1, second = -1;
-        for (std::size_t k = 0; k < n; ++k) {
-            const LidarEcho echo = measure(list[k], sunlight, i, k, draws);
-            if (!(echo.range_m > 0)) continue;
-            const double light = list[k].light;
+        const auto report = [&](const LidarEcho& echo, double light) {
+            if (!(echo.range_m > 0)) return;
             if (light > most) {
                 out.second = std::exchange(out.strongest, echo);
                 second = std::exchange(most, light);
@@ -122,8 +121,34 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
                 second = light;
             }
             out.last = echo;
+        };
+        if (air_.is_possible()) {
+            const Echo air = air_echo(at, beams[i], settings, met, noise, uniform(draws.of_echo(kAirEcho).w3[i]));
+            if (air.light > 0) report(measure(air, noise, i, kAirEcho, draws), air.light);
+            for (Echo& echo : std::span(list).first(n)) echo.light += air_.light_at(at, beams[i], echo.range_m);
         }
+        for (std::size_t k = 0; k < n; ++k) report(detect(list[k], noise, i, k, draws), list[k].light);
     }
+}
+
+/// Of the receiver, over that in the dark.
+double LidarReceiver::noise_in(double sunlight) const noexcept {
+    return std::sqrt(1 + model_.sunlight_noise * sunlight);
+}
+
+/// The medium's own, along the beam's axis; without one its light is 0.
+LidarReceiver::Echo LidarReceiver::air_echo(const BodyPoses& at, const Ray& beam, const ShotSettings& settings,
+                                            std::span<const LidarReturn> met, double noise,
+                                            double u) const noexcept {
+    double nearest_m = kInfinity;
+    for (const LidarReturn& r : met)
+        if (r.range_m > 0) nearest_m = std::min(nearest_m, r.range_m);
+    const auto [light, range_m] = air_.first(at, beam, nearest_m, noise, u);
+    if (!(light > 0) || settings.motions.empty()) return {light, range_m};
+    const Vec3 velocity =
+        velocity_at(settings, at, medium_->body(), beam.origin + range_m * beam.direction, beam.time) -
+        velocity_at(settings, at, settings.mount, beam.origin, beam.time);
+    return {light, range_m, dot(beam.direction, velocity)};
 }
 
 /// The beams that may meet a body.
@@ -201,6 +226,7 @@ LidarReceiver::Echo LidarReceiver::echo_of(std::span<const LidarReturn> met, dou
 
 /// Returns the number of echoes, the nearest first. Sorts the sub-rays by range where there may be several.
 std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept {
+    if (sub_rays.empty()) return 0;
     if (sub_rays.size() == 1) {
         const LidarReturn& r = sub_rays.front();
         if (!(r.range_m > 0)) return 0;
@@ -234,20 +260,21 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
 }
 
 /// None where the echo is not detected.
-LidarEcho LidarReceiver::measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
+LidarEcho LidarReceiver::detect(const Echo& echo, double noise, std::size_t lane, std::size_t number,
+                                Draws& draws) const noexcept {
+    if (least_light_ > 0) {
+        const double detected = detection_probability(echo.light / (noise * least_light_), model_.detection_snr);
+        if (detected < 1 && uniform(draws.of_echo(number).w3[lane]) >= detected) return {};
+    }
+    return measure(echo, noise, lane, number, draws);
+}
+
+/// Of an echo that is detected; none where it is out of range.
+LidarEcho LidarReceiver::measure(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                  Draws& draws) const noexcept {
     LidarEcho out{echo.range_m, static_cast<float>(echo.light * echo.range_m * echo.range_m), echo.velocity_m_s};
-    double late = 0;  // of the threshold's strength over the echo's: 0 where there is no limit
-    if (least_light_ > 0) {
-        const double s = std::sqrt(1 + model_.sunlight_noise * sunlight), x = echo.light / (s * least_light_);
-        if (model_.detection_snr > 0) {
-            const double detected = 0.5 * std::erfc(model_.detection_snr * (1 - x) / std::numbers::sqrt2);
-            if (uniform(draws.of_echo(number).w3[lane]) >= detected) return {};
-        } else if (x < 1) {
-            return {};
-        }
-        late = 1 / x;
-    }
+    // Of the threshold's strength over the echo's: 0 where there is no limit.
+    const double late = least_light_ > 0 ? noise * least_light_ / echo.light : 0;
     out.range_m += model_.range_bias_m + model_.range_walk_m * late;
     if (random_) {
         // Box and Muller 1958.

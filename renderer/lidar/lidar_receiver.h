@@ -10,6 +10,9 @@
 /// it, by s = sqrt(1 + sunlight_noise * radiance). An echo is detected with the probability Phi(snr * (x / s - 1)),
 /// its range has the standard deviation hypot(noise, noise_at_limit * s / x), and it is late by walk / x: a pulse
 /// that rises in proportion to its strength crosses a fixed threshold after a time in proportion to 1 / x.
+///
+/// A medium that sends light back itself adds to the echoes of surfaces, and gives one of its own, before them,
+/// where it crosses the threshold (renderer/lidar/air_echo.h).
 #pragma once
 
 #include <cstdint>
@@ -17,6 +20,7 @@
 
 #include "base/counter_random.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/lidar/air_echo.h"
 #include "renderer/lidar/beam_cone.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
@@ -31,8 +35,11 @@ public:
     /// `seed`: the scene's; `index`: of the LiDAR, so that they differ.
     LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
-    /// Dims what comes back; null, as at first: a vacuum. It must outlive this.
-    void set_medium(const Medium* medium) noexcept { medium_ = medium; }
+    /// Dims what comes back, and sends some back itself; null, as at first: a vacuum. It must outlive this.
+    void set_medium(const Medium* medium) noexcept {
+        medium_ = medium;
+        air_ = AirEcho(model_, least_light_, medium);
+    }
 
     /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
     /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Writes beams.n echoes: range with bias
@@ -56,8 +63,13 @@ private:
                ShotSettings settings, Draws& draws) noexcept;
     [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
-    [[nodiscard]] LidarEcho measure(const Echo& echo, double sunlight, std::size_t lane, std::size_t number,
+    [[nodiscard]] double noise_in(double sunlight) const noexcept;
+    [[nodiscard]] LidarEcho detect(const Echo& echo, double noise, std::size_t lane, std::size_t number,
+                                   Draws& draws) const noexcept;
+    [[nodiscard]] LidarEcho measure(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                     Draws& draws) const noexcept;
+    [[nodiscard]] Echo air_echo(const BodyPoses& at, const Ray& beam, const ShotSettings& settings,
+                                std::span<const LidarReturn> met, double noise, double u) const noexcept;
 
     LidarReceiverModel model_;
     double range_max_m_;
@@ -69,6 +81,7 @@ private:
     std::uint32_t stream_;
     BeamCone cone_;
     const Medium* medium_ = nullptr;
+    AirEcho air_;
     Lanes<std::size_t> first_{};          ///< sub-ray in `met_` of each shot that may meet a body
     std::vector<LidarReturn> met_;        ///< of the sub-rays of one shot after the other
     std::vector<std::uint32_t> meeting_;  ///< for each body a bit for each shot that may meet it

@@ -19,15 +19,6 @@ double mean(const Rgb& c) {
     return static_cast<double>(c.x + c.y + c.z) / 3;
 }
 
-/// Of a body's material point, world.
-Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point, double time) {
-    if (body < 0) return {};
-    const auto i = static_cast<std::size_t>(body);
-    const Motion& m = settings.motions[i];
-    const Rigid3 T = at.T_world_body_at(i, time);
-    return m.velocity_m_s + cross(T.q * m.rate_rad_s, point - T.t);
-}
-
 /// A shot on its way from mirror to mirror.
 struct Path {
     double range_m = 0, throughput = 1;
@@ -52,8 +43,7 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
                    const Vec3& direction) {
     const Scene& scene = tracer.scene();
     const Material& m = scene.materials[static_cast<std::size_t>(hits.material[i])];
-    if (m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0)
-        return surface_at(tracer, at, hits[i], direction, 0);
+    if (has_more_than_colour(m)) return surface_at(tracer, at, hits[i], direction, 0);
     Surface s{.diffuse = m.diffuse,
               .specular = m.specular,
               .exponent = m.exponent,
@@ -115,6 +105,15 @@ NARPA_EACH_ISA void take_to_world(const PoseLanes& T_world_mount, const Rigid3& 
 }
 
 }  // namespace
+
+Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point,
+                 double time) noexcept {
+    if (body < 0) return {};
+    const auto i = static_cast<std::size_t>(body);
+    const Motion& m = settings.motions[i];
+    const Rigid3 T = at.T_world_body_at(i, time);
+    return m.velocity_m_s + cross(T.q * m.rate_rad_s, point - T.t);
+}
 
 void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, RayBatch& beams) noexcept {
     PoseLanes T_world_mount;

@@ -31,6 +31,10 @@ struct ShotSettings {
     const Medium* medium = nullptr;           ///< dims the light on its way there and back; null: a vacuum
 };
 
+/// Of a body's material point, world; of body -1: 0. With settings.motions.
+[[nodiscard]] Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point,
+                               double time) noexcept;
+
 /// Takes beams from the axes of a LiDAR to the world's, each at its own time. `mount`: the body that it rides on;
 /// -1: it is at rest at T_mount_lidar.
 void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, RayBatch& beams) noexcept;

@@ -1,7 +1,6 @@
 #include "renderer/light/atmosphere.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace narpa {
@@ -9,8 +8,13 @@ namespace {
 
 /// Wavelength of the LiDARs' beams.
 constexpr double kLidar_m = 905e-9;
-/// Rays that start so near to each other start at one place: as a lens's do.
-constexpr double kOnePlace_m = 1;
+/// Rays that start so near to each other start at one place, as a lens's do; places are rounded to this part of it,
+/// and directions of the Sun to this, so that they have cells in common (AirCells).
+constexpr double kOnePlace_m = 1, kPlace_m = 0.25, kSunDirection = 0x1p-20;
+
+Vec3 rounded(const Vec3& v, double step) {
+    return {step * std::round(v.x / step), step * std::round(v.y / step), step * std::round(v.z / step)};
+}
 
 AirResolution resolution_of(const Atmosphere& a) {
     AirResolution r;
@@ -29,8 +33,7 @@ AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)
       sun_(scene.sun),
       light_(Air(scene.atmosphere->air, scene.atmosphere->samples_per_band), resolution_of(*scene.atmosphere),
              radius_of(scene), threads),
-      lidar_air_(scene.atmosphere->air, kLidar_m),
-      lidar_rule_(static_cast<std::size_t>(scene.atmosphere->steps)) {
+      lidar_air_(scene.atmosphere->air, kLidar_m, scene.atmosphere->steps) {
     if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body_].shape)) {
         const double radius = scene.atmosphere->air.ground_radius_m;
         scale_ = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
@@ -63,23 +66,24 @@ MediumSegment AtmosphereMedium::along(const BodyPoses& at, const Ray& ray, doubl
 void AtmosphereMedium::along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                                   std::span<MediumSegment> segments) const noexcept {
     if (rays.empty()) return;
-    const Ray& first = rays.front().ray;
-    const auto beside = [&](const MediumRay& r) {
-        return r.ray.time == first.time && norm(r.ray.origin - first.origin) <= kOnePlace_m;
-    };
-    if (rays.size() > RayBundle::kMost || !std::ranges::all_of(rays, beside))
-        return Medium::along_each(at, rays, segments);
-    const Frame frame = frame_at(at, first.time);
-    std::array<RayBundle::Ray, RayBundle::kMost> bundle;
-    std::array<AirLight, RayBundle::kMost> light;
+    if (rays.size() > RayBundle::kMost) return Medium::along_each(at, rays, segments);
+    double time = rays.front().ray.time;
+    Frame frame = frame_at(at, time);
+    const Vec3 origin = rounded(frame.point(rays.front().ray.origin), kPlace_m);
+    std::optional<Vec3> sun = to_sun(frame);
+    if (sun) sun = normalized(rounded(*sun, kSunDirection));
+    UninitializedArray<RayBundle::Ray, RayBundle::kMost> bundle;
+    UninitializedArray<AirLight, RayBundle::kMost> light;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        const Vec3 toward = frame.direction(rays[i].ray.direction);
+        const auto& [ray, range_m, u] = rays[i];
+        if (ray.time != time) frame = frame_at(at, time = ray.time);
+        if (norm(frame.point(ray.origin) - origin) > kOnePlace_m) return Medium::along_each(at, rays, segments);
+        const Vec3 toward = frame.direction(ray.direction);
         const double metre = norm(toward);
-        bundle[i] = {toward / metre, rays[i].range_m * metre};
+        bundle[i] = {toward / metre, range_m * metre};
     }
-    const std::optional<Vec3> sun = to_sun(frame);
-    RayBundle(light_, frame.point(first.origin), sun ? &*sun : nullptr)
-        .trace(std::span(bundle).first(rays.size()), light);
+    RayBundle(light_, origin, sun ? &*sun : nullptr, *cells_)
+        .trace(bundle.first(rays.size()), light.first(rays.size()));
     for (std::size_t i = 0; i < rays.size(); ++i) segments[i] = segment(light[i]);
 }
 
@@ -104,9 +108,16 @@ double AtmosphereMedium::lidar_transmittance(const BodyPoses& at, const Ray& ray
     const Frame frame = frame_at(at, ray.time);
     const Vec3 toward = frame.direction(ray.direction);
     const double metre = norm(toward);
-    const AirColumns c =
-        columns_along(lidar_air_, lidar_rule_, frame.point(ray.origin), toward / metre, range_m * metre);
-    return static_cast<double>(transmittance_of(lidar_air_, c).x);
+    return lidar_air_.transmittance(frame.point(ray.origin), toward / metre, range_m * metre);
+}
+
+/// Lengths are the world's: the ellipsoid's scale changes them by 0.3 %.
+Medium::Backscatter AtmosphereMedium::lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
+                                                        double to_m) const noexcept {
+    const Frame frame = frame_at(at, ray.time);
+    const auto [light, range_m] =
+        lidar_air_.backscattered(frame.point(ray.origin), normalized(frame.direction(ray.direction)), from_m, to_m);
+    return {light, range_m};
 }
 
 }  // namespace narpa

@@ -6,8 +6,10 @@
 /// apparent places (renderer/atmosphere/refraction.h).
 #pragma once
 
+#include <memory>
 #include <optional>
 
+#include "renderer/atmosphere/lidar_air.h"
 #include "renderer/atmosphere/ray_bundle.h"
 #include "renderer/light/medium.h"
 #include "renderer/scene/scene.h"
@@ -22,7 +24,7 @@ public:
     [[nodiscard]] MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                       double u) const noexcept override;
     [[nodiscard]] bool uses_random_numbers() const noexcept override { return false; }
-    /// Camera rays of one moment from one place: by interpolation (renderer/atmosphere/ray_bundle.h).
+    /// Camera rays from one place on the planet: by interpolation (renderer/atmosphere/ray_bundle.h).
     void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                     std::span<MediumSegment> segments) const noexcept override;
     [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;
@@ -30,6 +32,10 @@ public:
                               double time) const noexcept override;
     [[nodiscard]] double lidar_transmittance(const BodyPoses& at, const Ray& ray,
                                              double range_m) const noexcept override;
+    [[nodiscard]] Backscatter lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
+                                                double to_m) const noexcept override;
+    [[nodiscard]] double most_lidar_backscatter_1_m() const noexcept override { return lidar_air_.most_1_m(); }
+    [[nodiscard]] int body() const noexcept override { return static_cast<int>(body_); }
 
     [[nodiscard]] const ScatteredLight& light() const { return light_; }
 
@@ -54,8 +60,8 @@ private:
     Vec3 scale_{1, 1, 1};
     std::optional<Sun> sun_;
     ScatteredLight light_;
-    Air lidar_air_;
-    PanelRule lidar_rule_;
+    std::unique_ptr<AirCells> cells_ = std::make_unique<AirCells>();  ///< what frames have integrated
+    LidarAir lidar_air_;
 };
 
 }  // namespace narpa

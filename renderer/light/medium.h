@@ -56,6 +56,20 @@ public:
                                                      double range_m) const noexcept {
         return static_cast<double>(mean_band(transmittance(at, ray, range_m)));
     }
+    /// What the medium itself sends back of a LiDAR's pulse from between two ranges, 0 < from_m < to_m: pi times
+    /// the integral of backscatter * transmittance^2 / range^2, so that a diffuse surface sends reflectivity *
+    /// transmittance^2 / range^2; and its mean range.
+    struct Backscatter {
+        double light = 0, range_m = 0;
+    };
+    [[nodiscard]] virtual Backscatter lidar_backscatter(const BodyPoses& /*at*/, const Ray& /*ray*/,
+                                                        double /*from_m*/, double /*to_m*/) const noexcept {
+        return {};
+    }
+    /// Pi times the largest backscatter anywhere, 1/m; 0: it sends nothing back.
+    [[nodiscard]] virtual double most_lidar_backscatter_1_m() const noexcept { return 0; }
+    /// The body that it moves with; -1: it is at rest.
+    [[nodiscard]] virtual int body() const noexcept { return -1; }
 };
 
 }  // namespace narpa

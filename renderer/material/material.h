@@ -61,15 +61,27 @@ struct Material {
     Hapke hapke{};
     int texture = -1;           ///< index into Scene::textures: multiplies `diffuse`; -1 is none
     int emission_texture = -1;  ///< multiplies `emission`
-    int normal_texture = -1;    ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
-    int height_texture = -1;    ///< bumps: height in metres = bump_height_m * mean of rgb
+    int specular_texture = -1;  ///< multiplies `specular`: of an ocean that glints, not of its land
+    int cloud_texture = -1;     ///< share of the surface that white diffuse clouds hide, close above it
+    Rgb cloud_albedo{};
+    int normal_texture = -1;  ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
+    int height_texture = -1;  ///< bumps: height in metres = bump_height_m * mean of rgb
     float normal_scale = 1;
     float bump_height_m = 0;
     float retroreflectance = 0;  ///< towards a LiDAR, beside what the kind reflects: times a white diffuse surface
 };
 
+/// Textures beside that of `diffuse`.
+[[nodiscard]] inline bool has_more_than_colour(const Material& m) noexcept {
+    return m.emission_texture >= 0 || m.specular_texture >= 0 || m.cloud_texture >= 0 || m.normal_texture >= 0 ||
+           m.height_texture >= 0;
+}
 [[nodiscard]] inline bool is_textured(const Material& m) noexcept {
-    return m.texture >= 0 || m.emission_texture >= 0 || m.normal_texture >= 0 || m.height_texture >= 0;
+    return m.texture >= 0 || has_more_than_colour(m);
+}
+/// Does its emission differ from place to place?
+[[nodiscard]] inline bool has_emission_map(const Material& m) noexcept {
+    return m.emission_texture >= 0 || m.cloud_texture >= 0;
 }
 
 }  // namespace narpa

@@ -62,6 +62,7 @@ void read_air(TableReader& table, AirDescription& air) {
     air.gas_height_m = table.number("gas_height_m", kAirHeight).value_or(air.gas_height_m);
     air.aerosol_height_m = table.number("aerosol_height_m", kAirHeight).value_or(air.aerosol_height_m);
     air.gas_amount = table.number("gas_amount", {.low = 0, .high = 100}).value_or(air.gas_amount);
+    air.aerosol_lidar_ratio_sr = table.number("lidar_ratio_sr", {.low = 1, .high = 1000}).value_or(0);
     const bool earth = air.planet == Planet::earth;
     if (earth) {
         table.refuse("dust_depth", "belongs to planet = \"mars\"; the Earth's aerosol has a \"turbidity\"");

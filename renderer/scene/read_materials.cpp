@@ -11,13 +11,15 @@ namespace narpa {
 
 namespace {
 
+/// Thick clouds reflect 0.6 to 0.9 (K. N. Liou, An Introduction to Atmospheric Radiation, 2nd ed. 2002).
+constexpr Rgb kCloudAlbedo{0.75f, 0.75f, 0.75f};
 constexpr Range kRadiance{.low = 0, .high = 1e30};
 
 /// Keys of each kind beside those that all have: emission, normals, heights.
 const std::array<KindKeys, 9> kKindKeys{{
-    {"lambert", {"albedo", "texture"}},
-    {"phong", {"albedo", "texture", "specular", "exponent"}},
-    {"phong_classic", {"albedo", "texture", "specular", "exponent", "ambient"}},
+    {"lambert", {"albedo", "texture", "cloud_texture", "cloud_albedo"}},
+    {"phong", {"albedo", "texture", "specular", "exponent", "specular_texture", "cloud_texture", "cloud_albedo"}},
+    {"phong_classic", {"albedo", "texture", "specular", "exponent", "ambient", "specular_texture"}},
     {"mirror", {"reflectance"}},
     {"dielectric", {"ior", "fresnel"}},
     {"ggx", {"albedo", "texture", "metallic", "roughness", "ior", "fresnel"}},
@@ -124,6 +126,10 @@ void read_textures(TableReader& table, Material& m, SceneReading& reading) {
     using Colour = TextureUse::Colour;
     read_texture_key(table, "texture", &Material::texture, {}, reading);
     read_texture_key(table, "emission_texture", &Material::emission_texture, {}, reading);
+    read_texture_key(table, "specular_texture", &Material::specular_texture, {.colour = Colour::linear}, reading);
+    read_texture_key(table, "cloud_texture", &Material::cloud_texture, {.colour = Colour::linear}, reading);
+    if (!table.has("cloud_texture")) table.refuse("cloud_albedo", "belongs to cloud_texture, which is not here");
+    if (table.has("cloud_texture")) m.cloud_albedo = table.rgb("cloud_albedo", kUnit).value_or(kCloudAlbedo);
     read_texture_key(table, "normal_texture", &Material::normal_texture, {.colour = Colour::normals}, reading);
     read_texture_key(table, "height_texture", &Material::height_texture, {.colour = Colour::linear}, reading);
     if (table.has("emission_texture") && !table.has("emission"))

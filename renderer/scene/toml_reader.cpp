@@ -284,10 +284,6 @@ void TableReader::refuse_keys_of_other_kinds(std::string_view kind, std::span<co
     }
 }
 
-void TableReader::not_in_this_version(std::string_view key, std::string_view instead) {
-    refuse(key, fmt::format("not in this version of narpa; {}", instead));
-}
-
 void TableReader::finish() {
     for (const auto& [key, value] : *table_)
         if (std::find(asked_.begin(), asked_.end(), key.str()) == asked_.end())

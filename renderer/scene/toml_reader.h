@@ -126,8 +126,6 @@ public:
     void refuse(std::string_view key, const std::string& why);
     /// Refuses the keys that belong to other kinds only: each kind of table has its own.
     void refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds);
-    /// A key that this version does not support yet.
-    void not_in_this_version(std::string_view key, std::string_view instead);
     /// Notes a problem at the value of a key (at the table when absent).
     void fail(std::string_view key, const std::string& what);
     [[nodiscard]] const toml::source_region& place(std::string_view key) const;

@@ -1,6 +1,7 @@
 #include "renderer/terrain/detail.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -59,6 +60,40 @@ double rocks_between(double k, double d, double to) {
     return n;
 }
 
+/// Weights of the four posts about a place t between the second and the third: the cubic through these two whose
+/// slopes there are those between their neighbours (E. Catmull, R. Rom, "A class of local interpolating splines",
+/// 1974).
+std::array<double, 4> spline_weights(double t) {
+    return {((2 - t) * t - 1) * t / 2, ((3 * t - 5) * t * t + 2) / 2, ((4 - 3 * t) * t + 1) * t / 2,
+            (t - 1) * t * t / 2};
+}
+
+/// Four rows of posts about a row of cells.
+struct CellRows {
+    std::array<const double*, 4> row;
+    int columns;
+    bool around;  ///< the last column is the first again
+
+    [[nodiscard]] std::size_t column(int c) const {
+        if (around) return static_cast<std::size_t>((c + columns - 1) % (columns - 1));
+        return static_cast<std::size_t>(std::clamp(c, 0, columns - 1));
+    }
+    /// In the cell that begins at a column: smooth through the posts. Where one of the sixteen about it has no
+    /// height, on the two triangles of the cell.
+    [[nodiscard]] double height(int c, double u, double v) const {
+        if (u == 0 && v == 0) return row[1][column(c)];
+        const std::array<std::size_t, 4> at{column(c - 1), column(c), column(c + 1), column(c + 2)};
+        const std::array<double, 4> across = spline_weights(u), down = spline_weights(v);
+        double sum = 0;
+        for (std::size_t j = 0; j < 4; ++j)
+            for (std::size_t i = 0; i < 4; ++i) sum += down[j] * across[i] * row[j][at[i]];
+        return sum == sum ? sum : on_triangles(row[1][at[1]], row[1][at[2]], row[2][at[2]], row[2][at[1]], u, v);
+    }
+    static double on_triangles(double nw, double ne, double se, double sw, double u, double v) {
+        return u >= v ? nw + u * (ne - nw) + v * (se - ne) : nw + v * (sw - nw) + u * (se - sw);
+    }
+};
+
 }  // namespace
 
 DetailedSource::DetailedSource(HeightSource& coarse, double spacing_m, const TerrainDetail& detail)
@@ -80,27 +115,23 @@ int DetailedSource::rows() const {
 }
 
 bool DetailedSource::read_rows(int row, int count, double* heights) {
-    const int n = detail_.posts_per_post, width = columns(), coarse_width = coarse_.columns();
-    const int first = row / n, last = std::min((row + count - 1) / n + 1, coarse_.rows() - 1);
-    coarse_rows_.resize(static_cast<std::size_t>(last - first + 1) * static_cast<std::size_t>(coarse_width));
+    const int n = detail_.posts_per_post, width = columns(), coarse_rows = coarse_.rows();
+    const auto coarse_width = static_cast<std::size_t>(coarse_.columns());
+    // Two posts on either side of each cell.
+    const int first = std::max(row / n - 1, 0), last = std::min((row + count - 1) / n + 2, coarse_rows - 1);
+    coarse_rows_.resize(static_cast<std::size_t>(last - first + 1) * coarse_width);
     if (!coarse_.read_rows(first, last - first + 1, coarse_rows_.data())) return false;
-    const auto post = [&](int c, int r) {
-        return coarse_rows_[static_cast<std::size_t>(r - first) * static_cast<std::size_t>(coarse_width) +
-                            static_cast<std::size_t>(c)];
+    const auto row_at = [&](int r) {
+        return &coarse_rows_[static_cast<std::size_t>(std::clamp(r, 0, coarse_rows - 1) - first) * coarse_width];
     };
     for (int i = 0; i < count; ++i) {
-        const int r = (row + i) / n, r1 = std::min(r + 1, last);
+        const int r = (row + i) / n;
+        const CellRows rows{{row_at(r - 1), row_at(r), row_at(r + 1), row_at(r + 2)},
+                            static_cast<int>(coarse_width),
+                            coarse_.goes_around()};
         const double v = static_cast<double>((row + i) % n) / n;
-        for (int k = 0; k < width; ++k) {
-            const int c = k / n, c1 = std::min(c + 1, coarse_width - 1);
-            const double u = static_cast<double>(k % n) / n;
-            const double nw = post(c, r), se = post(c1, r1);
-            const bool at_post = k % n == 0 && (row + i) % n == 0;
-            heights[static_cast<std::size_t>(i) * static_cast<std::size_t>(width) + static_cast<std::size_t>(k)] =
-                at_post  ? nw
-                : u >= v ? nw + u * (post(c1, r) - nw) + v * (se - post(c1, r))
-                         : nw + v * (post(c, r1) - nw) + u * (se - post(c, r1));
-        }
+        double* const out = heights + static_cast<std::size_t>(i) * static_cast<std::size_t>(width);
+        for (int k = 0; k < width; ++k) out[k] = rows.height(k / n, static_cast<double>(k % n) / n, v);
     }
     for (std::size_t i = 0; i < sizes_.size(); ++i) add_features(sizes_[i], i, row, count, heights);
     return true;

@@ -20,8 +20,8 @@ struct TerrainDetail {
     std::uint64_t seed = 0;
 };
 
-/// A DEM on a grid that is finer by a whole number: on the triangles between its posts, with the features of
-/// TerrainDetail whose diameters are between two posts of the finer grid and two of the coarser.
+/// A DEM on a grid that is finer by a whole number: smooth between its posts, with the features of TerrainDetail
+/// whose diameters are between two posts of the finer grid and two of the coarser.
 class DetailedSource final : public HeightSource {
 public:
     /// `spacing_m`: between posts of `coarse`, which must outlive this.

@@ -36,6 +36,13 @@ inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
     return {reinterpret_cast<const char*>(data), size};
 }
 
+/// Prints what a reader said, where the environment variable NARPA_FUZZ_NOTES is set: to count crashes that a
+/// process of its own keeps from being ours.
+inline void note(const std::string& what) {
+    static const bool wanted = std::getenv("NARPA_FUZZ_NOTES") != nullptr;
+    if (wanted) std::printf("note: %s\n", what.c_str());
+}
+
 /// A folder for readers of files, in memory where there is such a place; removed when the program ends.
 class InputFolder {
 public:

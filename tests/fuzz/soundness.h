@@ -25,7 +25,8 @@ inline void check(const Mesh& m, std::size_t materials) {
 }
 
 inline void check(const Material& m, int textures) {
-    for (const int t : {m.texture, m.emission_texture, m.normal_texture, m.height_texture})
+    for (const int t :
+         {m.texture, m.emission_texture, m.specular_texture, m.cloud_texture, m.normal_texture, m.height_texture})
         require(t < textures, "textures are in range");
     const bool adds_up = m.kind == Material::Kind::phong;
     for (int b = 0; b < 3; ++b) {

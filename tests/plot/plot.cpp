@@ -1,6 +1,7 @@
 #include "plot/plot.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -36,6 +37,24 @@ TEST(Plot, WritesTheDocumentBesideThePicture) {
     EXPECT_EQ(nlohmann::json::parse(file), kDocument);
     if (!matplotlib_is_installed()) GTEST_SKIP() << "python3-matplotlib is not installed";
     EXPECT_GT(std::filesystem::file_size(folder / "loop.png"), 5000u);
+}
+
+/// A request to stop that reaches a whole process group, as Ctrl-C does, must not cost the picture.
+TEST(Plot, IsDrawnInAProcessGroupOfItsOwn) {
+    const test::TemporaryFolder folder;
+    const std::string program = folder / "plot";
+    std::ofstream(program) << "#!/bin/sh\ncut -d' ' -f5 /proc/$$/stat > \"$3\"\n";
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+    const char* before = std::getenv("NARPA_PLOT");
+    const std::string kept = before ? before : "";
+    ::setenv("NARPA_PLOT", program.c_str(), 1);
+    const Status written = write_plot(folder / "loop.png", kDocument);
+    before ? ::setenv("NARPA_PLOT", kept.c_str(), 1) : ::unsetenv("NARPA_PLOT");
+    ASSERT_TRUE(written) << written.error().text();
+    pid_t group = 0;
+    std::ifstream(folder / "loop.png") >> group;
+    EXPECT_GT(group, 0);
+    EXPECT_NE(group, ::getpgrp());
 }
 
 TEST(Plot, NumbersThatAreNotFiniteBecomeNull) {

@@ -54,7 +54,7 @@ TEST(DescentGuidance, IsPlannedFromTheEstimateUntilShortlyBeforeItsEnd) {
     const Vec3 planned = g.reference(40).position_m;
     g.step(at(40, planned + Vec3{3, 0, 0}, {-5, 0, 0}));
     expect_close(g.reference(40).position_m, planned, 1e-9);
-    EXPECT_EQ(g.phase(), GuidancePhase::moving);
+    EXPECT_EQ(g.phase(), GuidancePhase::braking);
 }
 
 TEST(DescentGuidance, GoesOverIntoTheVerticalDescentWithoutAJump) {
@@ -64,7 +64,7 @@ TEST(DescentGuidance, GoesOverIntoTheVerticalDescentWithoutAJump) {
     const double end_s = *s.legs[0].descent_s;
     const Reference before = g.reference(end_s);
     g.step(at(end_s, s.legs[0].to_m, s.legs[0].end_velocity_m_s));
-    EXPECT_EQ(g.phase(), GuidancePhase::closing);
+    EXPECT_EQ(g.phase(), GuidancePhase::terminal_descent);
     EXPECT_EQ(g.leg(), 1u);
     const Reference after = g.reference(end_s);
     expect_close(after.position_m, before.position_m, 1e-9);

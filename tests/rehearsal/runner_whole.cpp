@@ -190,7 +190,7 @@ TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
     const std::string proof = folder / "it-ran";
     const nlohmann::json record{{"format", 1},
                                 {"scenario", scenario->file},
-                                {"scenario_hash", scenario_texts(scenario->file, scenario->scene)->hash},
+                                {"scenario_hash", scenario_texts(*scenario)->hash},
                                 {"mode", "lockstep"},
                                 {"seed", 1u},
                                 {"dynamics", ""},

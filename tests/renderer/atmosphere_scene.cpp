@@ -71,6 +71,34 @@ TEST(AtmosphereInAScene, SunlightIsThatOfTheColumn) {
     EXPECT_LT(medium.transmittance(at, {ground, at_zenith_angle(95, 0), 0}, kInfinity).x, 1e-6f);
 }
 
+TEST(AtmosphereInAScene, RaysOfALensAndOfAnExposureAreThoseOfOnePlace) {
+    // From points of an aperture, at moments of an exposure, beside each other.
+    const Scene s = earth_scene(60);
+    const AtmosphereMedium medium(s, 2);
+    std::vector<MediumRay> rays;
+    for (int i = 0; i < 64; ++i) {
+        const double aside = 0.05 * std::sin(1.7 * i), zenith = 75 + 0.1 * (i / 8);
+        rays.push_back(
+            {{{aside, -aside, 6'371'002}, at_zenith_angle(zenith, 20 + 0.1 * (i % 8)), 1e-4 * i}, kInfinity});
+    }
+    std::vector<MediumSegment> segments(rays.size());
+    medium.along_each(placed(s), rays, segments);
+    double most = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const MediumSegment exact = medium.along(placed(s), rays[i].ray, kInfinity, 0);
+        for (int band = 0; band < 3; ++band) {
+            most = std::max(
+                most,
+                std::abs(static_cast<double>(segments[i].in_scattering[band] / exact.in_scattering[band]) - 1));
+            most = std::max(
+                most,
+                std::abs(static_cast<double>(segments[i].transmittance[band] / exact.transmittance[band]) - 1));
+        }
+    }
+    EXPECT_LT(most, 1.5e-3);
+    EXPECT_GT(most, 0);  // interpolated indeed
+}
+
 TEST(AtmosphereInAScene, AnAirlessSceneHasNoMedium) {
     Scene s = earth_scene(40);
     s.atmosphere.reset();

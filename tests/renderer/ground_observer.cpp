@@ -1,5 +1,6 @@
 // What an observer on the ground sees where, against ERFA's own chain; orbits; the range law through the air.
 #include <erfa.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -142,6 +143,52 @@ TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
     const Vec3 p = conjugate(scene->bodies[0].initial.T_world_body.q) * c.T_mount_camera.t;
     const Vec3 k{p.x / 6378137, p.y / 6378137, p.z / 6356752.3142};
     EXPECT_NEAR((norm(k) - 1) * 6.37e6, 47, 0.5);
+}
+
+/// Rays of an image are straight, and bodies stand where they are seen: a station 45 degrees above the horizon
+/// falls into the pixel to which ERFA refracts it, 20 pixels from where it would fall without air.
+TEST(GroundScene, AStationFallsIntoThePixelOfItsApparentPlace) {
+    const GroundObserver observer(kGreenwich, kMorning_ns);
+    const double z = 45 * kRadPerDeg, a = 150 * kRadPerDeg;
+    const Vec3 geometric = std::cos(z) * observer.zenith() +
+                           std::sin(z) * (std::cos(a) * observer.north() + std::sin(a) * observer.east());
+    const Vec3 station = observer.position_m() + 1e7 * geometric;  // so far that refraction has no parallax
+    std::string text = kGroundScene;
+    const auto replace = [&](std::string_view key, const std::string& with) {
+        const std::size_t at = text.find(key);
+        ASSERT_NE(at, std::string::npos);
+        text.replace(at, text.find('\n', at) - at, with);
+    };
+    replace("orbit =", fmt::format("position_m = [{:.3f}, {:.3f}, {:.3f}]", station.x, station.y, station.z));
+    replace("sphere = {", "sphere = {radius_m = 100}");
+    replace("track =", "azimuth_elevation_deg = [150.0, 45.01]");
+    const TemporaryFolder folder;
+    const auto scene = read_scene(folder.write("s.toml", text));
+    ASSERT_TRUE(scene) << scene.error().text();
+    const auto render_scene = RenderScene::create(*scene, 2);
+    ASSERT_TRUE(render_scene);
+    const Camera& c = scene->cameras[0];
+    const double focal_px = 32 / std::tan(0.025 * kRadPerDeg);
+    const auto pixel_of = [&](const Vec3& direction) {
+        const Vec3 d = conjugate(c.T_mount_camera.q) * direction;
+        return Vec3{31.5 + focal_px * d.x / d.z, 31.5 + focal_px * d.y / d.z, 0};
+    };
+    const Vec3 expected = pixel_of(observed_by_erfa(kGreenwich, geometric, observer, true)),
+               unrefracted = pixel_of(observed_by_erfa(kGreenwich, geometric, observer, false));
+    EXPECT_GT(norm(expected - unrefracted), 15);
+    Vec3 sum{};
+    int met = 0;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) {
+            const Vec3 d = normalized(Vec3{(x - 31.5) / focal_px, (y - 31.5) / focal_px, 1});
+            const Hit hit = render_scene->tracer().intersect(
+                placed(*scene), {c.T_mount_camera.t, c.T_mount_camera.q * d, 0}, kInfinity);
+            if (hit.body != 1) continue;
+            sum += Vec3{static_cast<double>(x), static_cast<double>(y), 0};
+            ++met;
+        }
+    ASSERT_GT(met, 0);
+    EXPECT_LT(norm(sum / met - expected), 0.7);
 }
 
 TEST(GroundScene, AStationDimsByTheRangeLawThroughTheAir) {

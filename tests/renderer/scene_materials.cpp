@@ -61,6 +61,12 @@ const BadScene kBadMaterials[] = {
     {"EmissionInfinite", BALL "material = {emission = inf}\n", 4, 24, "emission: got inf"},
     {"GlowWithoutEmission", BALL "material = {emission_texture = \"a.png\"}\n", 4, 32,
      "multiplies the \"emission\""},
+    {"CloudAlbedoAlone", BALL "material = {cloud_albedo = 0.5}\n", 4, 28,
+     "belongs to cloud_texture, which is not here"},
+    {"SpecularMapOnLambert", BALL "material = {specular_texture = \"a.png\"}\n", 4, 32,
+     "belongs to kind = \"phong\" or \"phong_classic\", and this is \"lambert\""},
+    {"CloudsOnGgx", BALL "material = {kind = \"ggx\", cloud_texture = \"a.png\"}\n", 4, 43,
+     "belongs to kind = \"lambert\" or \"phong\", and this is \"ggx\""},
     {"NormalScaleAlone", BALL "material = {normal_scale = 2}\n", 4, 28,
      "belongs to normal_texture, which is not here"},
     {"BumpHeightAlone", BALL "material = {bump_height_m = 2}\n", 4, 29, "belongs to height_texture"},
@@ -222,6 +228,19 @@ TEST(SceneMaterial, EveryTextureIsReadForWhatItIs) {
     EXPECT_EQ(texture(m.emission_texture).wrap, Texture::Wrap::clamp);
     EXPECT_EQ(m.normal_scale, 2);
     EXPECT_EQ(m.bump_height_m, -0.25f);
+}
+
+TEST(SceneMaterial, MapsOfAPlanetAreLinear) {
+    const TemporaryFolder folder;
+    cv::imwrite(folder / "grey.png", cv::Mat(2, 2, CV_8UC3, cv::Scalar(128, 128, 128)));
+    const Scene s = read_good(folder, BALL
+                              "[body.material]\nkind = \"phong\"\nspecular = 0.1\nexponent = 9\n"
+                              "specular_texture = \"grey.png\"\ncloud_texture = \"grey.png\"\n");
+    const Material& m = s.materials.at(0);
+    for (const int texture : {m.specular_texture, m.cloud_texture})
+        EXPECT_NEAR(s.textures.at(static_cast<std::size_t>(texture)).rgb[0], 65535 * 128.0 / 255, 0.5);
+    EXPECT_EQ(m.cloud_albedo, (Rgb{0.75f, 0.75f, 0.75f}));
+    EXPECT_EQ(m.emission_texture, -1);
 }
 
 TEST(SceneMaterial, FilesAreReadOnceForEachUse) {

@@ -144,7 +144,7 @@ def shade_phases(document, axes):
     for phase in document["phases"]:
         colour = PHASE_COLOURS.get(phase["phase"]) or others.setdefault(phase["phase"], OTHER_PHASES[len(others) % 4])
         axes.axvspan(phase["from_s"], phase["to_s"], color=colour, alpha=0.13, linewidth=0)
-        label = f"{phase['phase']} {phase['leg']}"
+        label = f"{phase['phase'].replace('_', ' ')} {phase['leg']}"
         if (phase["to_s"] - phase["from_s"]) / span > 0.0075 * len(label):
             axes.text(phase["from_s"], 0.98, " " + label, transform=axes.get_xaxis_transform(), va="top", fontsize=7.5)
     axes.set_xlim(0, span)

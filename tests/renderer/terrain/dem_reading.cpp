@@ -2,6 +2,7 @@
 #include "renderer/scene/dem_process.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <numbers>
@@ -199,6 +200,36 @@ TEST(Dem, ATruncatedFileIsAnError) {
         const auto t =
             read_dem_in_process(request_of(folder.write("t.tif", std::string_view(whole).substr(0, size))));
         EXPECT_FALSE(t) << size;
+    }
+}
+
+/// A label may name the data file beside it, and nothing elsewhere: neither a file outside of its folder nor one of
+/// GDAL's own file systems, which include the network. A FIFO, which would be waited for, is no file either.
+TEST(Dem, ALabelOpensNoFileOutsideOfItsFolder) {
+    NEEDS_GDAL();
+    const TemporaryFolder folder;
+    const std::string inside = folder / "dem";
+    std::filesystem::create_directory(inside);
+    for (const std::string& data : {folder / "pds3.img", inside + "/pds3.img"})
+        std::filesystem::copy_file(dem_file("pds3.img"), data);
+    ASSERT_EQ(::mkfifo((inside + "/fifo").c_str(), 0600), 0);
+    const std::string label = test::read_text(dem_file("pds3.lbl"));
+    const auto read_with = [&](const std::string& data) {
+        std::string named = label;
+        named.replace(named.find("pds3.img"), 8, data);
+        return read_dem_in_process(request_of(folder.write("dem/d.lbl", named)), {.seconds = 20});
+    };
+    EXPECT_TRUE(read_with("pds3.img"));
+    const std::vector<std::string> elsewhere{"../pds3.img",
+                                             folder / "pds3.img",
+                                             "/vsicurl/http://127.0.0.1:9/pds3.img",
+                                             "/vsisubfile/0_2400," + (folder / "pds3.img"),
+                                             "/vsistdin/",
+                                             "fifo"};
+    for (const std::string& data : elsewhere) {
+        const auto t = read_with(data);
+        ASSERT_FALSE(t) << data;
+        EXPECT_NE(t.error().what.find("Failed to open " + data), std::string::npos) << t.error().text();
     }
 }
 

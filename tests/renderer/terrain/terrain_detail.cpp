@@ -16,22 +16,58 @@ std::vector<double> all_of(HeightSource& source) {
     return h;
 }
 
-TEST(TerrainDetail, WithoutFeaturesItIsTheTrianglesOfTheDem) {
-    HeightGrid grid(20, 17, rough_ground);
+TEST(TerrainDetail, WithoutFeaturesItIsSmoothThroughThePosts) {
+    const auto bowl = [](double c, double r) { return 0.3 * c * c - 0.2 * c * r + 0.1 * r * r - 4 * c + r; };
+    HeightGrid grid(20, 17, bowl);
     DetailedSource fine(grid, 1, {.posts_per_post = 4});
     EXPECT_EQ(fine.columns(), 19 * 4 + 1);
     EXPECT_EQ(fine.rows(), 16 * 4 + 1);
     const std::vector<double> h = all_of(fine);
     for (int r = 0; r < fine.rows(); ++r)
         for (int c = 0; c < fine.columns(); ++c) {
+            const double height = h[static_cast<std::size_t>(r * fine.columns() + c)], x = c / 4.0, y = r / 4.0;
+            if (c % 4 == 0 && r % 4 == 0) {
+                EXPECT_EQ(height, grid.at(c / 4, r / 4));
+            } else if (x >= 1 && x <= 18 && y >= 1 && y <= 15) {
+                EXPECT_NEAR(height, bowl(x, y), 1e-12) << "the spline is exact to the second order";
+            }
+        }
+}
+
+TEST(TerrainDetail, BesideAHoleItIsTheTrianglesOfTheDem) {
+    const auto ground = [](int c, int r) { return c == 9 && r == 8 ? kNoHeight : rough_ground(c, r); };
+    HeightGrid grid(20, 17, ground);
+    DetailedSource fine(grid, 1, {.posts_per_post = 4});
+    const std::vector<double> h = all_of(fine);
+    int holes = 0;
+    for (int r = 6 * 4 + 1; r < 10 * 4; ++r)
+        for (int c = 7 * 4 + 1; c < 11 * 4; ++c) {
+            if (c % 4 == 0 && r % 4 == 0) continue;
             const double u = c % 4 / 4.0, v = r % 4 / 4.0;
-            const auto at = [&](int dc, int dr) {
-                return grid.at(std::min(c / 4 + dc, 19), std::min(r / 4 + dr, 16));
-            };
+            const auto at = [&](int dc, int dr) { return grid.at(c / 4 + dc, r / 4 + dr); };
             const double expected = u >= v ? at(0, 0) + u * (at(1, 0) - at(0, 0)) + v * (at(1, 1) - at(1, 0))
                                            : at(0, 0) + v * (at(0, 1) - at(0, 0)) + u * (at(1, 1) - at(0, 1));
-            EXPECT_NEAR(h[static_cast<std::size_t>(r * fine.columns() + c)], expected, 1e-12);
+            const double height = h[static_cast<std::size_t>(r * fine.columns() + c)];
+            ASSERT_EQ(height == height, expected == expected);
+            if (expected == expected) {
+                EXPECT_NEAR(height, expected, 1e-12);
+            }
+            holes += expected == expected ? 0 : 1;
         }
+    EXPECT_GT(holes, 30);
+}
+
+TEST(TerrainDetail, APlanetHasNoSeam) {
+    const auto bumps = [](int c, int r) { return std::sin(2 * 3.14159265358979 * (c % 24) / 24) * r; };
+    HeightGrid grid(25, 9, bumps, true);
+    DetailedSource fine(grid, 1, {.posts_per_post = 4});
+    const std::vector<double> h = all_of(fine);
+    const auto at = [&](int c, int r) { return h[static_cast<std::size_t>(r * fine.columns() + c)]; };
+    for (int r = 0; r < fine.rows(); ++r) {
+        EXPECT_EQ(at(0, r), at(fine.columns() - 1, r));
+        // The slope from the left equals that to the right: a sine is odd about the seam.
+        EXPECT_NEAR(at(1, r), -at(fine.columns() - 2, r), 1e-9);
+    }
 }
 
 TEST(TerrainDetail, WindowsAreTheSameHoweverTheyAreRead) {

@@ -1,4 +1,4 @@
-/// renderer/integrator/uninitialized_array.h - an array whose elements are written before they are read.
+/// base/uninitialized_array.h - an array whose elements are written before they are read.
 #pragma once
 
 #include <cstddef>

@@ -1,0 +1,46 @@
+#include "renderer/lidar/air_echo.h"
+
+#include <algorithm>
+
+namespace narpa {
+namespace {
+
+/// Of the threshold.
+constexpr double kFaintestGate = 0.1;
+/// Probabilities below this are none: gates behind are fainter.
+constexpr double kNever = 1e-12;
+
+}  // namespace
+
+AirEcho::AirEcho(const LidarReceiverModel& model, double least_light, const Medium* medium) noexcept
+    : medium_(medium),
+      least_light_(least_light),
+      snr_(model.detection_snr),
+      gate_m_(model.pulse_length_m),
+      start_m_(std::max(model.range_min_m, model.pulse_length_m)) {
+    if (medium == nullptr || !(least_light > 0)) return;
+    reach_m_ = std::sqrt(medium->most_lidar_backscatter_1_m() * gate_m_ / (kFaintestGate * least_light));
+}
+
+Medium::Backscatter AirEcho::first(const BodyPoses& at, const Ray& ray, double nearest_m, double noise,
+                                   double u) const noexcept {
+    double missed = 1;
+    const double end_m = std::min(reach_m_, nearest_m) - gate_m_;
+    for (double from_m = start_m_; from_m < end_m; from_m += gate_m_) {
+        const Medium::Backscatter gate = medium_->lidar_backscatter(at, ray, from_m, from_m + gate_m_);
+        const double x = gate.light / least_light_;
+        const double detected = detection_probability(x / noise, snr_);
+        if (x < kFaintestGate || detected < kNever) break;
+        missed *= 1 - detected;
+        if (u >= missed) return gate;
+    }
+    return {};
+}
+
+double AirEcho::light_at(const BodyPoses& at, const Ray& ray, double range_m) const noexcept {
+    if (range_m > reach_m_) return 0;
+    const double half = std::min(0.5 * gate_m_, 0.5 * range_m);
+    return medium_->lidar_backscatter(at, ray, range_m - half, range_m).light * (half > 0 ? gate_m_ / half : 0);
+}
+
+}  // namespace narpa

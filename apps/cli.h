@@ -39,6 +39,7 @@ Command add_bench_lidar(Parser bench);
 Command add_bench_latency(Parser bench);
 Command add_bench_atmosphere(Parser bench);
 Command add_bench_estimate(Parser bench);
+Command add_bench_terrain(Parser bench);
 
 /// {"error": ...}, with the exit status.
 nlohmann::json to_json(const Error& e);

@@ -81,7 +81,7 @@ Command add_bench(Parser app) {
     bench.group("Measure");
     auto chosen = std::make_shared<Command>();
     bench.choice<Command>({add_bench_render, add_bench_loop, add_bench_latency, add_bench_lidar,
-                           add_bench_atmosphere, add_bench_estimate},
+                           add_bench_atmosphere, add_bench_estimate, add_bench_terrain},
                           *chosen);
     bench.examples({"narpa bench loop docking", "narpa bench render --spp 4,16,64 -o out/error.png"});
     return [chosen] { return (*chosen)(); };

@@ -42,12 +42,6 @@ bool lock_memory() noexcept {
     return ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 }
 
-bool take_fifo_priority(int priority) noexcept {
-    sched_param parameters{};
-    parameters.sched_priority = priority;
-    return ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
-}
-
 bool run_on_cpu(int cpu) noexcept {
     cpu_set_t one;
     CPU_ZERO(&one);

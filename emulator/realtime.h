@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/fifo_priority.h"
 #include "base/result.h"
 
 namespace narpa {
@@ -16,9 +17,6 @@ void keep_heap() noexcept;
 bool lock_memory() noexcept;
 /// Touches the pages of the calling thread's stack that a frame may need.
 void touch_stack() noexcept;
-/// Gives the calling thread SCHED_FIFO at this priority (1..99). False: not permitted (RLIMIT_RTPRIO,
-/// CAP_SYS_NICE).
-bool take_fifo_priority(int priority) noexcept;
 /// Binds the calling thread to one processor. False: not permitted.
 bool run_on_cpu(int cpu) noexcept;
 /// "0,2-3" -> {0, 2, 3}; an Error if the process may not use one of them.

@@ -3,12 +3,15 @@
 #include <optional>
 
 #include "apps/programs/program.h"
+#include "base/fifo_priority.h"
 #include "base/stop.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/dynamics/node.h"
 
 namespace narpa::rehearsal {
 namespace {
+
+constexpr int kDynamicsPriority = 55;  ///< in real time; below the emulator's CAN thread
 
 struct Arguments {
     std::string scenario, bus;
@@ -22,6 +25,8 @@ Status simulate(Arguments& a) {
     if (!scenario) return scenario.error();
     a.options.seed = a.seed.value_or(scenario->seed);
     stop_on_signals();
+    // Late poses are wrong images. It computes for less than a millisecond at a time.
+    if (!a.options.lockstep) take_fifo_priority(kDynamicsPriority);
     auto bus = join_can_bus(a.bus, a.options.wait_s, stop_flag());
     if (!bus) return bus.error();
     notify_ready(a.ready_fd);

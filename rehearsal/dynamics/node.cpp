@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "drivers/can/remote_clock.h"
 #include "drivers/descriptor.h"
@@ -123,7 +124,8 @@ private:
         return Ok{};
     }
 
-    /// Commands that arrive meanwhile act at once. Returns early when stopped.
+    /// Commands that arrive meanwhile act from their time on, or at once where that is past. Returns early when
+    /// stopped.
     Status wait_until(std::int64_t t_ns) {
         for (;;) {
             if (auto received = receive(); !received) return received;
@@ -156,10 +158,16 @@ private:
             ++counts_.late;
         } else {
             commanded_ns_ = command.t_ns;
-            if (!options_.lockstep)
-                if (auto moved = advance_to(std::min(now_ns - t_start_ns_, next_ns_)); !moved) return moved;
-            ++(simulation_.apply(command) ? counts_.applied : counts_.lost);
+            if (options_.lockstep) return apply(command);
+            const std::int64_t acts_ns = std::max(now_ns, command.t_ns) - t_start_ns_;
+            if (auto moved = advance_to(std::min(acts_ns, next_ns_)); !moved) return moved;
+            if (acts_ns <= next_ns_) return apply(command);
+            pending_ = command;
         }
+        return Ok{};
+    }
+    Status apply(const ActuatorCommand& command) {
+        ++(simulation_.apply(command) ? counts_.applied : counts_.lost);
         return Ok{};
     }
 
@@ -179,8 +187,18 @@ private:
         return (simulation_.t_ns() / scenario_.pose_period_ns() + 1) * scenario_.pose_period_ns();
     }
 
-    /// Reports a contact on the way at its own time.
+    /// Applies a command on the way whose time has come.
     Status advance_to(std::int64_t t_ns) {
+        if (pending_ && pending_->t_ns - t_start_ns_ <= t_ns) {
+            const ActuatorCommand command = *std::exchange(pending_, std::nullopt);
+            if (auto moved = move_to(command.t_ns - t_start_ns_); !moved) return moved;
+            static_cast<void>(apply(command));
+        }
+        return move_to(t_ns);
+    }
+
+    /// Reports a contact on the way at its own time.
+    Status move_to(std::int64_t t_ns) {
         while (simulation_.t_ns() < t_ns) {
             const DynamicsPhase before = simulation_.phase();
             simulation_.advance_to(t_ns);
@@ -257,6 +275,7 @@ private:
     std::int64_t t_start_ns_ = 0;
     std::int64_t next_ns_ = 0;                  // real time: of the next poses
     std::optional<std::int64_t> commanded_ns_;  // of the newest command
+    std::optional<ActuatorCommand> pending_;    // real time: its time has not come
     std::uint8_t report_counter_ = 0, attitude_counter_ = 0;
     std::uint64_t poses_ = 0;
     CommandCounts counts_;

@@ -2,7 +2,7 @@
 /// thruster commands in.
 ///
 /// In lockstep the time waits at every control period for its command. In real time the clock is the emulator's,
-/// and a command acts from its arrival on.
+/// and a command acts from its time on, or from its arrival where that is later.
 #pragma once
 
 #include <cstdint>

@@ -119,7 +119,7 @@ void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const Measure
     measurements_.push_back(std::move(record));
 }
 
-CycleRecord Autopilot::cycle(std::int64_t t_ns) {
+CycleRecord Autopilot::cycle(std::int64_t t_ns, std::int64_t lead_ns) {
     const std::lock_guard lock(mutex_);
     CycleRecord out;
     estimator_->advance(t_ns);
@@ -140,14 +140,14 @@ CycleRecord Autopilot::cycle(std::int64_t t_ns) {
         control_->set_mass(estimator_->mass_kg());
         impulses = control_->step(out.t_s, motion, out.reference);
     }
-    estimator_->thrust(t_ns, impulses.linear_n_s);
+    estimator_->thrust(t_ns + lead_ns, impulses.linear_n_s);
 
     const auto sigma = [&](int i) { return std::sqrt(known.covariance(i, i)); };
     out.estimate = {
         cycle_,  t_ns,   known.T_chaser_target, {sigma(0), sigma(1), sigma(2)}, {sigma(3), sigma(4), sigma(5)},
         frames_, sweeps_};
     out.command = {static_cast<std::uint8_t>(cycle_),
-                   t_ns,
+                   t_ns + lead_ns,
                    impulses.linear_n_s,
                    impulses.angular_n_m_s,
                    guidance_->phase(),

@@ -70,8 +70,8 @@ public:
     void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement) {
         take(sensor, t_ns, measurement, frames_);
     }
-    /// Estimate at t_ns and command for the control period that follows; t_ns grows by control periods.
-    CycleRecord cycle(std::int64_t t_ns);
+    /// Estimate at t_ns and command for a control period from `lead_ns` after it on; t_ns grows by control periods.
+    CycleRecord cycle(std::int64_t t_ns, std::int64_t lead_ns = 0);
 
     [[nodiscard]] std::uint64_t restarts() const noexcept { return estimator_ ? estimator_->restarts() : 0; }
 

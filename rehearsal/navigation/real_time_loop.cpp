@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/fifo_priority.h"
 #include "base/stop.h"
 #include "drivers/descriptor.h"
 #include "estimator/features/feature_matcher.h"
@@ -25,6 +26,9 @@ constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kPatience_ns = 60 * kSecond_ns, kSilence_ns = 10 * kSecond_ns;
 /// Delays allowed after t_k: of its attitude report, of frames and packets that end at t_k.
 constexpr std::int64_t kReportWait_ns = 50 * kMs, kSensorWait_ns = 60 * kMs;
+/// A command acts so long after t_k: by then it has arrived, so that its thrust is the one that the filter takes.
+constexpr std::int64_t kCommandLead_ns = 60 * kMs;
+constexpr int kCyclePriority = 50;  ///< below the emulator's CAN thread
 
 constexpr std::int64_t kReadWait_ns = 50'000'000;
 constexpr std::size_t kFramesKept = 4, kNoticesKept = 16;
@@ -201,6 +205,7 @@ private:
     }
 
     Status run_cycles() {
+        take_fifo_priority(kCyclePriority);  // this thread alone: the measuring one computes for long
         for (std::int64_t t_ns = t_start_ns_;; t_ns += period_ns_) {
             if (auto there = wait_until(t_ns); !there || loop_.over()) return there;
             const std::int64_t late_ns = loop_.link.clock().now_ns() - t_ns;
@@ -212,7 +217,7 @@ private:
                 ++loop_.counts.cycles_late;
             }
             loop_.take_beams(t_ns);
-            loop_.publish(loop_.autopilot.cycle(t_ns));
+            loop_.publish(loop_.autopilot.cycle(t_ns, kCommandLead_ns));
         }
     }
 

@@ -151,8 +151,8 @@ Quat StateEstimator::q_frame_chaser(std::int64_t t_ns) const {
 }
 
 void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
-    advance(t_ns);
-    pulses_.clear();
+    if (t_ns <= this->t_ns()) advance(t_ns);
+    std::erase_if(pulses_, [&](const Pulse& p) { return p.from_ns >= t_ns || resting_; });
     if (resting_) return;
     const Thrusters& thrusters = scenario_.thrusters;
     const std::optional<Engine>& engine = scenario_.engine;
@@ -189,7 +189,7 @@ void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
     if (engine && engine->specific_impulse_s > 0)
         mass_kg_ -= std::max(0.0, engine->sign() * impulse_n_s[engine->axis()]) /
                     (engine->specific_impulse_s * kGravity0_m_s2);
-    advance(t_ns);
+    if (t_ns <= this->t_ns()) advance(t_ns);
 }
 
 void StateEstimator::advance(std::int64_t t_ns) {

@@ -18,6 +18,7 @@ def make_all(folder, assets=None):
         real = Path(assets) / REAL_MAPS[name] if assets else None
         image = cv2.imread(str(real)) if real and real.exists() else make()
         cv2.imwrite(str(folder / f"{name}.png"), cv2.resize(image, (2048, 1024), interpolation=cv2.INTER_AREA))
+    make_globe_maps(folder, Path(assets) if assets else None)
     cv2.imwrite(str(folder / "checker.png"), checker(16))
     heights = craters()
     cv2.imwrite(str(folder / "craters.png"), np.uint16(np.round(65535 * heights)))
@@ -25,6 +26,35 @@ def make_all(folder, assets=None):
     dem = Path(assets) / "missionDEM.tif" if assets else None
     ground = cv2.imread(str(dem), cv2.IMREAD_UNCHANGED) if dem and dem.exists() else 35 * heights[90:427, 300:648] - 4475
     write_terrain(folder / "gale.obj", np.float64(ground) + 4460)
+
+
+def make_globe_maps(folder, assets):
+    """Where there is water, lights by night, and clouds. Clouds are made up; water is where the map of heights is black."""
+
+    def real(name):
+        return cv2.imread(str(assets / name)) if assets and (assets / name).exists() else None
+
+    heights, night = real("earth-topology.png"), real("earth-night.jpg")
+    if heights is None:
+        heights = np.repeat(255 * (clouds(8) > 0.55)[..., None], 3, axis=2).astype(np.uint8)
+    if night is None:
+        sparks = np.random.default_rng(9).random(SIZE[::-1]) ** 60 * (clouds(10) > 0.6)
+        night = np.uint8(255 * sparks[..., None] * np.array([0.5, 0.8, 1.0]))
+    water = cv2.GaussianBlur(np.uint8(255 * (heights[..., 0] < 3)), (3, 3), 0)
+    lights = np.clip((np.float64(night[..., 2:]) - 36) * 3.5, 0, 255)  # without the dim blue that shows the continents
+    lights = lights * np.array([0.55, 0.8, 1.0])
+    for name, image in {"oceans": water, "earth_night": np.uint8(lights), "clouds": cloud_cover()}.items():
+        cv2.imwrite(str(folder / f"{name}.png"), cv2.resize(image, (2048, 1024), interpolation=cv2.INTER_AREA))
+
+
+def cloud_cover():
+    """Streaks of noise, thicker along the equator and about 50 degrees north and south."""
+    latitude = np.linspace(90, -90, SIZE[1])[:, None]
+    belts = np.exp(-((latitude / 8) ** 2)) + np.exp(-(((np.abs(latitude) - 52) / 16) ** 2))
+    noise = clouds(24, octaves=8, first=2)
+    x = (np.arange(SIZE[0]) + np.int64(60 * clouds(22, octaves=5, first=1))) % SIZE[0]  # swirls
+    y = np.clip(np.arange(SIZE[1])[:, None] + np.int64(40 * (clouds(23, octaves=5, first=1) - 0.5)), 0, SIZE[1] - 1)
+    return np.uint8(255 * np.clip(4 * (noise[y, x] - 0.55 + 0.08 * belts), 0, 1))
 
 
 def checker(squares):
@@ -60,11 +90,11 @@ def graticule():
     return image
 
 
-def clouds(seed, octaves=6):
-    """Noise in 0..1 over a map, the same on its left and right edges."""
+def clouds(seed, octaves=6, first=0):
+    """Noise in 0..1 over a map, the same on its left and right edges. Without the octaves before `first`, which are the widest."""
     random = np.random.default_rng(seed)
     total = np.zeros(SIZE[::-1], np.float32)
-    for octave in range(octaves):
+    for octave in range(first, octaves):
         coarse = random.random((3 * 2**octave, 6 * 2**octave)).astype(np.float32)
         coarse = np.hstack([coarse, coarse[:, :1]])
         total += cv2.resize(coarse, SIZE, interpolation=cv2.INTER_CUBIC) / 1.7**octave

@@ -1,5 +1,5 @@
-/// make_scene docking|craft|descent|small_body|landing OUTDIR - writes the meshes, textures and tables of a scene.
-/// The same bytes each time.
+/// make_scene docking|craft|descent|small_body|landing|terrain OUTDIR - writes the meshes, textures and tables of a
+/// scene. The same bytes each time.
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -39,6 +39,8 @@ bool write_scene(std::string_view scene, const Output& out) {
         out.mesh("landing_site", build_landing_site(), landing_materials());
         out.mesh("landing_map", build_landing_map(), landing_materials());
         out.mesh("lander", build_lander(), landing_materials());
+    } else if (scene == "terrain") {
+        write_highland(out.directory + "/highland.png");
     } else {
         return false;
     }
@@ -55,7 +57,7 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "make_scene: %s\n", e.what());
         return 1;
     }
-    std::fputs("usage: make_scene docking|craft|descent|small_body|landing OUTDIR   (an existing folder)\n",
+    std::fputs("usage: make_scene docking|craft|descent|small_body|landing|terrain OUTDIR   (an existing folder)\n",
                stderr);
     return 2;
 }

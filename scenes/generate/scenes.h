@@ -69,4 +69,14 @@ Mesh build_landing_site();
 Mesh build_landing_map();
 Mesh build_lander();
 
+// --- Terrain: an elevation model of cratered ground, 4.1 km square, hills of a hundred metres and craters of 8 to
+// 500 m, as a 16-bit PNG ---
+
+inline constexpr int kHighlandPosts = 1025;
+inline constexpr double kHighlandSpacing_m = 4;
+/// Height = number * step - zero.
+inline constexpr double kHighlandStep_m = 0.01, kHighlandZero_m = 300;
+/// Throws std::runtime_error where it cannot.
+void write_highland(const std::string& path);
+
 }  // namespace narpa::scenes

@@ -1,11 +1,12 @@
 #!/usr/bin/python3
-"""`narpa map`: depth and contour lines of the shipped descent scene, and of a ball with closed forms; the files are read by
+"""`narpa map`: depth and contour lines of the shipped descent and terrain scenes, and of a ball with closed forms; the files are read by
 OpenCV and an XML parser; bad input is refused."""
 import base64
 import importlib.util
 import json
 import math
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import support
@@ -66,6 +67,25 @@ def check_heights_of_the_descent():
     expect(abs(float(values.max()) - summary["highest_m"]) < 1e-4, "the document has the heights of all pixels")
 
 
+def check_terrain_against_its_elevation_model():
+    """Heights from three heights of a descent are those of the PNG that the terrain was made of, read by OpenCV. Between its
+    posts there are craters of 2 to 8 m; at a distance there is an error of half a pixel."""
+    scene = Path(next(s["file"] for s in json.loads(narpa("list", "--json").stdout)["scenes"] if s["name"] == "terrain"))
+    posts = cv2.imread(str(scene.with_name("highland.png")), cv2.IMREAD_UNCHANGED)
+    ground = 0.01 * posts.astype(np.float32) - 346
+    row, column = np.indices((480, 640))
+    for time_s in (0, 81, 97):
+        at = ("terrain", "--time", str(time_s))
+        mapped(*at, "-o", folder / "depth.pfm"), mapped(*at, "--of", "height", "-o", folder / "height.pfm")
+        depth, height = (cv2.imread(str(folder / f"{name}.pfm"), cv2.IMREAD_UNCHANGED) for name in ("depth", "height"))
+        metres = depth / (320 / math.tan(math.radians(30)))  # a pixel
+        x, y = (column - 319.5) * metres, (239.5 - row) * metres
+        expected = cv2.remap(ground, np.float32(512 + x / 4), np.float32(512 - y / 4), cv2.INTER_CUBIC)
+        off = np.abs(height - expected)
+        expect(np.median(off) < 0.1 + 0.1 * metres.mean(), f"t = {time_s} s: half of the heights within {np.median(off):.3f} m of the PNG's")
+        expect(np.quantile(off, 0.99) < 1.5 + 0.5 * metres.mean(), f"and 99 % within {np.quantile(off, 0.99):.2f} m")
+
+
 def check_pictures():
     scene = folder / "ball.toml"
     scene.write_text(BALL)
@@ -110,5 +130,5 @@ def check_refusals():
     expect("warning: no contour line: depth reaches from 8" in said, f"an interval too wide is told: {said}")
 
 
-for check in (check_depth_of_the_descent, check_heights_of_the_descent, check_pictures, check_refusals):
+for check in (check_depth_of_the_descent, check_heights_of_the_descent, check_terrain_against_its_elevation_model, check_pictures, check_refusals):
     check()

@@ -364,6 +364,42 @@ TEST_F(DynamicsOnSlcan, InRealTimePosesFollowTheEmulatorsClockFromAWholeSecondOn
     EXPECT_GE((*flown)["actuator_commands"]["refused"], 3);
 }
 
+TEST_F(DynamicsOnSlcan, InRealTimeACommandActsFromItsTimeOn) {
+    Scenario s = quiet();
+    s.duration_s = 600;
+    s.navigation.period_s = 1;
+    s.pose_rate_hz = 10;
+    Partner partner(*hub, s);
+    const auto begun = std::chrono::steady_clock::now();
+    partner.on_turn = [&] {
+        const std::chrono::nanoseconds since = std::chrono::steady_clock::now() - begun;
+        partner.beat(since.count(), RunState::running);
+    };
+    // Sent 850 ms early: a pulse of half a second from between two poses on.
+    int periods = 0;
+    std::int64_t sent_ns = 0;
+    partner.on_period = [&](std::int64_t t_ns) {
+        ActuatorCommand c;
+        c.t_ns = t_ns + (periods == 0 ? 850 * kMs : 0);
+        if (periods == 0) sent_ns = t_ns, c.impulse_n_s = {0, 0.5 * s.thrusters.force_n, 0};
+        if (++periods >= 3) c.phase = GuidancePhase::done;
+        if (periods != 2) partner.command(c);
+    };
+    const auto flown = fly(s, {}, bus, partner);
+    ASSERT_TRUE(flown) << flown.error().text();
+    const auto speed_m_s = [&](std::int64_t after_ms) {
+        for (const Partner::Pose& p : partner.poses)
+            if (p.base_id == s.chaser.can_id && p.command.t_valid_ns == sent_ns + after_ms * kMs)
+                return norm(p.command.motion.velocity_m_s);
+        return -1.0;
+    };
+    const double still = speed_m_s(0), full = s.thrusters.force_n / s.chaser.mass_kg;
+    EXPECT_NEAR(speed_m_s(800), still, 1e-4) << "long after it has come";
+    EXPECT_NEAR(std::abs(speed_m_s(900) - still), 0.05 * full, 1e-4);
+    EXPECT_NEAR(std::abs(speed_m_s(1200) - still), 0.35 * full, 1e-4);
+    EXPECT_NEAR(std::abs(speed_m_s(1600) - still), 0.5 * full, 1e-4);
+}
+
 TEST(DynamicsOnUdp, TheSameRunInCanFd) {
     const std::string bus = "udp:" + own_group();
     const auto hub = open_or_fail(bus, CanRole::hub);

@@ -1,5 +1,7 @@
 #include "renderer/atmosphere/panel_scattering.h"
 
+#include <array>
+#include <cstdint>
 #include <cstring>
 
 #include "base/each_isa.h"
@@ -33,17 +35,9 @@ inline Place place_of(const AirTables& t, const AirPanel& p, std::size_t k, cons
     return {radius, std::sqrt(h * (2 * t.ground_m + h)), std::min(1.0f, std::max(-1.0f, sun))};
 }
 
-/// The aerosol's phase function of a ray towards the Sun: what is kept of it when it is cut off at kMaxDegree, and
-/// the forward peak, f of it. Light that the peak has scattered n times has the peak folded n times with itself.
-struct ForwardPeak {
-    static constexpr std::size_t kMostFolds = 5, kTerms = 20;
-    Air::Spectrum rest{};  ///< times scattering
-    Air::Spectrum peak{};  ///< f times scattering: 1/m
-    std::array<Air::Spectrum, kMostFolds> folded{};
-};
-
-/// Legendre polynomials over 4 pi, times 2 l + 1.
-using LegendreTerms = std::array<float, kMaxDegree + 1 + ForwardPeak::kTerms>;
+/// Legendre polynomials over 4 pi, times 2 l + 1. Of the peak folded with itself the sum converges in so many more.
+constexpr std::size_t kPeakTerms = 20;
+using LegendreTerms = std::array<float, kMaxDegree + 1 + kPeakTerms>;
 inline void legendre_terms(float nu, LegendreTerms& out) noexcept {
     float before = 0, legendre = 1;
     for (std::size_t degree = 0; degree < out.size(); ++degree) {
@@ -54,80 +48,122 @@ inline void legendre_terms(float nu, LegendreTerms& out) noexcept {
     }
 }
 
-/// Moments of the peak: 1 up to kMaxDegree, then g^k. The first is what the phase function has beyond the rest; of
-/// the others the sum converges.
-inline void split(const Air& air, float nu, std::size_t lanes, ForwardPeak& out) noexcept {
-    LegendreTerms terms;
-    legendre_terms(nu, terms);
-    float kept = 0;
-    for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
-        kept += terms[degree];
-        for (std::size_t l = 0; l < lanes; ++l)
-            out.rest[l] += air.scaled_aerosol[l] * air.moment[degree][l] * terms[degree];
-    }
-    for (std::size_t l = 0; l < lanes; ++l) {
-        const float g = air.asymmetry[l], s = 1 + g * g - 2 * g * nu;
-        out.peak[l] = air.aerosol[l] - air.scaled_aerosol[l];
-        const float all = air.aerosol[l] * kInv4Pi * (1 - g * g) / (s * std::sqrt(s));
-        out.folded[0][l] = (all - out.rest[l]) / std::max(out.peak[l], 1e-30f);
-        float power = g;
-        for (std::size_t n = 1; n < ForwardPeak::kMostFolds; ++n) {
-            power *= g;
-            float sum = 0;
-            for (std::size_t k = ForwardPeak::kTerms; k-- > 0;) sum = sum * power + terms[kMaxDegree + 1 + k];
-            out.folded[n][l] = kept + sum;
-        }
-    }
+/// As exp_of_negative(), written out: the loops that call it are too long for the compiler to make vectors of.
+using Int8 = std::int32_t __attribute__((vector_size(32)));
+inline void exp_of_negative(const Vector8& x, Vector8& out) noexcept {
+    const Vector8 t = (x < -87.0f ? Vector8{} - 87.0f : x) * 1.44269504f;
+    const Int8 whole = __builtin_convertvector(t - 0.5f, Int8);
+    const Vector8 f = t - __builtin_convertvector(whole, Vector8);
+    Vector8 p = Vector8{} + 1.5403530e-4f;
+    for (const float c : {1.3333558e-3f, 9.6181291e-3f, 5.5504109e-2f, 2.4022651e-1f, 6.9314718e-1f, 1.0f})
+        p = p * f + c;
+    const Int8 power = (whole + 127) << 23;
+    Vector8 scale;
+    std::memcpy(&scale, &power, sizeof scale);
+    out = x < -87.0f ? Vector8{} : p * scale;
 }
 
-/// Mean of the folded peaks for light that is scattered into the ray once at least: `a` optical depth of the peak
-/// before and after. Poisson's distribution; more folds count as the most.
-inline float mean_fold(const ForwardPeak& p, std::size_t l, float a) noexcept {
+/// Mean of the folded peaks for light that is scattered into the ray once at least, by Poisson's distribution about
+/// `a`, the optical depth of the peak before and after; more folds count as the most.
+inline void mean_fold(const AerosolPhase& p, std::size_t block, const Vector8& a, Vector8& out) noexcept {
     constexpr float kThin = 1e-3f;
-    if (a < kThin) return p.folded[0][l];
-    const float none = exp_of_negative(-a);
-    float weight = none, left = 1 - none, sum = 0;
-    for (std::size_t n = 0; n + 1 < ForwardPeak::kMostFolds; ++n) {
-        weight *= a / static_cast<float>(n + 1);
+    const Vector8 depth = a < kThin ? Vector8{} + kThin : a;
+    Vector8 weight, folded, sum{};
+    exp_of_negative(-depth, weight);
+    Vector8 left = 1 - weight;
+    for (std::size_t n = 0; n + 1 < AerosolPhase::kMostFolds; ++n) {
+        weight *= depth * (1 / static_cast<float>(n + 1));
         left -= weight;
-        sum += weight * p.folded[n][l];
+        load(&p.folded[n][block], folded);
+        sum += weight * folded;
     }
-    return (sum + left * p.folded[ForwardPeak::kMostFolds - 1][l]) / a;
+    load(&p.folded[AerosolPhase::kMostFolds - 1][block], folded);
+    const Vector8 mean = (sum + left * folded) / depth;
+    load(&p.folded[0][block], folded);
+    out = a < kThin ? folded : mean;
 }
 
 }  // namespace
 
 NARPA_EACH_ISA void attenuate(const Air& air, const AirPanel& p, PanelTransmittance& through) noexcept {
+    for (std::size_t block = 0; block < air.lanes(); block += kBlock) {
+        Vector8 gas, aerosol, ozone, passes;
+        load(&air.gas[block], gas), load(&air.scaled_extinction[block], aerosol), load(&air.ozone[block], ozone);
+        for (std::size_t k = 0; k < p.n; ++k) {
+            exp_of_negative(-(gas * p.gas_before[k] + aerosol * p.aerosol_before[k] + ozone * p.ozone_before[k]),
+                            passes);
+            store(passes, &through[k][block]);
+        }
+    }
+}
+
+/// Moments of the peak: 1 up to kMaxDegree, then g^k. Folded once it is what the phase function has beyond the
+/// rest.
+NARPA_EACH_ISA void set_phase(const Air& air, float sun_nu, bool exact, AerosolPhase& phase) noexcept {
     const std::size_t lanes = air.lanes();
-    for (std::size_t k = 0; k < p.n; ++k)
-        for (std::size_t block = 0; block < lanes; block += kBlock)
-            for (std::size_t l = block; l < block + kBlock; ++l)
-                through[k][l] = exp_of_negative(-(air.gas[l] * p.gas_before[k] +
-                                                  air.scaled_extinction[l] * p.aerosol_before[k] +
-                                                  air.ozone[l] * p.ozone_before[k]));
+    LegendreTerms terms;
+    legendre_terms(sun_nu, terms);
+    phase.exact = exact;
+    float kept = 0;
+    Air::Spectrum rest{};
+    for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
+        kept += terms[degree];
+        for (std::size_t l = 0; l < lanes; ++l)
+            rest[l] += air.scaled_aerosol[l] * air.moment[degree][l] * terms[degree];
+    }
+    phase.rest = rest;
+    if (!exact) return;
+    for (std::size_t l = 0; l < lanes; ++l) {
+        const float g = air.asymmetry[l], s = 1 + g * g - 2 * g * sun_nu;
+        const float all = air.aerosol[l] * kInv4Pi * (1 - g * g) / (s * std::sqrt(s));
+        phase.peak[l] = air.aerosol[l] - air.scaled_aerosol[l];
+        phase.folded[0][l] = (all - rest[l]) / std::max(phase.peak[l], 1e-30f);
+    }
+    constexpr std::size_t kMore = AerosolPhase::kMostFolds - 1;
+    for (std::size_t block = 0; block < lanes; block += kBlock) {
+        Vector8 g, power[kMore], sum[kMore];
+        load(&air.asymmetry[block], g);
+        for (std::size_t n = 0; n < kMore; ++n) {
+            power[n] = g * (n == 0 ? g : power[n - 1]);
+            sum[n] = Vector8{};
+        }
+        for (std::size_t k = kPeakTerms; k-- > 0;)
+            for (std::size_t n = 0; n < kMore; ++n) sum[n] = sum[n] * power[n] + terms[kMaxDegree + 1 + k];
+        for (std::size_t n = 0; n < kMore; ++n) {
+            sum[n] += kept;
+            store(sum[n], &phase.folded[n + 1][block]);
+        }
+    }
 }
 
 NARPA_EACH_ISA void add_once(const AirTables& t, const Air& air, const AirPanel& p,
-                             const PanelTransmittance& through, const AirRay& ray, Air::Spectrum& out) noexcept {
+                             const PanelTransmittance& through, const AirRay& ray, const AerosolPhase& phase,
+                             Air::Spectrum& out) noexcept {
     const std::size_t lanes = t.lanes;
     Air::Spectrum sum = out;
     const float nu = ray.sun_nu, gas_phase = 0.0596831037f * (1 + nu * nu);
-    ForwardPeak phase;
-    split(air, nu, lanes, phase);
-    if (!ray.exact) phase.peak.fill(0);
     for (std::size_t k = 0; k < p.n; ++k) {
         const Place at = place_of(t, p, k, ray);
         const SunBeam beam = t.sun_beam(at.radius, at.horizon, at.sun);
         if (beam.visible == 0) continue;
         const float w = p.length_m[k] * beam.visible, gas = w * p.gas[k] * gas_phase, aerosol = w * p.aerosol[k];
         const auto [cg, ca, co] = beam.columns;
-        for (std::size_t block = 0; block < lanes; block += kBlock)
-            for (std::size_t l = block; l < block + kBlock; ++l) {
-                const float depth = air.gas[l] * cg + air.scaled_extinction[l] * ca + air.ozone[l] * co;
-                const float peak = phase.peak[l] * mean_fold(phase, l, phase.peak[l] * (ca + p.aerosol_before[k]));
-                sum[l] +=
-                    (air.gas[l] * gas + (phase.rest[l] + peak) * aerosol) * through[k][l] * exp_of_negative(-depth);
+        for (std::size_t block = 0; block < lanes; block += kBlock) {
+            Vector8 of_gas, of_aerosol, of_ozone, light, scattered, passes;
+            load(&phase.rest[block], scattered);
+            if (phase.exact) {
+                Vector8 peak, mean;
+                load(&phase.peak[block], peak);
+                mean_fold(phase, block, peak * (ca + p.aerosol_before[k]), mean);
+                scattered += peak * mean;
             }
+            load(&air.gas[block], of_gas), load(&air.scaled_extinction[block], of_aerosol);
+            load(&air.ozone[block], of_ozone), load(&through[k][block], passes), load(&sum[block], light);
+            Vector8 arrives;
+            exp_of_negative(-(of_gas * cg + of_aerosol * ca + of_ozone * co), arrives);
+            light += (of_gas * gas + scattered * aerosol) * passes * arrives;
+            store(light, &sum[block]);
+        }
     }
     out = sum;
 }

@@ -17,16 +17,14 @@ constexpr float kSqrt4Pi = 3.5449077f;
 /// Adds the irradiance of a surface, whose normal has the components nz along the zenith and nx towards the Sun.
 NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lanes, float nz, float nx,
                                     Air::Spectrum& out) noexcept {
-    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64, 0, -pi / 128 (R. Ramamoorthi, P. Hanrahan,
-    // SIGGRAPH 2001).
-    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f,        -0.13089969f,
-                               0.0f,        0.04908739f, 0.0f,        -0.02454369f};
-    static_assert(kLobe.size() == kMaxDegree + 1);
+    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P. Hanrahan, SIGGRAPH 2001).
+    constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f, -0.13089969f, 0.0f, 0.04908739f};
+    static_assert(kLobe.size() <= kMaxDegree + 1);
     Harmonics y;
-    harmonics(nz, nx, kMaxDegree, y);
+    harmonics(nz, nx, kLobe.size() - 1, y);
     Air::Spectrum sum = out;
     std::size_t i = 0;
-    for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
+    for (std::size_t degree = 0; degree < kLobe.size(); ++degree) {
         if (kLobe[degree] == 0) {
             i += degree + 1;
             continue;
@@ -79,13 +77,15 @@ ScatteredLight::Segment ScatteredLight::along(const Vec3& origin, const Vec3& di
     const Vec3 start = origin + entry * direction;
     const double r = norm(start);
     const AirRay ray{static_cast<float>(r), static_cast<float>(dot(start, direction) / r),
-                     static_cast<float>(dot(start, to_sun) / r), static_cast<float>(dot(direction, to_sun)), true};
+                     static_cast<float>(dot(start, to_sun) / r), static_cast<float>(dot(direction, to_sun))};
+    AerosolPhase phase;
+    set_phase(air_, ray.sun_nu, true, phase);
     AirPanel panel;
     PanelTransmittance through;
     for (std::size_t k = 0; k + 1 < ends.n; ++k) {
         fill_panel(air_, rule_, start, direction, ends.t_m[k] - entry, ends.t_m[k + 1] - entry, s.columns, panel);
         attenuate(air_, panel, through);
-        add_once(t, air_, panel, through, ray, s.in_scattering);
+        add_once(t, air_, panel, through, ray, phase, s.in_scattering);
         add_again(t, air_, panel, through, ray, s.in_scattering);
     }
     for (float& x : s.in_scattering) x = std::max(x, 0.0f);

@@ -99,7 +99,7 @@ void ScatteredLight::gather(std::size_t height, const AirResolution& resolution,
                     const double phi = std::numbers::pi * (static_cast<double>(a) + 0.5) / kAzimuths;
                     const double wx = sine * std::cos(phi), nu = wx * sun_sine + up * sun;
                     const AirRay ray{static_cast<float>(r), static_cast<float>(up), static_cast<float>(sun),
-                                     static_cast<float>(nu), false};
+                                     static_cast<float>(nu)};
                     const Way* way = &whole;
                     if (once) {  // direct light ends at the edge of the planet's shadow
                         const Vec3 to_sun{sun_sine * std::cos(phi), sun_sine * std::sin(phi), sun};
@@ -109,9 +109,14 @@ void ScatteredLight::gather(std::size_t height, const AirResolution& resolution,
                             way = &parted;
                         }
                     }
+                    AerosolPhase phase;
+                    if (once) set_phase(air_, ray.sun_nu, false, phase);
                     Spectrum light{};
                     for (std::size_t k = 0; k + 1 < way->ends.n; ++k)
-                        (once ? add_once : add_again)(t, air_, way->panels[k], way->to_nodes[k], ray, light);
+                        if (once)
+                            add_once(t, air_, way->panels[k], way->to_nodes[k], ray, phase, light);
+                        else
+                            add_again(t, air_, way->panels[k], way->to_nodes[k], ray, light);
                     if (side == 1) {
                         const double there = (r * sun + range * nu) / air_.ground_radius_m();
                         const Spectrum lit = once ? sunlight(0, there, true) : ground_irradiance(there);

@@ -1,4 +1,4 @@
-// narpa bench render --scenes - the standing scenes, one after another; --ablation - what each mechanism earns on
+// narpa bench render --scenes - the benchmark scenes, one after another; --ablation - what each mechanism earns on
 // them.
 #include "apps/bench_ladder.h"
 

@@ -120,7 +120,7 @@ Command add_bench_latency(Parser bench_command) {
          "attached to this machine, with a bridge in software (vhci-hcd, root); may be given many times")
         .type_name("SINK")
         .repeatable();
-    c.option("--size", o->size, "Of the frames").type_name("WIDTHxHEIGHT").shows_default();
+    c.option("--size", o->size, "Size of the frames").type_name("WIDTHxHEIGHT").shows_default();
     c.option("--format", o->format, "Of their pixels").shows_default();
     c.option("--count", o->settings.count, "How many are measured of each").range(1, 1000000).shows_default();
     c.option("--pause", o->pause_s, "Between an arrival and the next")

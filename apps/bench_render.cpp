@@ -175,7 +175,7 @@ Command add_bench_render(Parser bench_command) {
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
     const Option scenes =
         c.option("--scenes", o->ladder.scenes,
-                 "Measure time and error at a ladder of budgets, on the standing scenes: all, craft, "
+                 "Measure time and error at a ladder of budgets, on the benchmark scenes: all, craft, "
                  "craft-paths, docking, docking-contact, cornell, craft-and-ball")
             .comma_separated()
             .one_of(standing_scenes())

@@ -490,9 +490,10 @@ Command add_check(Parser app) {
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, usb:, /dev/video10, "
              "bulk: ...");
-    c.option("--calibration", o->calibration,
-             "Takes CAMERA.yaml (camera_info of ROS) and calibration.json: matrix, distortion and mount of each "
-             "sensor")
+    c.option(
+         "--calibration", o->calibration,
+         "Write CAMERA.yaml (camera_info of ROS) and calibration.json here: matrix, distortion and mount of each "
+         "sensor")
         .type_name("DIR");
     c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file").type_name("FILE");
     c.group("Start here");

@@ -99,17 +99,18 @@ Command add_rehearse(Parser app) {
     rehearsal::RehearsalOptions& r = o->run;
     r.version = NARPA_VERSION;
     const Parser c = app.subcommand(
-        "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and judge it");
+        "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and apply its gates");
     c.option("SCENARIO", r.scenario, "Scenario file, or a name that `narpa list` shows (default: docking)");
     c.option("-o,--output", r.folder,
              "Folder for page, verdict, logs (default: out/rehearsal/NAME, of the scenario's name): new, empty, or "
              "an earlier run's, which is replaced once all programs have started")
         .type_name("DIR");
-    c.flag("--real-time", r.real_time, "Every deadline counts (default: lockstep, the same bytes each time)");
-    c.option("--seed", r.seed, "Of the dynamics: dispersions, noise (default: the scenario's)");
+    c.flag("--real-time", r.real_time,
+           "In real time, with deadlines (default: in lockstep, the same bytes each time)");
+    c.option("--seed", r.seed, "Seed of the dynamics' dispersions and noise (default: the scenario's)");
     const Option runs = c.option("--runs", o->runs,
-                                 "So many runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
-                                 "goes on where it was interrupted")
+                                 "Number of runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
+                                 "continues an interrupted campaign")
                             .range(1, 100000);
     c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
     c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
@@ -120,16 +121,15 @@ Command add_rehearse(Parser app) {
         .repeatable();
     c.option("--dynamics", r.dynamics,
              "Command in place of narpa-dynamics, run by sh with SCENARIO, BUS, SEED, LOCKSTEP set; none: you "
-             "start it, "
-             "last")
+             "start it, last")
         .type_name("COMMAND");
     c.option("--navigation", r.navigation,
              "Command in place of narpa-navigation, run by sh with SCENARIO, BUS, VIDEO, LIDAR, SEED, LOCKSTEP "
-             "set; writes READY=1 to descriptor READY_FD or prints \"ready\" when it listens, or has 10 s; none: "
+             "set; writes READY=1 to descriptor READY_FD or prints \"ready\" when it listens, within 10 s; none: "
              "you start it and press Enter")
         .type_name("COMMAND");
     c.option("--threads", r.threads, "Threads of emulator and navigation (default: all cores)").range(0, 1024);
-    c.option("--patience", r.patience_s, "Seconds without progress after which it is given up")
+    c.option("--patience", r.patience_s, "Seconds without progress after which the run is ended")
         .type_name("SECONDS")
         .range(1.0, 86400.0)
         .shows_default();

@@ -180,8 +180,11 @@ Command add_render(Parser app) {
         "render", "Render one frame of a camera, byte for byte as `run` does (except with a time budget)");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
     c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME");
-    c.option("--time", o->time_s, "Simulation time (default: frame / rate)").type_name("SECONDS").range(-9e9, 9e9);
-    c.option("--frame", o->frame, "Frame number: seeds the noise (default: the one nearest to --time)");
+    c.option("--time", o->time_s, "Simulation time (default: that of --frame)")
+        .type_name("SECONDS")
+        .range(-9e9, 9e9);
+    c.option("--frame", o->frame,
+             "Frame number, which seeds the noise (default: the one nearest to --time; 0 without)");
     o->pose.add_to(c);
     c.option("--format", o->format, "GREY, Y16, YUYV, RGB24, RGGB8, RGGB16 ... instead of the scene's")
         .type_name("FORMAT");

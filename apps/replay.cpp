@@ -181,7 +181,8 @@ Outcome replay_any(const ReplayOptions& o) {
 Command add_replay(Parser app) {
     auto o = std::make_shared<ReplayOptions>();
     const Parser c = app.subcommand(
-        "replay", "Render the frames of a logged run again, bit for bit, and report what their budget cost");
+        "replay",
+        "Render the frames of a logged run again, bit for bit, and report the error that their budget left");
     c.option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written").required();
     c.option("--camera", o->camera, "Name of the camera (default: the first of the scene)").type_name("NAME");
     c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");

@@ -129,14 +129,12 @@ Command add_run(Parser app) {
         .type_name("SECONDS")
         .range(0.0, 9e9);
     const Option log =
-        c.option(
-             "--log", o->run.log_folder,
-             "Folder for run.json, truth, ledger, CAN log and contact sheet; those of an earlier run are replaced")
+        c.option("--log", o->run.log_folder,
+                 "Folder for run.json, truth, ledger, CAN log and contact sheet; replaces an earlier run in it")
             .type_name("DIR");
-    c.flag(
-         "--log-shots", o->run.log_shots,
-         "Log every LiDAR shot too: time, exact range, body, incidence, velocity, and what is reported of it (some "
-         "40 MB a second for 16 beams)")
+    c.flag("--log-shots", o->run.log_shots,
+           "Log every LiDAR shot too: time, exact range, body, incidence, velocity, and the reported values (about "
+           "40 MB a second for 300,000 shots a second)")
         .needs(log);
     const Option estimate =
         c.option(

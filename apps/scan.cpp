@@ -138,8 +138,8 @@ Outcome scan(const ScanOptions& o) {
 
 Command add_scan(Parser app) {
     auto o = std::make_shared<ScanOptions>();
-    const Parser c = app.subcommand(
-        "scan", "Scan with a LiDAR from a time on: returns (echoes that came back), all shots, or packets");
+    const Parser c =
+        app.subcommand("scan", "Scan with a LiDAR: returns (the echoes of shots), all shots, or packets");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
     c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)").type_name("NAME");
     c.option("--time", o->time_s, "Simulation time of the first packet")

@@ -47,8 +47,9 @@ Error no_such_body(const std::string& name, const std::string& given, const Scen
 void BudgetOptions::add_to(Parser app) {
     const Option samples = app.option("--spp", spp, "Samples per pixel instead of the scene's").range(1, 65535);
     const Option time =
-        app.option("--budget-ms", budget_ms, "Time budget per frame in milliseconds, instead").range(0.001, 1e6);
-    const Option rays = app.option("--budget-rays", budget_rays, "Budget per frame in rays, instead")
+        app.option("--budget-ms", budget_ms, "Time budget per frame in milliseconds, in place of samples")
+            .range(0.001, 1e6);
+    const Option rays = app.option("--budget-rays", budget_rays, "Budget per frame in rays, in place of samples")
                             .range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000});
     for (const Option& option : {samples, time, rays}) (void)option.group("Budget of a frame");
     samples.excludes(time).excludes(rays);
@@ -65,7 +66,7 @@ void BudgetOptions::override_scene(RenderSettings& render) const {
 void PoseOptions::add_to(Parser app) {
     app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) with the bodies' poses")
         .type_name("FILE");
-    app.option("--pose", poses, "A body's pose (metres; body to world), at any time")
+    app.option("--pose", poses, "A body's constant pose (metres; body to world)")
         .type_name("BODY=x,y,z,qw,qx,qy,qz")
         .values(1, 1)
         .repeatable();

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <cstring>
 
 namespace narpa {
 
@@ -20,6 +21,30 @@ namespace narpa {
     p = p * f + 1.0f;
     const float power = std::bit_cast<float>((whole + 127) << 23);
     return x < -87.0f ? 0.0f : p * power;
+}
+
+/// Eight numbers at once, for loops that are too long for the compiler to make vectors of. By reference: a function
+/// that returns or takes one has another ABI on each instruction set.
+using Vector8 = float __attribute__((vector_size(32)));
+inline void load(const float* from, Vector8& to) noexcept {
+    std::memcpy(&to, from, sizeof to);
+}
+inline void store(const Vector8& v, float* to) noexcept {
+    std::memcpy(to, &v, sizeof v);
+}
+/// The same numbers as one by one.
+inline void exp_of_negative(const Vector8& x, Vector8& out) noexcept {
+    using Int8 = std::int32_t __attribute__((vector_size(32)));
+    const Vector8 t = (x < -87.0f ? Vector8{} - 87.0f : x) * 1.44269504f;
+    const Int8 whole = __builtin_convertvector(t - 0.5f, Int8);
+    const Vector8 f = t - __builtin_convertvector(whole, Vector8);
+    Vector8 p = Vector8{} + 1.5403530e-4f;
+    for (const float c : {1.3333558e-3f, 9.6181291e-3f, 5.5504109e-2f, 2.4022651e-1f, 6.9314718e-1f, 1.0f})
+        p = p * f + c;
+    const Int8 power = (whole + 127) << 23;
+    Vector8 scale;
+    std::memcpy(&scale, &power, sizeof scale);
+    out = x < -87.0f ? Vector8{} : p * scale;
 }
 
 }  // namespace narpa

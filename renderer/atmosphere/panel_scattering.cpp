@@ -1,8 +1,6 @@
 #include "renderer/atmosphere/panel_scattering.h"
 
 #include <array>
-#include <cstdint>
-#include <cstring>
 
 #include "base/each_isa.h"
 
@@ -11,16 +9,7 @@ namespace {
 
 constexpr float kInv4Pi = 0.0795774715f;
 
-/// Eight lanes at once.
 constexpr std::size_t kBlock = 8;
-using Vector8 = float __attribute__((vector_size(32)));
-// By reference: a function that returns or takes one has another ABI on each instruction set.
-inline void load(const float* from, Vector8& to) noexcept {
-    std::memcpy(&to, from, sizeof to);
-}
-inline void store(const Vector8& v, float* to) noexcept {
-    std::memcpy(to, &v, sizeof v);
-}
 
 /// The aerosol's part of the scattering below which only degree 2 counts.
 constexpr float kClear = 2e-3f;
@@ -46,21 +35,6 @@ inline void legendre_terms(float nu, LegendreTerms& out) noexcept {
         const float next = ((2 * n + 1) * nu * legendre - n * before) / (n + 1);
         before = legendre, legendre = next;
     }
-}
-
-/// As exp_of_negative(), written out: the loops that call it are too long for the compiler to make vectors of.
-using Int8 = std::int32_t __attribute__((vector_size(32)));
-inline void exp_of_negative(const Vector8& x, Vector8& out) noexcept {
-    const Vector8 t = (x < -87.0f ? Vector8{} - 87.0f : x) * 1.44269504f;
-    const Int8 whole = __builtin_convertvector(t - 0.5f, Int8);
-    const Vector8 f = t - __builtin_convertvector(whole, Vector8);
-    Vector8 p = Vector8{} + 1.5403530e-4f;
-    for (const float c : {1.3333558e-3f, 9.6181291e-3f, 5.5504109e-2f, 2.4022651e-1f, 6.9314718e-1f, 1.0f})
-        p = p * f + c;
-    const Int8 power = (whole + 127) << 23;
-    Vector8 scale;
-    std::memcpy(&scale, &power, sizeof scale);
-    out = x < -87.0f ? Vector8{} : p * scale;
 }
 
 /// Mean of the folded peaks for light that is scattered into the ray once at least, by Poisson's distribution about

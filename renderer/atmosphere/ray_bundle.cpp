@@ -79,18 +79,17 @@ NARPA_EACH_ISA void blend(const PaddedLight* __restrict nodes, std::size_t layer
                           PaddedLight& __restrict out) noexcept {
     const std::array<float, 3> wu = parabola(at.u), wv = parabola(at.v);
     const std::array<float, 2> wl{layers == 2 ? 1 - at.layer : 1, at.layer};
-    PaddedLight sum{};
+    Vector8 sum{}, node, through;
     for (std::size_t layer = 0; layer < layers; ++layer)
         for (std::size_t j = 0; j < 3; ++j)
             for (std::size_t i = 0; i < 3; ++i) {
-                const float w = wl[layer] * wv[j] * wu[i];
-                const PaddedLight& node = nodes[layer * AirCell::kLayer + 3 * j + i];
-                for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += w * node[k];
+                load(nodes[layer * AirCell::kLayer + 3 * j + i].data(), node);
+                sum += wl[layer] * wv[j] * wu[i] * node;
             }
-    for (std::size_t k = 0; k < sum.size(); ++k) {
-        const float x = std::max(sum[k], 0.0f);
-        out[k] = k < 3 ? exp_of_negative(-x) : x;
-    }
+    sum = sum > 0.0f ? sum : Vector8{};
+    exp_of_negative(-sum, through);
+    store(sum, out.data());
+    for (std::size_t k = 0; k < 3; ++k) out[k] = through[k];
 }
 
 /// A cell with its nodes as blend() wants them: the optical depth in place of the transmittance, which falls by

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/each_isa.h"
+#include "renderer/atmosphere/fast_exp.h"
 #include "renderer/atmosphere/panel_scattering.h"
 
 namespace narpa {
@@ -43,15 +44,28 @@ NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lan
 /// Adds what the aerosol scatters strongly forward out of the direct light, times `facing`.
 NARPA_EACH_ISA void add_forward_peak(const Air& air, const SunBeam& beam, float facing,
                                      Air::Spectrum& out) noexcept {
-    Air::Spectrum sum = out;
     const float w = facing * beam.visible;
     const auto [gas, aerosol, ozone] = beam.columns;
-    for (std::size_t l = 0; l < air.lanes(); ++l) {
-        const float depth = air.gas[l] * gas + air.ozone[l] * ozone;
-        sum[l] += w * (exp_of_negative(-(depth + air.scaled_extinction[l] * aerosol)) -
-                       exp_of_negative(-(depth + air.aerosol_extinction[l] * aerosol)));
+    for (std::size_t l = 0; l < air.lanes(); l += 8) {
+        Vector8 of_gas, of_ozone, scaled, whole, with_peak, without, sum;
+        load(&air.gas[l], of_gas), load(&air.ozone[l], of_ozone);
+        load(&air.scaled_extinction[l], scaled), load(&air.aerosol_extinction[l], whole), load(&out[l], sum);
+        const Vector8 depth = of_gas * gas + of_ozone * ozone;
+        exp_of_negative(-(depth + scaled * aerosol), with_peak);
+        exp_of_negative(-(depth + whole * aerosol), without);
+        sum += w * (with_peak - without);
+        store(sum, &out[l]);
     }
-    out = sum;
+}
+
+/// exp(-optical depth).
+NARPA_EACH_ISA void pass(const Air& air, const AirColumns& columns, Air::Spectrum& out) noexcept {
+    for (std::size_t l = 0; l < air.lanes(); l += 8) {
+        Vector8 of_gas, of_aerosol, of_ozone, passes;
+        load(&air.gas[l], of_gas), load(&air.aerosol_extinction[l], of_aerosol), load(&air.ozone[l], of_ozone);
+        exp_of_negative(-(of_gas * columns.gas + of_aerosol * columns.aerosol + of_ozone * columns.ozone), passes);
+        store(passes, &out[l]);
+    }
 }
 
 }  // namespace
@@ -181,10 +195,8 @@ Rgb bands_of(const Air& air, const Air::Spectrum& light) noexcept {
 }
 
 Rgb transmittance_of(const Air& air, const AirColumns& columns) noexcept {
-    Air::Spectrum through{};
-    for (std::size_t l = 0; l < air.lanes(); ++l)
-        through[l] = exp_of_negative(-(air.gas[l] * columns.gas + air.aerosol_extinction[l] * columns.aerosol +
-                                       air.ozone[l] * columns.ozone));
+    Air::Spectrum through;
+    pass(air, columns, through);
     return bands_of(air, through);
 }
 

@@ -5,10 +5,8 @@
 namespace narpa {
 namespace {
 
-/// Of the threshold.
+/// Of the threshold. Noise alone crosses it in any gate; that is not the medium's echo.
 constexpr double kFaintestGate = 0.1;
-/// Probabilities below this are none: gates behind are fainter.
-constexpr double kNever = 1e-12;
 
 }  // namespace
 
@@ -29,9 +27,8 @@ Medium::Backscatter AirEcho::first(const BodyPoses& at, const Ray& ray, double n
     for (double from_m = start_m_; from_m < end_m; from_m += gate_m_) {
         const Medium::Backscatter gate = medium_->lidar_backscatter(at, ray, from_m, from_m + gate_m_);
         const double x = gate.light / least_light_;
-        const double detected = detection_probability(x / noise, snr_);
-        if (x < kFaintestGate || detected < kNever) break;
-        missed *= 1 - detected;
+        if (x < kFaintestGate) continue;
+        missed *= 1 - detection_probability(x / noise, snr_);
         if (u >= missed) return gate;
     }
     return {};

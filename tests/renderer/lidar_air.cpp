@@ -33,7 +33,6 @@ double lidar_equation(double pi_beta_1_m, double alpha_1_m, double from_m, doubl
 AirDescription even_air(double turbidity) {
     AirDescription air = earth_air(turbidity);
     air.gas_height_m = air.aerosol_height_m = 1e12;
-    air.aerosol_height_m = 1e12;
     return air;
 }
 

@@ -82,7 +82,7 @@ Result<View> map_view(const MapOptions& o) {
     const Camera& camera = (*world)->scene().cameras[*index];
     BodyPoses at((*world)->scene().bodies.size());
     (*world)->place(t_ns, camera.mount, at);
-    const Rigid3 T_world_camera = (*world)->sensor_pose(camera.mount, camera.T_mount_camera, at);
+    const Rigid3 T_world_camera = (*world)->camera_pose(camera, o.time_s, at);
     const SurfaceMapper mapper((*world)->tracer(), at, camera, T_world_camera, *quantity);
     const Progress progress("mapping to " + o.out);
     View view{*std::move(world), camera.name, mapper.map(), {}, {}};

@@ -127,4 +127,13 @@ struct Motion {
     Vec3 rate_rad_s{};
 };
 
+/// Straight on, with constant velocity and body rate.
+inline Motion extrapolate(const Motion& from, double dt_s) {
+    if (dt_s == 0) return from;  // bit for bit
+    Motion m = from;
+    m.T_world_body.t += from.velocity_m_s * dt_s;
+    m.T_world_body.q = normalized(from.T_world_body.q * exp_rotation(from.rate_rad_s * dt_s));
+    return m;
+}
+
 }  // namespace narpa

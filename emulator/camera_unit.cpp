@@ -24,7 +24,8 @@ double full_scale_radiance(const Camera& camera) noexcept {
 CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at, std::int64_t start_ns,
                        std::int64_t end_ns, std::span<const Motion> motions) noexcept {
     const auto at_time = [&](double time) {
-        return world.sensor_pose(camera.mount, camera.T_mount_camera, at, time);
+        const double t_ns = static_cast<double>(start_ns) + time * static_cast<double>(end_ns - start_ns);
+        return world.camera_pose(camera, 1e-9 * t_ns, at, time);
     };
     CameraPose pose = at_time(kMidExposure);
     if (camera.shutter) {

@@ -16,14 +16,6 @@ bool at_rest(const Motion& m) {
 
 }  // namespace
 
-Motion extrapolate(const Motion& from, double dt_s) {
-    if (dt_s == 0) return from;  // bit for bit what was commanded
-    Motion m = from;
-    m.T_world_body.t += from.velocity_m_s * dt_s;
-    m.T_world_body.q = normalized(from.T_world_body.q * exp_rotation(from.rate_rad_s * dt_s));
-    return m;
-}
-
 PoseTrack::PoseTrack(const Motion& initial, double stale_after_s)
     : initial_(initial), stale_after_ns_(std::llround(stale_after_s * 1e9)) {}
 

@@ -15,9 +15,6 @@
 
 namespace narpa {
 
-/// Extrapolates with constant velocity (world) and rate (body axes).
-[[nodiscard]] Motion extrapolate(const Motion& from, double dt_s);
-
 struct TrackedPose {
     Motion motion{};             ///< velocity and rate are the derivatives of this pose
     std::uint8_t counter = 0;    ///< of the newest command at or before the requested time

@@ -46,7 +46,8 @@ void World::find_moving() {
     moving_.clear();
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
         const Motion& m = scene_.bodies[i].initial;
-        if (tracks_[i] || m.velocity_m_s != Vec3{} || m.rate_rad_s != Vec3{}) moving_.push_back(i);
+        if (tracks_[i] || scene_.bodies[i].course || m.velocity_m_s != Vec3{} || m.rate_rad_s != Vec3{})
+            moving_.push_back(i);
     }
 }
 
@@ -80,7 +81,7 @@ Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_n
 
 TrackedPose World::pose(std::size_t body, std::int64_t t_ns) const noexcept {
     if (tracks_[body]) return tracks_[body]->at(t_ns);
-    return {extrapolate(scene_.bodies[body].initial, static_cast<double>(t_ns) * 1e-9), 0, 0, false, false};
+    return {motion_at(scene_.bodies[body], static_cast<double>(t_ns) * 1e-9), 0, 0, false, false};
 }
 
 PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,

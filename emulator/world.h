@@ -53,6 +53,12 @@ public:
         return mount < 0 ? T_mount_sensor
                          : at.T_world_body_at(static_cast<std::size_t>(mount), time) * T_mount_sensor;
     }
+    /// `t_s`: simulation time of that moment of the exposure, for a camera with a course of its own.
+    [[nodiscard]] Rigid3 camera_pose(const Camera& camera, double t_s, const BodyPoses& at,
+                                     double time = kMidExposure) const noexcept {
+        return camera.course ? camera.course->at(t_s).T_world_body
+                             : sensor_pose(camera.mount, camera.T_mount_camera, at, time);
+    }
     [[nodiscard]] std::optional<std::size_t> body_named(std::string_view name) const noexcept;
 
 private:

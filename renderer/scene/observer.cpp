@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "renderer/atmosphere/refractive_index.h"
 #include "renderer/scene/time_scales.h"
@@ -22,9 +23,28 @@ Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) {
     return normalized(direction + velocity_m_s / kLightSpeed);
 }
 
+/// Above the observer, with the lapse of the standard atmosphere.
+std::shared_ptr<const RefractiveShells> shells_above(const ObserverPlace& place) {
+    double fixed[3];
+    eraGd2gc(kWgs84, place.longitude_rad, place.latitude_rad, place.height_m, fixed);
+    const double n_minus_1 = 1e-6 * dry_refractivity(place.wavelength_m, place.temperature_k, place.pressure_hpa);
+    const LapseAtmosphere air(n_minus_1, place.temperature_k, 0.0065, std::max(1000.0, 11'000 - place.height_m));
+    return std::make_shared<RefractiveShells>(shells_of(air, norm(Vec3{fixed[0], fixed[1], fixed[2]}), 0,
+                                                        kAirTop_m - std::min(place.height_m, 0.5 * kAirTop_m)));
+}
+
 }  // namespace
 
-GroundObserver::GroundObserver(const ObserverPlace& place, std::int64_t unix_ns) : unix_ns_(unix_ns) {
+GroundObserver::GroundObserver(const ObserverPlace& place, std::int64_t unix_ns)
+    : GroundObserver(place, unix_ns, shells_above(place)) {}
+
+GroundObserver GroundObserver::after(double dt_s) const {
+    return {place_, unix_ns_ + std::llround(1e9 * dt_s), shells_};
+}
+
+GroundObserver::GroundObserver(const ObserverPlace& place, std::int64_t unix_ns,
+                               std::shared_ptr<const RefractiveShells> shells)
+    : place_(place), unix_ns_(unix_ns), shells_(std::move(shells)) {
     const TimeScales t = time_scales(unix_ns);
     JulianDate ut1;
     eraUtcut1(t.utc.days, t.utc.fraction, place.ut1_utc_s, &ut1.days, &ut1.fraction);
@@ -41,10 +61,6 @@ GroundObserver::GroundObserver(const ObserverPlace& place, std::int64_t unix_ns)
     zenith_ = cos_lat * cos_lon * x + cos_lat * sin_lon * y + sin_lat * z;
     east_ = -sin_lon * x + cos_lon * y;
     north_ = cross(zenith_, east_);
-    const double n_minus_1 = 1e-6 * dry_refractivity(place.wavelength_m, place.temperature_k, place.pressure_hpa);
-    // Above the observer, with the lapse of the standard atmosphere.
-    const LapseAtmosphere air(n_minus_1, place.temperature_k, 0.0065, std::max(1000.0, 11'000 - place.height_m));
-    shells_ = shells_of(air, norm(position_m_), 0, kAirTop_m - std::min(place.height_m, 0.5 * kAirTop_m));
 }
 
 Vec3 GroundObserver::refracted(const Vec3& direction, double range_m) const {
@@ -53,8 +69,8 @@ Vec3 GroundObserver::refracted(const Vec3& direction, double range_m) const {
     const double sine = norm(across), zenith = std::atan2(sine, cosine);
     if (sine < 1e-12 || zenith > 1.6) return direction;
     const double seen = range_m == std::numeric_limits<double>::infinity()
-                            ? apparent_zenith(shells_, zenith)
-                            : apparent_zenith(shells_, zenith, range_m);
+                            ? apparent_zenith(*shells_, zenith)
+                            : apparent_zenith(*shells_, zenith, range_m);
     return std::cos(seen) * zenith_ + std::sin(seen) / sine * across;
 }
 

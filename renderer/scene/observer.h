@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 
 #include "base/pose.h"
 #include "renderer/atmosphere/refraction.h"
@@ -24,6 +25,8 @@ struct ObserverPlace {
 class GroundObserver {
 public:
     GroundObserver(const ObserverPlace& place, std::int64_t unix_ns);
+    /// The same observer at another time. Allocates nothing.
+    [[nodiscard]] GroundObserver after(double dt_s) const;
 
     [[nodiscard]] const Vec3& position_m() const { return position_m_; }
     [[nodiscard]] const Vec3& velocity_m_s() const { return velocity_m_s_; }
@@ -44,10 +47,14 @@ public:
     [[nodiscard]] Vec3 refracted(const Vec3& direction, double range_m) const;
 
 private:
+    GroundObserver(const ObserverPlace& place, std::int64_t unix_ns,
+                   std::shared_ptr<const RefractiveShells> shells);
+
+    ObserverPlace place_;
     std::int64_t unix_ns_;
     Vec3 position_m_, velocity_m_s_, zenith_, north_, east_;
     Quat q_world_earth_;
-    RefractiveShells shells_;
+    std::shared_ptr<const RefractiveShells> shells_;
 };
 
 /// Elements of a two-body orbit about the Earth, in GCRS.

@@ -108,7 +108,6 @@ void read_motion(TableReader& table, Motion& motion) {
     motion.T_world_body.q = table.attitude("attitude_wxyz").value_or(Quat{});
     motion.velocity_m_s = table.vec3("velocity_m_s").value_or(Vec3{});
     motion.rate_rad_s = table.vec3("rate_rad_s").value_or(Vec3{});
-    read_orbit(table, motion);
 }
 
 }  // namespace
@@ -121,6 +120,7 @@ void read_bodies(TableReader& root, SceneReading& reading) {
         read_shape(table, body, reading);
         read_motion(table, body.initial);
         read_rotation(table, body.initial, reading);
+        read_orbit(table, body);
         read_can_id(table, body, reading.scene.bodies);
         table.finish();
         reading.scene.bodies.push_back(std::move(body));

@@ -41,11 +41,11 @@ void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<
 
 }  // namespace
 
-void read_orbit(TableReader& body, Motion& motion) {
-    auto table = body.table("orbit");
+void read_orbit(TableReader& body_table, Body& body) {
+    auto table = body_table.table("orbit");
     if (!table) return;
     for (const std::string_view key : {"position_m", "velocity_m_s"})
-        body.refuse(key, "the body has an orbit, which gives it; expected one of the two");
+        body_table.refuse(key, "the body has an orbit, which gives it; expected one of the two");
     OrbitalElements o;
     table->require("semi_major_axis_m", "a length from the Earth's centre");
     o.semi_major_axis_m =
@@ -59,9 +59,8 @@ void read_orbit(TableReader& body, Motion& motion) {
     o.argument_of_perigee_rad = angle("argument_of_perigee_deg");
     o.mean_anomaly_rad = angle("mean_anomaly_deg");
     table->finish();
-    const OrbitalState state = state_of(o);
-    motion.T_world_body.t = state.position_m;
-    motion.velocity_m_s = state.velocity_m_s;
+    body.course = orbit_course(o, body.initial);
+    body.initial = body.course->at(0);
 }
 
 void read_observer(TableReader& root, SceneReading& reading) {
@@ -71,53 +70,47 @@ void read_observer(TableReader& root, SceneReading& reading) {
     const ObserverPlace place = read_place(*table);
     const bool refracted = table->boolean("refraction").value_or(true);
     if (scene.epoch_unix_ns == 0) root.fail("observer", "the time is not known, expected an \"epoch\" in [scene]");
-    const GroundObserver observer(place, scene.epoch_unix_ns);
-    turn_earth(*table, observer, scene.bodies);
+    const Observing observing{GroundObserver(place, scene.epoch_unix_ns), refracted};
+    turn_earth(*table, observing.at_start, scene.bodies);
     const auto apparent = table->texts("sees");
     for (const std::string& name : apparent.value_or(std::vector<std::string>{})) {
         bool known = false;
         for (Body& b : scene.bodies) {
             if (b.name != name) continue;
             known = true;
-            Vec3& at = b.initial.T_world_body.t;
-            at = observer.position_m() + norm(at - observer.position_m()) *
-                                             observer.apparent_direction(at, b.initial.velocity_m_s, refracted);
+            b.course = apparent_course(observing, b);
+            b.initial = b.course->at(0);
         }
         if (!known) table->fail("sees", fmt::format("there is no body \"{}\", expected names of [[body]]", name));
     }
-    if (scene.sun && table->boolean("sun").value_or(true)) scene.sun->direction = observer.apparent_sun(refracted);
+    if (scene.sun && table->boolean("sun").value_or(true))
+        scene.sun->direction = observing.at_start.apparent_sun(refracted);
     table->finish();
-    reading.observer = Viewpoint{observer.position_m(), observer.zenith(), observer.north(), observer.east()};
+    reading.observer = observing;
 }
 
-void read_tracking(TableReader& camera, const SceneReading& reading, Rigid3& T) {
-    const auto track = camera.text("track");
-    const auto pointing = camera.pair("azimuth_elevation_deg", kAngle_deg);
+void read_tracking(TableReader& table, const SceneReading& reading, Camera& camera) {
+    const auto track = table.text("track");
+    const auto pointing = table.pair("azimuth_elevation_deg", kAngle_deg);
     if (!track && !pointing) return;
     const char* const key = track ? "track" : "azimuth_elevation_deg";
-    if (track && pointing)
-        return camera.fail(key, "there is an azimuth_elevation_deg too, expected one of the two");
+    if (track && pointing) return table.fail(key, "there is an azimuth_elevation_deg too, expected one of the two");
     for (const std::string_view other : {"mount", "position_m", "attitude_wxyz", "look_at"})
-        camera.refuse(other, "the camera stands at the [observer] and points by itself; expected one of the two");
-    if (!reading.observer) return camera.fail(key, "is seen by an observer, expected an [observer]");
-    const Viewpoint& from = *reading.observer;
-    Vec3 forward = from.zenith;
+        table.refuse(other, "the camera stands at the [observer] and points by itself; expected one of the two");
+    if (!reading.observer) return table.fail(key, "is seen by an observer, expected an [observer]");
+    const Observing& from = *reading.observer;
     if (pointing) {
-        const double azimuth = (*pointing)[0] * kRadPerDeg, elevation = (*pointing)[1] * kRadPerDeg;
-        forward = std::cos(elevation) * (std::cos(azimuth) * from.north + std::sin(azimuth) * from.east) +
-                  std::sin(elevation) * from.zenith;
+        camera.course = camera_towards(from, (*pointing)[0] * kRadPerDeg, (*pointing)[1] * kRadPerDeg);
     } else if (*track == "sun" && reading.scene.sun) {
-        forward = reading.scene.sun->direction;
+        camera.course = camera_towards_sun(from);
     } else {
         const auto body = std::find_if(reading.scene.bodies.begin(), reading.scene.bodies.end(),
                                        [&](const Body& b) { return b.name == *track; });
         if (body == reading.scene.bodies.end())
-            return camera.fail(key, fmt::format("there is no body \"{}\", expected one, or \"sun\"", *track));
-        forward = normalized(body->initial.T_world_body.t - from.position_m);
+            return table.fail(key, fmt::format("there is no body \"{}\", expected one, or \"sun\"", *track));
+        camera.course = camera_towards(from, *body);
     }
-    const Vec3 right = cross(forward, from.zenith);
-    T.t = from.position_m;
-    T.q = camera_attitude(forward, norm(right) > 1e-6 ? normalized(right) : from.east);
+    camera.T_mount_camera = camera.course->at(0).T_world_body;
 }
 
 }  // namespace narpa

@@ -177,7 +177,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     const Mounting mounting = read_mounting(table, scene.bodies, camera_attitude);
     camera.mount = mounting.mount;
     camera.T_mount_camera = mounting.T_mount_thing;
-    read_tracking(table, reading, camera.T_mount_camera);
+    read_tracking(table, reading, camera);
     read_projection(table, camera, folder);
     camera.period_ns = read_period_ns(table, camera.period_ns);
     if (scene.render.budget_ns > camera.period_ns)

@@ -19,6 +19,7 @@
 #include "renderer/material/material.h"
 #include "renderer/projection/distortion.h"
 #include "renderer/scene/atmosphere_settings.h"
+#include "renderer/scene/course.h"
 
 namespace narpa {
 
@@ -50,9 +51,15 @@ struct Ellipsoid {
 struct Body {
     std::string name;
     std::variant<int, Sphere, Ellipsoid> shape;  ///< index into Scene::meshes, or an exact shape
-    Motion initial{};                            ///< at time 0; moves on with its velocity and rate
+    Motion initial{};                            ///< at time 0
+    std::shared_ptr<const Course> course{};      ///< null: straight on from there
     std::optional<std::uint32_t> can_id{};       ///< base identifier of its pose commands on CAN
 };
+
+/// Of a body without commands.
+[[nodiscard]] inline Motion motion_at(const Body& body, double t_s) {
+    return body.course ? body.course->at(t_s) : extrapolate(body.initial, t_s);
+}
 
 struct Sun {
     Vec3 direction{0, 0, 1};  ///< unit, world: from the scene towards the Sun
@@ -181,6 +188,7 @@ struct Camera {
     std::string name;
     int mount = -1;  ///< body it rides on; -1 is the world
     Rigid3 T_mount_camera{};
+    std::shared_ptr<const Course> course{};  ///< of a camera on the world that moves; T_mount_camera: at time 0
     int width = 640, height = 480;
     double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px; the centre of the top-left pixel is (0, 0)
     std::optional<Distortion> distortion{};

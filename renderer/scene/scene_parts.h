@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "renderer/scene/dem_process.h"
+#include "renderer/scene/observed_courses.h"
 #include "renderer/scene/scene.h"
 #include "renderer/scene/texture_file.h"
 #include "renderer/scene/toml_reader.h"
@@ -40,11 +41,6 @@ struct NamedDem {
     toml::source_region place;
 };
 
-/// Where an [observer] stands, and the axes of the horizon there; world.
-struct Viewpoint {
-    Vec3 position_m, zenith, north, east;
-};
-
 /// State while one scene file is read.
 struct SceneReading {
     Scene scene;
@@ -54,7 +50,7 @@ struct SceneReading {
     std::vector<NamedTexture> textures{};
     std::vector<NamedDem> dems{};
     bool has_epoch = false;  ///< in [scene]
-    std::optional<Viewpoint> observer{};
+    std::optional<Observing> observer{};
 };
 
 /// [scene], [sun], [ambient], [render].
@@ -78,12 +74,12 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
 void read_dem(TableReader& body, int material, SceneReading& reading);
 /// Opens every DEM that was named; cameras and LiDARs come first.
 void load_dems(SceneReading& reading);
-/// `orbit` of a body, which gives its position and velocity.
-void read_orbit(TableReader& body, Motion& motion);
+/// `orbit` of a body, which gives its position and velocity; attitude and rate come first.
+void read_orbit(TableReader& table, Body& body);
 /// [observer]: puts the bodies and the Sun where they are seen; bodies and surroundings come first.
 void read_observer(TableReader& root, SceneReading& reading);
 /// `track` or `azimuth_elevation_deg` of a camera, which put it at the observer.
-void read_tracking(TableReader& camera, const SceneReading& reading, Rigid3& T_world_camera);
+void read_tracking(TableReader& table, const SceneReading& reading, Camera& camera);
 /// [atmosphere] and [sky]; bodies and surroundings come first.
 void read_atmosphere(TableReader& root, SceneReading& reading);
 /// Opens every mesh and texture that was named.

@@ -11,6 +11,7 @@
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/path_support.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/allocation_counter.h"
 
 namespace narpa {
 namespace {
@@ -143,6 +144,72 @@ TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
     const Vec3 p = conjugate(scene->bodies[0].initial.T_world_body.q) * c.T_mount_camera.t;
     const Vec3 k{p.x / 6378137, p.y / 6378137, p.z / 6356752.3142};
     EXPECT_NEAR((norm(k) - 1) * 6.37e6, 47, 0.5);
+}
+
+/// The scene at a later time is the one of a later epoch: the orbit, the Earth, the telescope.
+TEST(GroundScene, AtALaterTimeIsTheOneOfALaterEpoch) {
+    const TemporaryFolder folder;
+    const auto now = read_scene(folder.write("now.toml", kGroundScene));
+    ASSERT_TRUE(now) << now.error().text();
+    const double degrees_per_s = std::sqrt(3.986004418e14 / 6791e3) / 6791e3 * kDegPerRad;
+    for (const int t : {1, 30, 50}) {
+        std::string text = kGroundScene;
+        text.replace(text.find("07:20:00Z"), 9, fmt::format("07:20:{:02}Z", t));
+        text.replace(text.find("= 80}"), 5, fmt::format("= {:.12f}}}", 80 + degrees_per_s * t));
+        const auto later = read_scene(folder.write(fmt::format("{}.toml", t), text));
+        ASSERT_TRUE(later) << later.error().text();
+        EXPECT_LT(norm(motion_at(now->bodies[1], t).T_world_body.t - later->bodies[1].initial.T_world_body.t),
+                  1e-3);
+        EXPECT_LT(norm(motion_at(now->bodies[1], t).velocity_m_s - later->bodies[1].initial.velocity_m_s), 1e-5);
+        EXPECT_LT(
+            angle_between(motion_at(now->bodies[0], t).T_world_body.q, later->bodies[0].initial.T_world_body.q),
+            1e-8);
+        const Rigid3 telescope = now->cameras[0].course->at(t).T_world_body,
+                     expected = later->cameras[0].T_mount_camera;
+        EXPECT_LT(norm(telescope.t - expected.t), 1e-3);
+        EXPECT_LT(angle_between(telescope.q, expected.q), 1e-8);
+    }
+}
+
+TEST(GroundScene, CoursesHaveTheDerivativesOfTheirPoses) {
+    const TemporaryFolder folder;
+    const auto scene = read_scene(folder.write("s.toml", kGroundScene));
+    ASSERT_TRUE(scene) << scene.error().text();
+    for (const auto& course : {scene->bodies[1].course, scene->cameras[0].course}) {
+        constexpr double kT = 20, kStep = 0.01;
+        const Motion before = course->at(kT - kStep), at = course->at(kT), after = course->at(kT + kStep);
+        const Vec3 velocity = (after.T_world_body.t - before.T_world_body.t) / (2 * kStep);
+        EXPECT_LT(norm(at.velocity_m_s - velocity), 1e-4);
+        const Vec3 rate = rotation_vector(conjugate(before.T_world_body.q) * after.T_world_body.q) / (2 * kStep);
+        EXPECT_LT(norm(at.rate_rad_s - rate), 1e-7);
+    }
+    EXPECT_NEAR(norm(scene->bodies[1].course->at(0).velocity_m_s), std::sqrt(3.986004418e14 / 6791e3), 20);
+}
+
+TEST(GroundScene, ATelescopeAtAzimuthAndElevationTurnsWithTheEarth) {
+    std::string text = kGroundScene;
+    text.replace(text.find("track = \"station\""), 17, "azimuth_elevation_deg = [150.0, 40.0]");
+    const TemporaryFolder folder;
+    const auto scene = read_scene(folder.write("s.toml", text));
+    ASSERT_TRUE(scene) << scene.error().text();
+    const Rigid3 T = scene->cameras[0].course->at(3600).T_world_body;
+    const GroundObserver observer(kGreenwich, kMorning_ns + 3'600'000'000'000);
+    EXPECT_LT(norm(T.t - observer.position_m()), 1e-3);
+    const Vec3 forward = T.q * Vec3{0, 0, 1};
+    EXPECT_NEAR(dot(forward, observer.zenith()), std::sin(40 * kRadPerDeg), 1e-9);
+    EXPECT_NEAR(std::atan2(dot(forward, observer.east()), dot(forward, observer.north())), 150 * kRadPerDeg, 1e-9);
+    EXPECT_LT(std::abs(dot(T.q * Vec3{1, 0, 0}, observer.zenith())), 1e-9);
+}
+
+TEST(GroundScene, FollowingAllocatesNothing) {
+    if (!kAllocationsAreCounted) GTEST_SKIP() << "the sanitizer's heap counts nothing";
+    const TemporaryFolder folder;
+    const auto scene = read_scene(folder.write("s.toml", kGroundScene));
+    ASSERT_TRUE(scene) << scene.error().text();
+    const AllocationCounter count;
+    const Motion station = scene->bodies[1].course->at(10), telescope = scene->cameras[0].course->at(10);
+    EXPECT_EQ(count.on_this_thread(), 0u);
+    EXPECT_GT(norm(station.T_world_body.t - telescope.T_world_body.t), 4e5);
 }
 
 /// Rays of an image are straight, and bodies stand where they are seen: a station 45 degrees above the horizon

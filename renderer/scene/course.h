@@ -1,0 +1,15 @@
+/// renderer/scene/course.h - motion over simulation time of a body or camera that no command moves.
+#pragma once
+
+#include "base/pose.h"
+
+namespace narpa {
+
+class Course {
+public:
+    virtual ~Course() = default;
+    /// World. Velocity and rate are the pose's derivatives. From any thread; allocates nothing.
+    [[nodiscard]] virtual Motion at(double t_s) const noexcept = 0;
+};
+
+}  // namespace narpa

@@ -279,6 +279,8 @@ void RayBundle::interpolate(std::span<const Index> set, const Cell& cell, const 
 void RayBundle::make(const Cell& cell, AirCell& out) noexcept {
     out.layers = cell.one_layer ? 1 : 2;
     out.differs = AirCell::kAlongU | AirCell::kAlongV;
+    // Columns that are not filled yet have weight 0 in what is compared; 0 times NaN would be NaN.
+    for (std::size_t i = 0; i < out.layers * AirCell::kLayer; ++i) out.nodes[i] = {};
     const auto fill = [&](std::size_t column) {
         for (std::size_t layer = 0; layer < out.layers; ++layer)
             for (std::size_t row = 0; row < 3; ++row) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -162,7 +163,7 @@ private:
             const std::int64_t acts_ns = std::max(now_ns, command.t_ns) - t_start_ns_;
             if (auto moved = advance_to(std::min(acts_ns, next_ns_)); !moved) return moved;
             if (acts_ns <= next_ns_) return apply(command);
-            pending_ = command;
+            pending_.push_back(command);
         }
         return Ok{};
     }
@@ -187,10 +188,11 @@ private:
         return (simulation_.t_ns() / scenario_.pose_period_ns() + 1) * scenario_.pose_period_ns();
     }
 
-    /// Applies a command on the way whose time has come.
+    /// Applies commands on the way whose time has come.
     Status advance_to(std::int64_t t_ns) {
-        if (pending_ && pending_->t_ns - t_start_ns_ <= t_ns) {
-            const ActuatorCommand command = *std::exchange(pending_, std::nullopt);
+        while (!pending_.empty() && pending_.front().t_ns - t_start_ns_ <= t_ns) {
+            const ActuatorCommand command = pending_.front();
+            pending_.pop_front();
             if (auto moved = move_to(command.t_ns - t_start_ns_); !moved) return moved;
             static_cast<void>(apply(command));
         }
@@ -275,7 +277,7 @@ private:
     std::int64_t t_start_ns_ = 0;
     std::int64_t next_ns_ = 0;                  // real time: of the next poses
     std::optional<std::int64_t> commanded_ns_;  // of the newest command
-    std::optional<ActuatorCommand> pending_;    // real time: its time has not come
+    std::deque<ActuatorCommand> pending_;       // real time: their time has not come, rising
     std::uint8_t report_counter_ = 0, attitude_counter_ = 0;
     std::uint64_t poses_ = 0;
     CommandCounts counts_;

@@ -44,6 +44,13 @@ public:
         bus_.wait(10 * kMs);
     }
     void beat(std::int64_t t_ns, RunState state) { bus_.send(encode(Heartbeat{t_ns, state})); }
+    /// A clock in real time, which shows this at first.
+    void run_clock(std::int64_t from_ns) {
+        on_turn = [this, from_ns, begun = std::chrono::steady_clock::now()] {
+            const std::chrono::nanoseconds since = std::chrono::steady_clock::now() - begun;
+            beat(from_ns + since.count(), RunState::running);
+        };
+    }
     void command(const ActuatorCommand& c) {
         for (const CanFrame& f : encode(c, bus_.carries_fd())) bus_.send(f);
     }
@@ -331,13 +338,8 @@ TEST_F(DynamicsOnSlcan, InRealTimePosesFollowTheEmulatorsClockFromAWholeSecondOn
     s.duration_s = 600;
     s.navigation.period_s = 0.2;
     s.pose_rate_hz = 50;
-    // A clock that shows 3.4 s at first.
     Partner partner(*hub, s);
-    const auto begun = std::chrono::steady_clock::now();
-    partner.on_turn = [&] {
-        const std::chrono::nanoseconds since = std::chrono::steady_clock::now() - begun;
-        partner.beat(3'400 * kMs + since.count(), RunState::running);
-    };
+    partner.run_clock(3'400 * kMs);
     // Ends the flight once it has sent enough: on a slow machine a command may be too late to be applied.
     int too_old = 0;
     partner.on_period = [&](std::int64_t t_ns) {
@@ -370,11 +372,7 @@ TEST_F(DynamicsOnSlcan, InRealTimeACommandActsFromItsTimeOn) {
     s.navigation.period_s = 1;
     s.pose_rate_hz = 10;
     Partner partner(*hub, s);
-    const auto begun = std::chrono::steady_clock::now();
-    partner.on_turn = [&] {
-        const std::chrono::nanoseconds since = std::chrono::steady_clock::now() - begun;
-        partner.beat(since.count(), RunState::running);
-    };
+    partner.run_clock(0);
     // Sent 850 ms early: a pulse of half a second from between two poses on.
     int periods = 0;
     std::int64_t sent_ns = 0;
@@ -398,6 +396,44 @@ TEST_F(DynamicsOnSlcan, InRealTimeACommandActsFromItsTimeOn) {
     EXPECT_NEAR(std::abs(speed_m_s(900) - still), 0.05 * full, 1e-4);
     EXPECT_NEAR(std::abs(speed_m_s(1200) - still), 0.35 * full, 1e-4);
     EXPECT_NEAR(std::abs(speed_m_s(1600) - still), 0.5 * full, 1e-4);
+}
+
+TEST_F(DynamicsOnSlcan, InRealTimeAllCommandsThatComeEarlyAct) {
+    Scenario s = quiet();
+    s.duration_s = 600;
+    s.navigation.period_s = 1;
+    s.pose_rate_hz = 10;
+    Partner partner(*hub, s);
+    partner.run_clock(0);
+    // Both sent at once: a pulse from 750 ms on, ended 200 ms later by a command without one.
+    int periods = 0;
+    std::int64_t sent_ns = 0;
+    partner.on_period = [&](std::int64_t t_ns) {
+        ActuatorCommand c;
+        if (periods++ > 0) {
+            c.t_ns = t_ns;
+            c.phase = GuidancePhase::done;
+            partner.command(c);
+            return;
+        }
+        sent_ns = c.t_ns = t_ns;
+        c.t_ns += 750 * kMs;
+        c.impulse_n_s = {0, 0.8 * s.thrusters.force_n, 0};
+        partner.command(c);
+        c.t_ns += 200 * kMs;
+        c.impulse_n_s = {};
+        partner.command(c);
+    };
+    const auto flown = fly(s, {}, bus, partner);
+    ASSERT_TRUE(flown) << flown.error().text();
+    double still = -1, after = -1;
+    for (const Partner::Pose& p : partner.poses) {
+        if (p.base_id != s.chaser.can_id) continue;
+        if (p.command.t_valid_ns == sent_ns) still = norm(p.command.motion.velocity_m_s);
+        if (p.command.t_valid_ns == sent_ns + 1'000 * kMs) after = norm(p.command.motion.velocity_m_s);
+    }
+    EXPECT_NEAR(std::abs(after - still), 0.2 * s.thrusters.force_n / s.chaser.mass_kg, 1e-4);
+    EXPECT_EQ((*flown)["actuator_commands"]["refused"], 0);
 }
 
 TEST(DynamicsOnUdp, TheSameRunInCanFd) {

@@ -195,7 +195,7 @@ std::size_t stars_in_view(const World& world, const Camera& camera) {
     const StarField& field = *world.scene().stars;
     BodyPoses at(world.scene().bodies.size());
     world.place(0, camera.mount, at);
-    const Quat q_icrs_camera = field.q_icrs_world * world.sensor_pose(camera.mount, camera.T_mount_camera, at).q;
+    const Quat q_icrs_camera = field.q_icrs_world * world.camera_pose(camera, 0, at).q;
     const CameraModelHandle model(camera);
     return static_cast<std::size_t>(std::ranges::count_if(field.stars, [&](const Star& star) {
         const auto p = model->project(conjugate(q_icrs_camera) * star.direction);

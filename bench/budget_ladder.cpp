@@ -34,7 +34,7 @@ struct View {
           image(camera.width, camera.height),
           bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})) {
         world.place(settings.t_ns, camera.mount, at);
-        T_world_camera = world.sensor_pose(camera.mount, camera.T_mount_camera, at);
+        T_world_camera = world.camera_pose(camera, 1e-9 * static_cast<double>(settings.t_ns), at);
     }
     const World& world;
     const Camera& camera;

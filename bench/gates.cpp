@@ -23,7 +23,7 @@ public:
           bytes_(frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns})),
           handed_(bytes_.size()) {
         world.place(0, camera_.mount, at);
-        T_world_camera = world.sensor_pose(camera_.mount, camera_.T_mount_camera, at);
+        T_world_camera = world.camera_pose(camera_, 0, at);
         settings_.seed = world.scene().render.seed;
         make();  // takes the memory
     }

@@ -29,7 +29,7 @@ Vector3d direction(const Camera& c, const Vector2d& px) {
 struct Station {
     Station(const World& w, std::size_t index, std::uint32_t frame) : world(w), unit(w, index) {
         unit.expose(frame, 0);
-        T_world_camera = world.sensor_pose(unit.camera().mount, unit.camera().T_mount_camera, unit.placement());
+        T_world_camera = world.camera_pose(unit.camera(), 0, unit.placement());
     }
     const World& world;
     CameraUnit unit;

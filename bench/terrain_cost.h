@@ -1,7 +1,7 @@
 /// bench/terrain_cost.h - what a ray into terrain costs beside one into a mesh of the visible triangles alone.
 ///
-/// The ground is fractal and generated; a camera that looks straight down descends over its middle. From each
-/// height the rays through all pixel centres are traced, 4 x 4 pixels together, into
+/// The ground is fractal and generated; a nadir-pointing camera descends over its middle. From each height the rays
+/// through all pixel centres are traced, 4 x 4 pixels together, into
 /// - the terrain, its levels of detail chosen for the whole descent;
 /// - a mesh of those of its triangles that the view sees: that any of 8 x 8 rays in a pixel meets;
 /// - a mesh of those that the rays through the pixel centres meet, a part of these where triangles are smaller than

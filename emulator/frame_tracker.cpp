@@ -110,8 +110,10 @@ Status FrameTracker::set(const FrameLedger& ledger) {
 ApparentMotion FrameTracker::motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const {
     const double length_s = 1e-9 * static_cast<double>(ledger.t_exposure_end_ns - ledger.t_exposure_start_ns);
     if (!camera_.shutter || !(length_s > 0)) return {};
+    const double middle_s = 1e-9 * static_cast<double>(ledger.t_exposure_mid_ns);
     const auto q_frame_chaser = [&](double time) {
-        return (world_.sensor_pose(camera_.mount, camera_.T_mount_camera, at, time) * inverse(T_chaser_camera())).q;
+        const double t_s = middle_s + (time - kMidExposure) * length_s;
+        return (world_.camera_pose(camera_, t_s, at, time) * inverse(T_chaser_camera())).q;
     };
     const Quat q_middle = q_frame_chaser(kMidExposure);
     const Rigid3 T_chaser_target = T_chaser_camera() * guess;
@@ -132,7 +134,7 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     TrackedFrame out;
     out.frame = ledger.frame;
     out.t_ns = t_ns;
-    const Rigid3 T_world_camera = world_.sensor_pose(camera_.mount, camera_.T_mount_camera, at);
+    const Rigid3 T_world_camera = world_.camera_pose(camera_, 1e-9 * static_cast<double>(t_ns), at);
     out.truth = inverse(T_world_camera) * at.T_world_body[target_];
     const Quat q_frame_chaser = (T_world_camera * inverse(T_chaser_camera())).q;
     if (tracker_.started()) tracker_.filter().predict(t_ns);

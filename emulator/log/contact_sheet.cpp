@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "plot/plot.h"
+#include "renderer/image/image_file.h"
 
 namespace narpa {
 namespace {
@@ -104,11 +104,7 @@ Status ContactSheet::write(const std::string& path) const {
                         colour, width, cv::LINE_AA);
         shown.copyTo(sheet(cv::Rect(x, y, width_, height_)));
     }
-    try {
-        if (cv::imwrite(path, sheet)) return Ok{};
-    } catch (const cv::Exception&) {
-    }
-    return Error{"cannot be written, expected a PNG file in a folder that exists", path, 0, 0, ErrorKind::failed};
+    return write_png(path, sheet);
 }
 
 }  // namespace narpa

@@ -15,8 +15,9 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "renderer/scene/image_codecs.h"
 
 namespace narpa {
 namespace {
@@ -125,25 +126,20 @@ Status write_exr(const std::string& path, const RenderedFrame& frame) {
     return Ok{};
 }
 
+/// As the camera puts it out.
 Status write_png(const std::string& path, const RenderedFrame& frame) {
-    try {
-        const int width = frame.radiance.width, height = frame.radiance.height;
-        // cv::Mat has no const view; OpenCV only reads it.
-        const auto view = [&](int type) {
-            return cv::Mat(height, width, type, const_cast<std::uint8_t*>(frame.bytes.data()));
-        };
-        cv::Mat image;
-        switch (frame.camera.format) {
-            case PixelFormat::rgb24: cv::cvtColor(view(CV_8UC3), image, cv::COLOR_RGB2BGR); break;
-            case PixelFormat::yuyv: cv::cvtColor(view(CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV); break;
-            default: image = view(is_16_bit(frame.camera.format) ? CV_16UC1 : CV_8UC1); break;
-        }
-        std::vector<std::uint8_t> encoded;
-        if (!cv::imencode(".png", image, encoded)) return Error{"OpenCV could not encode the PNG", path};
-        return write_bytes(path, "", encoded.data(), encoded.size());
-    } catch (const std::exception& e) {
-        return Error{std::string("OpenCV could not encode the PNG: ") + e.what(), path};
+    // cv::Mat has no const view; OpenCV only reads it.
+    const auto view = [&](int type) {
+        return cv::Mat(frame.radiance.height, frame.radiance.width, type,
+                       const_cast<std::uint8_t*>(frame.bytes.data()));
+    };
+    cv::Mat image;
+    switch (frame.camera.format) {
+        case PixelFormat::rgb24: cv::cvtColor(view(CV_8UC3), image, cv::COLOR_RGB2BGR); break;
+        case PixelFormat::yuyv: cv::cvtColor(view(CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV); break;
+        default: image = view(is_16_bit(frame.camera.format) ? CV_16UC1 : CV_8UC1); break;
     }
+    return narpa::write_png(path, image);
 }
 
 /// In lower case, with the dot.
@@ -180,6 +176,18 @@ Status write_image(const std::string& path, const RenderedFrame& frame) {
 
 Status write_pfm(const std::string& path, int width, int height, std::span<const double> values) {
     return write_pfm(path, "Pf", width, height, std::vector<float>(values.begin(), values.end()));
+}
+
+Status write_png(const std::string& path, const cv::Mat& image) {
+    const Result<ImageCodecs> codecs = image_codecs();
+    if (!codecs) return codecs.error();
+    std::vector<std::uint8_t> encoded;
+    try {
+        if (!codecs->imencode(".png", image, encoded, {})) return Error{"OpenCV could not encode the PNG", path};
+    } catch (const std::exception& e) {
+        return Error{std::string("OpenCV could not encode the PNG: ") + e.what(), path};
+    }
+    return write_bytes(path, "", encoded.data(), encoded.size());
 }
 
 }  // namespace narpa

@@ -9,6 +9,10 @@
 #include "renderer/image/radiance_image.h"
 #include "renderer/scene/scene.h"
 
+namespace cv {
+class Mat;
+}
+
 namespace narpa {
 
 /// A frame before and after the detector; each file format stores what it can hold.
@@ -38,5 +42,8 @@ Status write_image(const std::string& path, const RenderedFrame& frame);
 /// Writes one 32-bit float a pixel as a grey PFM, little-endian, rows from the bottom. `values`: row by row from
 /// the top. Error: a path that cannot be written.
 Status write_pfm(const std::string& path, int width, int height, std::span<const double> values);
+
+/// Writes grey or colour (blue first) of 8 or 16 bits as PNG. Errors: a path that cannot be written; no codecs.
+Status write_png(const std::string& path, const cv::Mat& image);
 
 }  // namespace narpa

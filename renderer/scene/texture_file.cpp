@@ -9,6 +9,7 @@
 
 #include "renderer/material/texture_lookup.h"
 #include "renderer/scene/file_bytes.h"
+#include "renderer/scene/image_codecs.h"
 #include "renderer/scene/image_header.h"
 
 namespace narpa {
@@ -99,8 +100,10 @@ Result<Texture> decode_texture(const std::string& name, std::span<const std::uin
                                              size->height, kMostPixels),
                          .file = name};
         const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
+        const Result<ImageCodecs> codecs = image_codecs();
+        if (!codecs) return codecs.error();
         const cv::Mat bgr =
-            cv::imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+            codecs->imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
         if (bgr.empty()) return no_image;
         return from_image(name, bgr, use);
     } catch (const std::exception& e) {

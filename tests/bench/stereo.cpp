@@ -4,10 +4,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 
 #include "bench/stereo.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/image_files.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
@@ -89,7 +89,7 @@ TEST(StereoBench, PlotsItsMatches) {
     const test::TemporaryFolder folder;
     const std::string path = folder / "stereo.png";
     ASSERT_TRUE(plot_stereo(path, made_up(5, 0.5, 0.5)));
-    EXPECT_FALSE(cv::imread(path).empty());
+    EXPECT_FALSE(test::read_image_file(path).empty());
     EXPECT_FALSE(plot_stereo(folder / "nowhere/stereo.png", made_up(5, 0.5, 0.5)));
 }
 
@@ -150,7 +150,7 @@ TEST(StereoBench, ErrorsOnRealGroundAreAsPredicted) {
         GTEST_SKIP() << "no elevation model beside the project: ../shared/assets/dem/mars_gale";
     const auto descent = read_scene(kDescent);
     ASSERT_TRUE(descent);
-    const auto bench = measure_stereo(gale(cv::imread(file, cv::IMREAD_UNCHANGED), *descent), 100, quietly);
+    const auto bench = measure_stereo(gale(test::read_image_file(file), *descent), 100, quietly);
     ASSERT_TRUE(bench) << bench.error().text();
     EXPECT_EQ(all(stereo_faults(*bench, 100)), "") << in_words(*bench);
 }

@@ -5,9 +5,9 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <vector>
 
+#include "tests/support/image_files.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
@@ -56,7 +56,7 @@ TEST(ContactSheet, MosaicsHaveTheirColours) {
         sheet.offer(0, frame);
         const std::string path = folder / "sheet.png";
         ASSERT_TRUE(sheet.write(path));
-        const cv::Mat image = cv::imread(path);
+        const cv::Mat image = test::read_image_file(path);
         for (const auto& [x, y] : {std::pair{20, 10}, {21, 10}, {20, 11}, {21, 11}}) {
             const auto bgr = image.at<cv::Vec3b>(y, x);
             EXPECT_EQ(bgr[2], 255) << name(pixel);

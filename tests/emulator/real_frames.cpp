@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <sstream>
 
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
+#include "tests/support/image_files.h"
 
 namespace narpa {
 namespace {
@@ -68,8 +68,7 @@ protected:
             Detector{.exposure_s = 1e-4, .full_well_e = 40000, .read_noise_e = 30, .shot_noise = true, .bits = 12};
         scene.cameras.push_back(camera);
         render_scene.emplace(*RenderScene::create(scene));
-        const cv::Mat image =
-            cv::imread(folder + "/pose/near_msi_eros/" + std::string(j["image"]), cv::IMREAD_UNCHANGED);
+        const cv::Mat image = test::read_image_file(folder + "/pose/near_msi_eros/" + std::string(j["image"]));
         ASSERT_EQ(image.type(), CV_16UC1);
         frame.width = image.cols, frame.height = image.rows;
         for (int v = 0; v < image.rows; ++v)

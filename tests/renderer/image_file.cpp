@@ -10,10 +10,10 @@
 
 #include <filesystem>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "renderer/camera/detector.h"
+#include "tests/support/image_files.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -117,7 +117,7 @@ TEST(ImageFile, PfmIsReadByOpenCv) {
     const std::string path = scratch("radiance.pfm");
     ASSERT_TRUE(write_image(path, {shot.c, shot.image, nullptr, {}}));
     EXPECT_EQ(contents(path).substr(0, 13), "PF\n12 8\n-1.0\n");
-    const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+    const cv::Mat image = test::read_image_file(path);
     ASSERT_EQ(image.type(), CV_32FC3);
     for (int y = 0; y < 8; ++y)
         for (int x = 0; x < 12; ++x) {
@@ -131,7 +131,7 @@ TEST(ImageFile, GreyPfmIsReadByOpenCv) {
     const std::string path = scratch("depth.pfm");
     const std::vector<double> values{1.5, -2, 3, NAN, 1e6, 0.25};
     ASSERT_TRUE(write_pfm(path, 3, 2, values));
-    const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+    const cv::Mat image = test::read_image_file(path);
     ASSERT_EQ(image.type(), CV_32FC1);
     ASSERT_EQ(image.size(), cv::Size(3, 2));
     for (int i = 0; i < 6; ++i) {
@@ -149,7 +149,7 @@ TEST(ImageFile, PngIsTheCamerasOwnOutput) {
         const std::string path = scratch(std::string(name(format)) + ".png");
         const auto written = write_image(path, shot.frame());
         ASSERT_TRUE(written) << written.error().text();
-        const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+        const cv::Mat image = test::read_image_file(path);
         ASSERT_EQ(image.rows, 8);
         ASSERT_EQ(image.cols, 12);
         int lit = 0;

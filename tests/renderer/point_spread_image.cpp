@@ -6,13 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <opencv2/imgcodecs.hpp>
 
 #include "renderer/camera/image_optics.h"
 #include "renderer/scene/point_spread_file.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/point_spread_support.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/image_files.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -131,7 +131,7 @@ void write_png(const std::string& path, const PointSpreadImage& image) {
     for (int i = 0; i < image.width * image.height; ++i)
         samples(i / image.width, i % image.width) =
             static_cast<std::uint16_t>(std::lround(65535 * image.samples[static_cast<std::size_t>(i)] / most));
-    cv::imwrite(path, samples);
+    test::write_image_file(path, samples);
 }
 void write_exr(const std::string& path, const PointSpreadImage& image, const char* channel = "Y") {
     std::vector<float> samples(image.samples.begin(), image.samples.end());
@@ -168,9 +168,9 @@ TEST(PointSpreadImage, IsRefusedWhereItIsNoPointSpread) {
         ASSERT_FALSE(read) << name;
         EXPECT_NE(read.error().text().find(words), std::string::npos) << read.error().text();
     };
-    cv::imwrite(folder / "colour.png", cv::Mat(4, 4, CV_8UC3, cv::Scalar(1, 2, 3)));
-    cv::imwrite(folder / "large.png", cv::Mat(4, 300, CV_8UC1, cv::Scalar(1)));
-    cv::imwrite(folder / "black.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(0)));
+    test::write_image_file(folder / "colour.png", cv::Mat(4, 4, CV_8UC3, cv::Scalar(1, 2, 3)));
+    test::write_image_file(folder / "large.png", cv::Mat(4, 300, CV_8UC1, cv::Scalar(1)));
+    test::write_image_file(folder / "black.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(0)));
     PointSpreadImage image{.width = 2, .height = 1, .samples = {1, -1}};
     write_exr(folder / "below.exr", image);
     write_exr(folder / "band.exr", image, "R");

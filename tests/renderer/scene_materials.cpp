@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <opencv2/imgcodecs.hpp>
 
 #include "renderer/scene/kind_names.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/image_files.h"
 
 namespace narpa {
 namespace {
@@ -211,7 +211,7 @@ TEST(SceneMaterial, DefaultsAreTheStructs) {
 
 TEST(SceneMaterial, EveryTextureIsReadForWhatItIs) {
     const TemporaryFolder folder;
-    cv::imwrite(folder / "grey.png", cv::Mat(2, 2, CV_8UC3, cv::Scalar(128, 128, 128)));
+    test::write_image_file(folder / "grey.png", cv::Mat(2, 2, CV_8UC3, cv::Scalar(128, 128, 128)));
     const Scene s = read_good(
         folder, BALL
         "[body.material]\nemission = 2\ntexture = \"grey.png\"\n"
@@ -232,7 +232,7 @@ TEST(SceneMaterial, EveryTextureIsReadForWhatItIs) {
 
 TEST(SceneMaterial, MapsOfAPlanetAreLinear) {
     const TemporaryFolder folder;
-    cv::imwrite(folder / "grey.png", cv::Mat(2, 2, CV_8UC3, cv::Scalar(128, 128, 128)));
+    test::write_image_file(folder / "grey.png", cv::Mat(2, 2, CV_8UC3, cv::Scalar(128, 128, 128)));
     const Scene s = read_good(folder, BALL
                               "[body.material]\nkind = \"phong\"\nspecular = 0.1\nexponent = 9\n"
                               "specular_texture = \"grey.png\"\ncloud_texture = \"grey.png\"\n");

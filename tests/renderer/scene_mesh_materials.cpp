@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <opencv2/imgcodecs.hpp>
 
 #include "renderer/scene/mesh_file.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/image_files.h"
 
 namespace narpa {
 namespace {
@@ -133,8 +133,9 @@ TEST(MtlMaterial, BadNumbersAreNamed) {
 class BumpMap : public testing::Test {
 protected:
     BumpMap() {
-        cv::imwrite(folder_ / "normals.png", cv::Mat(4, 4, CV_8UC3, cv::Scalar(255, 128, 128)));  // blue first
-        cv::imwrite(folder_ / "heights.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(128)));
+        test::write_image_file(folder_ / "normals.png",
+                               cv::Mat(4, 4, CV_8UC3, cv::Scalar(255, 128, 128)));  // blue first
+        test::write_image_file(folder_ / "heights.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(128)));
         folder_.write("m.obj", kTriangle);
     }
     Scene read(const std::string& statements, const char* scale = "1") {

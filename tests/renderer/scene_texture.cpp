@@ -1,10 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 
 #include "renderer/scene/texture_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/image_files.h"
 
 namespace narpa {
 namespace {
@@ -21,7 +21,7 @@ TEST(TextureFile, EightBitsAreMadeLinear) {
     cv::Mat image(1, 256, CV_8UC3);
     for (int i = 0; i < 256; ++i)
         image.at<cv::Vec3b>(0, i) = cv::Vec3b(0, static_cast<uchar>(255 - i), static_cast<uchar>(i));
-    cv::imwrite(folder / "t.png", image);
+    test::write_image_file(folder / "t.png", image);
     const Result<Texture> t = read_texture(folder / "t.png");
     ASSERT_TRUE(t) << t.error().text();
     ASSERT_EQ(t->width, 256);
@@ -41,7 +41,7 @@ TEST(TextureFile, EveryEightBitCodeIsWithinHalfACodeOfTheStandard) {
     const TemporaryFolder folder;
     cv::Mat codes(16, 16, CV_8UC1);
     for (int i = 0; i < 256; ++i) codes.at<uchar>(i / 16, i % 16) = static_cast<uchar>(i);
-    cv::imwrite(folder / "t.png", codes);
+    test::write_image_file(folder / "t.png", codes);
     const Result<Texture> t = read_texture(folder / "t.png");
     ASSERT_TRUE(t);
     for (std::size_t i = 0; i < 256; ++i)
@@ -59,8 +59,8 @@ TEST(TextureFile, UseChoosesTheCurveWhateverTheDepth) {
         eight.at<uchar>(0, i) = static_cast<uchar>(i);
         sixteen.at<std::uint16_t>(0, i) = static_cast<std::uint16_t>(257 * i);
     }
-    cv::imwrite(folder / "8.png", eight);
-    cv::imwrite(folder / "16.png", sixteen);
+    test::write_image_file(folder / "8.png", eight);
+    test::write_image_file(folder / "16.png", sixteen);
     const auto codes = [&](const char* file, Colour colour) {
         const Result<Texture> t = read_texture(folder / file, {.colour = colour});
         EXPECT_TRUE(t);
@@ -79,7 +79,7 @@ TEST(TextureFile, SixteenBitsOfSrgbAreMadeLinear) {
     const TemporaryFolder folder;
     cv::Mat image(4, 1000, CV_16UC1);
     for (int i = 0; i < 4000; ++i) image.at<std::uint16_t>(i / 1000, i % 1000) = static_cast<std::uint16_t>(i * 16);
-    cv::imwrite(folder / "t.png", image);
+    test::write_image_file(folder / "t.png", image);
     const Result<Texture> t = read_texture(folder / "t.png", {.colour = TextureUse::Colour::srgb});
     ASSERT_TRUE(t);
     for (std::size_t i = 0; i < 4000; ++i)
@@ -95,8 +95,8 @@ TEST(TextureFile, EightAndSixteenBitsOfTheSamePictureAgreeWithinHalfACode) {
         sixteen.at<std::uint16_t>(0, i) = static_cast<std::uint16_t>(16 * i);
         eight.at<uchar>(0, i) = static_cast<uchar>(std::lround(255 * srgb(16 * i / 65535.0)));
     }
-    cv::imwrite(folder / "16.png", sixteen);
-    cv::imwrite(folder / "8.png", eight);
+    test::write_image_file(folder / "16.png", sixteen);
+    test::write_image_file(folder / "8.png", eight);
     const Result<Texture> a = read_texture(folder / "16.png"), b = read_texture(folder / "8.png");
     ASSERT_TRUE(a && b);
     for (std::size_t i = 0; i < 4096; ++i)  // rounding to 16 bits: a half more of a code of 65535
@@ -105,8 +105,8 @@ TEST(TextureFile, EightAndSixteenBitsOfTheSamePictureAgreeWithinHalfACode) {
 
 TEST(TextureFile, NormalMapsOfEightBitsAreFlatAt128) {
     const TemporaryFolder folder;
-    cv::imwrite(folder / "n.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 128, 128)));
-    cv::imwrite(folder / "ends.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 64, 0)));
+    test::write_image_file(folder / "n.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 128, 128)));
+    test::write_image_file(folder / "ends.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 64, 0)));
     const Result<Texture> n = read_texture(folder / "n.png", {.colour = TextureUse::Colour::normals});
     const Result<Texture> ends = read_texture(folder / "ends.png", {.colour = TextureUse::Colour::normals});
     ASSERT_TRUE(n && ends);
@@ -118,7 +118,7 @@ TEST(TextureFile, BringsItsCoarserLevelsAndItsWrap) {
     const TemporaryFolder folder;
     cv::Mat image(2, 4, CV_16UC1, cv::Scalar(1000));
     image.at<std::uint16_t>(0, 0) = 3000;
-    cv::imwrite(folder / "t.png", image);
+    test::write_image_file(folder / "t.png", image);
     const Result<Texture> t = read_texture(folder / "t.png", {.wrap = Texture::Wrap::clamp});
     ASSERT_TRUE(t);
     EXPECT_EQ(t->wrap, Texture::Wrap::clamp);
@@ -131,7 +131,7 @@ TEST(TextureFile, BringsItsCoarserLevelsAndItsWrap) {
 TEST(TextureFile, SixteenBitsAreLinearAlready) {
     const TemporaryFolder folder;
     const cv::Mat image(2, 3, CV_16UC3, cv::Scalar(300, 200, 100));
-    cv::imwrite(folder / "t.png", image);
+    test::write_image_file(folder / "t.png", image);
     const Result<Texture> t = read_texture(folder / "t.png");
     ASSERT_TRUE(t) << t.error().text();
     EXPECT_EQ(t->rgb.size(), 18u);
@@ -140,8 +140,8 @@ TEST(TextureFile, SixteenBitsAreLinearAlready) {
 
 TEST(TextureFile, GreyIsCopiedAndAlphaDropped) {
     const TemporaryFolder folder;
-    cv::imwrite(folder / "grey.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(255)));
-    cv::imwrite(folder / "alpha.png", cv::Mat(1, 1, CV_8UC4, cv::Scalar(255, 0, 255, 0)));
+    test::write_image_file(folder / "grey.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(255)));
+    test::write_image_file(folder / "alpha.png", cv::Mat(1, 1, CV_8UC4, cv::Scalar(255, 0, 255, 0)));
     const Result<Texture> grey = read_texture(folder / "grey.png"), alpha = read_texture(folder / "alpha.png");
     ASSERT_TRUE(grey && alpha);
     EXPECT_EQ(grey->rgb, (std::vector<std::uint16_t>{65535, 65535, 65535}));
@@ -159,7 +159,7 @@ TEST(TextureFile, RowsComeFromTheTop) {
 
 TEST(TextureFile, WhatIsNoImageGivesAnError) {
     const TemporaryFolder folder;
-    cv::imwrite(folder / "cut.png", cv::Mat(64, 64, CV_8UC3, cv::Scalar(1, 2, 3)));
+    test::write_image_file(folder / "cut.png", cv::Mat(64, 64, CV_8UC3, cv::Scalar(1, 2, 3)));
     std::filesystem::resize_file(folder / "cut.png", 40);
     for (const std::string& path : {folder.write("text.png", "not an image"), folder.write("empty.png", ""),
                                     folder / "missing.png", folder / "cut.png", folder / "."}) {
@@ -175,7 +175,7 @@ TEST(TextureFile, FormatsOfTheManualAreRead) {
     const cv::Mat image(31, 50, CV_8UC3, cv::Scalar(0, 0, 255));
     for (const char* name : {"t.png", "t.jpg", "t.tiff", "t.webp", "t.bmp", "t.ppm", "t.pgm", "t.pbm"}) {
         const bool is_grey = std::string(name) == "t.pgm" || std::string(name) == "t.pbm";
-        cv::imwrite(folder / name, is_grey ? cv::Mat(31, 50, CV_8UC1, cv::Scalar(255)) : image);
+        test::write_image_file(folder / name, is_grey ? cv::Mat(31, 50, CV_8UC1, cv::Scalar(255)) : image);
         const Result<Texture> t = read_texture(folder / name);
         ASSERT_TRUE(t) << t.error().text();
         EXPECT_EQ(t->width, 50);
@@ -190,7 +190,7 @@ TEST(TextureFile, OtherFormatsAndTooManyPixelsAreRefusedBeforeTheyAreDecoded) {
         const Result<Texture> t = read_texture(path);
         return t ? "" : t.error().text().substr(path.size());
     };
-    cv::imwrite(folder / "t.ras", cv::Mat(1, 1, CV_8UC3, cv::Scalar(1, 2, 3)));  // Sun raster
+    test::write_image_file(folder / "t.ras", cv::Mat(1, 1, CV_8UC3, cv::Scalar(1, 2, 3)));  // Sun raster
     EXPECT_EQ(error_of(folder / "t.ras"),
               ": not an image that can be read, expected PNG, JPEG, TIFF, WebP, BMP or PNM");
     const std::string words = " pixels, expected at most 268435456 of them";
@@ -200,7 +200,7 @@ TEST(TextureFile, OtherFormatsAndTooManyPixelsAreRefusedBeforeTheyAreDecoded) {
               ": an image of 2147483648 x 1" + words);
     // A size written over that of a good file.
     const auto with_bytes = [&](const char* name, std::size_t at, const std::string& bytes) {
-        cv::imwrite(folder / name, cv::Mat(2, 2, CV_8UC3, cv::Scalar(1, 2, 3)));
+        test::write_image_file(folder / name, cv::Mat(2, 2, CV_8UC3, cv::Scalar(1, 2, 3)));
         std::string file = test::read_text(folder / name);
         return folder.write(name, file.replace(at, bytes.size(), bytes));
     };

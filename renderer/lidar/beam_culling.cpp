@@ -15,9 +15,10 @@ namespace {
 constexpr double kEmbreeSlack = 4e-6;
 /// Of the distance: more than what single precision here, and a ray that is traced again slightly turned, are off.
 constexpr float kBeamSlack = 2e-6f;
-/// Boxes of a tree that beams are held against. More cost more time with few sub-rays, fewer with many: with 1 and
-/// 8 at the docking station, 127 take 0.92 and 1.05 of the time, 2047 take 1.1 and 1.01.
-constexpr std::size_t kMostBoxes = 511;
+/// Boxes of a tree that beams are held against, of cones and of single rays. More cost more time and leave out more
+/// beams: at the docking station 127 take 1.05 of the time with 8 sub-rays, 2047 take 1.01; with one ray 511
+/// take 1.08.
+constexpr std::size_t kMostBoxes = 511, kMostForRays = 127;
 /// Directions along an axis have no reciprocal.
 constexpr double kLeastDirection = 1e-12;
 
@@ -135,12 +136,12 @@ NARPA_EACH_ISA std::uint32_t touching_leaves(std::span<const BeamBox> boxes, con
 }
 
 /// The first boxes of a tree, which are the largest; those whose children are left out become leaves.
-std::vector<BeamBox> beam_boxes(std::span<const BoxNode> nodes) {
+std::vector<BeamBox> beam_boxes(std::span<const BoxNode> nodes, std::size_t most) {
     std::vector<BeamBox> boxes;
-    for (const BoxNode& node : nodes.first(std::min(nodes.size(), kMostBoxes))) {
+    for (const BoxNode& node : nodes.first(std::min(nodes.size(), most))) {
         const Vec3f low{node.low[0], node.low[1], node.low[2]}, high{node.high[0], node.high[1], node.high[2]};
         const Vec3f half = 0.5f * (high - low), middle = low + half;
-        const bool leaf = node.children + 1 >= kMostBoxes;
+        const bool leaf = node.children + 1 >= most;
         boxes.push_back(
             {middle.x, middle.y, middle.z, half.x, half.y, half.z, norm(half), leaf ? 0 : node.children});
     }
@@ -151,10 +152,12 @@ std::vector<BeamBox> beam_boxes(std::span<const BoxNode> nodes) {
 
 BeamCulling::BeamCulling(const Tracer& tracer, double tangent, double range_max_m)
     : tracer_(tracer), tangent_(tangent), range_max_m_(range_max_m) {
+    const std::size_t most = tangent > 0 ? kMostBoxes : kMostForRays;
     for (const std::uint32_t body : tracer.all_bodies()) {
         const auto same = std::ranges::find(shapes_, &tracer.shape(body), &BoxedShape::shape);
         shape_of_body_.push_back(static_cast<std::size_t>(same - shapes_.begin()));
-        if (same == shapes_.end()) shapes_.push_back({&tracer.shape(body), beam_boxes(tracer.shape(body).boxes())});
+        if (same == shapes_.end())
+            shapes_.push_back({&tracer.shape(body), beam_boxes(tracer.shape(body).boxes(), most)});
     }
     meeting_.resize(shape_of_body_.size());
     bodies_.resize(shape_of_body_.size());

@@ -1,5 +1,7 @@
 #include "renderer/lidar/lidar_shot.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -57,22 +59,46 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
     return s;
 }
 
-/// What the shot meets at the end of its path.
-LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i,
-                      const Path& path, bool sunlight) {
+/// Asks memory for the four texels of a lookup. Where coordinates leave the image it may ask for others: no matter.
+/// These two are always inlined, as GCC takes a function that does nothing else for one without effect.
+[[gnu::always_inline]] inline void prefetch_texels(const Texture& t, float u, float v) {
+    if (t.rgb.empty() || !std::isfinite(u) || !std::isfinite(v)) return;
+    const auto first_at = [](float place, int n) {
+        const float part = place - std::floor(place);
+        return static_cast<std::size_t>(
+            std::clamp(static_cast<int>(part * static_cast<float>(n) - 0.5f), 0, n - 1));
+    };
+    const std::size_t row = first_at(1 - v, t.height), column = first_at(u, t.width),
+                      width = static_cast<std::size_t>(t.width);
+    __builtin_prefetch(&t.rgb[3 * (row * width + column)]);
+    if (row + 1 < static_cast<std::size_t>(t.height)) __builtin_prefetch(&t.rgb[3 * ((row + 1) * width + column)]);
+}
+
+/// The texels of all lanes are on their way before the first is looked up: else each lookup waits for its own.
+[[gnu::always_inline]] inline void prefetch_textures(const Scene& scene, const HitBatch& hits,
+                                                     std::uint32_t lanes) {
+    for (std::uint32_t rest = lanes; rest != 0; rest &= rest - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+        const int texture = scene.materials[static_cast<std::size_t>(hits.material[i])].texture;
+        if (texture >= 0) prefetch_texels(scene.textures[static_cast<std::size_t>(texture)], hits.u[i], hits.v[i]);
+    }
+}
+
+/// What the shot meets at the end of its path. In place: a copy of what was just written in parts is slow.
+void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i, const Path& path,
+                bool sunlight, LidarReturn& r) {
     const Vec3 back = -path.direction;
     const Surface surface = surface_of(tracer, at, hits, i, path.direction);
     const double cosine = dot(surface.normal, back);
     const double reflectivity = std::numbers::pi * mean(bsdf(surface, surface.normal, back, back)) +
                                 static_cast<double>(surface.material->retroreflectance);
-    LidarReturn r{.range_m = path.range_m,
-                  .reflectivity = static_cast<float>(path.throughput * cosine * reflectivity),
-                  .body = hits.body[i],
-                  .cos_incidence = static_cast<float>(cosine),
-                  .velocity_m_s = path.rate_m_s};
+    r.range_m = path.range_m;
+    r.reflectivity = static_cast<float>(path.throughput * cosine * reflectivity);
+    r.body = hits.body[i];
+    r.cos_incidence = static_cast<float>(cosine);
+    r.velocity_m_s = path.rate_m_s;
     if (sunlight)
         r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hits[i], surface, back);
-    return r;
 }
 
 /// By the air on the piece of the path that ends in the hit, there and back.
@@ -139,6 +165,7 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
     for (int mirrors = 0;; ++mirrors) {
         std::uint32_t mirrored = 0;
         Vec3Lanes directions;
+        prefetch_textures(tracer.scene(), hits, going & hits.met);
         for (std::size_t i = 0; i < beams.n; ++i) {
             if (!is_set(going & hits.met, i)) continue;
             Path& path = paths[i];
@@ -148,7 +175,7 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
             if (!(path.range_m < settings.range_max_m)) continue;
             const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
             if (!settings.multipath || m.kind != Material::Kind::mirror) {
-                returns[i] = return_of(tracer, at, hits, i, path, is_set(settings.sunlight, i));
+                put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
             } else if (mirrors < kMirrors) {
                 const Vec3 n = hits.shading_normal[i], d = path.direction;
                 path.direction = normalized(d - 2 * dot(d, n) * n);

@@ -26,6 +26,10 @@ std::vector<float> coarser_variance(std::span<const float> variance, const Camer
     return std::move(mean.dn);
 }
 
+std::size_t level_number(int factor) {
+    return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)));
+}
+
 }  // namespace
 
 std::string_view name(DenseStatus status) noexcept {
@@ -71,9 +75,13 @@ Status DenseAlignment::check(const MeasuredImage& frame, std::span<const float> 
 LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
                                  const DenseOptions& options, const MeasuredImage& frame,
                                  std::span<const float> frame_variance) {
-    auto& kept = levels_[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
+    const std::size_t number = level_number(factor);
+    auto& kept = levels_[number];
     if (!kept || kept->window() != window)
         kept.emplace(render_scene_, camera, sensor_, static_cast<double>(factor) * factor, window, target_, at);
+    else if (hold_frame_[number])
+        return *kept;
+    hold_frame_[number] = true;
     kept->begin_frame(at, options.motion, times_.scaled(factor), options.model);
     kept->measure(coarser_image(frame, factor), coarser_variance(frame_variance, camera_, factor));
     return *kept;
@@ -83,7 +91,8 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
                                             const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                             std::span<const float> frame_variance) {
     if (auto good = check(frame, frame_variance, at, T_camera_body_guess); !good) return good.error();
-    DenseEstimate e = descend(frame, at, T_camera_body_guess, options, frame_variance);
+    hold_frame_.fill(false);
+    DenseEstimate e = descend(frame, at, T_camera_body_guess, options, frame_variance, options.finest);
     Fit fit;
     if (e.status == DenseStatus::converged && options.rivals > 0)
         compete(frame, at, T_camera_body_guess, options, frame_variance, e, fit);
@@ -100,14 +109,29 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
     return e;
 }
 
-/// The first of the mirrored starts that converges decides. The answer with the smaller loss stays; how far they
-/// are apart is part of its error.
+/// The first of the mirrored starts that converges decides. Its coarse levels suffice where they end close enough
+/// to the answer for one step to lead there. Else the answer with the smaller loss stays; how far they are apart is
+/// part of its error.
 void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                              const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e,
                              Fit& fit) {
     for (int k = 0; k < options.rivals; ++k) {
         const Vector6 beyond = std::pow(0.5, k) * error_between(guess, e.T_camera_body);
-        DenseEstimate other = descend(frame, at, displaced(e.T_camera_body, beyond), options, frame_variance);
+        DenseEstimate other =
+            descend(frame, at, displaced(e.T_camera_body, beyond), options, frame_variance, 2 * options.finest);
+        e.renders += other.renders;
+        if (other.status == DenseStatus::left_the_picture) continue;
+        LevelView& finest = *levels_[level_number(options.finest)];
+        other.exposure = e.exposure;
+        const Camera camera = coarser_camera(camera_, options.finest);
+        LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);
+        if (const auto apart = solver.miss(e.T_camera_body)) {
+            e.covariance += *apart * apart->transpose();
+            return;
+        }
+        DenseOptions to_the_end = options;
+        to_the_end.coarsest = options.finest;
+        other = descend(frame, at, other.T_camera_body, to_the_end, frame_variance, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
         other.renders = e.renders;
@@ -127,7 +151,8 @@ void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, co
 }
 
 DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                                      const DenseOptions& options, std::span<const float> frame_variance) {
+                                      const DenseOptions& options, std::span<const float> frame_variance,
+                                      int last) {
     DenseEstimate e;
     e.T_camera_body = guess;
     const Tracer& tracer = render_scene_.tracer();
@@ -138,7 +163,7 @@ DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPose
     }
     int factor = options.coarsest;
     while (factor > options.finest && extent_px(*about) / factor < kLeastExtent_px) factor /= 2;
-    for (bool first = true; factor >= options.finest; factor /= 2, first = false) {
+    for (bool first = options.coarsest > options.finest; factor >= last; factor /= 2, first = false) {
         const Camera camera = coarser_camera(camera_, factor);
         std::optional<Window> window = window_about(tracer, camera, target_, e.T_camera_body);
         if (!window) {
@@ -166,6 +191,7 @@ Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camer
     const Camera camera = coarser_camera(camera_, options.finest);
     const std::optional<Window> window = window_about(render_scene_.tracer(), camera, target_, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
+    hold_frame_.fill(false);
     LevelView& view = level(options.finest, camera, *window, at, options, none, frame_variance);
     DenseEstimate e;
     e.T_camera_body = T_camera_body;

@@ -95,8 +95,10 @@ public:
                                         const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:
+    /// `last`: factor of the last level; coarser than the finest: for a pose alone.
     [[nodiscard]] DenseEstimate descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                                        const DenseOptions& options, std::span<const float> frame_variance);
+                                        const DenseOptions& options, std::span<const float> frame_variance,
+                                        int last);
     void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
@@ -111,6 +113,7 @@ private:
     SensorModel sensor_;  ///< the levels refer to it
     RowTimes times_;
     std::array<std::optional<LevelView>, 7> levels_{};  ///< by the logarithm of their factor
+    std::array<bool, 7> hold_frame_{};                  ///< the levels that hold this frame
 };
 
 }  // namespace narpa

@@ -182,6 +182,7 @@ public:
                 add(j, i, j, i + 1);
             }
         add_contours();
+        if (fine_row_s_ == 0) add_by_direction();
         return sum_ / (static_cast<double>(s) * s);
     }
     /// Total variation of the signal across the pixel, DN; after `sum`.
@@ -192,6 +193,10 @@ private:
     struct Side {
         double x, y, dx, dy;
         double jump;  ///< DN, left or upper minus right or lower sample
+    };
+    /// Of the sides across one direction of the image.
+    struct Jumps {
+        double sum = 0, over_range = 0;  ///< DN, DN / m
     };
     struct Contour {
         Side side;
@@ -235,8 +240,31 @@ private:
 
     /// `along`: where between the nearer sample, 0, and the other, 1, the edge lies.
     void add(const Side& side, double along, double range_m, double share) {
-        sum_ +=
-            share * side.jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
+        const double jump = share * side.jump;
+        if (fine_row_s_ == 0) {
+            Jumps& jumps = side.dy == 0 ? across_x_ : across_y_;
+            jumps.sum += jump;
+            jumps.over_range += jump / range_m;
+        } else {
+            sum_ += jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
+        }
+    }
+
+    /// Where rows are exposed together a velocity is linear in the inverse range, and hardly changes in a pixel
+    /// otherwise: that of its centre.
+    void add_by_direction() {
+        const CameraModel& model = *grid_.frame.model;
+        const double middle = 0.5 * (grid_.fineness - 1);
+        const Vec3 direction = model.direction({x_ * grid_.fineness + middle, y_ * grid_.fineness + middle});
+        const ProjectionJacobian J = model.jacobian(direction);
+        const auto add_sides = [&](const Jumps& jumps, const Vec3& move) {
+            const Vec3 turn =
+                jumps.sum * cross(direction, move) - jumps.over_range * cross(view_.t_camera_target, move);
+            sum_.head<3>() += to_eigen(turn);
+            sum_.tail<3>() += to_eigen(jumps.over_range * move);
+        };
+        add_sides(across_x_, J.x);
+        add_sides(across_y_, J.y);
     }
 
     /// Bisects contours side by side: where between two samples the nearer surface ends, and its range there.
@@ -268,8 +296,9 @@ private:
         const double cosine =
             std::max(std::min(std::abs(dot(a.normal, a.ray_direction)), std::abs(dot(b.normal, b.ray_direction))),
                      kLeastCosine);
-        const double step_m = std::max(a.range_m, b.range_m) * norm(a.ray_direction - b.ray_direction) / cosine;
-        return norm(a.position - b.position) > kSurfaceSteps * step_m;
+        const double range_m = kSurfaceSteps * std::max(a.range_m, b.range_m);
+        const Vec3 apart = a.position - b.position, turn = a.ray_direction - b.ray_direction;
+        return dot(apart, apart) * cosine * cosine > range_m * range_m * dot(turn, turn);
     }
 
     /// Image velocity across a side at this point of the grid: grid points per unit of the pose's error.
@@ -295,6 +324,7 @@ private:
     const RowView& view_;
     const double fine_row_s_;
     Row sum_ = Row::Zero();
+    Jumps across_x_, across_y_;
     std::vector<Contour> contours_;
     double jumps_ = 0;
 };
@@ -398,7 +428,7 @@ void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sens
         const Quat back = exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to that of mid-exposure
         for (int x = 1; x < camera_.width - 1; ++x) {
             Row row = pixel(patch, x, y, view);
-            row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
+            if (t_s != 0) row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
             derivative_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) +
                         static_cast<std::size_t>(x)] += weight * row.cast<float>();
         }

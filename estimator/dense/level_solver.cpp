@@ -50,14 +50,17 @@ constexpr double kPolishRays = 8;
 /// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
 constexpr int kMostPolishes = 5;
 constexpr double kPolished_sigmas = 1;
+/// Poses within this motion, px, are in one minimum where a step leads from one to the other: no more than this
+/// part of the way is left, or so many variances.
+constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
 /// Part of the window that the target is assumed to fill at first.
 constexpr double kFirstPart = 0.25;
 constexpr int kMostShift_px = 12;
 /// Model error on coarse levels: this part of the signal power.
 constexpr double kCoarseModel = 0.1;
 constexpr double kLeastGain = 0.05;
-/// The Jacobian is reused for poses within this motion, px.
-constexpr double kDerivativeServes_px = 0.2;
+/// The Jacobian is reused for poses within this motion, px; for the last steps within that.
+constexpr double kDerivativeServes_px = 0.2, kLastServes_px = 0.02;
 
 /// Largest motion of a point of the target in the image, about.
 double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_camera_target, double extent_px) {
@@ -103,14 +106,11 @@ DenseStatus LevelSolver::run(bool first) {
     render(e_.T_camera_body);
     if (first) shift();
     robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images()) : 0;
-    double damping = kFirstDamping, moved_px = std::numeric_limits<double>::infinity();
+    double damping = kFirstDamping;
     double least = std::numeric_limits<double>::infinity();
     int stalled = 0;
     for (int k = 0; k < o_.iterations; ++k) {
-        if (moved_px > kDerivativeServes_px) {
-            differentiate();
-            moved_px = 0;
-        }
+        differentiate(kDerivativeServes_px);
         if (!linearise()) return DenseStatus::too_few_pixels;
         if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
@@ -128,7 +128,6 @@ DenseStatus LevelSolver::run(bool first) {
         stalled = shrinks || gains ? 0 : stalled + 1;
         least = std::min(least, step.size);
         if (step.trusted && stalled == kMostStalled) return DenseStatus::converged;
-        moved_px += step.motion_px;
         damping = std::max(damping / kDampingStep, kLeastDamping);
         adapt_stride(step);
     }
@@ -137,15 +136,27 @@ DenseStatus LevelSolver::run(bool first) {
 
 void LevelSolver::polish() {
     rays_ *= kPolishRays;
+    stride_ = 1;
+    render(e_.T_camera_body);
     for (int k = 0; k < kMostPolishes; ++k) {
-        render(e_.T_camera_body);
-        differentiate();
-        stride_ = 1;
+        differentiate(kLastServes_px);
         if (!linearise()) return;
         const Step step = next_step(kLeastDamping);
-        const bool last = step.size * kConverged_sigmas < kPolished_sigmas || k == kMostPolishes - 1;
-        if (!try_step(step) || last) return;
+        if (!try_step(step) || step.size * kConverged_sigmas < kPolished_sigmas) return;
     }
+}
+
+std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
+    const Vector6 way = error_between(e_.T_camera_body, T_camera_body);
+    if (!(distance_px(way) < kReach_px)) return {};
+    render(e_.T_camera_body);
+    ++e_.renders;
+    if (!linearise()) return {};
+    const Matrix6 information = equations_.pose_information() / (robust_.scale * robust_.scale);
+    const Vector6 left = way - next_step(kLeastDamping).pose;
+    const double most = std::max(kLeftVariances, kLeft * kLeft * way.dot(information * way));
+    if (!(left.dot(information * left) < most)) return {};
+    return left;
 }
 
 void LevelSolver::finish() {
@@ -171,7 +182,7 @@ void LevelSolver::finish() {
 
 Result<Matrix6> LevelSolver::bound() {
     render(e_.T_camera_body);
-    differentiate();
+    differentiate(0);
     PhotometricImages images = view_.images();
     images.signal_variance = {};
     images.measured = {};
@@ -216,7 +227,9 @@ void LevelSolver::render(const Rigid3& T) {
     view_.render(T, settings_);
 }
 
-void LevelSolver::differentiate() {
+void LevelSolver::differentiate(double reach_px) {
+    const std::optional<Rigid3>& there = view_.differentiated_at();
+    if (there && distance_px(error_between(*there, e_.T_camera_body)) < reach_px) return;
     view_.differentiate(e_.T_camera_body, settings_, fineness_);
 }
 
@@ -237,10 +250,14 @@ LevelSolver::Step LevelSolver::next_step(double damping) const {
     Step s;
     s.pose = stride_ * damped.ldlt().solve(equations_.pose_gradient());
     const double sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
-    s.motion_px = motion_px(s.pose, pixels_per_radian_, e_.T_camera_body, extent_px(view_.window()));
+    s.motion_px = distance_px(s.pose);
     s.size = coarse_ ? s.motion_px / kCoarseStep_px : sigmas / kConverged_sigmas;
     s.trusted = stride_ == 1 && s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
     return s;
+}
+
+double LevelSolver::distance_px(const Vector6& step) const {
+    return motion_px(step, pixels_per_radian_, e_.T_camera_body, extent_px(view_.window()));
 }
 
 /// Fine details that are further off than their extent shorten steps: while consecutive steps are parallel, they

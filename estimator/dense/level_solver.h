@@ -22,6 +22,9 @@ public:
     void polish();
     /// Covariance, residuals and status at the last rendered pose.
     void finish();
+    /// A step from the estimate's pose ends so far from the other; nothing where it does not lead there or most of
+    /// the way, or where one of them is beyond the Jacobian's reach.
+    [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
     /// DenseAlignment::bound at the estimate.
     Result<Matrix6> bound();
 
@@ -35,9 +38,11 @@ private:
 
     void shift();
     void render(const Rigid3& T);
-    void differentiate();
+    void differentiate(double reach_px);
     bool linearise();
     [[nodiscard]] Step next_step(double damping) const;
+    /// Largest motion of a point of the target in the image, about.
+    [[nodiscard]] double distance_px(const Vector6& step) const;
     bool try_step(const Step& step);
     void adapt_stride(const Step& step);
     /// By what is not known of the model, at the last rendered pose.

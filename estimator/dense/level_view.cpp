@@ -95,6 +95,7 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
 
 void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
                             const ModelUncertainty& model) {
+    differentiated_at_.reset();
     at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model;
     view_.begin_frame(at_, motion_, times_);
     derivative_.begin_frame(at_, motion_, times_);
@@ -145,6 +146,7 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
 
 void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
     columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness);
+    differentiated_at_ = T_camera_target;
 }
 
 PhotometricImages LevelView::images() const {

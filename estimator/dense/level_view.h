@@ -45,6 +45,8 @@ public:
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                        const Vec3& turn_rad);
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
+    /// The pose of this frame's latest Jacobian.
+    [[nodiscard]] const std::optional<Rigid3>& differentiated_at() const noexcept { return differentiated_at_; }
     /// The latest of each.
     [[nodiscard]] PhotometricImages images() const;
 
@@ -64,6 +66,7 @@ private:
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
     std::vector<std::uint8_t> measured_clipped_;
     std::span<const PixelDerivative> columns_;
+    std::optional<Rigid3> differentiated_at_;
 };
 
 }  // namespace narpa

@@ -46,7 +46,7 @@ LidarUnit::LidarUnit(const World& world, std::size_t index, bool truth)
     : world_(world),
       lidar_(world.scene().lidars[index]),
       model_(*lidar_.model),
-      receiver_(lidar_, world.scene().render.seed, index),
+      receiver_(world.tracer(), lidar_, world.scene().render.seed, index),
       placement_(world.scene().bodies.size()),
       motions_(truth || spec().measures_velocity ? world.scene().bodies.size() : 0),
       shots_(spec().shots_per_packet),
@@ -107,7 +107,7 @@ void LidarUnit::trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcep
             }
             place_beams(placement_, lidar_.mount, lidar_.T_mount_lidar, beams);
             Lanes<LidarEchoes> echoes;
-            receiver_.receive(world_.tracer(), placement_, beams, first_number + span.first + done,
+            receiver_.receive(placement_, beams, first_number + span.first + done,
                               velocity ? std::span<const Motion>(motions_) : std::span<const Motion>(),
                               std::span(echoes).first(beams.n));
             for (std::size_t i = 0; i < beams.n; ++i) echoes_[shot[i]] = echoes[i];

@@ -5,8 +5,6 @@
 #include <numbers>
 
 #include "base/constants.h"
-#include "base/each_isa.h"
-#include "renderer/geometry/poses_at.h"
 
 namespace narpa {
 namespace {
@@ -26,33 +24,6 @@ double uniform(std::uint32_t word) {
 
 double light_of(const LidarReturn& r) {
     return static_cast<double>(r.reflectivity) / (r.range_m * r.range_m);
-}
-
-/// The beams, cones about the rays, that may meet the bounds of a body: its sphere and its ellipsoid.
-NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_world_body, double body_radius_m,
-                                      const BodyBounds& body, double half_tangent, Lanes<int>& __restrict meeting) {
-    const double radius_m = body_radius_m, tangent = half_tangent;
-    const Vec3 a = body.semi_axes_m, centre_m = body.centre_m;
-    for (std::size_t i = 0; i < kLanes; ++i) {
-        const Rigid3 T = T_world_body[i];
-        const Vec3 to = T.t - beams.origin[i], d = beams.direction[i];
-        const double along_m = dot(to, d), to2 = dot(to, to);
-        const double spot_m = tangent * (std::sqrt(to2) + radius_m), reach_m = radius_m + spot_m;
-        const double reach2 = reach_m * reach_m;
-        const bool near = (to2 <= reach2) | ((along_m >= 0) & (to2 - along_m * along_m <= reach2));
-
-        // An ellipsoid that holds all points within spot_m of the body's: (a + s)^2 <= 1.1 a^2 + 11 s^2.
-        const auto [x, y, z] = columns(T.q);
-        const auto axis = [&](double a_m) {
-            return choose(tangent > 0, std::sqrt(1.1 * a_m * a_m + 11 * spot_m * spot_m), a_m * (1 + 1e-6));
-        };
-        const Vec3 b{axis(a.x), axis(a.y), axis(a.z)};
-        const Vec3 o = (Vec3{-dot(x, to), -dot(y, to), -dot(z, to)} - centre_m) / b;
-        const Vec3 v = Vec3{dot(x, d), dot(y, d), dot(z, d)} / b;
-        const double ov = dot(o, v), vv = dot(v, v), c = dot(o, o) - 1;
-        const bool inside = c <= 0, ahead = (ov < 0) & (ov * ov >= (1 - 1e-9) * vv * c);
-        meeting[i] = -static_cast<int>(near & (inside | ahead));
-    }
 }
 
 }  // namespace
@@ -77,9 +48,11 @@ private:
     std::size_t made_ = 0;
 };
 
-LidarReceiver::LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index)
-    : model_(lidar.receiver),
+LidarReceiver::LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint64_t seed, std::size_t index)
+    : tracer_(tracer),
+      model_(lidar.receiver),
       range_max_m_(lidar.range_max_m),
+      shot_range_max_m_(model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_),
       mount_(lidar.mount),
       sunlight_(model_.sunlight_noise > 0 || (lidar.model && lidar.model->spec().measures_sunlight)),
       least_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
@@ -87,11 +60,12 @@ LidarReceiver::LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t
       schedule_(seed),
       stream_(kStream + static_cast<std::uint32_t>(index)),
       cone_(model_.beam_divergence_rad, model_.sub_rays),
+      culling_(tracer, cone_.tangent(), shot_range_max_m_),
       met_(kLanes * cone_.size()) {}
 
-void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
+void LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
                             std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
-    const ShotSettings settings{.range_max_m = model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_,
+    const ShotSettings settings{.range_max_m = shot_range_max_m_,
                                 .multipath = model_.multipath,
                                 .sunlight = sunlight_ ? ~0u : 0u,
                                 .motions = motions,
@@ -99,8 +73,8 @@ void LidarReceiver::receive(const Tracer& tracer, const BodyPoses& at, const Ray
                                 .medium = medium_};
     Draws draws(*this, first);
     const std::size_t sub_rays = cone_.size();
-    const std::uint32_t meeting = find_meeting(tracer, at, beams);
-    trace(tracer, at, beams, meeting, settings, draws);
+    const std::uint32_t meeting = culling_.find_meeting(at, beams);
+    trace(at, beams, meeting, settings, draws);
     for (std::size_t i = 0; i < beams.n; ++i) {
         LidarEchoes& out = echoes[i] = {};
         if (!is_set(meeting, i) && !air_.is_possible()) continue;
@@ -151,36 +125,9 @@ LidarReceiver::Echo LidarReceiver::air_echo(const BodyPoses& at, const Ray& beam
     return {light, range_m, dot(beam.direction, velocity)};
 }
 
-/// The beams that may meet a body.
-std::uint32_t LidarReceiver::find_meeting(const Tracer& tracer, const BodyPoses& at,
-                                          const RayBatch& beams) noexcept {
-    const std::size_t bodies = tracer.all_bodies().size();
-    meeting_.resize(bodies);
-    bodies_.resize(bodies);
-    std::uint32_t any = 0;
-    for (std::size_t body = 0; body < bodies; ++body) {
-        PoseLanes T_world_body;
-        poses_at(at, body, beams.time, T_world_body);
-        Lanes<int> meeting;
-        find_meeting_body(beams, T_world_body, tracer.bounding_radius_m(body), tracer.bounds(body), cone_.tangent(),
-                          meeting);
-        meeting_[body] = bits_of(meeting) & lanes_below(beams.n);
-        any |= meeting_[body];
-    }
-    return any;
-}
-
-/// The bodies that any of these shots may meet.
-std::span<const std::uint32_t> LidarReceiver::bodies_of(std::uint32_t shots) noexcept {
-    std::size_t n = 0;
-    for (std::size_t body = 0; body < meeting_.size(); ++body)
-        if ((meeting_[body] & shots) != 0) bodies_[n++] = static_cast<std::uint32_t>(body);
-    return std::span(bodies_).first(n);
-}
-
 /// Sub-rays of a beam run side by side, so they are traced together, through the bodies that their beams may meet.
-void LidarReceiver::trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted,
-                          ShotSettings settings, Draws& draws) noexcept {
+void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted, ShotSettings settings,
+                          Draws& draws) noexcept {
     const std::size_t sub_rays = cone_.size();
     Lanes<std::size_t> beam;
     Lanes<BeamCone::Across> across{};
@@ -204,8 +151,8 @@ void LidarReceiver::trace(const Tracer& tracer, const BodyPoses& at, const RayBa
             shots |= 1u << i;
             k += n;
         }
-        settings.bodies = bodies_of(shots);
-        shoot(tracer, at, rays, settings, std::span(met_).subspan(begin, rays.n));
+        settings.bodies = culling_.bodies_of(shots);
+        shoot(tracer_, at, rays, settings, std::span(met_).subspan(begin, rays.n));
     }
 }
 

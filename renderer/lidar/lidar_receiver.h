@@ -22,6 +22,7 @@
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/lidar/air_echo.h"
 #include "renderer/lidar/beam_cone.h"
+#include "renderer/lidar/beam_culling.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
 
@@ -32,8 +33,9 @@ public:
     /// More echoes of one shot than these, the nearest ones, are lost.
     static constexpr std::size_t kMostEchoes = 4;
 
-    /// `seed`: the scene's; `index`: of the LiDAR, so that they differ.
-    LidarReceiver(const Lidar& lidar, std::uint64_t seed, std::size_t index);
+    /// `seed`: the scene's; `index`: of the LiDAR, so that they differ. The tracer must outlive it. Allocates here
+    /// alone.
+    LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
     /// Dims what comes back, and sends some back itself; null, as at first: a vacuum. It must outlive this.
     void set_medium(const Medium* medium) noexcept {
@@ -44,9 +46,9 @@ public:
     /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
     /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Writes beams.n echoes: range with bias
     /// and noise, before a packet's rounding; the reflectivity that the light stands for at that range, which is
-    /// less where only a part of the beam is met. Allocates for more bodies than ever before only.
-    void receive(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
-                 std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
+    /// less where only a part of the beam is met.
+    void receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::span<const Motion> motions,
+                 std::span<LidarEchoes> echoes) noexcept;
 
 private:
     /// Light and range of what is one echo.
@@ -56,11 +58,8 @@ private:
     using EchoList = std::array<Echo, kMostEchoes>;
     class Draws;
 
-    [[nodiscard]] std::uint32_t find_meeting(const Tracer& tracer, const BodyPoses& at,
-                                             const RayBatch& beams) noexcept;
-    [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::uint32_t shots) noexcept;
-    void trace(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted,
-               ShotSettings settings, Draws& draws) noexcept;
+    void trace(const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted, ShotSettings settings,
+               Draws& draws) noexcept;
     [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
     [[nodiscard]] double noise_in(double sunlight) const noexcept;
@@ -71,8 +70,10 @@ private:
     [[nodiscard]] Echo air_echo(const BodyPoses& at, const Ray& beam, const ShotSettings& settings,
                                 std::span<const LidarReturn> met, double noise, double u) const noexcept;
 
+    const Tracer& tracer_;
     LidarReceiverModel model_;
     double range_max_m_;
+    double shot_range_max_m_;  ///< beyond `range_max_m_` where ranges wrap
     int mount_;
     bool sunlight_;       ///< is wanted
     double least_light_;  ///< rho / range^2; 0: all is detected
@@ -82,10 +83,9 @@ private:
     BeamCone cone_;
     const Medium* medium_ = nullptr;
     AirEcho air_;
-    Lanes<std::size_t> first_{};          ///< sub-ray in `met_` of each shot that may meet a body
-    std::vector<LidarReturn> met_;        ///< of the sub-rays of one shot after the other
-    std::vector<std::uint32_t> meeting_;  ///< for each body a bit for each shot that may meet it
-    std::vector<std::uint32_t> bodies_;   ///< that sub-rays traced together may meet
+    BeamCulling culling_;
+    Lanes<std::size_t> first_{};    ///< sub-ray in `met_` of each shot that may meet a body
+    std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
 };
 
 }  // namespace narpa

@@ -57,6 +57,17 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
     return s;
 }
 
+/// The texels of all lanes are on their way before the first is looked up: else each lookup waits for its own.
+void prefetch_textures(const Tracer& tracer, const HitBatch& hits, std::uint32_t lanes) {
+    const Scene& scene = tracer.scene();
+    for_each_lane(lanes, [&](std::size_t i) {
+        const int texture = scene.materials[static_cast<std::size_t>(hits.material[i])].texture;
+        if (texture < 0) return;
+        prefetch_texels(scene.textures[static_cast<std::size_t>(texture)], hits.u[i], hits.v[i],
+                        tracer.shape(static_cast<std::size_t>(hits.body[i])).properties().texture_layout);
+    });
+}
+
 /// What the shot meets at the end of its path.
 LidarReturn return_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i,
                       const Path& path, bool sunlight) {
@@ -139,6 +150,7 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
     for (int mirrors = 0;; ++mirrors) {
         std::uint32_t mirrored = 0;
         Vec3Lanes directions;
+        prefetch_textures(tracer, hits, going & hits.met);
         for (std::size_t i = 0; i < beams.n; ++i) {
             if (!is_set(going & hits.met, i)) continue;
             Path& path = paths[i];

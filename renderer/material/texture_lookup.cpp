@@ -236,6 +236,20 @@ Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootpr
                     static_cast<double>(u), static_cast<double>(v));
 }
 
+void prefetch_texels(const Texture& texture, float u, float v, TextureLayout layout) noexcept {
+    if (!can_look_up(texture, u, v)) return;
+    const Edges edges = edges_of(texture, layout);
+    const auto texel_at = [](double place, int n) {
+        return static_cast<std::size_t>(std::clamp(static_cast<int>(place * n - 0.5), 0, std::max(0, n - 2)));
+    };
+    const std::size_t row = texel_at(1 - into_unit(static_cast<double>(v), edges.repeat_v), texture.height),
+                      column = texel_at(into_unit(static_cast<double>(u), edges.repeat_u), texture.width);
+    const std::size_t stride = 3 * static_cast<std::size_t>(texture.width);
+    const std::uint16_t* texel = texture.rgb.data() + row * stride + 3 * column;
+    __builtin_prefetch(texel);
+    if (texture.height > 1) __builtin_prefetch(texel + stride);
+}
+
 TextureSlope texture_slope(const Texture& texture, float u, float v, const TextureFootprint& footprint,
                            TextureLayout layout) noexcept {
     if (!can_look_up(texture, u, v)) return {};

@@ -32,6 +32,9 @@ struct TextureFootprint {
 [[nodiscard]] Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootprint& footprint = {},
                                  TextureLayout layout = TextureLayout::flat) noexcept;
 
+/// Asks memory for the texels of a lookup without a footprint. Lookups of a batch do well to wait side by side.
+void prefetch_texels(const Texture& texture, float u, float v, TextureLayout layout) noexcept;
+
 /// Change of the mean of the three bands per unit of u and of v.
 struct TextureSlope {
     float du = 0, dv = 0;

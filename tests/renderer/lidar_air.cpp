@@ -121,13 +121,13 @@ std::vector<LidarEchoes> shots_in(const Medium* medium, const LidarReceiverModel
     Lidar lidar;
     lidar.range_max_m = 1e4;
     lidar.receiver = model;
-    LidarReceiver receiver(lidar, seed, 0);
+    LidarReceiver receiver(render_scene->tracer(), lidar, seed, 0);
     receiver.set_medium(medium);
     std::vector<LidarEchoes> out(n);
     for (std::size_t first = 0; first < n; first += kLanes) {
         RayBatch beams;
         for (; beams.n < std::min(kLanes, n - first); ++beams.n) beams.put(beams.n, {{}, {0, 0, 1}});
-        receiver.receive(render_scene->tracer(), at, beams, first, {}, std::span(out).subspan(first));
+        receiver.receive(at, beams, first, {}, std::span(out).subspan(first));
     }
     return out;
 }

@@ -36,12 +36,12 @@ public:
         Lidar lidar;
         lidar.range_max_m = range_max_m;
         lidar.receiver = model;
-        LidarReceiver receiver(lidar, seed, 0);
+        LidarReceiver receiver(render_scene->tracer(), lidar, seed, 0);
         std::vector<LidarEchoes> out(n);
         for (std::size_t first = 0; first < n; first += kLanes) {
             RayBatch beams;
             for (; beams.n < std::min(kLanes, n - first); ++beams.n) beams.put(beams.n, {{}, {0, 0, 1}});
-            receiver.receive(render_scene->tracer(), at, beams, first, motions, std::span(out).subspan(first));
+            receiver.receive(at, beams, first, motions, std::span(out).subspan(first));
         }
         return out;
     }

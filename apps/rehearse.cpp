@@ -107,7 +107,7 @@ Command add_rehearse(Parser app) {
         .type_name("DIR");
     c.flag("--real-time", r.real_time,
            "In real time, with deadlines (default: in lockstep, the same bytes each time)");
-    c.option("--seed", r.seed, "Seed of the dynamics' dispersions and noise (default: the scenario's)");
+    c.option("--seed", r.seed, "Seed of the dispersions and of all noise (default: the scenario's)");
     const Option runs = c.option("--runs", o->runs,
                                  "Number of runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
                                  "continues an interrupted campaign")

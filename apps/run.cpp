@@ -1,6 +1,9 @@
 // narpa run - the emulator: poses in on CAN, frames and packets out, until the time is over or a signal comes.
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <optional>
+
 #include "apps/cli.h"
 #include "apps/scene_options.h"
 #include "base/ready.h"
@@ -16,6 +19,7 @@ struct RunCommandOptions {
     std::string scene;
     std::vector<std::string> video, lidar;
     std::string cpus;
+    std::optional<std::uint64_t> seed;
     BudgetOptions budget;
     bool estimates = false;
     TrackerFlags estimator;
@@ -80,6 +84,7 @@ Outcome run(const RunCommandOptions& options) {
     auto scene = load_scene(options.scene);
     if (!scene) return scene.error();
     options.budget.override_scene(scene->render);
+    if (options.seed) scene->render.seed = *options.seed;
     auto emulator = Emulator::create(*std::move(scene), o);
     if (!emulator) return emulator.error();
 
@@ -125,6 +130,7 @@ Command add_run(Parser app) {
         .repeatable();
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,
                                    "The clock advances only with commands; no wall time enters any result");
+    c.option("--seed", o->seed, "Seed of the sensors' noise and of the renders, instead of the scene's");
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         .type_name("SECONDS")
         .range(0.0, 9e9);

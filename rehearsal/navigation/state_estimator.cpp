@@ -1,5 +1,6 @@
 #include "rehearsal/navigation/state_estimator.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,6 +30,12 @@ AttitudeTrack::At AttitudeTrack::at(std::int64_t t_ns) const noexcept {
     const AttitudeReport& nearest = reports_[after == 0 ? 0 : count_ - 1];
     const double off_s = 1e-9 * static_cast<double>(t_ns - nearest.t_ns);
     return {normalized(nearest.q_world_chaser * exp_rotation(off_s * nearest.rate_rad_s)), nearest.rate_rad_s};
+}
+
+double AttitudeTrack::share_of_newest(std::int64_t t_ns) const noexcept {
+    if (count_ < 2 || t_ns >= newest().t_ns) return 1;
+    const std::int64_t last_ns = reports_[count_ - 2].t_ns;
+    return std::max(0.0, static_cast<double>(t_ns - last_ns) / static_cast<double>(newest().t_ns - last_ns));
 }
 
 bool AttitudeTrack::has(std::int64_t t_ns) const noexcept {
@@ -66,6 +73,15 @@ Eigen::Matrix<double, 6, 3> star_tracker_jacobian(const Vec3& target_from_chaser
 Matrix6 star_tracker_covariance(const Vec3& target_from_chaser_m, double sigma_rad) {
     const auto J = star_tracker_jacobian(target_from_chaser_m);
     return sigma_rad * sigma_rad * J * J.transpose();
+}
+
+/// The same of the filter's state, if it were measured at once.
+Eigen::Matrix<double, 12, 3> star_tracker_jacobian(const RelativeState& state, const Quat& q_frame_chaser) {
+    Eigen::Matrix<double, 12, 3> J = Eigen::Matrix<double, 12, 3>::Zero();
+    const Eigen::Matrix3d R = rotation_matrix(q_frame_chaser);
+    J.middleRows<3>(0) = -skew(to_eigen(state.position_m)) * R;
+    J.middleRows<3>(6) = rotation_matrix(conjugate(state.q_frame_target)) * R;
+    return J;
 }
 
 /// Covariance of deviations, at least `least` each, along axes rotated by q.
@@ -206,6 +222,7 @@ void StateEstimator::advance(std::int64_t t_ns) {
 void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
     advance(t_ns);
     pulses_.clear();
+    by_star_tracker_.setZero();
     RelativeMotion m = motion();
     const PortState port = port_state(m, scenario_.target, scenario_.chaser);
     const Vec3 at = port.T_port_chaser_port.t, along = port.velocity_m_s;
@@ -223,6 +240,7 @@ void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
 void StateEstimator::on_touchdown(std::int64_t t_ns) {
     advance(t_ns);
     pulses_.clear();
+    by_star_tracker_.setZero();
     RelativeMotion m = motion();
     const Vec3 at = port_state(m, scenario_.target, scenario_.chaser).position_m();
     place_port(at, {}, scenario_.target, scenario_.chaser, m);
@@ -238,12 +256,31 @@ void StateEstimator::on_touchdown(std::int64_t t_ns) {
 
 UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     if (measurement.t_ns > t_ns()) advance(measurement.t_ns);
+    const Matrix12 before = filter().covariance();
+    const std::uint64_t restarts = tracker_.restarts();
     const PoseMeasurement m = at_centres_of_mass(
         measurement, scenario_.chaser.centre_of_mass_m, scenario_.target.centre_of_mass_m,
         q_frame_chaser(measurement.t_ns), kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
     const UpdateResult result = tracker_.update(m);
-    if (result.outcome == UpdateOutcome::taken) taken_ns_ = std::max(taken_ns_, measurement.t_ns);
+    if (result.outcome != UpdateOutcome::taken) return result;
+    taken_ns_ = std::max(taken_ns_, measurement.t_ns);
+    if (tracker_.restarts() != restarts)
+        by_star_tracker_.setZero();
+    else
+        correlate(before, attitude_.share_of_newest(measurement.t_ns));
     return result;
+}
+
+/// After an update of the filter that had the covariance `before`: with K its gain and H the measurement's
+/// Jacobian, I - K H is covariance * before^-1, and K H is what the state takes over of the star tracker's error.
+/// The filter takes those of several measurements for independent, even by one report: of these the one that weighs
+/// most counts, as its covariance does not have the sum.
+void StateEstimator::correlate(const Matrix12& before, double share) {
+    const Matrix12 kept = before.ldlt().solve(filter().covariance()).transpose();
+    const auto J = star_tracker_jacobian(filter().state(), q_frame_chaser(t_ns()));
+    const Eigen::Matrix<double, 12, 3> by_earlier = kept * by_star_tracker_, by_this = share * (J - kept * J);
+    const auto turn = [](const auto& by) { return by.template middleRows<3>(6).norm(); };
+    by_star_tracker_ = turn(by_this) > turn(by_earlier) ? by_this : by_earlier;
 }
 
 UpdateResult StateEstimator::take(const TargetRange& r) {
@@ -288,11 +325,18 @@ RelativeMotion StateEstimator::motion() const {
 }
 
 TargetEstimate StateEstimator::estimate() const {
-    const PoseFilter::Pose pose = filter().pose(q_frame_chaser(t_ns()));
+    const Quat q = q_frame_chaser(t_ns());
+    const PoseFilter::Pose pose = filter().pose(q);
     const Rigid3 T_mass_target{{}, -scenario_.target.centre_of_mass_m};
+    const double sigma_rad = kDegree * scenario_.attitude_sensor.attitude_sigma_deg;
+    // Turning the state to the chaser's axes adds the star tracker's error, and takes away what of the same error
+    // came with the measurements.
+    Eigen::Matrix<double, 6, 3> known;
+    known << rotation_matrix(conjugate(q) * filter().state().q_frame_target) * by_star_tracker_.middleRows<3>(6),
+        rotation_matrix(conjugate(q)) * by_star_tracker_.middleRows<3>(0);
+    const Matrix6 both = sigma_rad * sigma_rad * known * star_tracker_jacobian(pose.T_chaser_target.t).transpose();
     const Matrix6 covariance =
-        pose.covariance +
-        star_tracker_covariance(pose.T_chaser_target.t, kDegree * scenario_.attitude_sensor.attitude_sigma_deg);
+        pose.covariance + star_tracker_covariance(pose.T_chaser_target.t, sigma_rad) - both - both.transpose();
     // The chaser's centre of mass only shifts the origin: the covariance is the same.
     const Rigid3 T = Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target;
     TargetEstimate out{

@@ -22,6 +22,9 @@ public:
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
     [[nodiscard]] const AttitudeReport& newest() const noexcept { return reports_[count_ - 1]; }
 
+    /// Share of the newest report's error in what `at` gives.
+    [[nodiscard]] double share_of_newest(std::int64_t t_ns) const noexcept;
+
     /// A report of this time, to a millisecond, is kept.
     [[nodiscard]] bool has(std::int64_t t_ns) const noexcept;
 
@@ -85,7 +88,9 @@ public:
                                          const AttitudeReport& attitude);
 
     /// The chaser's attitude from now on.
-    void take(const AttitudeReport& report) { attitude_.take(report); }
+    void take(const AttitudeReport& report) {
+        if (attitude_.take(report)) by_star_tracker_.setZero();
+    }
     /// Impulses commanded at t_ns: each pulse lasts from then on as long as it takes at full force.
     void thrust(std::int64_t t_ns, const Vec3& impulse_n_s);
     /// Late measurements are inserted at their own time. After several gated ones in a row the filter
@@ -137,11 +142,15 @@ private:
     [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
     [[nodiscard]] Matrix6 covariance_of_model(const Rigid3& T_chaser_target) const;
+    void correlate(const Matrix12& before, double share);
 
     Scenario scenario_;
     std::int64_t t_start_ns_;
     PoseTracker tracker_;  ///< started
     AttitudeTrack attitude_;
+    /// How the error of the state depends on that of the newest attitude report, by which measurements were turned
+    /// to the frame.
+    Eigen::Matrix<double, 12, 3> by_star_tracker_ = Eigen::Matrix<double, 12, 3>::Zero();
     std::deque<Pulse> pulses_;  ///< that start after the filter's time
     std::int64_t taken_ns_;
     double mass_kg_;

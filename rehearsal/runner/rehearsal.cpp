@@ -176,7 +176,8 @@ private:
 
     Status start_emulator() {
         auto& line = emulator_.command.line;
-        line = {program("narpa"), "run", scenario_.scene, "--can", options_.bus, "--log", in_folder("emulator")};
+        line = {program("narpa"),      "run",    scenario_.scene,       "--can", options_.bus, "--log",
+                in_folder("emulator"), "--seed", std::to_string(seed())};
         append(line, "--video", video_);
         append(line, "--lidar", lidar_sinks_);
         if (!options_.real_time) line.emplace_back("--lockstep");

@@ -19,7 +19,7 @@ namespace narpa::rehearsal {
 struct RehearsalOptions {
     std::string scenario;               ///< file
     std::string folder;                 ///< for everything that is written
-    std::optional<std::uint64_t> seed;  ///< of the dynamics; default: the scenario's
+    std::optional<std::uint64_t> seed;  ///< of dispersions and all noise; default: the scenario's
     bool real_time = false;
     std::string bus = "slcan:0";               ///< as `narpa run --can`
     std::map<std::string, std::string> video;  ///< camera -> device, in place of a FIFO in the folder

@@ -140,11 +140,11 @@ struct Navigation {
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
     std::vector<std::string> velocimeters;     ///< LiDARs whose velocities come over CAN, beside the others
     double period_s = 1;                       ///< of measurements and of control
-    double acceleration_psd = 1e-6,
-           angular_acceleration_psd = 1e-9;  ///< m^2 s^-3, rad^2 s^-3: process noise
-    double abort_sigma_m = 2;                ///< aborts at this position uncertainty
-    double abort_lost_s = 20;                ///< or after so long without a measurement
-    double abort_off_m = 5;                  ///< or so far off the reference
+    /// Process noise beside that of the thrusters, which the filter knows by itself, m^2 s^-3 and rad^2 s^-3.
+    double acceleration_psd = 1e-10, angular_acceleration_psd = 1e-14;
+    double abort_sigma_m = 2;  ///< aborts at this position uncertainty
+    double abort_lost_s = 20;  ///< or after so long without a measurement
+    double abort_off_m = 5;    ///< or so far off the reference
 };
 
 /// What the navigation believes of the world, and the emulator does not render: errors of its model, vectors along

@@ -73,6 +73,12 @@ TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
     ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
     for (const char* file : {"/emulator/can.log", "/emulator/nav.ledger.csv", "/navigation/navigation.csv"})
         EXPECT_FALSE(first_difference(o.folder + file, (folder / "run") + file)) << file;
+
+    // Another seed, other noise of the sensors: a campaign would else fly all of its runs with the same.
+    o.folder = folder / "other";
+    o.seed = 9;
+    ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
+    EXPECT_EQ(nlohmann::json::parse(read_text(o.folder + "/emulator/run.json"))["render"]["seed"], 9);
 }
 
 TEST(Whole, NamesAProgramThatEndsTooSoon) {

@@ -195,5 +195,66 @@ TEST(LidarCalibrationFile, SaysWhereAndWhatIsWrong) {
     EXPECT_FALSE(read_lidar_calibration(folder.write("gone", "") + ".yaml", 2));
 }
 
+/// A damaged file of a unit, as the scene's reader refuses it: where it is named, its own place, what was expected.
+TEST(LidarCalibrationFile, DamageIsRefusedByTheScene) {
+    const TemporaryFolder folder;
+    std::string yaml = "lasers:\n", angles;
+    for (int laser = 0; laser < 16; ++laser) {
+        yaml += "- {laser_id: " + std::to_string(laser) + ", vert_correction: 0.1}\n";
+        angles += (laser > 0 ? ", " : "") + std::to_string(8 - laser);
+    }
+    const std::string metadata = "{\n\"beam_altitude_angles\": [" + angles + "],\n\"beam_azimuth_angles\": [" +
+                                 angles + "],\n\"lidar_mode\": \"1024x10\"}";
+    const auto damaged = [](std::string text, const std::string& part, const std::string& with) {
+        const auto at = text.find(part);
+        EXPECT_NE(at, text.npos) << part;
+        return text.replace(at, part.size(), with);
+    };
+    struct Case {
+        const char *model, *file;
+        std::string text;
+        const char* expected;  ///< after the file's name
+    };
+    const Case cases[]{
+        {"VLP-16", "unit.yaml", yaml, nullptr},
+        {"VLP-16", "unit.yaml", yaml.substr(0, yaml.size() / 2), ":2:1: expected lasers: a list of 16"},
+        {"VLP-16", "unit.yaml", yaml.substr(0, yaml.rfind('-')), ":2:1: expected lasers: a list of 16"},
+        {"VLP-16", "unit.yaml", damaged(yaml, "laser_id: 7", "laser_id: 6"),
+         ":9:3: laser_id: expected each of 0 to 15 once"},
+        {"VLP-16", "unit.yaml", damaged(yaml, "7, vert_correction: 0.1", "7, vert_correction: 0.1.1"),
+         ":9:34: vert_correction: expected a number in [-1.6, 1.6]"},
+        {"VLP-16", "unit.yaml", damaged(yaml, "7, vert_correction: 0.1", "7, vert_correction: .nan"),
+         ":9:34: vert_correction: expected a number in [-1.6, 1.6]"},
+        {"VLP-16", "unit.yaml", damaged(yaml, "7, vert_correction: 0.1", "7, vert_correction: 100"),
+         ":9:34: vert_correction: expected a number in [-1.6, 1.6]"},
+        {"VLP-16", "unit.yaml", std::string("\0\xff\x01", 3), ""},
+        {"os1-16", "unit.json", metadata, nullptr},
+        {"os1-16", "unit.json", metadata.substr(0, metadata.size() / 2), ":3: not JSON"},
+        {"os1-16", "unit.json", damaged(metadata, "8, 7", "8, 700"),
+         ":2: beam_altitude_angles: expected numbers from -90"},
+        {"os1-16", "unit.json", damaged(metadata, "azimuth_angles\": [8, ", "azimuth_angles\": ["),
+         ":3: beam_azimuth_angles: expected as many angles as beam_altitude_angles has"},
+        {"os1-16", "unit.json", damaged(metadata, "1024x10", "1024x"),
+         ":4: lidar_mode: expected columns and turns a second, as 1024x10"},
+        {"os1-16", "unit.json", "", ": is empty"},
+    };
+    for (const Case& c : cases) {
+        const std::string file = folder.write(c.file, c.text);
+        const std::string scene = folder.write(
+            "scene.toml", std::string("[ambient]\nradiance = 1\n[[body]]\nname = \"b\"\nsphere = {radius_m = 1}\n"
+                                      "[[lidar]]\nname = \"l\"\nmodel = \"") +
+                              c.model + "\"\ncalibration = \"" + c.file + "\"\n");
+        const auto read = read_scene(scene);
+        if (!c.expected) {
+            EXPECT_TRUE(read) << read.error().text();
+            continue;
+        }
+        ASSERT_FALSE(read) << c.text;
+        EXPECT_EQ(read.error().file, scene);
+        EXPECT_EQ(read.error().line, 9) << read.error().text();
+        EXPECT_NE(read.error().what.find(file + c.expected), std::string::npos) << read.error().what;
+    }
+}
+
 }  // namespace
 }  // namespace narpa

@@ -5,12 +5,6 @@
 #include "renderer/integrator/subpixel_bodies.h"
 
 namespace narpa {
-namespace {
-
-/// Of the size of a mesh: Embree's rays are in single precision, and meet edges that they miss by so little.
-constexpr double kEmbreeSlack = 4e-6;
-
-}  // namespace
 
 TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
     : tracer_(tracer),
@@ -21,20 +15,14 @@ TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
       most_listed_(std::min(kMostListed, tracer.scene().bodies.size())),
       listed_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
       lists_(most_listed_ * listed_.size()) {
-    for (const std::uint32_t body : tracer.all_bodies()) {
-        const auto same = std::find_if(shapes_.begin(), shapes_.end(),
-                                       [&](const OutlinedShape& s) { return s.shape == &tracer.shape(body); });
-        outline_of_body_.push_back(static_cast<std::size_t>(same - shapes_.begin()));
-        if (same == shapes_.end()) shapes_.push_back({&tracer.shape(body), tracer.shape(body).boxes()});
-    }
+    for (const std::uint32_t body : tracer.all_bodies()) boxes_.push_back(tracer.shape(body).boxes());
 }
 
 void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept {
     std::fill(listed_.begin(), listed_.end(), std::uint8_t{0});
     const CameraModelHandle model(camera_);
     for (const std::uint32_t body : tracer_.all_bodies()) {
-        CulledBody culled{tracer_.bounds(body), shapes_[outline_of_body_[body]].boxes,
-                          BodyView(at.T_world_body[body], T_world_camera),
+        CulledBody culled{tracer_.bounds(body), boxes_[body], BodyView(at.T_world_body[body], T_world_camera),
                           kEmbreeSlack * tracer_.bounding_radius_m(body)};
         culled.slack_m += culled.view.rounding_m;
         if (camera_.point_spread) {

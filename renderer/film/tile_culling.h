@@ -43,13 +43,8 @@ private:
     const Tracer& tracer_;
     const Camera& camera_;
     int tiles_x_, tiles_y_;
-    struct OutlinedShape {
-        const Shape* shape;
-        std::vector<BoxNode> boxes;
-    };
-    std::vector<OutlinedShape> shapes_;
-    std::vector<std::size_t> outline_of_body_;  ///< index into shapes_
-    TileMask mask_;                             ///< of one body at a time
+    std::vector<std::span<const BoxNode>> boxes_;  ///< of each body's shape
+    TileMask mask_;                                ///< of one body at a time
     std::size_t most_listed_;
     std::vector<std::uint8_t> listed_;  ///< bodies in each tile's list; most_listed_ + 1: more than it holds
     std::vector<std::uint32_t> lists_;  ///< most_listed_ for each tile

@@ -129,7 +129,12 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
     return Ok{};
 }
 
-std::vector<BoxNode> MeshShape::boxes() const {
+std::span<const BoxNode> MeshShape::boxes() const {
+    std::call_once(boxes_made_, [&] { boxes_ = make_boxes(); });
+    return boxes_;
+}
+
+std::vector<BoxNode> MeshShape::make_boxes() const {
     if (mesh_.faces.empty()) return {BoxNode{}};
     std::vector<BoxNode> boxes = box_tree(mesh_);
     if (mesh_.origin_m == Vec3{}) return boxes;

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
 
 #include "base/result.h"
 #include "renderer/geometry/embree.h"
@@ -43,13 +46,14 @@ public:
         lift(points, wanted, starts);
     }
     [[nodiscard]] TextureFrame texture_frame(const Hit& hit) const noexcept override;
-    [[nodiscard]] std::vector<BoxNode> boxes() const override;
+    [[nodiscard]] std::span<const BoxNode> boxes() const override;
     [[nodiscard]] std::unique_ptr<const EmissiveSurface> emission(const Scene& scene) const override {
         return mesh_emission(scene, mesh_);
     }
 
 private:
     MeshShape(const Scene& scene, const Mesh& mesh);
+    [[nodiscard]] std::vector<BoxNode> make_boxes() const;
     Status build_hierarchy(RTCDevice device);
     /// Three corners, as the hierarchy holds them.
     [[nodiscard]] Triangle triangle(std::uint32_t face) const noexcept {
@@ -104,6 +108,8 @@ private:
     double radius_m_ = 0;      ///< about the centre
     bool closed_ = false;      ///< a ray that misses the mesh cannot have passed through it undetected
     bool off_centre_ = false;  ///< the sphere about the centre is clearly smaller than the one about the origin
+    mutable std::once_flag boxes_made_;
+    mutable std::vector<BoxNode> boxes_;
 };
 
 }  // namespace narpa

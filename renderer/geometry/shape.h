@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "renderer/geometry/ray_batch.h"
@@ -52,6 +53,8 @@ struct BodyBounds {
 };
 
 inline constexpr std::size_t kBoxLeaves = 4096;  ///< of a shape's tree of boxes, at most
+/// Of the size of a mesh: Embree's rays are in single precision, and meet edges that they miss by so little.
+inline constexpr double kEmbreeSlack = 4e-6;
 
 /// A box along the body's axes.
 struct BoxNode {
@@ -137,7 +140,8 @@ public:
     /// In the body's frame.
     [[nodiscard]] virtual TextureFrame texture_frame(const Hit& hit) const noexcept = 0;
     /// A tree of boxes whose leaves hold the surface, root first; empty: the ellipsoid of `bounds` fits it best.
-    [[nodiscard]] virtual std::vector<BoxNode> boxes() const { return {}; }
+    /// Made when it is first asked for, by any thread, and kept.
+    [[nodiscard]] virtual std::span<const BoxNode> boxes() const { return {}; }
     /// Null where none of the materials shines. The scene must outlive it.
     [[nodiscard]] virtual std::unique_ptr<const EmissiveSurface> emission(const Scene&) const { return nullptr; }
 

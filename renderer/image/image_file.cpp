@@ -134,10 +134,14 @@ Status write_png(const std::string& path, const RenderedFrame& frame) {
                        const_cast<std::uint8_t*>(frame.bytes.data()));
     };
     cv::Mat image;
-    switch (frame.camera.format) {
-        case PixelFormat::rgb24: cv::cvtColor(view(CV_8UC3), image, cv::COLOR_RGB2BGR); break;
-        case PixelFormat::yuyv: cv::cvtColor(view(CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV); break;
-        default: image = view(is_16_bit(frame.camera.format) ? CV_16UC1 : CV_8UC1); break;
+    try {
+        switch (frame.camera.format) {
+            case PixelFormat::rgb24: cv::cvtColor(view(CV_8UC3), image, cv::COLOR_RGB2BGR); break;
+            case PixelFormat::yuyv: cv::cvtColor(view(CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV); break;
+            default: image = view(is_16_bit(frame.camera.format) ? CV_16UC1 : CV_8UC1); break;
+        }
+    } catch (const std::exception& e) {
+        return Error{std::string("OpenCV could not convert the frame: ") + e.what(), path};
     }
     return narpa::write_png(path, image);
 }
@@ -179,7 +183,7 @@ Status write_pfm(const std::string& path, int width, int height, std::span<const
 }
 
 Status write_png(const std::string& path, const cv::Mat& image) {
-    const Result<ImageCodecs> codecs = image_codecs();
+    const Result<ImageCodecs> codecs = image_codecs(path);
     if (!codecs) return codecs.error();
     std::vector<std::uint8_t> encoded;
     try {

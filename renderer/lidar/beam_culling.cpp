@@ -11,8 +11,6 @@
 namespace narpa {
 namespace {
 
-/// Of the size of a mesh: Embree's rays are in single precision, and meet edges that they miss by so little.
-constexpr double kEmbreeSlack = 4e-6;
 /// Of the distance: more than what single precision here, and a ray that is traced again slightly turned, are off.
 constexpr float kBeamSlack = 2e-6f;
 /// Boxes of a tree that beams are held against, of cones and of single rays. More cost more time and leave out more

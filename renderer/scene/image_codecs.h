@@ -18,12 +18,13 @@ namespace narpa {
 
 /// The functions of opencv2/imgcodecs.hpp.
 struct ImageCodecs {
-    cv::Mat (*imdecode)(const cv::_InputArray& bytes, int flags);
+    cv::Mat (*imdecode)(const cv::_InputArray& bytes, int flags) = nullptr;
     bool (*imencode)(const std::string& extension, const cv::_InputArray& image, std::vector<unsigned char>& bytes,
-                     const std::vector<int>& parameters);
+                     const std::vector<int>& parameters) = nullptr;
 };
 
-/// From any thread. Errors: the library or one of the functions is not there, with the loader's reason.
-Result<ImageCodecs> image_codecs();
+/// For reading or writing this file; from any thread. Errors name it: the library or one of the functions is not
+/// there, with the loader's reason.
+Result<ImageCodecs> image_codecs(const std::string& file);
 
 }  // namespace narpa

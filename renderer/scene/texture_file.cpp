@@ -100,7 +100,7 @@ Result<Texture> decode_texture(const std::string& name, std::span<const std::uin
                                              size->height, kMostPixels),
                          .file = name};
         const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
-        const Result<ImageCodecs> codecs = image_codecs();
+        const Result<ImageCodecs> codecs = image_codecs(name);
         if (!codecs) return codecs.error();
         const cv::Mat bgr =
             codecs->imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);

@@ -62,6 +62,14 @@ public:
         return port_state(scenario_.target, target, scenario_.chaser, chaser);
     }
 
+    /// Of the chaser by the pose command of this time; -1: there is none.
+    [[nodiscard]] double speed_m_s(std::int64_t t_ns) const {
+        for (const Pose& p : poses)
+            if (p.base_id == scenario_.chaser.can_id && p.command.t_valid_ns == t_ns)
+                return norm(p.command.motion.velocity_m_s);
+        return -1;
+    }
+
 private:
     void take(const CanFrame& frame) {
         frames.push_back(frame);
@@ -385,12 +393,7 @@ TEST_F(DynamicsOnSlcan, InRealTimeACommandActsFromItsTimeOn) {
     };
     const auto flown = fly(s, {}, bus, partner);
     ASSERT_TRUE(flown) << flown.error().text();
-    const auto speed_m_s = [&](std::int64_t after_ms) {
-        for (const Partner::Pose& p : partner.poses)
-            if (p.base_id == s.chaser.can_id && p.command.t_valid_ns == sent_ns + after_ms * kMs)
-                return norm(p.command.motion.velocity_m_s);
-        return -1.0;
-    };
+    const auto speed_m_s = [&](std::int64_t after_ms) { return partner.speed_m_s(sent_ns + after_ms * kMs); };
     const double still = speed_m_s(0), full = s.thrusters.force_n / s.chaser.mass_kg;
     EXPECT_NEAR(speed_m_s(800), still, 1e-4) << "long after it has come";
     EXPECT_NEAR(std::abs(speed_m_s(900) - still), 0.05 * full, 1e-4);
@@ -426,12 +429,7 @@ TEST_F(DynamicsOnSlcan, InRealTimeAllCommandsThatComeEarlyAct) {
     };
     const auto flown = fly(s, {}, bus, partner);
     ASSERT_TRUE(flown) << flown.error().text();
-    double still = -1, after = -1;
-    for (const Partner::Pose& p : partner.poses) {
-        if (p.base_id != s.chaser.can_id) continue;
-        if (p.command.t_valid_ns == sent_ns) still = norm(p.command.motion.velocity_m_s);
-        if (p.command.t_valid_ns == sent_ns + 1'000 * kMs) after = norm(p.command.motion.velocity_m_s);
-    }
+    const double still = partner.speed_m_s(sent_ns), after = partner.speed_m_s(sent_ns + 1'000 * kMs);
     EXPECT_NEAR(std::abs(after - still), 0.2 * s.thrusters.force_n / s.chaser.mass_kg, 1e-4);
     EXPECT_EQ((*flown)["actuator_commands"]["refused"], 0);
 }

@@ -16,7 +16,7 @@ namespace narpa::test {
 inline void write_image_file(const std::string& path, const cv::Mat& image) {
     std::vector<unsigned char> bytes;
     const std::string extension = path.substr(path.rfind('.'));
-    if (!(*image_codecs()).imencode(extension, image, bytes, {})) throw std::runtime_error("no " + path);
+    if (!image_codecs(path)->imencode(extension, image, bytes, {})) throw std::runtime_error("no " + path);
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
@@ -25,7 +25,7 @@ inline void write_image_file(const std::string& path, const cv::Mat& image) {
 inline cv::Mat read_image_file(const std::string& path) {
     std::ifstream in(path, std::ios::binary);
     const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};
-    return bytes.empty() ? cv::Mat() : (*image_codecs()).imdecode(bytes, cv::IMREAD_UNCHANGED);
+    return bytes.empty() ? cv::Mat() : image_codecs(path)->imdecode(bytes, cv::IMREAD_UNCHANGED);
 }
 
 }  // namespace narpa::test

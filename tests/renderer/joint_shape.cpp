@@ -18,7 +18,7 @@ using namespace test;
 class TiltedSquare final : public Shape {
 public:
     TiltedSquare(const Vec3& x, const Vec3& y, double half_m)
-        : x_(x), y_(y), normal_(cross(x, y)), half_m_(half_m) {
+        : x_(x), y_(y), normal_(cross(x, y)), half_m_(half_m), box_(box_of(x, y, half_m)) {
         const double radius_m = std::sqrt(2.0) * half_m;
         properties_ = {.radius_m = radius_m,
                        .bound_m = radius_m * (1 + 1e-9),
@@ -57,16 +57,19 @@ public:
         });
     }
     [[nodiscard]] TextureFrame texture_frame(const Hit&) const noexcept override { return {}; }
-    [[nodiscard]] std::vector<BoxNode> boxes() const override {
-        const Vec3 reach{half_m_ * (std::abs(x_.x) + std::abs(y_.x)), half_m_ * (std::abs(x_.y) + std::abs(y_.y)),
-                         half_m_ * (std::abs(x_.z) + std::abs(y_.z))};
-        const Vec3f high = vec_cast<float>(reach);
-        return {{{-high.x, -high.y, -high.z}, {high.x, high.y, high.z}}};
-    }
+    [[nodiscard]] std::span<const BoxNode> boxes() const override { return {&box_, 1}; }
 
 private:
+    [[nodiscard]] static BoxNode box_of(const Vec3& x, const Vec3& y, double half_m) {
+        const Vec3f high =
+            vec_cast<float>(half_m * Vec3{std::abs(x.x) + std::abs(y.x), std::abs(x.y) + std::abs(y.y),
+                                          std::abs(x.z) + std::abs(y.z)});
+        return {{-high.x, -high.y, -high.z}, {high.x, high.y, high.z}};
+    }
+
     Vec3 x_, y_, normal_;
     double half_m_;
+    BoxNode box_;
 };
 
 /// A ball over the tilted square, under the Sun; far from the world's origin.

@@ -282,6 +282,28 @@ inline Rgb radiance_at(const GBufferTile& tile, std::size_t place) {
     return {tile.r[place], tile.g[place], tile.b[place]};
 }
 
+/// Asks for the memory of a tile's pixels, so that it is there when they have been traced.
+template <class Tile>
+void prefetch_pixels(const Tile& t, const RadianceImage& out) {
+    constexpr int kPixelsPerLine = 64 / static_cast<int>(sizeof(Rgb));
+    for (int y = 0; y < t.height; ++y)
+        for (int x = 0; x < t.width; x += kPixelsPerLine)
+            __builtin_prefetch(&out.pixels[index_of(t.x + x, t.y + y, out.width)], 1);
+}
+
+/// A tile's pixels, band by band.
+template <class Tile>
+void put_pixels(const Tile& t, const PerPixel<float>& r, const PerPixel<float>& g, const PerPixel<float>& b,
+                RadianceImage& out) {
+    for (int y = 0; y < t.height; ++y) {
+        Rgb* const row = &out.pixels[index_of(t.x, t.y + y, out.width)];
+        for (int x = 0; x < t.width; ++x) {
+            const std::size_t at = place_in_tile(x, y);
+            row[x] = {r[at], g[at], b[at]};
+        }
+    }
+}
+
 /// Adds the samples of a batch to their pixels.
 inline void add_samples(const SampleBatch& b, const BatchRadiance& light, PerPixel<PixelMeans>& means) {
     for_each_lane(b.direct_lanes, [&](std::size_t i) { means[b.place[i]].direct.add(light.direct[i]); });

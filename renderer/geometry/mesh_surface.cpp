@@ -32,9 +32,8 @@ NARPA_EACH_ISA void MeshShape::fill_surface(const ShapeHits& found, const Vertex
                                             HitBatch& __restrict hits) const noexcept {
     const Lanes<int> inner = masks_of(found.inner);
     Lanes<int> outside;
-    const auto fill = [&](std::size_t i, const std::array<Vec3, 3>& normals) {
+    const auto fill = [&](std::size_t i, const TriangleSurface& s) {
         const Vec3 d = found.direction[i];
-        const TriangleSurface s = surface_about(found.triangle[i], found.point(i), normals, -d);
         const bool back = (inner[i] != 0) | (dot(s.outwards, d) > 0);
         const double side = choose(back, -1, 1);
         outside[i] = -static_cast<int>(!back);
@@ -45,9 +44,11 @@ NARPA_EACH_ISA void MeshShape::fill_surface(const ShapeHits& found, const Vertex
         hits.beyond_body.put(i, choose(back, s.above, s.below));
     };
     if (mesh_.normals.empty())
-        for (std::size_t i = 0; i < kLanes; ++i) fill(i, {});
+        for (std::size_t i = 0; i < kLanes; ++i)
+            fill(i, flat_surface(found.triangle[i], found.position[i], -found.direction[i]));
     else
-        for (std::size_t i = 0; i < kLanes; ++i) fill(i, vertex.normals(i));
+        for (std::size_t i = 0; i < kLanes; ++i)
+            fill(i, surface_about(found.triangle[i], found.point(i), vertex.normals(i), -found.direction[i]));
     hits.outside = bits_of(outside);
     hits.u.fill(0), hits.v.fill(0);
     if (!vertex.textured) return;

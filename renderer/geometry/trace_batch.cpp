@@ -146,6 +146,17 @@ void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::
     local.coherent = rays.coherent;
 }
 
+/// Directions in the frame of a body; of lanes that are not wanted some that are finite.
+NARPA_EACH_ISA void turn_directions(const Quat& q_world_body, const Vec3Lanes& directions, std::uint32_t wanted,
+                                    Vec3Lanes& __restrict turned) {
+    const auto [x, y, z] = columns(q_world_body);
+    const Lanes<int> mine = masks_of(wanted);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 d = choose(mine[i] != 0, directions[i], {0, 0, 1});
+        turned.put(i, {dot(x, d), dot(y, d), dot(z, d)});
+    }
+}
+
 /// Poses of a body at the moments of these lanes.
 void put_poses(const BodyPoses& at, std::size_t body, const Lanes<double>& time, std::uint32_t lanes,
                PoseLanes& T_world_body) {
@@ -207,27 +218,54 @@ class Tracer::Impl::LeavingRays {
 public:
     LeavingRays(const Impl& impl, const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                 std::uint32_t wanted) noexcept
-        : inside_(wanted & ~from.outside) {
-        own_.fill(-1);
-        for (const auto& [body, mine] : BodyGroups(from.body, wanted)) {
-            for_each_lane(mine, [&](std::size_t i) { own_[i] = from.body[i]; });
-            impl.shapes[body]->depart(from, mine, start_);
-            if (mine == wanted && !at.moves(body))
-                own_at_.fill(at.T_world_body[body]);
-            else
-                put_poses(at, body, from.time, mine, own_at_);
-        }
-        set_out(own_at_, from, start_, directions, wanted, offset_, direction_, time_);
+        : impl_(impl), at_(at), from_(from), directions_(directions), wanted_(wanted), groups_(from.body, wanted) {
+        for (const auto& [body, mine] : groups_) impl.shapes[body]->depart(from, mine, start_);
     }
-    [[nodiscard]] WorldRays rays(bool coherent) const noexcept {
-        return {coherent, direction_, own_at_.t, offset_, time_, is_one_moment(time_), &own_, &start_, inside_};
+
+    /// The body that all of them leave, if it is still; else as many as there are bodies.
+    [[nodiscard]] std::size_t body_of_all() const noexcept {
+        const auto& [body, mine] = *groups_.begin();
+        return mine == wanted_ && !at_.moves(body) ? body : impl_.shapes.size();
+    }
+    /// The lanes that meet this body, of all, before `t_max`: the world's axes are not needed.
+    [[nodiscard]] std::uint32_t occluded_by(std::size_t body, const Lanes<double>& t_max,
+                                            bool coherent) const noexcept {
+        ShapeRays local;
+        turn_directions(at_.T_world_body[body].q, directions_, wanted_, local.direction);
+        local.origin = start_;
+        local.entry_m.fill(0);
+        local.t_max = t_max;
+        local.leaving = wanted_;
+        local.inside = wanted_ & ~from_.outside;
+        local.coherent = coherent;
+        return impl_.shapes[body]->occluded(local, lanes_before(local.entry_m, t_max) & wanted_);
+    }
+
+    [[nodiscard]] WorldRays in_world(bool coherent) noexcept {
+        own_.fill(-1);
+        for_each_lane(wanted_, [&](std::size_t i) { own_[i] = from_.body[i]; });
+        if (const std::size_t own = body_of_all(); own < impl_.shapes.size()) {
+            own_at_.fill(at_.T_world_body[own]);
+        } else {
+            own_at_ = {};
+            for (const auto& [body, mine] : groups_) put_poses(at_, body, from_.time, mine, own_at_);
+        }
+        set_out(own_at_, from_, start_, directions_, wanted_, offset_, direction_, time_);
+        return {coherent, direction_, own_at_.t,
+                offset_,  time_,      is_one_moment(time_),
+                &own_,    &start_,    wanted_ & ~from_.outside};
     }
 
 private:
-    std::uint32_t inside_;
-    Lanes<int> own_;
+    const Impl& impl_;
+    const BodyPoses& at_;
+    const SurfacePoints& from_;
+    const Vec3Lanes& directions_;
+    std::uint32_t wanted_;
+    BodyGroups groups_;
     Vec3Lanes start_{};
-    PoseLanes own_at_{};
+    Lanes<int> own_;
+    PoseLanes own_at_;
     Vec3Lanes offset_, direction_;
     Lanes<double> time_;
 };
@@ -301,12 +339,19 @@ void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std:
     }
 }
 
-std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const WorldRays& rays, const Lanes<double>& t_max,
-                                          std::uint32_t wanted) const noexcept {
+std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const SurfacePoints& from,
+                                          const Vec3Lanes& directions, const Lanes<double>& t_max,
+                                          std::uint32_t wanted, bool coherent) const noexcept {
+    LeavingRays leaving(*this, at, from, directions, wanted);
+    const std::size_t own = leaving.body_of_all();
+    const bool is_one = own < shapes.size();
+    std::uint32_t dark = is_one ? leaving.occluded_by(own, t_max, coherent) : 0;
+    if (dark == wanted || (is_one && all_bodies.size() == 1)) return dark;
+    const WorldRays rays = leaving.in_world(coherent);
     ShapeRays local;
     local.t_max = t_max;
-    std::uint32_t dark = 0;
     for (const std::uint32_t body : all_bodies) {
+        if (body == own) continue;
         if (dark == wanted) break;
         enter_body(at, rays, body, local.entry_m);
         const std::uint32_t entering = lanes_before(local.entry_m, t_max) & wanted & ~dark;
@@ -362,24 +407,21 @@ void Tracer::intersect(const BodyPoses& at, const RayBatch& rays, std::span<cons
 void Tracer::intersect(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                        std::uint32_t wanted, HitBatch& hits) const noexcept {
     if (wanted == 0) return hits.clear();
-    const Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
+    Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
+    const WorldRays rays = leaving.in_world(false);
     NearestHits nearest;
-    impl_->find_nearest(at, leaving.rays(false), wanted, impl_->all_bodies, nearest);
-    impl_->finish(at, leaving.rays(false), nearest, hits);
+    impl_->find_nearest(at, rays, wanted, impl_->all_bodies, nearest);
+    impl_->finish(at, rays, nearest, hits);
 }
 
 std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                                std::uint32_t wanted) const noexcept {
-    if (wanted == 0) return 0;
-    const Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
-    return impl_->find_occluded(at, leaving.rays(true), kNoEnd, wanted);
+    return wanted == 0 ? 0 : impl_->find_occluded(at, from, directions, kNoEnd, wanted, true);
 }
 
 std::uint32_t Tracer::occluded(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                                const Lanes<double>& t_max, std::uint32_t wanted) const noexcept {
-    if (wanted == 0) return 0;
-    const Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
-    return impl_->find_occluded(at, leaving.rays(false), t_max, wanted);
+    return wanted == 0 ? 0 : impl_->find_occluded(at, from, directions, t_max, wanted, false);
 }
 
 }  // namespace narpa

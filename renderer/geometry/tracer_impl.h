@@ -35,9 +35,10 @@ struct Tracer::Impl {
                     Lanes<double>& entry_m) const noexcept;
     void trace_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body, std::uint32_t wanted,
                     ShapeRays& local, NearestHits& nearest) const noexcept;
-    /// The `wanted` lanes that meet any body before `t_max`.
-    [[nodiscard]] std::uint32_t find_occluded(const BodyPoses& at, const WorldRays& rays,
-                                              const Lanes<double>& t_max, std::uint32_t wanted) const noexcept;
+    /// The `wanted` lanes whose rays from these points meet any body before `t_max`.
+    [[nodiscard]] std::uint32_t find_occluded(const BodyPoses& at, const SurfacePoints& from,
+                                              const Vec3Lanes& directions, const Lanes<double>& t_max,
+                                              std::uint32_t wanted, bool coherent) const noexcept;
     /// The surfaces at the nearest hits, in the world.
     void finish(const BodyPoses& at, const WorldRays& rays, const NearestHits& nearest,
                 HitBatch& hits) const noexcept;

@@ -58,18 +58,23 @@ struct TriangleSurface {
     Vec3 above{}, below{};  ///< where rays leave on the outer and on the inner side
 };
 
-/// `normals` are those of the vertices, or zero, and then the surface is flat. `otherwise` is outwards where the
-/// triangle has no area.
+/// Of a mesh without vertex normals. `otherwise` is outwards where the triangle has no area.
+[[nodiscard]] inline TriangleSurface flat_surface(const Triangle& t, const Vec3& position,
+                                                  const Vec3& otherwise) noexcept {
+    const Vec3 normal = t.normal();
+    const double area2 = norm(normal);
+    const Vec3 outwards = choose(area2 > 0, normal / area2, otherwise);
+    return {outwards, outwards, position, position};
+}
+
+/// `normals` are those of the vertices; zero: the surface is flat.
 ///
 /// Rays leave from the surface that the normals describe, which is above the flat triangle where the mesh bulges to
 /// their side: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II (2021), chapter 4.
 [[nodiscard]] inline TriangleSurface surface_about(const Triangle& t, const TrianglePoint& p,
                                                    const std::array<Vec3, 3>& normals,
                                                    const Vec3& otherwise) noexcept {
-    const Vec3 normal = t.normal();
-    const double area2 = norm(normal);
-    TriangleSurface s{.outwards = choose(area2 > 0, normal / area2, otherwise)};
-
+    TriangleSurface s = flat_surface(t, p.position, otherwise);
     const double weight_a = 1 - p.b1 - p.b2;
     const double height_a = dot(p.position - t.a, normals[0]), height_b = dot(p.position - t.b, normals[1]),
                  height_c = dot(p.position - t.c, normals[2]);

@@ -223,6 +223,21 @@ Rgb filtered(const Texture& t, const Edges& edges, const Filter& f, double u, do
     return {std::min(sum[0] * scale, 1.0f), std::min(sum[1] * scale, 1.0f), std::min(sum[2] * scale, 1.0f)};
 }
 
+/// One lookup in the finest level: as `filtered` with a filter that covers nothing.
+Rgb unfiltered(const Texture& t, const Edges& edges, double u, double v) {
+    if (edges.repeat_u) u = into_unit(u, true);
+    if (edges.repeat_v) v = into_unit(v, true);
+    const Image finest = image_of(t, 0);
+    const double x = u * t.width - 0.5, y = (1 - v) * t.height - 0.5;
+    Bands sum{};
+    if (x >= 0 && x < t.width - 1 && y >= 0 && y < t.height - 1)
+        add_inner(finest, x, y, 1, sum);
+    else
+        add_wrapped(finest, edges, u, v, 1, sum);
+    const Bands rgb = sum * kFullScale;  // rounding makes nothing whiter than white
+    return {std::min(rgb[0], 1.0f), std::min(rgb[1], 1.0f), std::min(rgb[2], 1.0f)};
+}
+
 bool can_look_up(const Texture& t, float u, float v) {
     return t.width > 0 && t.height > 0 && std::isfinite(u) && std::isfinite(v);
 }
@@ -232,8 +247,11 @@ bool can_look_up(const Texture& t, float u, float v) {
 Rgb texture_lookup(const Texture& texture, float u, float v, const TextureFootprint& footprint,
                    TextureLayout layout) noexcept {
     if (!can_look_up(texture, u, v)) return {1, 1, 1};
-    return filtered(texture, edges_of(texture, layout), filter_for(texture, footprint, v, layout),
-                    static_cast<double>(u), static_cast<double>(v));
+    const Edges edges = edges_of(texture, layout);
+    if (footprint == TextureFootprint{})
+        return unfiltered(texture, edges, static_cast<double>(u), static_cast<double>(v));
+    return filtered(texture, edges, filter_for(texture, footprint, v, layout), static_cast<double>(u),
+                    static_cast<double>(v));
 }
 
 TextureSlope texture_slope(const Texture& texture, float u, float v, const TextureFootprint& footprint,

@@ -26,6 +26,8 @@ constexpr double kExcluded = 100;
 constexpr std::size_t kMostContenders = 4;
 /// The range may be beyond what was known of it by so many standard deviations.
 constexpr double kRangeSigmas = 3;
+/// Fits with other samples, where the frame's sampling noise is not known.
+constexpr int kOtherSamples = 3;
 /// Rays per pixel where whole images are compared.
 constexpr double kWholeRays = 32;
 
@@ -68,6 +70,22 @@ private:
     LevelView view_;
     FrameSettings settings_{};
 };
+
+/// Variance of an answer over its covariance where the frame's sampling noise is not known: it is taken to be as
+/// large as that of the renders, and the scatter of fits with other samples has twice the variance of one.
+double with_sampling_noise(DenseAlignment& dense, const MeasuredImage& frame, const BodyPoses& at,
+                           const DenseEstimate& answer, DenseOptions options, int& renders) {
+    options.coarsest = options.finest, options.rivals = 0;
+    double sum = 0;
+    for (int k = 0; k < kOtherSamples; ++k) {
+        ++options.seed;
+        const auto fit = dense.align(frame, at, answer.T_camera_body, options);
+        if (!fit) return 1;
+        renders += fit->renders;
+        sum += normalised_error_squared(error_between(answer.T_camera_body, fit->T_camera_body), answer.covariance);
+    }
+    return 1 + sum / (6 * kOtherSamples);
+}
 
 }  // namespace
 
@@ -131,7 +149,7 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
     const double extent_px = sought.known.extent_px();
     while (extent_px / (2 * sought.factor) >= kCoarseExtent_px && sought.factor < kCoarsest) sought.factor *= 2;
     while (extent_px / sought.dense.finest >= kFineExtent_px && sought.dense.finest < sought.factor)
-        sought.dense.finest *= 2, sought.dense.rays_per_pixel /= 4;
+        sought.dense.finest *= 2, sought.dense.rays_per_pixel /= 2;
     std::vector<Contender> contenders = coarse_fits(sought, out);
     if (contenders.empty()) {
         out.answer.why = fmt::format("none of {} hypotheses leads to a pose", sought.hypotheses.size());
@@ -209,6 +227,9 @@ Status PoseSearch::fine_fits(const Sought& sought, std::vector<Contender>& conte
     out.pixels = fit->pixels, out.residual = fit->residual, out.answer = fit->answer;
     if (!out.answer.usable()) return Ok{};
 
+    const bool noise_known = !sought.variance.empty();
+    if (!noise_known)
+        out.covariance *= with_sampling_noise(dense_, sought.frame, sought.known.at, *fit, options, out.renders);
     Fit judged;
     observe(out.T_camera_target, out.covariance, judged);
     for (const Contender& c : contenders) {
@@ -221,7 +242,7 @@ Status PoseSearch::fine_fits(const Sought& sought, std::vector<Contender>& conte
     if (range_m < sought.known.least_m - slack_m || range_m > sought.known.most_m + slack_m)
         judged.failed = fmt::format("a range of {:.4g} m, expected {:.4g} to {:.4g} m", range_m,
                                     sought.known.least_m, sought.known.most_m);
-    if (!judged.failed.empty() || !judged.rivals.empty()) out.answer = judge(std::move(judged));
+    if (!noise_known || !judged.failed.empty() || !judged.rivals.empty()) out.answer = judge(std::move(judged));
     return Ok{};
 }
 

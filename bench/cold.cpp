@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -108,7 +110,7 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
         for (const float v : view.aovs().variance) variance.push_back(v * dn_per_mean * dn_per_mean);
 
     SearchOptions search;
-    // Where the guess is off by at most this part of the truth, the truth is off it by no more than that:
+    // What is off the truth by this part of it has the truth off by more.
     search.range_m = guess_m;
     search.range_part = o.range_part / (1 - o.range_part);
     search.dense.rays_per_pixel = 24, search.dense.fineness = 4;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/result.h"
 #include "base/stop.h"
 #include "emulator/threads.h"
 #include "protocols/estimate.h"
@@ -16,7 +17,7 @@
 namespace narpa {
 
 struct ColdOptions {
-    std::vector<std::string> targets{"station", "craft", "detailed"};  ///< or any of honesty_scenes.h
+    std::vector<std::string> targets{"craft", "detailed"};  ///< of honesty_scenes.h, or bodies of the docking scene
     int trials = 60;
     int size = 96;            ///< pixels of the longer side of the camera
     double range_part = 0.3;  ///< the expected range is off by up to this part of the true one

@@ -6,8 +6,11 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <random>
+#include <string>
 
 #include "estimator/search/attitude_grid.h"
 #include "estimator/view/model_view.h"

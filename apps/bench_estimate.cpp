@@ -8,6 +8,7 @@
 #include "apps/bench_scene.h"
 #include "apps/cli.h"
 #include "bench/approach.h"
+#include "bench/cold.h"
 #include "bench/filter.h"
 #include "bench/honesty.h"
 #include "bench/honesty_scenes.h"
@@ -31,6 +32,7 @@ struct EstimateBenchOptions {
     PnpBenchOptions pnp;
     ApproachOptions approach;
     HonestyOptions honesty;
+    ColdOptions cold;
     int first_trial = 0;
     std::string model_error, told;
 };
@@ -257,9 +259,30 @@ Outcome bench_honesty(const EstimateBenchOptions& o, Findings& findings) {
     return to_json(rows);
 }
 
-constexpr std::pair<const char*, Part> kParts[] = {{"pnp", bench_pnp},       {"approach", bench_approach},
-                                                   {"stereo", bench_stereo}, {"icp", bench_icp},
-                                                   {"filter", bench_filter}, {"honesty", bench_honesty}};
+Outcome bench_cold(const EstimateBenchOptions& o, Findings& findings) {
+    auto docking = scene_or_shipped("", "docking/docking.toml");
+    if (!docking) return docking.error();
+    ColdOptions options = o.cold;
+    if (o.quick) options.trials = 3;
+    TracingThreads threads(o.threads);
+    Progress progress("cold start");
+    const auto trials = run_cold(
+        options, *docking, o.first_trial, threads,
+        [&](const ColdTrial& t) {
+            progress.show(fmt::format("trial {}: {}: {}", t.number, t.target,
+                                      kAnswerKinds[static_cast<std::size_t>(t.answer)]));
+        },
+        stop_flag());
+    if (!trials) return trials.error();
+    say(in_words(*trials));
+    const auto wrong = std::ranges::count_if(*trials, &ColdTrial::wrong);
+    if (wrong > 0) findings.faults.push_back(fmt::format("cold: {} good answers are wrong", wrong));
+    return to_json(*trials);
+}
+
+constexpr std::pair<const char*, Part> kParts[] = {
+    {"pnp", bench_pnp},       {"approach", bench_approach}, {"stereo", bench_stereo}, {"icp", bench_icp},
+    {"filter", bench_filter}, {"honesty", bench_honesty},   {"cold", bench_cold}};
 
 Outcome bench_estimates(const EstimateBenchOptions& o) {
     stop_on_signals();
@@ -370,11 +393,24 @@ Command add_bench_estimate(Parser bench_command) {
              "honesty: how the world differs from the believed model, standard deviations (docs/estimation.md)")
         .type_name("NAME=VALUE,...");
     c.option("--told", o->told, "honesty: what the estimators are told of it").type_name("NAME=VALUE,...");
+    c.option("--cold-trials", o->cold.trials, "cold: frames").range(1, 1'000'000).shows_default();
+    c.option(
+         "--cold-targets", o->cold.targets,
+         fmt::format("cold: station, {} (default: {})", fmt::join(targets, ", "), fmt::join(o->cold.targets, ", ")))
+        .comma_separated()
+        .type_name("LIST");
+    c.option("--cold-size", o->cold.size, "cold: pixels of the camera's longer side")
+        .range(32, 10'000)
+        .shows_default();
+    c.flag("!--cold-noise-unknown", o->cold.noise_known,
+           "cold: the search does not know the frames' sampling noise");
     c.flag("--quick", o->quick, "Few draws of all, to see that it works");
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
     c.option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error").type_name("DIR");
     c.footer(
-        "Exit status 1 where points or stereo are less exact than they must be, or the bench was interrupted.");
+        "Exit status 1 where points or stereo are less exact than they must be, a good answer is wrong, or the "
+        "bench was "
+        "interrupted.");
     return [o] { return bench_estimates(*o); };
 }
 

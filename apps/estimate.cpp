@@ -295,6 +295,7 @@ Outcome estimate(EstimateOptions o) {
     for (const std::string& file : {o.csv, o.picture})
         if (auto made = make_folder_of(file); !made) return made.error();
     if (of_log) return estimate_log(o, *tracker);
+    if (tracker->search && !o.sweep.empty()) return Error{"start \"search\" goes with frames, not with a sweep"};
     if (o.frame.empty() && o.sweep.empty() && !find_file(FileKind::scene, o.input))
         return Error{
             "no such folder, expected that of a logged run or rehearsal, or a scene with --frame FILE.raw or "

@@ -102,22 +102,34 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
         .one_of({"features", "dense"})
         .shows_default();
-    app.option(dashes + "start", start, "Error of the first guess, in attitude and as a part of the range")
-        .type_name("DEG,PERCENT")
+    app.option(
+           dashes + "start", start,
+           "Error of the first guess, in attitude and as a part of the range; search: no guess but of the range")
+        .type_name("DEG,PERCENT|search")
         .shows_default();
+    app.option(dashes + "range-guess", tracker.range_guess_m,
+               "For a start by search: range, known to 30 % (default: the truth, off by up to 30 % at random)")
+        .type_name("METRES")
+        .range(1e-3, 1e9)
+        .finite();
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
 }
 
 Result<TrackerOptions> TrackerFlags::options() const {
     TrackerOptions o = tracker;
+    o.method = method == "dense" ? EstimateMethod::dense : EstimateMethod::features;
+    o.search = start == "search";
+    if (o.search) return o;
+    if (o.range_guess_m > 0)
+        return Error{fmt::format("a range is guessed for a start by search, not \"{}\"", start)};
     double deg = 0, percent = 0;
     int used = 0;
     const bool read = std::sscanf(start.c_str(), "%lf,%lf%n", &deg, &percent, &used) == 2 &&
                       used == static_cast<int>(start.size());
     if (!read || !(deg >= 0 && deg <= 180) || !(percent >= 0 && percent <= 100))
-        return Error{fmt::format("start \"{}\", expected DEG,PERCENT from 0,0 to 180,100, like 5,5", start)};
+        return Error{
+            fmt::format("start \"{}\", expected DEG,PERCENT from 0,0 to 180,100, like 5,5, or search", start)};
     o.start_deg = deg, o.start_percent = percent;
-    o.method = method == "dense" ? EstimateMethod::dense : EstimateMethod::features;
     return o;
 }
 

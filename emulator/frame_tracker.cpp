@@ -8,6 +8,7 @@
 #include "emulator/camera_control.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
+#include "estimator/search/pose_search.h"
 
 namespace narpa {
 namespace {
@@ -83,6 +84,7 @@ FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t t
                                                    BodyPoses(world.scene().bodies.size()), features);
     if (options.method == EstimateMethod::dense)
         pixels_ = std::make_unique<DenseAlignment>(world.render_scene(), camera_, target);
+    if (options.search) search_ = std::make_unique<PoseSearch>(world.render_scene(), camera_, target);
 }
 FrameTracker::~FrameTracker() = default;
 
@@ -101,6 +103,7 @@ Status FrameTracker::set(const FrameLedger& ledger) {
     apply(taken, as_in_the_scene, camera_);
     features_->set_detector(*camera_.detector);
     if (pixels_) pixels_->set_detector(*camera_.detector);
+    if (search_) search_->set_detector(*camera_.detector);
     if (taken.binning == 1 && taken.region.width == camera_.width && taken.region.height == camera_.height)
         return Ok{};
     return Error{fmt::format("{} x {} pixels, binned by {}: expected the whole image, not binned",
@@ -141,12 +144,13 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     if (tracker_.started() && !is_tracked(q_frame_chaser)) tracker_.stop();
     if (tracker_.started()) {
         out.guess = inverse(T_chaser_camera()) * tracker_.filter().pose(q_frame_chaser).T_chaser_target;
-    } else {
+    } else if (!search_) {
         out.guess = off_truth(out.truth, options_, random_);
     }
     const ApparentMotion moving = motion(ledger, at, out.guess);
+    const bool searched = search_ && !tracker_.started();
     if (const Status usable = set(ledger); usable)
-        measure(bytes, at, moving, out);
+        measure(bytes, at, T_world_camera, moving, out);
     else
         out.why = usable.error().what;
     if (out.measured) {
@@ -166,16 +170,23 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
     out.ms = seconds_since(start_ns) * 1e3;
-    if (pixels_ && out.measured)  // at the truth: after the estimate, and not part of its time
-        if (const auto bound = pixels_->bound(at, out.truth, dense_options(moving))) out.bound = *bound;
+    if ((searched || pixels_) && out.measured) {  // at the truth: after the estimate, and not part of its time
+        const auto bound = searched ? search_->bound(at, T_world_camera, out.truth, dense_options({}))
+                                    : pixels_->bound(at, out.truth, dense_options(moving));
+        if (bound) out.bound = *bound;
+    }
     return out;
 }
 
-void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const ApparentMotion& motion,
-                           TrackedFrame& out) {
+void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
+                           const ApparentMotion& motion, TrackedFrame& out) {
     const auto image = measured_image(camera_, bytes);
     if (!image) {
         out.why = image.error().what;
+        return;
+    }
+    if (search_ && !tracker_.started()) {
+        measure_by_search(*image, at, T_world_camera, out);
         return;
     }
     measure_by_features(*image, at, motion, out);
@@ -212,6 +223,26 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
     out.why = e->answer.why;
     if (!e->answer.usable()) return;
     out.measured = e->T_camera_body;
+    out.covariance = e->covariance;
+}
+
+void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
+                                     TrackedFrame& out) {
+    SearchOptions o;
+    const double off = std::uniform_real_distribution(-o.range_part, o.range_part)(random_);
+    o.range_m = options_.range_guess_m > 0 ? options_.range_guess_m : norm(out.truth.t) / (1 + off);
+    o.dense = dense_options({});
+    const auto e = search_->find(image, at, T_world_camera, o);
+    if (!e) {
+        out.why = e.error().what;
+        return;
+    }
+    out.matches = static_cast<int>(e->pixels);
+    out.renders = e->renders;
+    out.answer = e->answer;
+    out.why = e->answer.why;
+    if (!e->answer.usable()) return;
+    out.measured = e->T_camera_target;
     out.covariance = e->covariance;
 }
 

@@ -30,12 +30,15 @@ inline constexpr std::array<std::string_view, 2> kEstimateMethods{"features", "d
 class DenseAlignment;
 struct DenseOptions;
 class FeatureAlignment;
+class PoseSearch;
 struct MeasuredImage;
 
 struct TrackerOptions {
     std::string target;  ///< name of the body; empty: the first with a mesh that does not carry the camera
     EstimateMethod method = EstimateMethod::features;
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
+    bool search = false;                      ///< no guess but of the range, known to 30 % (estimator/search)
+    double range_guess_m = 0;                 ///< for the search; 0: the truth, off by up to 30 % at random
     std::uint64_t seed = 1;                   ///< of the first guess's direction
     int spp = 4;                              ///< of the renders that frames are compared with
     /// What drives the relative motion beyond a constant velocity and rate: power spectral densities, m^2 s^-3 and
@@ -84,8 +87,8 @@ public:
     /// Takes a frame as the camera put it out, with the exposure and gain of its ledger; a frame of a part of the
     /// image or of binned pixels gives no pose. `at`: where the bodies were; of it only the light on the target,
     /// the bodies beside it, the camera's own attitude during the exposure, and the truth for the errors are used.
-    /// Until a frame has given a pose, guesses are the truth displaced as the options state. Runs on the calling
-    /// thread's TBB arena.
+    /// Until a frame has given a pose, guesses are the truth displaced as the options state, or each frame is
+    /// searched. Runs on the calling thread's TBB arena.
     TrackedFrame take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
 
 private:
@@ -95,11 +98,14 @@ private:
     /// Of the target in camera axes during the exposure, by the filter and the camera's own attitude; 0 without a
     /// shutter.
     [[nodiscard]] ApparentMotion motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const;
-    void measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const ApparentMotion& motion,
-                 TrackedFrame& out);
+    void measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
+                 const ApparentMotion& motion, TrackedFrame& out);
     void measure_by_features(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
                              TrackedFrame& out);
     void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
+                           TrackedFrame& out);
+    /// Without a guess; the target is taken to stand still during the exposure.
+    void measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
                            TrackedFrame& out);
     [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion) const;
     /// The pose is known well enough for a render to be compared from there.
@@ -114,6 +120,7 @@ private:
     std::mt19937_64 random_;
     std::unique_ptr<FeatureAlignment> features_;
     std::unique_ptr<DenseAlignment> pixels_;  ///< by method `dense`
+    std::unique_ptr<PoseSearch> search_;      ///< where the options ask for it
     PoseTracker tracker_;
 };
 

@@ -18,14 +18,6 @@ constexpr double kAgree = 25;
 /// The coarsest level shows the target no smaller than this.
 constexpr double kLeastExtent_px = 16;
 
-/// Means over factor x factor pixels have this variance.
-std::vector<float> coarser_variance(std::span<const float> variance, const Camera& camera, int factor) {
-    if (variance.empty()) return {};
-    MeasuredImage mean = coarser_image({camera.width, camera.height, {variance.begin(), variance.end()}}, factor);
-    for (float& v : mean.dn) v /= static_cast<float>(factor * factor);
-    return std::move(mean.dn);
-}
-
 std::size_t level_number(int factor) {
     return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)));
 }
@@ -82,7 +74,7 @@ LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window&
     else if (hold_frame_[number])
         return *kept;
     hold_frame_[number] = true;
-    kept->begin_frame(at, options.motion, times_.scaled(factor), options.model);
+    kept->begin_frame(at, options.motion, times_.scaled(factor), options.model, options.T_world_camera);
     kept->measure(coarser_image(frame, factor), coarser_variance(frame_variance, camera_, factor));
     return *kept;
 }

@@ -34,6 +34,10 @@ struct DenseOptions {
     std::uint64_t seed = 1;
     ApparentMotion motion{};  ///< the target's, in camera axes: during the exposure, for cameras with a shutter
     ModelUncertainty model{};
+    /// The camera's pose in the world, where the light is known in the camera's axes: the target's attitude to the
+    /// light is then that of the pose, and its shading holds the attitude too. Empty: the light is known in the
+    /// target's axes, by its attitude in `at`.
+    std::optional<Rigid3> T_world_camera{};
     /// An answer counts that two starts lead to, the guess and the guess mirrored in the first answer: false minima
     /// and valleys in which steps end early are met from both sides. At most so many mirrored starts; 0: no such
     /// test.
@@ -88,6 +92,10 @@ public:
     /// Exposure and gain of the frames from now on.
     void set_detector(const Detector& detector);
 
+    /// What `align` would refuse to look at.
+    [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
+                               const BodyPoses& at, const Rigid3& guess) const;
+
     /// Cramer-Rao bound of the pose from one frame: the inverse of sum g g' / s^2, s^2 the sensor's and the frame's
     /// variance as in `align`, with the priors of the exposure. The information in the variance itself is left out:
     /// it is smaller by the number of electrons in a pixel.
@@ -101,8 +109,6 @@ private:
                                         int last);
     void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
-    [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
-                               const BodyPoses& at, const Rigid3& guess) const;
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
                      const DenseOptions& options, const MeasuredImage& frame,
                      std::span<const float> frame_variance);

@@ -94,9 +94,9 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
 }
 
 void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
-                            const ModelUncertainty& model) {
+                            const ModelUncertainty& model, const std::optional<Rigid3>& T_world_camera) {
     differentiated_at_.reset();
-    at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model;
+    at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model, T_world_camera_ = T_world_camera;
     view_.begin_frame(at_, motion_, times_);
     derivative_.begin_frame(at_, motion_, times_);
 }
@@ -115,7 +115,16 @@ void LevelView::measure(const MeasuredImage& image, std::span<const float> varia
         }
 }
 
+/// Where the camera is known to be, the pose places the target in the light.
+void LevelView::place(const Rigid3& T_camera_target) {
+    if (!T_world_camera_) return;
+    at_.set(target_, *T_world_camera_ * T_camera_target);
+    view_.begin_frame(at_, motion_, times_);
+    derivative_.begin_frame(at_, motion_, times_);
+}
+
 void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& settings) {
+    place(T_camera_target);
     view_.render(T_camera_target, settings, true);
     const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
@@ -145,8 +154,24 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
 }
 
 void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
+    place(T_camera_target);
     columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness);
     differentiated_at_ = T_camera_target;
+    if (T_world_camera_) add_shading(T_camera_target, settings);
+}
+
+/// Adds what the shading changes by while the target turns under its light, by differences.
+void LevelView::add_shading(const Rigid3& T_camera_target, const FrameSettings& settings) {
+    constexpr double kTurn_rad = 0.01;
+    with_shading_.assign(columns_.begin(), columns_.end());
+    for (int axis = 0; axis < 3; ++axis) {
+        Vec3 turn{};
+        turn[axis] = kTurn_rad;
+        const auto change = change_with_light(T_camera_target, settings, conjugate(T_camera_target.q) * turn);
+        for (std::size_t i = 0; i < change.size(); ++i)
+            with_shading_[i][axis] += change[i] / static_cast<float>(kTurn_rad);
+    }
+    columns_ = with_shading_;
 }
 
 PhotometricImages LevelView::images() const {

@@ -34,9 +34,9 @@ public:
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
     /// As ModelView::begin_frame; `times`: of the rows of `camera`. Of `model` brightness and light widen what is
-    /// expected of the pixels.
+    /// expected of the pixels. `T_world_camera`: DenseOptions.
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
-                     const ModelUncertainty& model);
+                     const ModelUncertainty& model, const std::optional<Rigid3>& T_world_camera);
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);
@@ -44,6 +44,7 @@ public:
     /// axes, and seen at the same pose.
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                        const Vec3& turn_rad);
+    /// At the pose of the latest render.
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
     /// The pose of this frame's latest Jacobian.
     [[nodiscard]] const std::optional<Rigid3>& differentiated_at() const noexcept { return differentiated_at_; }
@@ -52,6 +53,8 @@ public:
 
 private:
     [[nodiscard]] float signal_of(const Rgb& radiance) const;
+    void place(const Rigid3& T_camera_target);
+    void add_shading(const Rigid3& T_camera_target, const FrameSettings& settings);
 
     const SensorModel& sensor_;
     double pixels_averaged_;
@@ -61,11 +64,13 @@ private:
     ApparentMotion motion_{};
     RowTimes times_{};
     ModelUncertainty model_{};
+    std::optional<Rigid3> T_world_camera_;
     ModelView view_;
     ImageDerivative derivative_;
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
     std::vector<std::uint8_t> measured_clipped_;
     std::span<const PixelDerivative> columns_;
+    std::vector<PixelDerivative> with_shading_;  ///< columns_, where the light is known in the camera's axes
     std::optional<Rigid3> differentiated_at_;
 };
 

@@ -178,4 +178,11 @@ MeasuredImage coarser_image(const MeasuredImage& image, int factor) {
     return out;
 }
 
+std::vector<float> coarser_variance(std::span<const float> variance, const Camera& camera, int factor) {
+    if (variance.empty()) return {};
+    MeasuredImage mean = coarser_image({camera.width, camera.height, {variance.begin(), variance.end()}}, factor);
+    for (float& v : mean.dn) v /= static_cast<float>(factor * factor);
+    return std::move(mean.dn);
+}
+
 }  // namespace narpa

@@ -64,5 +64,8 @@ struct SensorModel {
 /// Means over factor x factor pixels: the image of coarser_camera, with 1 / factor^2 of the variance. Clipped where
 /// one of them is.
 [[nodiscard]] MeasuredImage coarser_image(const MeasuredImage& image, int factor);
+/// Variances, DN^2, of the pixels of coarser_image, from those of the camera's independent pixels; none of none.
+[[nodiscard]] std::vector<float> coarser_variance(std::span<const float> variance, const Camera& camera,
+                                                  int factor);
 
 }  // namespace narpa

@@ -160,6 +160,26 @@ TEST_F(EstimateTest, KnowsTheSettingsOfTheFrame) {
     EXPECT_EQ(binned.why, "320 x 240 pixels, binned by 2: expected the whole image, not binned");
 }
 
+/// Without a guess the first frame is searched, and the next ones follow from it.
+TEST_F(EstimateTest, StartsBySearch) {
+    const auto world = World::create(docking());
+    ASSERT_TRUE(world) << world.error().text();
+    CameraUnit unit(**world, 0);
+    TrackerOptions options;
+    options.search = true;
+    options.range_guess_m = 50;
+    const auto tracker = FrameTracker::create(**world, 0, options);
+    ASSERT_TRUE(tracker);
+    for (std::uint32_t k = 0; k < 2; ++k) {
+        const FrameLedger ledger = unit.expose(k, unit.t_mid_ns(k));
+        const TrackedFrame f = (*tracker)->take(ledger, unit.bytes(), unit.placement());
+        ASSERT_TRUE(f.measured) << f.why;
+        EXPECT_LT(error_between(*f.measured, f.truth).head<3>().norm(), 5e-3) << k;
+        EXPECT_LT(error_between(*f.measured, f.truth).tail<3>().norm(), 0.01 * norm(f.truth.t)) << k;
+        EXPECT_GT(position_sigma(f.bound), 0) << k;
+    }
+}
+
 TEST_F(EstimateTest, GoesOutOnCan) {
     RunOptions o;
     o.bus = "slcan:0";
@@ -240,6 +260,8 @@ TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     refuses(scene, "--frame");
     refuses(scene + " --frame x --target moon", "expected one of: station, chaser");
     refuses(scene + " --frame x --start 5", "expected DEG,PERCENT");
+    refuses(scene + " --frame x --range-guess 20", "start by search");
+    refuses(scene + " --sweep x --start search", "not with a sweep");
     refuses(folder_ / "nowhere", "nowhere");
 }
 

@@ -1,0 +1,93 @@
+/// estimator/search/template_matcher.h - small renders of the target at any attitude, compared with the frame.
+///
+/// A render is moved and scaled until the centroid and the spread of its light are those of what stands out in the
+/// frame; that gives each attitude its direction and range. In partial phase both are of the lit part alone, so the
+/// unlit part is where the attitude has it.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "estimator/search/frame_view.h"
+#include "estimator/view/model_view.h"
+
+namespace narpa {
+
+/// What stands out against the frame's background, pixels of the sensor.
+struct BrightRegion {
+    double x = 0, y = 0;  ///< centroid
+    int pixels = 0;
+};
+
+/// A pose, and the part of the frame's light that it does not explain: 0 all, 1 nothing.
+struct Hypothesis {
+    Rigid3 T_camera_target{};
+    double misfit = 1;
+};
+
+/// Of the smaller of two spheres that hold the body: about its origin, and about its bounds' centre.
+[[nodiscard]] double apparent_radius_m(const Tracer& tracer, std::size_t body);
+
+/// What a search knows beside the frame.
+struct SearchView {
+    const RenderScene& render_scene;
+    Camera camera;  ///< without an embedded line
+    std::size_t target = 0;
+    BodyPoses at;
+    Rigid3 T_world_camera{};
+    double range_m = 1, least_m = 0, most_m = 1;  ///< expected, and its limits
+
+    /// Diameter of the target's bounds in the image, pixels, at the expected range.
+    [[nodiscard]] double extent_px() const;
+    /// The pose with the centre of the target's bounds in this direction, at this distance.
+    [[nodiscard]] Rigid3 aimed(const Quat& q_camera_target, const Vec3& direction, double distance_m) const;
+};
+
+/// Nothing where no pixel stands out.
+[[nodiscard]] std::optional<BrightRegion> find_bright_region(const SearchView& known, const MeasuredImage& frame);
+
+class TemplateMatcher {
+public:
+    /// All outlive it. `size_px`: of the target in the renders, about; `spp`: of them.
+    TemplateMatcher(const SearchView& known, const FrameView& frame, const BrightRegion& region, double size_px,
+                    int spp);
+
+    /// Renders and compares, with memory of its own.
+    class Worker {
+    public:
+        explicit Worker(const TemplateMatcher& matcher);
+        /// At this attitude; the position is where the render has to be to agree best.
+        [[nodiscard]] Hypothesis compare(const Rigid3& T_camera_target);
+
+    private:
+        const TemplateMatcher& m_;
+        BodyPoses at_;
+        ModelView view_;
+        std::vector<double> light_;
+    };
+
+private:
+    struct Spread {
+        double x = 0, y = 0, radius = 0;  ///< of the light about its centroid, root mean square, template pixels
+        double energy = 0;
+        [[nodiscard]] bool any() const { return radius > 0; }
+    };
+    [[nodiscard]] bool is_inside(std::size_t p) const;
+    [[nodiscard]] double sensor_px(double template_px, int first) const;
+    [[nodiscard]] double light_of(const RadianceImage& image, std::size_t p) const;
+    [[nodiscard]] double frame_light(double x, double y, double side) const;
+    [[nodiscard]] Spread spread(const std::vector<double>& light) const;
+
+    const SearchView& known_;
+    const FrameView& frame_;
+    SensorModel sensor_;
+    NoiseScale noise_;
+    double scale_;  ///< template pixels in one of the sensor's
+    int side_, left_, top_;
+    Camera camera_;
+    FrameSettings settings_;
+    std::vector<double> background_;
+    Spread of_frame_{};
+};
+
+}  // namespace narpa

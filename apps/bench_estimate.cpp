@@ -378,6 +378,9 @@ Command add_bench_estimate(Parser bench_command) {
         .comma_separated()
         .one_of({kHonestyMethods.begin(), kHonestyMethods.end()})
         .type_name("LIST");
+    c.option("--honesty-size", o->honesty.size, "honesty: pixels of the camera's sides")
+        .range(32, 10'000)
+        .shows_default();
     const auto targets = honesty_targets();
     c.option("--targets", o->honesty.targets, fmt::format("honesty: {} (default: all)", fmt::join(targets, ", ")))
         .comma_separated()

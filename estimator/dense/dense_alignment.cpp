@@ -1,5 +1,7 @@
 #include "estimator/dense/dense_alignment.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -94,11 +96,25 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         const bool known = !frame_variance.empty() && options.model == ModelUncertainty{};
         fit.residual = e.residual;
         fit.residual_most = known ? options.residual_most : options.residual_most_unknown;
+        if (known && has_independent_noise() && std::abs(e.blur) > options.blur_most && fit.failed.empty())
+            fit.failed = fmt::format(
+                "a blur of {:.3g} standard deviations that the model does not have, expected at "
+                "most {:g}",
+                e.blur, options.blur_most);
     } else {
         fit.failed = name(e.status);
     }
     e.answer = judge(std::move(fit));
     return e;
+}
+
+/// A point spread function shares the samples of a pixel with its neighbours, and the colours of a mosaic are means
+/// of neighbours. Rounding is like noise where there is half a step of other noise (B. Widrow, IRE Trans. Circuit
+/// Theory 3, 1956).
+bool DenseAlignment::has_independent_noise() const {
+    constexpr double kDithered = 3;  // half a step squared over rounding's variance, step^2 / 12
+    return !camera_.point_spread && !is_bayer(camera_.format) &&
+           sensor_.read_dn2 >= kDithered * sensor_.rounding_dn2;
 }
 
 /// The first of the mirrored starts that converges decides. Its coarse levels suffice where they end close enough

@@ -45,6 +45,9 @@ struct DenseOptions {
     /// Largest residuals of a right pose (DenseEstimate::residual): of frames whose noise is known, that is, where
     /// `frame_variance` is given and the model is exact; and of others.
     double residual_most = 1.15, residual_most_unknown = 6;
+    /// Largest blur that the model does not have (DenseEstimate::blur), where the noise is known and independent
+    /// from pixel to pixel: chance exceeds it in 6 of 10^5 frames.
+    double blur_most = 4;
 };
 
 enum class DenseStatus : std::uint8_t {
@@ -71,6 +74,7 @@ struct DenseEstimate {
     /// pose (PhotometricEquations::residual), whichever is larger.
     double residual = 0;
     double excess_loss = 0;  ///< misfit of all pixels together, about a chi-square
+    double blur = 0;         ///< blur_score, standard deviations
     Answer answer;
 };
 
@@ -107,6 +111,7 @@ private:
     [[nodiscard]] DenseEstimate descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                         const DenseOptions& options, std::span<const float> frame_variance,
                                         int last);
+    [[nodiscard]] bool has_independent_noise() const;
     void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,

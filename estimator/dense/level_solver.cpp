@@ -170,8 +170,10 @@ void LevelSolver::finish() {
     const PhotometricCost loss = cost(images, e_.exposure, {});
     e_.excess_loss = loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels);
     e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
-    const double of_information =
-        equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0}).residual();
+    const PhotometricEquations of_noise =
+        equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
+    const double of_information = of_noise.residual();
+    e_.blur = blur_score(images, e_.exposure, of_noise);
     e_.residual =
         std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
     const double off = std::abs(e_.exposure.gain - 1);

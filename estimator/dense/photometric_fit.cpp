@@ -255,6 +255,39 @@ Vector8 response(const PhotometricImages& images, const Exposure& exposure, cons
         .gradient;
 }
 
+double blur_score(const PhotometricImages& images, const Exposure& exposure, const PhotometricEquations& fit) {
+    struct Sum {
+        Vector8 shared = Vector8::Zero();
+        double score = 0, variance = 0;
+        Sum& operator+=(const Sum& b) {
+            shared += b.shared, score += b.score, variance += b.variance;
+            return *this;
+        }
+    };
+    const Residuals residuals(images, exposure, 0);
+    // How a blur changes a pixel: as its variance times half the Laplacian.
+    const auto by_blur = [&](const Residual& r, std::size_t p) {
+        const auto& S = images.signal;
+        const auto width = static_cast<std::size_t>(images.width);
+        const auto around = static_cast<double>(S[p - 1] + S[p + 1] + S[p - width] + S[p + width]);
+        return r.inverse_s * exposure.gain * (around - 4 * static_cast<double>(S[p]));
+    };
+    const Vector8 shared = sum_rows<Sum>(images, [&](int y, Sum& row) {
+                               residuals.each(y, [&](const Residual& r, std::size_t p) {
+                                   row.shared += by_blur(r, p) * r.inverse_s * design(images, exposure, p);
+                               });
+                           }).shared;
+    const Vector8 taken = fit.information.inverse() * shared;  // by pose and exposure
+    const Sum sum = sum_rows<Sum>(images, [&](int y, Sum& row) {
+        residuals.each(y, [&](const Residual& r, std::size_t p) {
+            const double term = (by_blur(r, p) - r.inverse_s * design(images, exposure, p).dot(taken)) * r.r;
+            row.score += term;
+            row.variance += term * term;
+        });
+    });
+    return sum.variance > 0 ? sum.score / std::sqrt(sum.variance) : 0;
+}
+
 Vector6 PhotometricEquations::pose_gradient() const {
     const Eigen::Matrix2d of_exposure = information.bottomRightCorner<2, 2>().inverse();
     return gradient.head<6>() - information.topRightCorner<6, 2>() * of_exposure * gradient.tail<2>();

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -25,14 +26,12 @@ constexpr double kNeighbour_px = 1.5;
 /// outline.
 constexpr double kStep_px = 6;
 
+/// Fewer degrees of freedom of the residuals say nothing of their scatter.
+constexpr double kFewestFreedom = 3;
 /// Steps of a smaller normalised square are noise: each view selects other features.
 constexpr double kSettledSquared = 9;
 /// Side of the blocks in which the target is searched.
 constexpr int kBlock_px = 6;
-
-PixelCovariance with_floor(const PixelCovariance& c, double floor_px) {
-    return {c.uu + floor_px * floor_px, c.uv, c.vv + floor_px * floor_px};
-}
 
 /// Infinite where the point has no image.
 Pixel project(const CameraModel& camera, const Vec3& p) {
@@ -43,10 +42,6 @@ Pixel project(const CameraModel& camera, const Vec3& p) {
 /// Part of a window's side that it shares with another so far away.
 double overlap(double distance_px) {
     return std::max(0.0, 1 - std::abs(distance_px) / (2 * kHalfWindow_px + 1));
-}
-
-double mahalanobis(double du, double dv, const PixelCovariance& c) {
-    return (c.vv * du * du - 2 * c.uv * du * dv + c.uu * dv * dv) / (c.uu * c.vv - c.uv * c.uv);
 }
 
 double root_mean_square(const std::vector<double>& lengths) {
@@ -83,8 +78,21 @@ std::string_view name(FeatureStatus status) noexcept {
 struct FeatureAlignment::Points {
     std::vector<Vec3> body_m;
     std::vector<Pixel> pixels;
-    std::vector<PixelCovariance> noise;  ///< of the sensor alone
+    std::vector<Eigen::Matrix2d> noise;  ///< of the sensor alone
 
+    /// Of a match, where all scatter by `floor_px` beyond the sensor's noise.
+    [[nodiscard]] Eigen::Matrix2d match_covariance(std::size_t i, double floor_px) const {
+        return noise[i] + floor_px * floor_px * Eigen::Matrix2d::Identity();
+    }
+    [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const {
+        std::vector<PixelCovariance> all;
+        all.reserve(size());
+        for (std::size_t i = 0; i < size(); ++i) {
+            const Eigen::Matrix2d S = match_covariance(i, floor_px);
+            all.push_back({S(0, 0), S(0, 1), S(1, 1)});
+        }
+        return all;
+    }
     [[nodiscard]] std::size_t size() const { return body_m.size(); }
 
     [[nodiscard]] std::vector<double> residuals_px(const CameraModel& camera, const Rigid3& T) const {
@@ -102,27 +110,37 @@ struct FeatureAlignment::Points {
             if (wanted[i] != 0) body_m[n] = body_m[i], pixels[n] = pixels[i], noise[n] = noise[i], ++n;
         body_m.resize(n), pixels.resize(n), noise.resize(n);
     }
-    /// Covariance due to excess errors that are correlated between matches as far as their windows overlap:
-    /// C (sum over pairs of J_i' W_i S_ij W_j J_j) C.
-    [[nodiscard]] Matrix6 covariance_of_shared_errors(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
-                                                      double floor_px) const {
-        std::vector<Eigen::Matrix<double, 6, 2>> pulls;  // J' W
-        pulls.reserve(size());
-        for (std::size_t i = 0; i < size(); ++i) {
-            const PixelCovariance c = with_floor(noise[i], floor_px);
-            Eigen::Matrix2d S;
-            S << c.uu, c.uv, c.uv, c.vv;
-            pulls.emplace_back(reprojection_jacobian(camera, T, body_m[i]).transpose() * S.inverse());
-        }
-        Matrix6 middle = Matrix6::Zero();
+    /// Of the matches' Jacobians in units of their errors: w w', and overlap_ij w_i w_j' of all pairs whose windows
+    /// overlap, by which part their errors are the same.
+    struct Sums {
+        Matrix6 information = Matrix6::Zero(), shared = Matrix6::Zero();
+    };
+    [[nodiscard]] Sums sums(const CameraModel& camera, const Rigid3& T, double floor_px) const {
+        std::vector<Eigen::Matrix<double, 6, 2>> whitened;
+        whitened.reserve(size());
         for (std::size_t i = 0; i < size(); ++i)
+            whitened.emplace_back(match_covariance(i, floor_px)
+                                      .llt()
+                                      .matrixL()
+                                      .solve(reprojection_jacobian(camera, T, body_m[i]))
+                                      .transpose());
+        Sums out;
+        for (std::size_t i = 0; i < size(); ++i) {
+            out.information += whitened[i] * whitened[i].transpose();
             for (std::size_t j = 0; j < i; ++j) {
-                const double shared = overlap(pixels[i].u - pixels[j].u) * overlap(pixels[i].v - pixels[j].v);
-                if (shared <= 0) continue;
-                const Matrix6 pair = shared * pulls[i] * pulls[j].transpose();
-                middle += pair + pair.transpose();
+                const double part = overlap(pixels[i].u - pixels[j].u) * overlap(pixels[i].v - pixels[j].v);
+                if (part <= 0) continue;
+                const Matrix6 pair = part * whitened[i] * whitened[j].transpose();
+                out.shared += pair + pair.transpose();
             }
-        return floor_px * floor_px * C * middle * C;
+        }
+        return out;
+    }
+    /// Expected chi^2 of the residuals: the pose takes up more than six numbers' worth of errors that matches
+    /// share.
+    [[nodiscard]] double freedom(const CameraModel& camera, const Rigid3& T, double floor_px) const {
+        const Sums s = sums(camera, T, floor_px);
+        return 2 * static_cast<double>(size()) - 6 - s.information.ldlt().solve(s.shared).trace();
     }
     /// How much larger the errors of the pose may be than `covariance` says, in variance, at least 1: by the
     /// scatter of the pulls of parts of the target, whose matches share errors of model and light (clustered
@@ -141,9 +159,7 @@ struct FeatureAlignment::Points {
         for (std::size_t i = 0; i < size(); ++i) {
             const auto part = static_cast<std::size_t>((pixels[i].v - top) / side) * kParts +
                               static_cast<std::size_t>((pixels[i].u - left) / side);
-            const PixelCovariance c = with_floor(noise[i], floor_px);
-            Eigen::Matrix2d S;
-            S << c.uu, c.uv, c.uv, c.vv;
+            const Eigen::Matrix2d S = match_covariance(i, floor_px);
             const Pixel p = project(camera, T * body_m[i]);
             const Eigen::Vector2d r(pixels[i].u - p.u, pixels[i].v - p.v);
             pulls[part] += reprojection_jacobian(camera, T, body_m[i]).transpose() * S.inverse() * r;
@@ -158,13 +174,13 @@ struct FeatureAlignment::Points {
     }
     /// The excess error of a match beyond the sensor's noise that makes chi^2 equal to its degrees of freedom; 0
     /// where the noise suffices.
-    [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T) const {
-        const double freedom = std::max(1.0, 2 * static_cast<double>(size()) - 6);
+    [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T, double freedom) const {
         const auto chi2 = [&](double floor) {
             double sum = 0;
             for (std::size_t i = 0; i < size(); ++i) {
                 const Pixel p = project(camera, T * body_m[i]);
-                sum += mahalanobis(p.u - pixels[i].u, p.v - pixels[i].v, with_floor(noise[i], floor));
+                const Eigen::Vector2d r(p.u - pixels[i].u, p.v - pixels[i].v);
+                sum += r.dot(match_covariance(i, floor).inverse() * r);
             }
             return sum;
         };
@@ -227,20 +243,20 @@ void FeatureAlignment::find_target() {
 }
 
 /// Features of the view as it was rendered last that lie on the target, and where the frame has them.
-void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones,
+void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
                               Points& points) {
     points = {};
     const auto target = static_cast<int>(view_.target());
     find_target();
-    TonedImage toned_view = tones.toned(view_.radiance());
-    if (toned_view.height != frame.height) {  // the frame's last row was its embedded line
-        toned_view.height = frame.height;
+    ByteImage view_bytes = scale.scaled(view_.radiance());
+    if (view_bytes.height != frame.height) {  // the frame's last row was its embedded line
+        view_bytes.height = frame.height;
         const auto pixels = static_cast<std::size_t>(frame.height) * static_cast<std::size_t>(frame.width);
-        toned_view.pixels.resize(pixels), on_target_.resize(pixels);
+        view_bytes.pixels.resize(pixels), on_target_.resize(pixels);
     }
     const Rigid3 T_target_world = inverse(view_.T_world_target());
     HitBatch hits;
-    for (const FeatureMatch& m : match_corners(toned_view, toned_frame, on_target_, settings_.features)) {
+    for (const FeatureMatch& m : match_corners(view_bytes, frame_bytes, on_target_, settings_.features)) {
         const double u = m.view_u, v = m.view_v;
         view_.trace_pixels(std::array<ImagePoint, 5>{{{u, v},
                                                       {u + kNeighbour_px, v},
@@ -249,12 +265,11 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const TonedImage& tone
                                                       {u, v - kNeighbour_px}}},
                            hits);
         if (hits.body[0] != target || !on_smooth_surface(hits) || is_clipped(frame, m.frame_u, m.frame_v)) continue;
-        const Eigen::Matrix2d C =
-            flow_covariance(toned_frame, tones.variance(), m.frame_u, m.frame_v, kHalfWindow_px);
+        const Eigen::Matrix2d C = flow_covariance(view_bytes, frame_bytes, m, kHalfWindow_px);
         if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;
         points.body_m.push_back(T_target_world * hits.position[0]);
         points.pixels.push_back({m.frame_u, m.frame_v});
-        points.noise.push_back({C(0, 0), C(0, 1), C(1, 1)});
+        points.noise.push_back(C);
     }
 }
 
@@ -283,8 +298,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     view_.begin_frame(at, motion, times_);
     const CameraModelHandle model(view_.camera());
     const CameraModel& camera = *model;
-    const ToneScale tones(frame, sensor_);
-    const TonedImage toned_frame = tones.toned(frame);
+    const ByteScale scale(frame, sensor_);
+    const ByteImage frame_bytes = scale.scaled(frame);
     FrameSettings render_settings;
     render_settings.spp = times_.exposure_s > 0 ? settings_.spp_over_time : settings_.spp;
     render_settings.seed = settings_.seed;
@@ -294,7 +309,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();
         view_.render(estimate.T_camera_target, render_settings, false);
-        gather(frame, toned_frame, tones, points);
+        gather(frame, frame_bytes, scale, points);
         to_mid_exposure(estimate.T_camera_target, motion, times_, points.pixels, points.body_m);
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;
@@ -303,8 +318,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
 
         // First a robust pose; then least squares on its inliers.
         const auto solve = [&](Loss loss) {
-            std::vector<PixelCovariance> covariances;
-            for (const PixelCovariance& c : points.noise) covariances.push_back(with_floor(c, floor_px));
+            const std::vector<PixelCovariance> covariances = points.covariances(floor_px);
             RefineOptions options;
             options.loss.kind = loss;
             const PnpInput input{model, points.body_m, points.pixels, 1, covariances};
@@ -315,15 +329,16 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         PnpFit fit = solve(Loss::cauchy);
         for (int tries = 0; tries < 2 && fit.ok(); ++tries) {
             const std::vector<double> residuals = points.residuals_px(camera, fit.T_camera_body);
-            const double scale = scale_of(residuals);
+            const double outlier_px = kOutlier * scale_of(residuals);
             std::vector<std::uint8_t> agrees;
-            for (const double r : residuals) agrees.push_back(r < kOutlier * scale ? 1 : 0);
+            for (const double r : residuals) agrees.push_back(r < outlier_px ? 1 : 0);
             points.keep(agrees);
             if (points.size() < kFewestMatches) {
                 estimate.status = FeatureStatus::few_matches;
                 return estimate;
             }
-            floor_px = points.floor_px(camera, fit.T_camera_body);
+            floor_px =
+                points.floor_px(camera, fit.T_camera_body, points.freedom(camera, fit.T_camera_body, floor_px));
             fit = solve(Loss::none);
         }
         if (!fit.ok()) {
@@ -341,11 +356,17 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         round.after_px = root_mean_square(points.residuals_px(camera, fit.T_camera_body));
         const Vector6 step = error_between(estimate.T_camera_target, fit.T_camera_body);
         estimate.T_camera_target = fit.T_camera_body;
-        floor_px = points.floor_px(camera, fit.T_camera_body);
-        estimate.covariance = fit.covariance + points.covariance_of_shared_errors(camera, fit.T_camera_body,
-                                                                                  fit.covariance, floor_px);
-        estimate.covariance *=
-            points.inflation(camera, fit.T_camera_body, fit.covariance, estimate.covariance, floor_px);
+        const double freedom = points.freedom(camera, fit.T_camera_body, floor_px);
+        if (!(freedom >= kFewestFreedom)) {
+            estimate.status = FeatureStatus::few_matches;
+            return estimate;
+        }
+        floor_px = points.floor_px(camera, fit.T_camera_body, freedom);
+        const Matrix6& C = fit.covariance;
+        estimate.covariance = C + C * points.sums(camera, fit.T_camera_body, floor_px).shared * C;
+        // The scatter is estimated from so many numbers (Student 1908).
+        estimate.covariance *= freedom / (freedom - 2);
+        estimate.covariance *= points.inflation(camera, fit.T_camera_body, C, estimate.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
         if (root_mean_square(moved) < settings_.settled_px ||
             normalised_error_squared(step, estimate.covariance) < kSettledSquared) {
@@ -356,8 +377,9 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
+    const std::vector<PixelCovariance> of_noise = points.covariances(0);
     estimate.bound =
-        refiner.refine({model, points.body_m, points.pixels, 1, points.noise}, estimate.T_camera_target).covariance;
+        refiner.refine({model, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;
     return estimate;
 }
 

@@ -31,7 +31,7 @@ struct FeatureSettings {
 enum class FeatureStatus : std::uint8_t {
     settled,
     unsettled,    ///< still moving after renders_max views
-    few_matches,  ///< fewer than kFewestMatches inliers
+    few_matches,  ///< fewer than kFewestMatches inliers, or windows that all overlap
     no_pose,      ///< the solver failed
 };
 inline constexpr int kFewestMatches = 8;
@@ -45,8 +45,8 @@ struct FeatureRound {
 struct FeatureEstimate {
     FeatureStatus status = FeatureStatus::few_matches;
     Rigid3 T_camera_target{};
-    /// From the sensor's noise and the excess scatter of the matches, which is correlated between
-    /// matches whose windows overlap, in proportion to the overlap; and from the model's uncertainty.
+    /// From the sensor's noise and the excess scatter of the matches, both correlated between matches whose windows
+    /// overlap, in proportion to the overlap; and from the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
     /// Cramer-Rao for these points with the sensor's noise and the model's uncertainty alone.
     Matrix6 bound = Matrix6::Zero();
@@ -75,7 +75,7 @@ private:
     struct Points;
     [[nodiscard]] FeatureEstimate estimate(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                            const ApparentMotion& motion);
-    void gather(const MeasuredImage& frame, const TonedImage& toned_frame, const ToneScale& tones, Points& points);
+    void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale, Points& points);
     void find_target();
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;
 

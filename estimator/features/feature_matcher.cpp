@@ -15,14 +15,16 @@ constexpr float kRoundTrip_px = 0.5f;
 constexpr int kFlowWindow_px = 21, kFlowLevels = 4;
 /// Part of the frame's pixels that may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
+/// Variance of rounding to whole steps.
+constexpr double kRounding = 1.0 / 12;
 
-cv::Mat as_mat(const TonedImage& image) {
+cv::Mat as_mat(const ByteImage& image) {
     return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data())};
 }
 
 }  // namespace
 
-ToneScale::ToneScale(const MeasuredImage& frame, const SensorModel& sensor) : sensor_(sensor) {
+ByteScale::ByteScale(const MeasuredImage& frame, const SensorModel& sensor) : sensor_(sensor) {
     std::vector<float> dn = frame.dn;
     double top_dn = sensor.top_dn;
     if (!dn.empty()) {
@@ -30,36 +32,29 @@ ToneScale::ToneScale(const MeasuredImage& frame, const SensorModel& sensor) : se
         std::nth_element(dn.begin(), dn.begin() + rank, dn.end());
         top_dn = std::max<double>(dn[static_cast<std::size_t>(rank)], sensor.black_dn + 1);
     }
-    black_ = stabilised(sensor.black_dn);
-    steps_ = 255 / (stabilised(top_dn) - black_);
+    steps_per_dn_ = 255 / (top_dn - sensor.black_dn);
 }
 
-/// Has a standard deviation of 1.
-double ToneScale::stabilised(double dn) const {
-    const double above = dn - sensor_.black_dn, constant = sensor_.read_dn2 + sensor_.rounding_dn2;
-    if (sensor_.shot_dn <= 0) return above / std::sqrt(constant);
-    return 2 / sensor_.shot_dn * std::sqrt(std::max(0.0, sensor_.shot_dn * above + constant));
+std::uint8_t ByteScale::step(double dn) const {
+    return static_cast<std::uint8_t>(std::clamp(steps_per_dn_ * (dn - sensor_.black_dn), 0.0, 255.0) + 0.5);
 }
 
-std::uint8_t ToneScale::tone(double dn) const {
-    return static_cast<std::uint8_t>(std::clamp(steps_ * (stabilised(dn) - black_), 0.0, 255.0) + 0.5);
-}
-
-double ToneScale::variance() const {
-    return steps_ * steps_ + 1.0 / 12;
-}
-
-TonedImage ToneScale::toned(const MeasuredImage& frame) const {
-    TonedImage out{frame.width, frame.height, {}};
-    out.pixels.reserve(frame.dn.size());
-    for (const float dn : frame.dn) out.pixels.push_back(tone(dn));
+ByteImage ByteScale::scaled(const MeasuredImage& frame) const {
+    ByteImage out{frame.width, frame.height, {}};
+    out.pixels.reserve(frame.dn.size()), out.variance.reserve(frame.dn.size());
+    for (const float value : frame.dn) {
+        const auto dn = static_cast<double>(value);
+        out.pixels.push_back(step(dn));
+        out.variance.push_back(
+            static_cast<float>(steps_per_dn_ * steps_per_dn_ * sensor_.variance_dn2(dn) + kRounding));
+    }
     return out;
 }
 
-TonedImage ToneScale::toned(const RadianceImage& view) const {
-    TonedImage out{view.width, view.height, {}};
+ByteImage ByteScale::scaled(const RadianceImage& view) const {
+    ByteImage out{view.width, view.height, {}};
     out.pixels.reserve(view.pixels.size());
-    for (const Rgb& L : view.pixels) out.pixels.push_back(tone(sensor_.dn(L)));
+    for (const Rgb& L : view.pixels) out.pixels.push_back(step(sensor_.dn(L)));
     return out;
 }
 
@@ -70,7 +65,7 @@ SingleThreadedOpenCv::~SingleThreadedOpenCv() {
     cv::setNumThreads(before_);
 }
 
-std::vector<FeatureMatch> match_corners(const TonedImage& view, const TonedImage& frame,
+std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& frame,
                                         const std::vector<std::uint8_t>& on_target, int most) {
     const cv::Mat mask(view.height, view.width, CV_8U, const_cast<std::uint8_t*>(on_target.data()));
     std::vector<FeatureMatch> matches;
@@ -94,23 +89,34 @@ std::vector<FeatureMatch> match_corners(const TonedImage& view, const TonedImage
     return matches;
 }
 
-Eigen::Matrix2d flow_covariance(const TonedImage& image, double variance, double u_px, double v_px, int half_px) {
-    const int u0 = static_cast<int>(std::lround(u_px)), v0 = static_cast<int>(std::lround(v_px));
-    const auto at = [&](int u, int v) {
+Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, const FeatureMatch& match,
+                                int half_px) {
+    const int view_u = static_cast<int>(std::lround(match.view_u)),
+              view_v = static_cast<int>(std::lround(match.view_v)),
+              frame_u = static_cast<int>(std::lround(match.frame_u)),
+              frame_v = static_cast<int>(std::lround(match.frame_v));
+    const auto index = [](const ByteImage& image, int u, int v) {
         return static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(u);
     };
-    Eigen::Matrix2d G = Eigen::Matrix2d::Zero();
-    for (int v = std::max(1, v0 - half_px); v <= std::min(image.height - 2, v0 + half_px); ++v)
-        for (int u = std::max(1, u0 - half_px); u <= std::min(image.width - 2, u0 + half_px); ++u) {
-            const double gu = 0.5 * (image.pixels[at(u + 1, v)] - image.pixels[at(u - 1, v)]);
-            const double gv = 0.5 * (image.pixels[at(u, v + 1)] - image.pixels[at(u, v - 1)]);
-            Eigen::Matrix2d gg;
-            gg << gu * gu, gu * gv, gu * gv, gv * gv;
-            G += gg;
+    Eigen::Matrix2d G = Eigen::Matrix2d::Zero(), of_noise = Eigen::Matrix2d::Zero();
+    for (int dv = -half_px; dv <= half_px; ++dv)
+        for (int du = -half_px; du <= half_px; ++du) {
+            const int u = view_u + du, v = view_v + dv;
+            if (u < 1 || v < 1 || u > view.width - 2 || v > view.height - 2) continue;
+            const Eigen::Vector2d g(
+                0.5 * (view.pixels[index(view, u + 1, v)] - view.pixels[index(view, u - 1, v)]),
+                0.5 * (view.pixels[index(view, u, v + 1)] - view.pixels[index(view, u, v - 1)]));
+            const int there_u = std::clamp(frame_u + du, 0, frame.width - 1),
+                      there_v = std::clamp(frame_v + dv, 0, frame.height - 1);
+            const double variance =
+                static_cast<double>(frame.variance[index(frame, there_u, there_v)]) + kRounding;  // the view's too
+            G += g * g.transpose();
+            of_noise += variance * g * g.transpose();
         }
     const double determinant = G.determinant(), trace = G.trace();
     if (determinant <= 1e-6 * trace * trace) return Eigen::Matrix2d::Zero();
-    return variance * G.inverse();
+    const Eigen::Matrix2d inverse = G.inverse();
+    return inverse * of_noise * inverse;
 }
 
 }  // namespace narpa

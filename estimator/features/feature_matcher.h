@@ -12,30 +12,32 @@
 
 namespace narpa {
 
-/// Eight bits a pixel, row-major, variance-stabilised: the generalised Anscombe transform of DN (Murtagh, Starck
-/// and Bijaoui 1995), so that one step is the same number of standard deviations everywhere.
-struct TonedImage {
+/// Eight bits a pixel, row-major, linear in the light.
+///
+/// No tone curve: a pixel of an edge is the mean of a few samples, and what a curve makes of it depends on how many
+/// they are. Edges of views of four samples and of frames of one were 0.1 px apart in square roots of the light,
+/// and poses too far away by 3e-4 of the range.
+struct ByteImage {
     int width = 0, height = 0;
     std::vector<std::uint8_t> pixels;
+    std::vector<float> variance{};  ///< of each pixel, steps^2; empty: of a view, whose noise is not known
 };
 
-/// The tone curve of a frame and of the views that it is compared with.
-class ToneScale {
+/// The scale of a frame and of the views that it is compared with.
+class ByteScale {
 public:
     /// 255 is nearly the brightest DN of the frame.
-    ToneScale(const MeasuredImage& frame, const SensorModel& sensor);
+    ByteScale(const MeasuredImage& frame, const SensorModel& sensor);
 
-    [[nodiscard]] TonedImage toned(const MeasuredImage& frame) const;
-    [[nodiscard]] TonedImage toned(const RadianceImage& view) const;
-    /// Variance of a pixel of a toned frame in steps^2: sensor noise, and rounding to eight bits.
-    [[nodiscard]] double variance() const;
+    /// With the variances of sensor noise and of rounding to eight bits.
+    [[nodiscard]] ByteImage scaled(const MeasuredImage& frame) const;
+    [[nodiscard]] ByteImage scaled(const RadianceImage& view) const;
 
 private:
-    [[nodiscard]] double stabilised(double dn) const;
-    [[nodiscard]] std::uint8_t tone(double dn) const;
+    [[nodiscard]] std::uint8_t step(double dn) const;
 
     SensorModel sensor_;
-    double black_ = 0, steps_ = 1;  ///< 255 / (top - black), stabilised
+    double steps_per_dn_ = 1;
 };
 
 /// Pixels; the centre of the top-left one is (0, 0).
@@ -58,13 +60,13 @@ private:
 
 /// Corners of least eigenvalue (Shi and Tomasi 1994), tracked by pyramidal optical flow (Bouguet 2001) into the
 /// frame and back. `most`: at most so many corners. `on_target`: mask of the view, non-zero where corners may lie.
-[[nodiscard]] std::vector<FeatureMatch> match_corners(const TonedImage& view, const TonedImage& frame,
+[[nodiscard]] std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& frame,
                                                       const std::vector<std::uint8_t>& on_target, int most);
 
-/// Covariance (px^2; u, v) of a point tracked by optical flow, for independent noise of this `variance` in the
-/// pixels of the image that it is tracked to: variance * (sum of g g' over the window)^-1, g the image gradients.
-/// The window reaches `half_px` to each side. Zero where the sum is singular: no corner.
-[[nodiscard]] Eigen::Matrix2d flow_covariance(const TonedImage& image, double variance, double u_px, double v_px,
-                                              int half_px);
+/// Covariance (px^2; u, v) of a point tracked by optical flow into `frame`, of the noise of its pixels: G^-1 (sum
+/// of variance g g') G^-1 over the window, g the gradients of the view and G the sum of g g'. The window reaches
+/// `half_px` to each side. Zero where G is singular: no corner.
+[[nodiscard]] Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame,
+                                              const FeatureMatch& match, int half_px);
 
 }  // namespace narpa

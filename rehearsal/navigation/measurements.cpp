@@ -20,11 +20,10 @@ FeatureSettings feature_settings(std::uint64_t seed, const ModelUncertainty& mod
     return f;
 }
 
-/// Factor on the estimator's covariance. The estimator takes the errors of matches for independent, but edges in a
-/// frame of one sample a pixel have correlated errors (measured in closed loop: normalised innovations squared
-/// of 9.3 where 6 are expected), and in the last metre consecutive frames have the same ones: with a factor of 2,
-/// one run in five had estimates beyond four standard deviations there.
-constexpr double kMatchVariance = 3;
+/// Factor on the estimator's covariance: consecutive frames show the same details in nearly the same pixels, so
+/// their errors are correlated (0.2 to 0.3 from one second to the next between 18 and 3 m), and the filter takes
+/// them for independent.
+constexpr double kMatchVariance = 2.5;
 /// Radius of the search around the prediction, in standard deviations.
 constexpr double kSearchSigmas = 4;
 /// No search where the prediction is this good: a search costs much more than an alignment.

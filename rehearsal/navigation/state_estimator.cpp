@@ -324,6 +324,17 @@ RelativeMotion StateEstimator::motion() const {
     return in_world(filter().state(), scenario_.orbit, t_s(t_ns()), now.q_world_chaser, now.rate_rad_s);
 }
 
+/// At most so much of the state's variance along any direction: what is linearized at different poses could make it
+/// more than all of it where the star tracker's error is the largest.
+Eigen::Matrix<double, 12, 3> StateEstimator::by_star_tracker(double sigma_rad) const {
+    constexpr double kMostShared = 0.95;
+    const Eigen::Matrix3d shared =
+        sigma_rad * sigma_rad * by_star_tracker_.transpose() * filter().covariance().ldlt().solve(by_star_tracker_);
+    const double most =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(shared, Eigen::EigenvaluesOnly).eigenvalues()[2];
+    return std::sqrt(kMostShared / std::max(most, kMostShared)) * by_star_tracker_;
+}
+
 TargetEstimate StateEstimator::estimate() const {
     const Quat q = q_frame_chaser(t_ns());
     const PoseFilter::Pose pose = filter().pose(q);
@@ -331,9 +342,10 @@ TargetEstimate StateEstimator::estimate() const {
     const double sigma_rad = kDegree * scenario_.attitude_sensor.attitude_sigma_deg;
     // Turning the state to the chaser's axes adds the star tracker's error, and takes away what of the same error
     // came with the measurements.
+    const auto by = by_star_tracker(sigma_rad);
     Eigen::Matrix<double, 6, 3> known;
-    known << rotation_matrix(conjugate(q) * filter().state().q_frame_target) * by_star_tracker_.middleRows<3>(6),
-        rotation_matrix(conjugate(q)) * by_star_tracker_.middleRows<3>(0);
+    known << rotation_matrix(conjugate(q) * filter().state().q_frame_target) * by.middleRows<3>(6),
+        rotation_matrix(conjugate(q)) * by.middleRows<3>(0);
     const Matrix6 both = sigma_rad * sigma_rad * known * star_tracker_jacobian(pose.T_chaser_target.t).transpose();
     const Matrix6 covariance =
         pose.covariance + star_tracker_covariance(pose.T_chaser_target.t, sigma_rad) - both - both.transpose();

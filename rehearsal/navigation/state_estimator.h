@@ -143,6 +143,7 @@ private:
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
     [[nodiscard]] Matrix6 covariance_of_model(const Rigid3& T_chaser_target) const;
     void correlate(const Matrix12& before, double share);
+    [[nodiscard]] Eigen::Matrix<double, 12, 3> by_star_tracker(double sigma_rad) const;
 
     Scenario scenario_;
     std::int64_t t_start_ns_;

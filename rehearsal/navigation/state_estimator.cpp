@@ -1,6 +1,7 @@
 #include "rehearsal/navigation/state_estimator.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -130,6 +130,55 @@ NARPA_EACH_ISA void take_to_world(const PoseLanes& T_world_mount, const Rigid3& 
     }
 }
 
+Path to_first_hit(const BodyPoses& at, const RayBatch& beams, const HitBatch& hits, std::size_t i,
+                  const ShotSettings& settings) {
+    Path path{.direction = beams.direction[i]};
+    if (!settings.motions.empty())
+        path.velocity = velocity_at(settings, at, settings.mount, beams.origin[i], beams.time[i]);
+    if (settings.medium != nullptr) dim(path, at, beams.origin[i], hits, i, *settings.medium);
+    advance(path, at, hits, i, settings);
+    return path;
+}
+
+bool goes_on(const Tracer& tracer, const HitBatch& hits, std::size_t i, const ShotSettings& settings) {
+    const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
+    return settings.multipath && m.kind == Material::Kind::mirror;
+}
+
+void reflect(Path& path, const Tracer& tracer, const HitBatch& hits, std::size_t i) {
+    const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
+    const Vec3 n = hits.shading_normal[i], d = path.direction;
+    path.direction = normalized(d - 2 * dot(d, n) * n);
+    path.throughput *= mean(m.specular) * mean(m.specular);  // there and back
+}
+
+/// The shots whose first hits are mirrors. `hits`: in, those; they become the latest.
+void follow_mirrors(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
+                    std::uint32_t mirrored, HitBatch& hits, std::span<LidarReturn> returns) {
+    Lanes<Path> paths;
+    for_each_lane(mirrored, [&](std::size_t i) { paths[i] = to_first_hit(at, beams, hits, i, settings); });
+    for (int mirrors = 0; mirrored != 0 && mirrors < kMirrors; ++mirrors) {
+        Vec3Lanes directions;
+        for_each_lane(mirrored, [&](std::size_t i) {
+            reflect(paths[i], tracer, hits, i);
+            directions.put(i, paths[i].direction);
+        });
+        tracer.intersect(at, hits, directions, mirrored, hits);
+        const std::uint32_t met = mirrored & hits.met;
+        mirrored = 0;
+        for_each_lane(met, [&](std::size_t i) {
+            Path& path = paths[i];
+            if (settings.medium != nullptr) dim(path, at, path.start, hits, i, *settings.medium);
+            advance(path, at, hits, i, settings);
+            if (!(path.range_m < settings.range_max_m)) return;
+            if (goes_on(tracer, hits, i, settings))
+                mirrored |= 1u << i;
+            else
+                put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
+        });
+    }
+}
+
 }  // namespace
 
 Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point,
@@ -154,40 +203,19 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
            std::span<LidarReturn> returns) noexcept {
     HitBatch hits;
     tracer.intersect(at, beams, settings.bodies.empty() ? tracer.all_bodies() : settings.bodies, hits);
-    Lanes<Path> paths;
+    prefetch_textures(tracer.scene(), hits, hits.met & lanes_below(beams.n));
+    std::uint32_t mirrored = 0;
     for (std::size_t i = 0; i < beams.n; ++i) {
         returns[i] = {};
-        paths[i].direction = beams.direction[i];
-        if (!settings.motions.empty())
-            paths[i].velocity = velocity_at(settings, at, settings.mount, beams.origin[i], beams.time[i]);
+        if (!is_set(hits.met, i)) continue;
+        const Path path = to_first_hit(at, beams, hits, i, settings);
+        if (!(path.range_m < settings.range_max_m)) continue;
+        if (goes_on(tracer, hits, i, settings))
+            mirrored |= 1u << i;
+        else
+            put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
     }
-    std::uint32_t going = lanes_below(beams.n);
-    for (int mirrors = 0;; ++mirrors) {
-        std::uint32_t mirrored = 0;
-        Vec3Lanes directions;
-        prefetch_textures(tracer.scene(), hits, going & hits.met);
-        for (std::size_t i = 0; i < beams.n; ++i) {
-            if (!is_set(going & hits.met, i)) continue;
-            Path& path = paths[i];
-            if (settings.medium != nullptr)
-                dim(path, at, mirrors == 0 ? beams.origin[i] : path.start, hits, i, *settings.medium);
-            advance(path, at, hits, i, settings);
-            if (!(path.range_m < settings.range_max_m)) continue;
-            const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
-            if (!settings.multipath || m.kind != Material::Kind::mirror) {
-                put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
-            } else if (mirrors < kMirrors) {
-                const Vec3 n = hits.shading_normal[i], d = path.direction;
-                path.direction = normalized(d - 2 * dot(d, n) * n);
-                path.throughput *= mean(m.specular) * mean(m.specular);  // there and back
-                directions.put(i, path.direction);
-                mirrored |= 1u << i;
-            }
-        }
-        if (mirrored == 0) return;
-        tracer.intersect(at, hits, directions, mirrored, hits);
-        going = mirrored;
-    }
+    if (mirrored != 0) follow_mirrors(tracer, at, beams, settings, mirrored, hits, returns);
 }
 
 LidarReturn shoot(const Tracer& tracer, const BodyPoses& at, const Ray& beam,

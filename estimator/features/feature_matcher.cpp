@@ -15,8 +15,8 @@ constexpr float kRoundTrip_px = 0.5f;
 constexpr int kFlowWindow_px = 21, kFlowLevels = 4;
 /// Part of the frame's pixels that may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
-/// Variance of rounding to whole steps.
-constexpr double kRounding = 1.0 / 12;
+/// Of rounding to whole steps.
+constexpr double kRoundingVariance = 1.0 / 12;
 
 cv::Mat as_mat(const ByteImage& image) {
     return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data())};
@@ -46,7 +46,7 @@ ByteImage ByteScale::scaled(const MeasuredImage& frame) const {
         const auto dn = static_cast<double>(value);
         out.pixels.push_back(step(dn));
         out.variance.push_back(
-            static_cast<float>(steps_per_dn_ * steps_per_dn_ * sensor_.variance_dn2(dn) + kRounding));
+            static_cast<float>(steps_per_dn_ * steps_per_dn_ * sensor_.variance_dn2(dn) + kRoundingVariance));
     }
     return out;
 }
@@ -108,8 +108,8 @@ Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, c
                 0.5 * (view.pixels[index(view, u, v + 1)] - view.pixels[index(view, u, v - 1)]));
             const int there_u = std::clamp(frame_u + du, 0, frame.width - 1),
                       there_v = std::clamp(frame_v + dv, 0, frame.height - 1);
-            const double variance =
-                static_cast<double>(frame.variance[index(frame, there_u, there_v)]) + kRounding;  // the view's too
+            const double variance = static_cast<double>(frame.variance[index(frame, there_u, there_v)]) +
+                                    kRoundingVariance;  // the view's too
             G += g * g.transpose();
             of_noise += variance * g * g.transpose();
         }

@@ -412,8 +412,7 @@ Command add_bench_estimate(Parser bench_command) {
     c.option("-o,--output", o->plots, "Folder for plots: of each part, and of time against error").type_name("DIR");
     c.footer(
         "Exit status 1 where points or stereo are less exact than they must be, a good answer is wrong, or the "
-        "bench was "
-        "interrupted.");
+        "bench was interrupted.");
     return [o] { return bench_estimates(*o); };
 }
 

@@ -144,11 +144,11 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     if (tracker_.started() && !is_tracked(q_frame_chaser)) tracker_.stop();
     if (tracker_.started()) {
         out.guess = inverse(T_chaser_camera()) * tracker_.filter().pose(q_frame_chaser).T_chaser_target;
-    } else if (!search_) {
+    } else if (!searches()) {
         out.guess = off_truth(out.truth, options_, random_);
     }
     const ApparentMotion moving = motion(ledger, at, out.guess);
-    const bool searched = search_ && !tracker_.started();
+    const bool searched = searches();
     if (const Status usable = set(ledger); usable)
         measure(bytes, at, T_world_camera, moving, out);
     else
@@ -178,6 +178,10 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     return out;
 }
 
+bool FrameTracker::searches() const {
+    return search_ && !tracker_.started();
+}
+
 void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
                            const ApparentMotion& motion, TrackedFrame& out) {
     const auto image = measured_image(camera_, bytes);
@@ -185,7 +189,7 @@ void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses&
         out.why = image.error().what;
         return;
     }
-    if (search_ && !tracker_.started()) {
+    if (searches()) {
         measure_by_search(*image, at, T_world_camera, out);
         return;
     }

@@ -98,6 +98,7 @@ private:
     /// Of the target in camera axes during the exposure, by the filter and the camera's own attitude; 0 without a
     /// shutter.
     [[nodiscard]] ApparentMotion motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const;
+    [[nodiscard]] bool searches() const;  ///< the next frame: there is no pose yet
     void measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
                  const ApparentMotion& motion, TrackedFrame& out);
     void measure_by_features(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,

@@ -97,10 +97,9 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         fit.residual = e.residual;
         fit.residual_most = known ? options.residual_most : options.residual_most_unknown;
         if (known && has_independent_noise() && std::abs(e.blur) > options.blur_most && fit.failed.empty())
-            fit.failed = fmt::format(
-                "a blur of {:.3g} standard deviations that the model does not have, expected at "
-                "most {:g}",
-                e.blur, options.blur_most);
+            fit.failed =
+                fmt::format("{} blurred than the model, by {:.3g} standard deviations, expected at most {:g}",
+                            e.blur > 0 ? "more" : "less", std::abs(e.blur), options.blur_most);
     } else {
         fit.failed = name(e.status);
     }

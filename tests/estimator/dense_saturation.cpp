@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "../support/cameras.h"
 #include "../support/shapes.h"
 #include "base/constants.h"
 #include "estimator/dense/dense_alignment.h"
@@ -14,24 +15,6 @@
 
 namespace narpa {
 namespace {
-
-Camera square_camera(int size) {
-    Camera camera;
-    camera.width = camera.height = size;
-    camera.fx = camera.fy = 1.6 * size;
-    camera.cx = camera.cy = 0.5 * (size - 1);
-    camera.format = PixelFormat::grey;
-    camera.detector = Detector{.exposure_s = 3e-5,
-                               .pixel_pitch_m = 5e-6,
-                               .f_number = 4,
-                               .quantum_efficiency = 0.5,
-                               .full_well_e = 20000,
-                               .read_noise_e = 12,
-                               .shot_noise = true,
-                               .black_level_dn = 32,
-                               .bits = 12};
-    return camera;
-}
 
 struct Claims {
     int claimed = 0;
@@ -80,7 +63,7 @@ TEST(DenseSaturation, ACubeIsFoundByItsOutline) {
     cube.ambient = {8, 8, 8};
     cube.materials.push_back(test::lambert(0.3f));
     test::add_mesh(cube, test::box(2, 2, 2));
-    const Claims c = claims(cube, square_camera(128), 30, 6, 6);
+    const Claims c = claims(cube, test::square_camera(128), 30, 6, 6);
     EXPECT_GE(c.claimed, 5);
     EXPECT_LT(c.worst_deg, 0.1);
     EXPECT_LT(c.worst_part, 1e-3);
@@ -89,7 +72,7 @@ TEST(DenseSaturation, ACubeIsFoundByItsOutline) {
 TEST(DenseSaturation, WhatClaimsToBeRightOnTheStationIsRight) {
     auto station = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
     ASSERT_TRUE(station) << station.error().text();
-    const Claims c = claims(*station, square_camera(128), 30, 30, 6);
+    const Claims c = claims(*station, test::square_camera(128), 30, 30, 6);
     EXPECT_GE(c.claimed, 3);
     EXPECT_LT(c.worst_deg, 0.05);
     EXPECT_LT(c.worst_part, 1e-3);

@@ -15,6 +15,7 @@
 #include "estimator/search/attitude_grid.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -89,20 +90,8 @@ public:
         body.name = "target";
         body.shape = 0;
         scene_.bodies.push_back(std::move(body));
-        Camera& c = camera_;
-        c.width = c.height = 72;
-        c.fx = c.fy = 115;
-        c.cx = c.cy = 35.5;
-        c.format = PixelFormat::y16;
-        c.detector = Detector{.exposure_s = 3e-5,
-                              .pixel_pitch_m = 5e-6,
-                              .f_number = 4,
-                              .quantum_efficiency = 0.5,
-                              .full_well_e = 20000,
-                              .read_noise_e = 12,
-                              .shot_noise = true,
-                              .black_level_dn = 32,
-                              .bits = 12};
+        camera_.fx = camera_.fy = 115;
+        camera_.format = PixelFormat::y16;
         render_scene_.emplace(*RenderScene::create(scene_));
         search_.emplace(*render_scene_, camera_, 0);
     }
@@ -146,7 +135,7 @@ public:
 
 private:
     Scene scene_;
-    Camera camera_;
+    Camera camera_ = test::square_camera(72);
     std::optional<RenderScene> render_scene_;
     std::optional<PoseSearch> search_;
     std::vector<float> variance_;

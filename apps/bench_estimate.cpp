@@ -252,11 +252,12 @@ Outcome bench_honesty(const EstimateBenchOptions& o, Findings& findings) {
     Progress progress("honesty");
     const auto rows = run_honesty(
         options, o.first_trial, threads, [&](const std::string& step) { progress.show(step); }, stop_flag());
-    say(in_words(rows));
+    if (!rows) return rows.error();
+    say(in_words(*rows));
     int beyond = 0;
-    for (const HonestyRow& row : rows) beyond += row.beyond;
+    for (const HonestyRow& row : *rows) beyond += row.beyond;
     if (beyond > 0) findings.faults.push_back(fmt::format("honesty: {} good answers beyond 6 sigma", beyond));
-    return to_json(rows);
+    return to_json(*rows);
 }
 
 Outcome bench_cold(const EstimateBenchOptions& o, Findings& findings) {
@@ -382,9 +383,10 @@ Command add_bench_estimate(Parser bench_command) {
         .range(32, 10'000)
         .shows_default();
     const auto targets = honesty_targets();
-    c.option("--targets", o->honesty.targets, fmt::format("honesty: {} (default: all)", fmt::join(targets, ", ")))
+    c.option("--targets", o->honesty.targets,
+             fmt::format("honesty: {} (default: all of these), or scene files (.toml), whose first body it is",
+                         fmt::join(targets, ", ")))
         .comma_separated()
-        .one_of({targets.begin(), targets.end()})
         .type_name("LIST");
     c.option("--conditions", o->honesty.conditions,
              fmt::format("honesty: {} (default: all)", fmt::join(kHonestyConditions, ", ")))

@@ -12,13 +12,14 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pose/pnp.h"
+#include "estimator/search/template_matcher.h"
 #include "renderer/camera/detector.h"
 #include "renderer/projection/distortion.h"
 
 namespace narpa {
 namespace {
 
-constexpr double kRadius_m = 2;  ///< of the targets, about
+constexpr double kRadius_m = 2;  ///< of the targets made in code, about
 constexpr RangeNoise kRangeNoise{0.02, 5.1e-5};
 
 /// An answer beside the truth.
@@ -83,9 +84,12 @@ struct KnownTarget {
     std::unique_ptr<DenseAlignment> dense;
     std::unique_ptr<FeatureAlignment> features;
     std::unique_ptr<CloudIcp> icp;
+    double radius_m;
 
     KnownTarget(Scene s, const ModelUncertainty& told)
-        : scene(std::move(s)), render_scene(*RenderScene::create(scene)) {
+        : scene(std::move(s)),
+          render_scene(*RenderScene::create(scene)),
+          radius_m(scene.file.empty() ? kRadius_m : apparent_radius_m(render_scene.tracer(), 0)) {
         FeatureSettings f;
         f.model = told;
         dense = std::make_unique<DenseAlignment>(render_scene, camera(), 0);
@@ -96,12 +100,24 @@ struct KnownTarget {
     [[nodiscard]] const Camera& camera() const { return scene.cameras.front(); }
 };
 
+using Targets = std::vector<std::unique_ptr<KnownTarget>>;
+
+Result<Targets> known_targets(const HonestyOptions& o) {
+    Targets targets;
+    std::vector<std::string> names = o.targets;
+    if (names.empty())
+        for (const std::string_view name : honesty_targets()) names.emplace_back(name);
+    for (const std::string& name : names) {
+        auto scene = honesty_scene(name, o.size);
+        if (!scene) return scene.error();
+        targets.push_back(std::make_unique<KnownTarget>(*std::move(scene), o.told));
+    }
+    return targets;
+}
+
 class Campaign {
 public:
-    explicit Campaign(const HonestyOptions& o) : o_(o) {
-        for (const std::string_view name : honesty_targets())
-            if (o.targets.empty() || std::ranges::find(o.targets, name) != o.targets.end())
-                targets_.push_back(std::make_unique<KnownTarget>(*honesty_scene(name, o.size), o.told));
+    Campaign(const HonestyOptions& o, Targets targets) : o_(o), targets_(std::move(targets)) {
         for (const std::string_view c : kHonestyConditions)
             if (o.conditions.empty() || std::ranges::find(o.conditions, c) != o.conditions.end())
                 conditions_.push_back(c);
@@ -115,7 +131,7 @@ public:
         KnownTarget& target = *targets_[d.index(targets_.size())];
         row.condition = conditions_[d.index(conditions_.size())];
         row.target = method == "points" ? "random points" : target.scene.name;
-        const Rigid3 truth = pose(row.condition, method == "icp", d);
+        const Rigid3 truth = pose(target.radius_m, row.condition, method == "icp", d);
         const TrialResult out = method == "points" ? points(row.condition, d)
                                 : method == "icp"  ? sweep(target, row.condition, truth, d)
                                                    : frame(target, method, row.condition, truth, d);
@@ -131,8 +147,8 @@ public:
 
 private:
     /// Looks at the target nearly, from 3 to 10 radii; `beside`: half of it is out of the picture.
-    [[nodiscard]] Rigid3 pose(std::string_view condition, bool lidar, Draw& d) const {
-        const double range_m = condition == "far" ? d.uniform(15, 40) * kRadius_m : d.uniform(3, 8) * kRadius_m;
+    [[nodiscard]] Rigid3 pose(double radius_m, std::string_view condition, bool lidar, Draw& d) const {
+        const double range_m = condition == "far" ? d.uniform(15, 40) * radius_m : d.uniform(3, 8) * radius_m;
         const double half_view = 0.5 / 1.6;
         double right = d.uniform(-0.05, 0.05), down = d.uniform(-0.05, 0.05);
         if (condition == "beside") right += half_view;
@@ -269,7 +285,7 @@ private:
     }
 
     const HonestyOptions& o_;
-    std::vector<std::unique_ptr<KnownTarget>> targets_;
+    Targets targets_;
     std::vector<std::string_view> conditions_;
     PnpSolver solver_{64};
     Rigid3 points_truth_{};
@@ -287,9 +303,12 @@ void HonestyRow::add(const HonestyRow& other) {
     beyond_trials.insert(beyond_trials.end(), other.beyond_trials.begin(), other.beyond_trials.end());
 }
 
-std::vector<HonestyRow> run_honesty(const HonestyOptions& o, int first, TracingThreads& threads,
-                                    const std::function<void(const std::string&)>& progress, const StopFlag& stop) {
-    Campaign campaign(o);
+Result<std::vector<HonestyRow>> run_honesty(const HonestyOptions& o, int first, TracingThreads& threads,
+                                            const std::function<void(const std::string&)>& progress,
+                                            const StopFlag& stop) {
+    auto targets = known_targets(o);
+    if (!targets) return targets.error();
+    Campaign campaign(o, *std::move(targets));
     std::map<std::array<std::string, 3>, HonestyRow> rows;
     for (const std::string& method : o.methods)
         for (int k = first; k < first + o.trials && !stop; ++k) {

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/result.h"
 #include "base/stop.h"
 #include "emulator/threads.h"
 #include "estimator/pose/model_uncertainty.h"
@@ -24,7 +25,7 @@ inline constexpr std::array<std::string_view, 7> kHonestyConditions{"plain",  "b
 
 struct HonestyOptions {
     std::vector<std::string> methods{kHonestyMethods.begin(), kHonestyMethods.end()};
-    std::vector<std::string> targets;         ///< empty: all of honesty_scenes.h
+    std::vector<std::string> targets;         ///< as in honesty_scenes.h; empty: all that are made in code
     std::vector<std::string> conditions;      ///< empty: all
     int trials = 200;                         ///< of each method
     int size = 96;                            ///< pixels of the camera
@@ -48,10 +49,11 @@ struct HonestyRow {
 };
 
 /// One for each method, target and condition that was drawn. `first`: number of the first trial; a trial depends on
-/// its number and the seed alone.
-[[nodiscard]] std::vector<HonestyRow> run_honesty(const HonestyOptions& options, int first, TracingThreads& threads,
-                                                  const std::function<void(const std::string&)>& progress,
-                                                  const StopFlag& stop);
+/// its number, the seed and the options alone. Errors: a target that is none.
+[[nodiscard]] Result<std::vector<HonestyRow>> run_honesty(const HonestyOptions& options, int first,
+                                                          TracingThreads& threads,
+                                                          const std::function<void(const std::string&)>& progress,
+                                                          const StopFlag& stop);
 
 [[nodiscard]] nlohmann::json to_json(const std::vector<HonestyRow>& rows);
 /// Tables by method, by method and target, and by method and condition.

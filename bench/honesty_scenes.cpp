@@ -6,6 +6,8 @@
 #include <random>
 #include <utility>
 
+#include "renderer/scene/scene_file.h"
+
 namespace narpa {
 namespace {
 
@@ -138,15 +140,7 @@ constexpr std::array<HonestyShape, 8> kShapes{{
      }},
 }};
 
-}  // namespace
-
-std::vector<std::string_view> honesty_targets() {
-    std::vector<std::string_view> names;
-    for (const HonestyShape& t : kShapes) names.push_back(t.name);
-    return names;
-}
-
-Result<Scene> honesty_scene(std::string_view target, int size) {
+Result<Scene> scene_of_shape(std::string_view target) {
     for (const HonestyShape& t : kShapes) {
         if (t.name != target) continue;
         Scene s;
@@ -164,25 +158,50 @@ Result<Scene> honesty_scene(std::string_view target, int size) {
         body.name = target;
         body.shape = 0;
         s.bodies.push_back(std::move(body));
-        Camera c;
-        c.name = "camera";
-        c.width = c.height = size;
-        c.fx = c.fy = 1.6 * size;
-        c.cx = c.cy = 0.5 * (size - 1);
-        c.format = PixelFormat::y16;
-        c.detector = Detector{.exposure_s = 3e-5,
-                              .pixel_pitch_m = 5e-6,
-                              .f_number = 4,
-                              .quantum_efficiency = 0.5,
-                              .full_well_e = 20000,
-                              .read_noise_e = 12,
-                              .shot_noise = true,
-                              .black_level_dn = 32,
-                              .bits = 12};
-        s.cameras.push_back(std::move(c));
         return s;
     }
-    return Error{"no target named \"" + std::string(target) + "\""};
+    return Error{"no target named \"" + std::string(target) +
+                 "\", expected one of the names or a scene file (.toml)"};
+}
+
+Result<Scene> scene_of_file(const std::string& file) {
+    auto s = read_scene(file);
+    if (!s) return s;
+    if (s->bodies.empty()) return Error{"has no body, expected a target", file};
+    s->bodies.resize(1);
+    s->lights.clear();
+    s->lidars.clear();
+    return s;
+}
+
+}  // namespace
+
+std::vector<std::string_view> honesty_targets() {
+    std::vector<std::string_view> names;
+    for (const HonestyShape& t : kShapes) names.push_back(t.name);
+    return names;
+}
+
+Result<Scene> honesty_scene(std::string_view target, int size) {
+    Result<Scene> s = target.ends_with(".toml") ? scene_of_file(std::string(target)) : scene_of_shape(target);
+    if (!s) return s;
+    Camera c;
+    c.name = "camera";
+    c.width = c.height = size;
+    c.fx = c.fy = 1.6 * size;
+    c.cx = c.cy = 0.5 * (size - 1);
+    c.format = PixelFormat::y16;
+    c.detector = Detector{.exposure_s = 3e-5,
+                          .pixel_pitch_m = 5e-6,
+                          .f_number = 4,
+                          .quantum_efficiency = 0.5,
+                          .full_well_e = 20000,
+                          .read_noise_e = 12,
+                          .shot_noise = true,
+                          .black_level_dn = 32,
+                          .bits = 12};
+    s->cameras = {std::move(c)};
+    return s;
 }
 
 }  // namespace narpa

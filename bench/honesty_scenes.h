@@ -13,8 +13,10 @@ namespace narpa {
 /// Names of the targets: boxes of several shapes, an n-gonal prism, smooth and rough bodies.
 [[nodiscard]] std::vector<std::string_view> honesty_targets();
 
-/// One body of about 2 m radius about its origin, lit by the Sun and a little light from everywhere; a grey camera
-/// of 12 bits, square, at the world's origin. `size`: its pixels. Errors: no target of this name.
+/// One body, lit by the Sun and a little light from everywhere; a grey camera of 12 bits, square, at the world's
+/// origin. `size`: its pixels. `target`: one of these names, a body of about 2 m radius about its origin; or a
+/// scene file (.toml), whose first body and light it takes. Errors: no target of this name, or a file that has
+/// none.
 [[nodiscard]] Result<Scene> honesty_scene(std::string_view target, int size);
 
 }  // namespace narpa

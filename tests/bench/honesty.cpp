@@ -11,8 +11,10 @@ namespace {
 std::vector<HonestyRow> run(const HonestyOptions& o, int first) {
     static TracingThreads threads(0);
     const StopFlag stop{};
-    return run_honesty(
+    auto rows = run_honesty(
         o, first, threads, [](const std::string&) {}, stop);
+    EXPECT_TRUE(rows) << rows.error().what;
+    return *std::move(rows);
 }
 
 /// Trials whose good answers were beyond 6 sigma: valleys in which steps ended early, frames blurred by what the
@@ -38,6 +40,33 @@ TEST(Honesty, FewTrialsOfEach) {
             good += row.answers[0];
         }
         EXPECT_GE(good, std::string_view(method) == "features" ? 0 : trials / 10) << method;
+    }
+}
+
+TEST(Honesty, ATargetFromASceneFile) {
+    HonestyOptions o;
+    o.methods = {"icp"};
+    o.conditions = {"plain"};
+    o.targets = {NARPA_BUILD_DIR "/scenes/docking/docking.toml"};
+    o.trials = 5;
+    const auto rows = run(o, 0);
+    ASSERT_EQ(rows.size(), 1);
+    EXPECT_EQ(rows.front().target, "docking");
+    EXPECT_GE(rows.front().answers[0], 1);
+    EXPECT_EQ(rows.front().beyond, 0);
+}
+
+TEST(Honesty, ATargetThatIsNone) {
+    static TracingThreads threads(0);
+    const StopFlag stop{};
+    HonestyOptions o;
+    for (const auto& [name, what] :
+         {std::pair{"teapot", "expected one of the names"}, {"teapot.toml", "no such file"}}) {
+        o.targets = {name};
+        const auto rows = run_honesty(
+            o, 0, threads, [](const std::string&) {}, stop);
+        ASSERT_FALSE(rows);
+        EXPECT_NE(rows.error().what.find(what), std::string::npos) << rows.error().what;
     }
 }
 

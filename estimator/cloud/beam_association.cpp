@@ -16,6 +16,9 @@ constexpr double kGrazingCosine = 0.05;
 /// another surface: steps that are as small in the mean of a footprint's range as this do no harm to a thousand
 /// points.
 constexpr double kOnPlane = 0.1;
+/// Another surface: of a normal that is turned by more than the angle of this cosine; a point lies on it within so
+/// many standard deviations.
+constexpr double kOtherSurface = 0.87, kOnOther = 3;
 /// The rim that is searched for edges, in parts of the footprint's radius.
 constexpr double kWider = 1.1;
 
@@ -171,22 +174,27 @@ std::uint32_t BeamAssociation::meeting_edges(const RayBatch& axes, const HitBatc
     return edges;
 }
 
+Vec3 BeamAssociation::trace_around(const Rigid3& T, const Beam& beam, double radius_m, HitBatch& hits) const {
+    const Ray axis = in_target(T, beam);
+    const Vec3 point = axis.origin + beam.range_m * axis.direction;
+    const Vec3& d = axis.direction;
+    const Vec3 across = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
+    const Vec3 other = cross(d, across);
+    RayBatch rays;
+    rays.n = kLanes;
+    for (std::size_t k = 0; k < kLanes; ++k) {
+        const auto& [u, v] = disc()[k];
+        rays.put(k, {axis.origin, normalized(point + radius_m * (u * across + v * other) - axis.origin)});
+    }
+    tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
+    return point;
+}
+
 void BeamAssociation::around_beams(const Rigid3& T, double search_m, std::size_t stride,
                                    std::vector<PointToPlane>& out) const {
-    RayBatch rays;
     HitBatch hits;
-    rays.n = kLanes;
     for (std::size_t i = 0; i < beams_.size(); i += stride) {
-        const Ray beam = in_target(T, beams_[i]);
-        const Vec3 point = beam.origin + beams_[i].range_m * beam.direction;
-        const Vec3& d = beam.direction;
-        const Vec3 across = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
-        const Vec3 other = cross(d, across);
-        for (std::size_t k = 0; k < kLanes; ++k) {
-            const auto& [u, v] = disc()[k];
-            rays.put(k, {beam.origin, normalized(point + search_m * (u * across + v * other) - beam.origin)});
-        }
-        tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
+        const Vec3 point = trace_around(T, beams_[i], search_m, hits);
         PointToPlane& p = out.emplace_back();
         double nearest = std::numeric_limits<double>::infinity();
         for_each_lane(hits.met, [&](std::size_t lane) {
@@ -204,6 +212,22 @@ void BeamAssociation::around_beams(const Rigid3& T, double search_m, std::size_t
             p.normal = (point - p.surface_m) / p.distance_m;
         }
     }
+}
+
+bool BeamAssociation::may_lie_elsewhere(const Rigid3& T, const RangeNoise& noise, double radius_m, std::size_t i,
+                                        const PointToPlane& p) const {
+    const Beam& beam = beams_[i];
+    const Vec3 direction = conjugate(T.q) * beam.direction;
+    HitBatch hits;
+    const Vec3 point = trace_around(T, beam, radius_m, hits);
+    bool elsewhere = false;
+    for_each_lane(hits.met, [&](std::size_t lane) {
+        const Vec3 normal = hits.geometric_normal[lane];
+        const double cosine = std::abs(dot(normal, direction));
+        if (dot(normal, p.normal) > kOtherSurface || cosine < kGrazingCosine) return;
+        elsewhere |= std::abs(dot(normal, point - hits.position[lane])) < kOnOther * noise.range_m * cosine;
+    });
+    return elsewhere;
 }
 
 Vector6 BeamAssociation::derivative(const Rigid3& T, std::size_t i, const PointToPlane& p) const {

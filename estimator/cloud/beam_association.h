@@ -52,6 +52,12 @@ public:
     /// call. Without a footprint there are none.
     void find_edges(const Rigid3& T_lidar_target, const RangeNoise& noise);
 
+    /// The point may as well lie on another surface that ends next to its beam: one that rays within `radius_m` of
+    /// it meet, turned by more than 30 degrees, and within three standard deviations of the point. `p`: of
+    /// associate() for point `i`.
+    [[nodiscard]] bool may_lie_elsewhere(const Rigid3& T_lidar_target, const RangeNoise& noise, double radius_m,
+                                         std::size_t i, const PointToPlane& p) const;
+
     /// The derivative of distance_m with an error of the pose (pose_estimate.h), for point `i` of the sweep.
     [[nodiscard]] Vector6 derivative(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const;
 
@@ -73,6 +79,8 @@ private:
     [[nodiscard]] std::uint32_t meeting_edges(const RayBatch& axes, const HitBatch& met,
                                               const RangeNoise& noise) const;
     void around_beams(const Rigid3& T, double search_m, std::size_t stride, std::vector<PointToPlane>& out) const;
+    /// Sixteen rays within `radius_m` of the beam at the point, the first through it. Returns the point.
+    Vec3 trace_around(const Rigid3& T, const Beam& beam, double radius_m, HitBatch& hits) const;
 
     const Tracer& tracer_;
     BodyPoses at_rest_;  ///< target coordinates are the tracer's world

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -29,6 +30,10 @@ constexpr double kWeak = 0.01, kFewElsewhere = 0.02;
 constexpr double kBetter = 0.5;
 /// Of a search about a minimum at which points lie beside the model, in parts of the points' spread.
 constexpr double kBesideCircle = 0.15;
+/// Other surfaces are looked for so near to a beam, in standard deviations of the range.
+constexpr double kElsewhere_sigmas = 2;
+/// An answer further from the start, in parts of the search, was not looked for: a symmetry led there.
+constexpr double kSearched = 1.5;
 
 /// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
 struct Biweight {
@@ -53,6 +58,23 @@ bool share_is_more(std::size_t found, std::size_t n, double least) {
         sum += term;
     }
     return sum < 0.05;
+}
+
+/// At most, of surfaces within `reach_m` of the target's origin.
+double surface_motion_m(const Vector6& pose_step, double reach_m) {
+    return pose_step.tail<3>().norm() + pose_step.head<3>().norm() * reach_m;
+}
+
+/// Along some observed motion more than so much of the information of `all` is not that of `some`.
+bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& some) {
+    constexpr double kMost = 0.75;
+    const int from = all.observability.unobserved;
+    if (from == 6 || some.observability.unobserved > from) return from < 6;
+    const auto motions = all.observability.motions.rightCols(6 - from);
+    const Eigen::MatrixXd left = motions.transpose() * some.information * motions,
+                          whole = motions.transpose() * all.information * motions;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(left, whole, Eigen::EigenvaluesOnly);
+    return !(eigen.eigenvalues()[0] > 1 - kMost);
 }
 
 Status check(std::span<const RangePoint> points) {
@@ -116,10 +138,40 @@ PoseShifts CloudIcp::shifts(const Rigid3& T, const Pass& pass, const Observabili
     return joined(pose_shifts(u, T, motion_), of_ranges);
 }
 
+/// Covariance, bound and root of the information. `information`: what the answer may rest on.
+void CloudIcp::weigh(const Pass& pass, const Matrix6& information, CloudEstimate& out) const {
+    const double factor = variance_factor(pass, out.used);
+    const Observability& o = out.observability;
+    const PoseShifts by_model = shifts(out.T_lidar_target, pass, o);
+    const Matrix6 of_model = by_model * by_model.transpose();
+    out.bound = o.covariance(pass.information, 1) + of_model;
+    out.covariance = o.covariance(information, factor) + of_model;
+    out.root_information = root_information_with(o.root_information(information, factor), by_model);
+}
+
+/// The answer may rest only on points that others check; nor may it rest on points that may lie on another surface.
+void CloudIcp::verify(CloudEstimate& out) {
+    const Rigid3& T = out.T_lidar_target;
+    association_.find_edges(T, settings_.noise);
+    const Pass pass = linearise(T, 0, 1, out);
+    if (!pass.enough) return;
+    CheckedInformation checked = checked_information(rows_, pass.spread, kUnobservedBelow);
+    const double radius_m = kElsewhere_sigmas * settings_.noise.range_m;
+    for (WeightedRow& row : rows_)
+        row.checked = !association_.may_lie_elsewhere(T, settings_.noise, radius_m, row.measurement,
+                                                      planes_[row.measurement]);
+    const CheckedInformation on_one = checked_information(rows_, pass.spread, kUnobservedBelow);
+    if (rests_on_the_rest(checked, on_one)) checked = on_one;
+    out.unchecked = checked.unchecked;
+    out.observability = checked.observability;
+    weigh(pass, checked.information, out);
+}
+
 CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
     association_.associate(T, settings_.noise, search_m, stride, planes_);
     Pass pass;
     magnitudes_.clear();
+    rows_.clear();
     for (const PointToPlane& p : planes_)
         if (p.fate == BeamFate::met) magnitudes_.push_back(std::abs(p.distance_m) / p.sigma_m);
     out.points = planes_.size();
@@ -148,6 +200,7 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
         ++out.used;
         const Vector6 J = association_.derivative(T, k * stride, p) / p.sigma_m;
         const Matrix6 JJ = J * J.transpose();
+        rows_.push_back({J, robust.weight, k});
         pass.hessian += robust.weight * JJ;
         pass.gradient -= robust.weight * e * J;
         pass.information += JJ;
@@ -188,7 +241,8 @@ Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points
 
 CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_t points, int circles) {
     CloudEstimate out;
-    Rigid3 T = search_m > 0 ? search(start, search_m, points, circles, out) : start;
+    Rigid3& T = out.T_lidar_target;
+    T = search_m > 0 ? search(start, search_m, points, circles, out) : start;
     Vector6 last = Vector6::Zero();
     double damping = 1, moved_m = 0;  // since edges were found
     for (int i = 0;; ++i) {
@@ -200,13 +254,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         const Pass pass = linearise(T, 0, 1, out);
         if (!pass.enough) break;
         if (out.settled || i == settings_.iterations) {
-            const double factor = variance_factor(pass, out.used);
-            const PoseShifts by_model = shifts(T, pass, out.observability);
-            const Matrix6 of_model = by_model * by_model.transpose();
-            out.bound = out.observability.covariance(pass.information, 1) + of_model;
-            out.covariance = out.observability.covariance(pass.information, factor) + of_model;
-            out.root_information =
-                root_information_with(out.observability.root_information(pass.information, factor), by_model);
+            weigh(pass, pass.information, out);
             break;
         }
         Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
@@ -214,12 +262,11 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         if (step.dot(pass.hessian * last) < 0) damping *= 0.5;
         step *= damping;
         T = displaced(T, step);
-        moved_m += step.tail<3>().norm() + step.head<3>().norm() * association_.reach_m();
+        moved_m += surface_motion_m(step, association_.reach_m());
         ++out.iterations;
         out.settled = step.dot(pass.hessian * step) < std::pow(settings_.settled * pass.scatter, 2);
         last = step;
     }
-    out.T_lidar_target = T;
     out.on_model = share_is_more(out.explained, out.points - out.edges, settings_.explained_least);
     return out;
 }
@@ -277,13 +324,17 @@ void CloudIcp::compete(CloudEstimate& found, double search_m) {
         }
 }
 
-Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start) const {
+Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double search_m) const {
     Fit fit;
     compare_with_guess(e.T_lidar_target, start, fit);
+    const double moved_m = surface_motion_m(fit.moved, association_.reach_m());
     if (!e.settled)
         fit.failed = fmt::format("still moving after {} iterations", e.iterations);
     else if (!e.on_model)
         fit.failed = fmt::format("{} of {} points lie on the model", e.explained, e.points - e.edges);
+    else if (search_m > 0 && e.observability.unobserved == 0 && moved_m > kSearched * search_m)
+        fit.failed =
+            fmt::format("surfaces are {:.3g} m from the guess, expected at most {:.3g} m", moved_m, search_m);
     fit.observability = e.observability;
     fit.root_information = e.root_information;
     fit.rivals = e.rivals;
@@ -300,6 +351,7 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
     motion_ = motion;
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
+    rows_.reserve(points.size());
 
     CloudEstimate out = attempt(start, search_m, kSearchPoints, kSearchIterations);
     if (search_m > 0 && !(out.settled && out.on_model)) {
@@ -314,7 +366,8 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
                              " beams meet the target where it is taken to be, expected at least " +
                              std::to_string(kFewestBeams),
                      .kind = ErrorKind::failed};
-    out.answer = answer_of(out, start);
+    verify(out);
+    out.answer = answer_of(out, start, search_m);
     return out;
 }
 

@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "estimator/cloud/beam_association.h"
 #include "estimator/pose/answer.h"
+#include "estimator/pose/leverage.h"
 #include "estimator/pose/model_uncertainty.h"
 
 namespace narpa {
@@ -46,6 +47,10 @@ struct CloudEstimate {
     Answer answer;
     /// The first is the sum of the others.
     std::size_t points = 0, used = 0, missed = 0, edges = 0, grazing = 0, rejected = 0;
+    /// Of the points used: they count for the pose, not for what it is worth. They hold a motion alone, or two of
+    /// them, so that an error would not show (leverage.h); or a motion rests on points that may lie on another
+    /// surface, which begins within two standard deviations of the range.
+    int unchecked = 0;
     /// Points within four standard deviations of the noise from the model.
     std::size_t explained = 0;
     /// Minus the logarithm of the likelihood, of normal noise and outliers beyond four standard deviations: half
@@ -61,7 +66,8 @@ public:
         : settings_(settings), association_(tracer, target) {}
 
     /// `search_m`: bound of the error of surfaces at the start, about distance * angle + shift; 0: no search around
-    /// the beams. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
+    /// the beams. An answer that is observed in all motions and further from the start than 1.5 times that is
+    /// refused. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
     /// search that is not finite, or fewer than six beams that meet the model. Allocates only for more points than
     /// ever before, or an Error.
     [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const ApparentMotion& motion,
@@ -69,9 +75,11 @@ public:
 
 private:
     struct Pass;  ///< sums over the points at one pose
-    [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start) const;
+    [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start, double search_m) const;
     [[nodiscard]] PoseShifts shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const;
     [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
+    void weigh(const Pass& pass, const Matrix6& information, CloudEstimate& out) const;
+    void verify(CloudEstimate& out);
     [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
     [[nodiscard]] double edges_hold_m() const;
@@ -85,6 +93,7 @@ private:
     BeamAssociation association_;
     ApparentMotion motion_{};  ///< of the sweep
     std::vector<PointToPlane> planes_;
+    std::vector<WeightedRow> rows_;  ///< of the points used
     std::vector<double> magnitudes_;
 };
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "estimator/dense/level_solver.h"
 
@@ -19,6 +20,33 @@ namespace {
 constexpr double kAgree = 25;
 /// The coarsest level shows the target no smaller than this.
 constexpr double kLeastExtent_px = 16;
+
+/// Where the weakest motion's standard deviation is larger than this part of the largest that counts as observed,
+/// the image may not be linear over it. The loss rises by at least this part of what a linear image's would, at so
+/// many standard deviations.
+constexpr double kSurelyLinear = 0.2, kRise_sigmas = 4, kLeastRise = 0.5;
+/// Other minima are looked for so many standard deviations away.
+constexpr double kAside_sigmas = 8;
+
+/// One standard deviation of the motion that the image holds least.
+Vector6 weakest_motion(const DenseEstimate& e) {
+    const Observability o = observability_of(e.covariance, norm(e.T_camera_body.t));
+    return o.motions.col(0) / std::sqrt(o.eigenvalues[0]);
+}
+
+bool is_weak(const DenseEstimate& e) {
+    const Vector6 motion = weakest_motion(e);
+    return std::max(motion.head<3>().norm() / kMostRotation_rad,
+                    motion.tail<3>().norm() / (kMostTranslation * norm(e.T_camera_body.t))) > kSurelyLinear;
+}
+
+/// Turns a plane with this normal about its intersection with the image's so that it is tilted to the other side of
+/// the line of sight.
+Quat other_tilt(const Vec3& normal, const Vec3& position_m) {
+    const Vec3 axis = cross(normal, -normalized(position_m));
+    const double sine = norm(axis);
+    return sine > 1e-9 ? exp_rotation(2 * std::asin(std::min(1.0, sine)) / sine * axis) : Quat{};
+}
 
 std::size_t level_number(int factor) {
     return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)));
@@ -90,6 +118,8 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
     Fit fit;
     if (e.status == DenseStatus::converged && options.rivals > 0)
         compete(frame, at, T_camera_body_guess, options, frame_variance, e, fit);
+    if (e.status == DenseStatus::converged && options.rivals > 0 && fit.failed.empty() && is_weak(e))
+        examine(frame, at, options, frame_variance, e, fit);
     if (e.status == DenseStatus::converged) {
         observe(e.T_camera_body, e.covariance, fit);
         compare_with_guess(e.T_camera_body, T_camera_body_guess, fit);
@@ -155,6 +185,41 @@ void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, co
         return;
     }
     fit.failed = "no second start leads to the same pose";
+}
+
+/// What the covariance of a weak motion leaves out: other minima along it, or where a flat face is tilted to the
+/// other side of the line of sight; and an image that is linear in the pose over less than a few standard
+/// deviations.
+void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
+                             std::span<const float> frame_variance, DenseEstimate& e, Fit& fit) {
+    const Camera camera = coarser_camera(camera_, options.finest);
+    const auto view_of_answer = [&]() -> LevelView& {
+        const auto window = window_about(render_scene_.tracer(), camera, target_, e.T_camera_body);
+        return level(options.finest, camera, *window, at, options, frame, frame_variance);
+    };
+    const Vector6 aside = kAside_sigmas * weakest_motion(e);
+    std::vector<Rigid3> starts{displaced(e.T_camera_body, aside), displaced(e.T_camera_body, -aside)};
+    LevelView& view = view_of_answer();
+    LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).examine();
+    if (const auto face = view.flat_face())
+        starts.push_back({other_tilt(*face, e.T_camera_body.t) * e.T_camera_body.q, e.T_camera_body.t});
+    DenseOptions from_near = options;
+    from_near.coarsest = std::min(options.coarsest, 2 * options.finest);
+    for (const Rigid3& start : starts) {
+        DenseEstimate other = descend(frame, at, start, from_near, frame_variance, options.finest);
+        e.renders += other.renders;
+        if (other.status != DenseStatus::converged) continue;
+        other.renders = e.renders;
+        if (other.excess_loss < e.excess_loss) std::swap(e, other);
+        const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
+        const double worse = other.excess_loss - e.excess_loss;
+        if (normalised_error_squared(apart, e.covariance) > kElsewhere && worse < kAsLikely)
+            fit.rivals.push_back({other.T_camera_body, worse});
+    }
+    LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
+    solver.examine();
+    if (!(solver.rise(kRise_sigmas) > kLeastRise))
+        fit.failed = fmt::format("the image is not linear in the pose over {:g} standard deviations", kRise_sigmas);
 }
 
 DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,

@@ -114,6 +114,8 @@ private:
     [[nodiscard]] bool has_independent_noise() const;
     void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
+    void examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
+                 std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
                      const DenseOptions& options, const MeasuredImage& frame,
                      std::span<const float> frame_variance);

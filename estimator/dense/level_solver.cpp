@@ -182,6 +182,27 @@ void LevelSolver::finish() {
         e_.status = DenseStatus::does_not_fit;
 }
 
+void LevelSolver::examine() {
+    rays_ *= kPolishRays;
+    render(e_.T_camera_body);
+    differentiate(kDerivativeServes_px);
+    linearise();
+}
+
+double LevelSolver::rise(double sigmas) {
+    const Observability o = observability_of(e_.covariance, norm(e_.T_camera_body.t));
+    const Vector6 motion = sigmas / std::sqrt(o.eigenvalues[0]) * o.motions.col(0);
+    const double here = cost(view_.images(), e_.exposure, {}).robust;
+    double least = std::numeric_limits<double>::infinity();
+    for (const double side : {-1.0, 1.0}) {
+        const Eigen::Vector2d step = equations_.exposure_step(side * motion);
+        const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
+        render(displaced(e_.T_camera_body, side * motion));
+        least = std::min(least, cost(view_.images(), exposure, {}).robust - here);
+    }
+    return least / (sigmas * sigmas);
+}
+
 Result<Matrix6> LevelSolver::bound() {
     render(e_.T_camera_body);
     differentiate(0);

@@ -25,6 +25,11 @@ public:
     /// A step from the estimate's pose ends so far from the other; nothing where it does not lead there or most of
     /// the way, or where one of them is beyond the Jacobian's reach.
     [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
+    /// Renders with the last step's rays and linearises at the estimate's pose.
+    void examine();
+    /// After examine(): how the loss rises along the motion that is held least, over what the covariance says; the
+    /// lesser of both sides at this many standard deviations. About one where the image is linear so far.
+    [[nodiscard]] double rise(double sigmas);
     /// DenseAlignment::bound at the estimate.
     Result<Matrix6> bound();
 

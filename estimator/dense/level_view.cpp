@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "base/constants.h"
@@ -172,6 +173,24 @@ void LevelView::add_shading(const Rigid3& T_camera_target, const FrameSettings& 
             with_shading_[i][axis] += change[i] / static_cast<float>(kTurn_rad);
     }
     columns_ = with_shading_;
+}
+
+std::optional<Vec3> LevelView::flat_face() const {
+    constexpr double kSteps = 100;  // of a normal's components
+    std::map<std::array<long, 3>, std::size_t> faces;
+    std::size_t pixels = 0;
+    const Aovs& aovs = view_.aovs();
+    for (std::size_t i = 0; i < aovs.body.size(); ++i) {
+        if (aovs.body[i] != static_cast<int>(target_)) continue;
+        const Vec3& n = aovs.normal[i];
+        ++faces[{std::lround(kSteps * n.x), std::lround(kSteps * n.y), std::lround(kSteps * n.z)}];
+        ++pixels;
+    }
+    const auto largest = std::ranges::max_element(faces, {}, [](const auto& face) { return face.second; });
+    if (largest == faces.end() || 3 * largest->second < pixels) return {};
+    const auto& [x, y, z] = largest->first;
+    return conjugate(view_.T_world_camera().q) *
+           normalized(Vec3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
 }
 
 PhotometricImages LevelView::images() const {

@@ -48,6 +48,8 @@ public:
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
     /// The pose of this frame's latest Jacobian.
     [[nodiscard]] const std::optional<Rigid3>& differentiated_at() const noexcept { return differentiated_at_; }
+    /// Of the latest render's target pixels at least a third have this normal, camera axes: a flat face.
+    [[nodiscard]] std::optional<Vec3> flat_face() const;
     /// The latest of each.
     [[nodiscard]] PhotometricImages images() const;
 

@@ -61,7 +61,7 @@ struct Answer {
 
 /// Standard deviations beyond which a motion counts as unobserved by an image: the image is not linear in the pose
 /// over so much. Translation is a part of the range.
-inline constexpr double kMostRotation_rad = 0.1, kMostTranslation = 0.1;
+inline constexpr double kMostRotation_rad = 0.025, kMostTranslation = 0.025;
 /// Of a pose with this covariance: motions whose standard deviation exceeds the limits are not observed.
 [[nodiscard]] Observability observability_of(const Matrix6& covariance, double range_m);
 /// Fills in what the covariance holds, and how far the pose is from its guess.

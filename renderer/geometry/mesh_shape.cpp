@@ -105,9 +105,8 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
     };
     scene_.reset(rtcNewScene(device));
     const embree::Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                 RTC_FORMAT_FLOAT3, sizeof(Vec3f),
-                                                                 mesh_.positions.size() + 1));
+    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(
+        geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh_.positions.size() + 1));
     auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 3 * sizeof(std::uint32_t), std::max<std::size_t>(1, mesh_.faces.size())));

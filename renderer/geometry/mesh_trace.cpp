@@ -49,9 +49,12 @@ using Four [[gnu::vector_size(16)]] = float;
                 std::memcpy(&v, &vertices[faces[i + lane][k]], sizeof v);
                 return v;
             };
-            const auto store = [&](std::size_t axis, Four v) { std::memcpy(&out.at[3 * k + axis][i], &v, sizeof v); };
+            const auto store = [&](std::size_t axis, Four v) {
+                std::memcpy(&out.at[3 * k + axis][i], &v, sizeof v);
+            };
             const Four a = load(0), b = load(1), c = load(2), d = load(3);
-            const Four ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+            const Four ab = __builtin_shufflevector(a, b, 0, 4, 1, 5),
+                       cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
             const Four ab_z = __builtin_shufflevector(a, b, 2, 6, 3, 7),
                        cd_z = __builtin_shufflevector(c, d, 2, 6, 3, 7);
             store(0, __builtin_shufflevector(ab, cd, 0, 1, 4, 5));

@@ -86,31 +86,40 @@ void LidarUnit::over_spans(std::int64_t start_ns, std::int64_t span_ns, const Wo
     }
 }
 
-Ray LidarUnit::beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) noexcept {
-    const double time = static_cast<double>(start_ns + shot.t_offset_ns - span.begin_ns) /
-                        static_cast<double>(std::max<std::int64_t>(1, span.end_ns - span.begin_ns));
-    return {shot.origin_m, shot.direction, time};
+void LidarUnit::put_beam(std::size_t shot, std::int64_t start_ns, const Span& span, RayBatch& beams) noexcept {
+    const LidarShot& s = shots_[shot];
+    const std::size_t i = beams.n++;
+    beams.origin.put(i, s.origin_m);
+    beams.direction.put(i, s.direction);
+    beams.time[i] = static_cast<double>(start_ns + s.t_offset_ns - span.begin_ns);
+}
+
+void LidarUnit::place(const Span& span, RayBatch& beams) noexcept {
+    const auto span_ns = static_cast<double>(std::max<std::int64_t>(1, span.end_ns - span.begin_ns));
+    for (double& time : beams.time) time /= span_ns;
+    place_beams(placement_, lidar_.mount, lidar_.T_mount_lidar, beams);
 }
 
 void LidarUnit::trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcept {
     const bool velocity = spec().measures_velocity;
     const auto first_number = static_cast<std::uint64_t>(packet) * shots_.size();
+    std::ranges::fill(echoes_, LidarEchoes{});
     over_spans(start_ns, velocity ? kVelocitySpan_ns : kSpan_ns, [&](const Span& span) {
+        Lanes<LidarEchoes> echoes;
         const bool by_laser = span.n == by_laser_.size();
         for (std::size_t done = 0; done < span.n;) {
             Lanes<std::size_t> shot;
             RayBatch beams;
-            for (; beams.n < kLanes && done + beams.n < span.n; ++beams.n) {
+            while (beams.n < kLanes && done + beams.n < span.n) {
                 const std::size_t next = span.first + done + beams.n;
                 shot[beams.n] = by_laser ? by_laser_[next] : next;
-                beams.put(beams.n, beam(shots_[shot[beams.n]], start_ns, span));
+                put_beam(shot[beams.n], start_ns, span, beams);
             }
-            place_beams(placement_, lidar_.mount, lidar_.T_mount_lidar, beams);
-            Lanes<LidarEchoes> echoes;
-            receiver_.receive(placement_, beams, first_number + span.first + done,
-                              velocity ? std::span<const Motion>(motions_) : std::span<const Motion>(),
-                              std::span(echoes).first(beams.n));
-            for (std::size_t i = 0; i < beams.n; ++i) echoes_[shot[i]] = echoes[i];
+            place(span, beams);
+            const std::uint32_t possible =
+                receiver_.receive(placement_, beams, first_number + span.first + done,
+                                  velocity ? std::span<const Motion>(motions_) : std::span<const Motion>(), echoes);
+            for_each_lane(possible, [&](std::size_t i) { echoes_[shot[i]] = echoes[i]; });
             done += beams.n;
         }
     });
@@ -125,9 +134,8 @@ void LidarUnit::trace_truth(std::int64_t start_ns) noexcept {
     over_spans(start_ns, kVelocitySpan_ns, [&](const Span& span) {
         for (std::size_t first = span.first, end = first + span.n; first < end;) {
             RayBatch beams;
-            for (; beams.n < kLanes && first + beams.n < end; ++beams.n)
-                beams.put(beams.n, beam(shots_[first + beams.n], start_ns, span));
-            place_beams(placement_, lidar_.mount, lidar_.T_mount_lidar, beams);
+            while (beams.n < kLanes && first + beams.n < end) put_beam(first + beams.n, start_ns, span, beams);
+            place(span, beams);
             shoot(world_.tracer(), placement_, beams, settings, std::span(truth_).subspan(first, beams.n));
             first += beams.n;
         }

@@ -59,8 +59,10 @@ private:
     /// Calls `work(Span)` for the packet's shots; longer spans have no velocities.
     template <class Work>
     void over_spans(std::int64_t start_ns, std::int64_t span_ns, const Work& work) noexcept;
-    /// In the LiDAR's axes.
-    [[nodiscard]] static Ray beam(const LidarShot& shot, std::int64_t start_ns, const Span& span) noexcept;
+    /// Appends a shot, in the LiDAR's axes and its time in nanoseconds after the span's begin.
+    void put_beam(std::size_t shot, std::int64_t start_ns, const Span& span, RayBatch& beams) noexcept;
+    /// Takes such beams to the world's axes, and their times to parts of the span.
+    void place(const Span& span, RayBatch& beams) noexcept;
     void trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcept;
     void trace_truth(std::int64_t start_ns) noexcept;
 

@@ -221,11 +221,7 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
     PerPixel<float> r, g, b;
     w.centres(t, out.width, out.height, 1, 0,
               [&](const SampleBatch& batch, const CameraBatch&, const BatchRadiance& light) {
-                  for (std::size_t i = 0; i < batch.samples.n; ++i) {
-                      const Rgb l = light(w.f, i);
-                      const std::size_t at = batch.place[i];
-                      r[at] = l.x, g[at] = l.y, b[at] = l.z;
-                  }
+                  put_in_tile(w.f, light, batch.place, batch.samples.n, r, g, b);
               });
     put_pixels(t, r, g, b, out);
 }

@@ -101,21 +101,8 @@ void GBuffer::store(const Frame& f, const CameraBatch& p, const BatchRadiance& l
         store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.sun_only ? p.lit : 0, seen);
     else
         seen = {};
-    // The batches of a whole tile are its blocks of 4 x 4 pixels.
-    const bool block = p.rays.n == kLanes && place[kLanes - 1] == place[0] + kLanes - 1;
-    const auto put = [&](const auto& from, auto& to) {
-        if (block)
-            std::copy(from.begin(), from.end(), to.begin() + place[0]);
-        else
-            for (std::size_t i = 0; i < p.rays.n; ++i) to[place[i]] = from[i];
-    };
-    if (f.sun_only) {
-        put(light.direct.r, tile.r), put(light.direct.g, tile.g), put(light.direct.b, tile.b);
-    } else {
-        RgbLanes whole;
-        for (std::size_t i = 0; i < p.rays.n; ++i) whole.put(i, light(f, i));
-        put(whole.r, tile.r), put(whole.g, tile.g), put(whole.b, tile.b);
-    }
+    const auto put = [&](const auto& from, auto& to) { put_in_tile(from, place, p.rays.n, to); };
+    put_in_tile(f, light, place, p.rays.n, tile.r, tile.g, tile.b);
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
     if (!f.sun_only) put(p.variance, tile.reused);

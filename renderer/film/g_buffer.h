@@ -43,6 +43,23 @@ constexpr std::size_t place_in_tile(int x, int y) noexcept {
 template <class T>
 using PerPixel = std::array<T, kTilePixels>;
 
+/// Stores a batch's values in the places of its pixels. The batches of a whole tile are its blocks of 4 x 4 pixels.
+template <class T>
+void put_in_tile(const Lanes<T>& from, const Lanes<std::uint8_t>& place, std::size_t n, PerPixel<T>& to) noexcept {
+    if (n == kLanes && place[kLanes - 1] == place[0] + kLanes - 1)
+        std::copy(from.begin(), from.end(), to.begin() + place[0]);
+    else
+        for (std::size_t i = 0; i < n; ++i) to[place[i]] = from[i];
+}
+inline void put_in_tile(const Frame& f, const BatchRadiance& light, const Lanes<std::uint8_t>& place, std::size_t n,
+                        PerPixel<float>& r, PerPixel<float>& g, PerPixel<float>& b) noexcept {
+    RgbLanes whole;
+    if (!f.sun_only)
+        for (std::size_t i = 0; i < n; ++i) whole.put(i, light(f, i));
+    const RgbLanes& rgb = f.sun_only ? light.direct : whole;
+    put_in_tile(rgb.r, place, n, r), put_in_tile(rgb.g, place, n, g), put_in_tile(rgb.b, place, n, b);
+}
+
 /// One sample of each pixel of a tile.
 struct alignas(64) GBufferTile {
     PerPixel<float> r, g, b;     ///< radiance

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 #include "renderer/film/camera_batch.h"
@@ -291,17 +292,34 @@ void prefetch_pixels(const Tile& t, const RadianceImage& out) {
             __builtin_prefetch(&out.pixels[index_of(t.x + x, t.y + y, out.width)], 1);
 }
 
+/// Four pixels, band by band, as they lie in an image.
+inline std::array<Rgb, kBlock> interleave(const float* red, const float* green, const float* blue) {
+    using Four [[gnu::vector_size(16)]] = float;
+    static_assert(kBlock == 4 && sizeof(Rgb) == 3 * sizeof(float));
+    Four r, g, b;
+    std::memcpy(&r, red, sizeof r), std::memcpy(&g, green, sizeof g), std::memcpy(&b, blue, sizeof b);
+    const Four low = __builtin_shufflevector(r, g, 0, 4, 1, 5), high = __builtin_shufflevector(r, g, 2, 6, 3, 7);
+    const std::array<Four, 3> mixed{
+        __builtin_shufflevector(low, b, 0, 1, 4, 2),
+        __builtin_shufflevector(__builtin_shufflevector(g, b, 1, 5, 1, 5), high, 0, 1, 4, 5),
+        __builtin_shufflevector(high, b, 6, 2, 3, 7)};
+    return std::bit_cast<std::array<Rgb, kBlock>>(mixed);
+}
+
 /// A tile's pixels, band by band.
 template <class Tile>
 void put_pixels(const Tile& t, const PerPixel<float>& r, const PerPixel<float>& g, const PerPixel<float>& b,
                 RadianceImage& out) {
-    for (int y = 0; y < t.height; ++y) {
-        Rgb* const row = &out.pixels[index_of(t.x, t.y + y, out.width)];
-        for (int x = 0; x < t.width; ++x) {
+    for (int y = 0; y < t.height; ++y)
+        for (int x = 0; x < t.width; x += kBlock) {
             const std::size_t at = place_in_tile(x, y);
-            row[x] = {r[at], g[at], b[at]};
+            const std::array<Rgb, kBlock> pixels = interleave(&r[at], &g[at], &b[at]);
+            Rgb* const to = &out.pixels[index_of(t.x + x, t.y + y, out.width)];
+            if (x + kBlock <= t.width)
+                std::copy(pixels.begin(), pixels.end(), to);
+            else
+                std::copy_n(pixels.begin(), t.width - x, to);
         }
-    }
 }
 
 /// Adds the samples of a batch to their pixels.

@@ -105,15 +105,14 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
     };
     scene_.reset(rtcNewScene(device));
     const embree::Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                 RTC_FORMAT_FLOAT3, sizeof(Vec3f),
-                                                                 std::max<std::size_t>(1, mesh_.positions.size())));
+    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(
+        geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh_.positions.size() + 1));
     auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 3 * sizeof(std::uint32_t), std::max<std::size_t>(1, mesh_.faces.size())));
     if (vertices == nullptr || indices == nullptr)
         return failed("has no memory for " + std::to_string(mesh_.faces.size()) + " triangles");
-    vertices[0] = {};
+    vertices[mesh_.positions.size()] = {};  // the only one of a mesh without any; read with the one before it
     indices[0] = {0, 0, 0};
     for (std::size_t i = 0; i < mesh_.positions.size(); ++i)
         vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) + (mesh_.origin_m - vertex_origin_));

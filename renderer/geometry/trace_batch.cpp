@@ -270,8 +270,9 @@ private:
     Lanes<double> time_;
 };
 
-void Tracer::Impl::trace_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body, std::uint32_t wanted,
-                              ShapeRays& local, NearestHits& nearest) const noexcept {
+NARPA_EACH_ISA void Tracer::Impl::trace_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body,
+                                             std::uint32_t wanted, ShapeRays& local,
+                                             NearestHits& nearest) const noexcept {
     to_body(at, body, rays, rays.that_leave(body), local);
     local.t_max = nearest.at.range_m;
     const std::uint32_t met = shapes[body]->intersect(local, wanted, nearest.at);
@@ -295,8 +296,9 @@ void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::u
     }
 }
 
-void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,
-                                std::span<const std::uint32_t> bodies, NearestHits& nearest) const noexcept {
+NARPA_EACH_ISA void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,
+                                               std::span<const std::uint32_t> bodies,
+                                               NearestHits& nearest) const noexcept {
     nearest.met = nearest.at.inner = 0;
     nearest.body.fill(-1);
     nearest.at.range_m = kNoEnd;
@@ -339,9 +341,9 @@ void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std:
     }
 }
 
-std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const SurfacePoints& from,
-                                          const Vec3Lanes& directions, const Lanes<double>& t_max,
-                                          std::uint32_t wanted, bool coherent) const noexcept {
+NARPA_EACH_ISA std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const SurfacePoints& from,
+                                                         const Vec3Lanes& directions, const Lanes<double>& t_max,
+                                                         std::uint32_t wanted, bool coherent) const noexcept {
     LeavingRays leaving(*this, at, from, directions, wanted);
     const std::size_t own = leaving.body_of_all();
     const bool is_one = own < shapes.size();
@@ -362,8 +364,8 @@ std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const SurfacePoin
     return dark;
 }
 
-void Tracer::Impl::finish(const BodyPoses& at, const WorldRays& rays, const NearestHits& nearest,
-                          HitBatch& hits) const noexcept {
+NARPA_EACH_ISA void Tracer::Impl::finish(const BodyPoses& at, const WorldRays& rays, const NearestHits& nearest,
+                                         HitBatch& hits) const noexcept {
     hits.met = nearest.met;
     hits.outside = 0;
     hits.body = nearest.body;

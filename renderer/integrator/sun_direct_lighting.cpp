@@ -37,7 +37,7 @@ void put(SurfaceLanes& surfaces, std::size_t i, const Rgb& diffuse, const Rgb& s
     surfaces.exponent[i] = exponent;
 }
 
-void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& specular) {
+NARPA_EACH_ISA void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& specular) {
     surfaces.diffuse.fill(m.diffuse);
     surfaces.specular.fill(specular);
     surfaces.emission.fill(m.emission);
@@ -47,36 +47,30 @@ void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& specular) {
 /// Material by material: a batch rarely meets more than two.
 void gather_surfaces(const Frame& f, const CameraBatch& p, SurfaceLanes& surfaces) {
     const Scene& scene = f.tracer.scene();
-    fill(surfaces, kPlainMaterial, {});
     surfaces.normal = p.hits.shading_normal;
+    bool filled = false;
     for (std::uint32_t left = p.hits.met; left != 0;) {
         const int material = p.hits.material[static_cast<std::size_t>(std::countr_zero(left))];
-        std::uint32_t same = 0;
-        for (std::size_t i = 0; i < kLanes; ++i)
-            same |= static_cast<std::uint32_t>(p.hits.material[i] == material) << i;
-        same &= left;
-        const bool alone = same == p.hits.met;
+        const std::uint32_t same = lanes_with(p.hits.material, material) & left;
         left &= ~same;
         const Material& m = scene.materials[static_cast<std::size_t>(material)];
+        const Rgb specular = m.kind == Material::Kind::phong ? m.specular : Rgb{};
+        if (!filled) fill(surfaces, m, specular), filled = true;
         if (m.kind > Material::Kind::phong) {
             surfaces.others |= same;
             continue;
         }
-        const Rgb specular = m.kind == Material::Kind::lambert ? Rgb{} : m.specular;
         surfaces.lanes |= same;
         if (specular != Rgb{}) surfaces.shiny |= same;
-        if (is_textured(m)) {
+        if (is_textured(m))
             for_each_lane(same, [&](std::size_t i) {
                 const Surface s = surface_of(f, p, i);
                 put(surfaces, i, s.diffuse, s.specular, s.emission, s.exponent);
                 surfaces.normal.put(i, s.normal);
             });
-        } else if (alone) {
-            fill(surfaces, m, specular);
-        } else {
+        else if (surfaces.lanes != same || surfaces.others != 0)
             for_each_lane(same,
                           [&](std::size_t i) { put(surfaces, i, m.diffuse, specular, m.emission, m.exponent); });
-        }
     }
 }
 

@@ -18,7 +18,7 @@ constexpr float kBeamSlack = 2e-6f;
 /// take 1.08.
 constexpr std::size_t kMostBoxes = 511, kMostForRays = 127;
 /// Directions along an axis have no reciprocal.
-constexpr double kLeastDirection = 1e-12;
+constexpr float kLeastDirection = 1e-12f;
 
 /// The beams, cones about the rays, that may meet the bounds of a body: its sphere and its ellipsoid.
 NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_world_body, double body_radius_m,
@@ -53,11 +53,15 @@ NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_
 struct alignas(64) LocalBeams {
     Lanes<float> x, y, z;              ///< where they start, metres
     Lanes<float> per_x, per_y, per_z;  ///< 1 / direction
+    Lanes<float> slack_m;              ///< what a single ray needs at the body's far end
 };
 
-NARPA_EACH_ISA void to_body(const RayBatch& beams, const PoseLanes& T_world_body, LocalBeams& __restrict local) {
-    const auto reciprocal = [](double d) {
-        return static_cast<float>(1 / std::copysign(std::max(std::abs(d), kLeastDirection), d));
+/// Places in the frame are off by what single precision makes of the mesh's size and of the distance.
+NARPA_EACH_ISA void to_body(const RayBatch& beams, const PoseLanes& T_world_body, double radius_m,
+                            LocalBeams& __restrict local) {
+    const auto reciprocal = [](double direction) {
+        const auto d = static_cast<float>(direction);
+        return 1 / std::copysign(std::max(std::abs(d), kLeastDirection), d);
     };
     for (std::size_t i = 0; i < kLanes; ++i) {
         const Rigid3 T = T_world_body[i];
@@ -69,6 +73,7 @@ NARPA_EACH_ISA void to_body(const RayBatch& beams, const PoseLanes& T_world_body
         local.per_x[i] = reciprocal(dot(x, d));
         local.per_y[i] = reciprocal(dot(y, d));
         local.per_z[i] = reciprocal(dot(z, d));
+        local.slack_m[i] = static_cast<float>(kEmbreeSlack * radius_m + kBeamSlack * (norm(o) + radius_m));
     }
 }
 
@@ -88,42 +93,43 @@ inline std::uint32_t bits_of_masks(const Lanes<int>& masks) {
     return static_cast<std::uint32_t>(four[0] | four[1] | four[2] | four[3]);
 }
 
-/// Of cones and their end.
+/// Of beams: half of their widening, and their end.
 struct BeamReach {
-    float slack_m, tangent, end_m;
+    float tangent, end_m;
 };
 
 /// The beams that touch the box, grown by as much as a beam is wide at the box's far end.
-inline std::uint32_t touching(const BeamBox& box, const LocalBeams& beams, const BeamReach& reach) {
+template <bool cones>
+std::uint32_t touching(const BeamBox& box, const LocalBeams& beams, const BeamReach& reach) {
     const BeamBox b = box;
-    const float slack_m = reach.slack_m + reach.tangent * b.radius, end_m = reach.end_m, tangent = reach.tangent;
+    const float end_m = reach.end_m, tangent = reach.tangent, own_m = tangent * b.radius;
     Lanes<int> met;
     for (std::size_t i = 0; i < kLanes; ++i) {
         const float x = b.x - beams.x[i], y = b.y - beams.y[i], z = b.z - beams.z[i];
-        const float distance_m = std::sqrt(x * x + y * y + z * z), grow_m = slack_m + tangent * distance_m;
-        const float x1 = (x - (b.half_x + grow_m)) * beams.per_x[i],
-                    x2 = (x + (b.half_x + grow_m)) * beams.per_x[i],
-                    y1 = (y - (b.half_y + grow_m)) * beams.per_y[i],
-                    y2 = (y + (b.half_y + grow_m)) * beams.per_y[i],
-                    z1 = (z - (b.half_z + grow_m)) * beams.per_z[i],
-                    z2 = (z + (b.half_z + grow_m)) * beams.per_z[i];
-        const float enter = std::max(std::max(std::min(x1, x2), std::min(y1, y2)), std::min(z1, z2));
-        const float leave = std::min(std::min(std::max(x1, x2), std::max(y1, y2)), std::max(z1, z2));
+        float grow_m = beams.slack_m[i];
+        if constexpr (cones) grow_m += own_m + tangent * std::sqrt(x * x + y * y + z * z);
+        // Along each axis: where the beam is half-way through, and as much before and behind.
+        const float mid_x = x * beams.per_x[i], half_x = (b.half_x + grow_m) * std::abs(beams.per_x[i]);
+        const float mid_y = y * beams.per_y[i], half_y = (b.half_y + grow_m) * std::abs(beams.per_y[i]);
+        const float mid_z = z * beams.per_z[i], half_z = (b.half_z + grow_m) * std::abs(beams.per_z[i]);
+        const float enter = std::max(std::max(mid_x - half_x, mid_y - half_y), mid_z - half_z);
+        const float leave = std::min(std::min(mid_x + half_x, mid_y + half_y), mid_z + half_z);
         met[i] = -static_cast<int>(std::max(enter, 0.0f) <= std::min(leave, end_m));
     }
     return bits_of_masks(met);
 }
 
 /// Those of the beams that touch a leaf.
-NARPA_EACH_ISA std::uint32_t touching_leaves(std::span<const BeamBox> boxes, const LocalBeams& beams,
-                                             const BeamReach& reach, std::uint32_t wanted) {
+template <bool cones>
+std::uint32_t touching_leaves(std::span<const BeamBox> boxes, const LocalBeams& beams, const BeamReach& reach,
+                              std::uint32_t wanted) {
     std::array<std::uint32_t, kMostBoxes> open;  // one more with each step down
     std::size_t n = 0;
     open[n++] = 0;
     std::uint32_t found = 0;
     while (n > 0 && found != wanted) {
         const BeamBox& box = boxes[open[--n]];
-        const std::uint32_t met = touching(box, beams, reach) & wanted & ~found;
+        const std::uint32_t met = touching<cones>(box, beams, reach) & wanted & ~found;
         if (met == 0) continue;
         if (box.children == 0)
             found |= met;
@@ -131,6 +137,15 @@ NARPA_EACH_ISA std::uint32_t touching_leaves(std::span<const BeamBox> boxes, con
             open[n++] = box.children, open[n++] = box.children + 1;
     }
     return found;
+}
+
+NARPA_EACH_ISA std::uint32_t leaves_on_cones(std::span<const BeamBox> boxes, const LocalBeams& beams,
+                                             const BeamReach& reach, std::uint32_t wanted) {
+    return touching_leaves<true>(boxes, beams, reach, wanted);
+}
+NARPA_EACH_ISA std::uint32_t leaves_on_rays(std::span<const BeamBox> boxes, const LocalBeams& beams,
+                                            const BeamReach& reach, std::uint32_t wanted) {
+    return touching_leaves<false>(boxes, beams, reach, wanted);
 }
 
 /// The first boxes of a tree, which are the largest; those whose children are left out become leaves.
@@ -175,12 +190,12 @@ std::uint32_t BeamCulling::find_meeting(const BodyPoses& at, const RayBatch& bea
             meeting_[body] = bits_of(meeting) & wanted;
         } else {
             LocalBeams local;
-            to_body(beams, T_world_body, local);
-            // Places in the frame are off by what single precision makes of the mesh's size and of the distance.
-            const auto slack_m = static_cast<float>(kEmbreeSlack * radius_m);
-            const BeamReach reach{slack_m, static_cast<float>(tangent_) + kBeamSlack,
-                                  static_cast<float>(range_max_m_) * (1 + 2 * kBeamSlack) + slack_m};
-            meeting_[body] = touching_leaves(boxes, local, reach, wanted);
+            to_body(beams, T_world_body, radius_m, local);
+            const BeamReach reach{
+                static_cast<float>(tangent_),
+                static_cast<float>(range_max_m_ * (1 + 2 * double{kBeamSlack}) + kEmbreeSlack * radius_m)};
+            meeting_[body] = tangent_ > 0 ? leaves_on_cones(boxes, local, reach, wanted)
+                                          : leaves_on_rays(boxes, local, reach, wanted);
         }
         any |= meeting_[body];
     }

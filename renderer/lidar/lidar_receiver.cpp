@@ -63,8 +63,8 @@ LidarReceiver::LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint
       culling_(tracer, cone_.tangent(), shot_range_max_m_),
       met_(kLanes * cone_.size()) {}
 
-void LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
-                            std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
+std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
+                                     std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
     const ShotSettings settings{.range_max_m = shot_range_max_m_,
                                 .multipath = model_.multipath,
                                 .sunlight = sunlight_ ? ~0u : 0u,
@@ -75,15 +75,16 @@ void LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uin
     const std::size_t sub_rays = cone_.size();
     const std::uint32_t meeting = culling_.find_meeting(at, beams);
     trace(at, beams, meeting, settings, draws);
-    for (std::size_t i = 0; i < beams.n; ++i) {
+    const std::uint32_t possible = air_.is_possible() ? lanes_below(beams.n) : meeting;
+    for_each_lane(possible, [&](std::size_t i) {
         LidarEchoes& out = echoes[i] = {};
-        if (!is_set(meeting, i) && !air_.is_possible()) continue;
         const auto met =
             is_set(meeting, i) ? std::span(met_).subspan(first_[i], sub_rays) : std::span<LidarReturn>();
         if (!met.empty()) out.sunlight = met.front().sunlight;
-        const double noise = noise_in(static_cast<double>(out.sunlight));
         EchoList list;
         const std::size_t n = part(met, list);
+        if (n == 0 && !air_.is_possible()) return;
+        const double noise = noise_in(static_cast<double>(out.sunlight));
         double most = -1, second = -1;
         const auto report = [&](const LidarEcho& echo, double light) {
             if (!(echo.range_m > 0)) return;
@@ -102,7 +103,8 @@ void LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uin
             for (Echo& echo : std::span(list).first(n)) echo.light += air_.light_at(at, beams[i], echo.range_m);
         }
         for (std::size_t k = 0; k < n; ++k) report(detect(list[k], noise, i, k, draws), list[k].light);
-    }
+    });
+    return possible;
 }
 
 /// Of the receiver, over that in the dark.

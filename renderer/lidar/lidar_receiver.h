@@ -44,11 +44,12 @@ public:
     }
 
     /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
-    /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Writes beams.n echoes: range with bias
-    /// and noise, before a packet's rounding; the reflectivity that the light stands for at that range, which is
-    /// less where only a part of the beam is met.
-    void receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::span<const Motion> motions,
-                 std::span<LidarEchoes> echoes) noexcept;
+    /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Returns a bit for each shot of which
+    /// something may come back, and writes the echoes of these alone: range with bias and noise, before a packet's
+    /// rounding; the reflectivity that the light stands for at that range, which is less where only a part of the
+    /// beam is met.
+    std::uint32_t receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
+                          std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
 
 private:
     /// Light and range of what is one echo.

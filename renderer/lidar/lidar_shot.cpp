@@ -9,6 +9,7 @@
 #include "base/each_isa.h"
 #include "renderer/geometry/poses_at.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/lidar/plain_returns.h"
 #include "renderer/material/texture_lookup.h"
 
 namespace narpa {
@@ -203,18 +204,34 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
            std::span<LidarReturn> returns) noexcept {
     HitBatch hits;
     tracer.intersect(at, beams, settings.bodies.empty() ? tracer.all_bodies() : settings.bodies, hits);
-    prefetch_textures(tracer.scene(), hits, hits.met & lanes_below(beams.n));
+    std::fill_n(returns.begin(), beams.n, LidarReturn{});
+    const std::uint32_t met = hits.met & lanes_below(beams.n);
+    if (met == 0) return;
+    prefetch_textures(tracer.scene(), hits, met);
+    PlainReturns plain;
+    const bool nothing_on_the_way = settings.motions.empty() && settings.medium == nullptr;
+    if (nothing_on_the_way) find_plain_returns(tracer, beams, hits, met, plain);
+    for_each_lane(plain.lanes, [&](std::size_t i) {
+        if (!(hits.range_m[i] < settings.range_max_m)) return;
+        LidarReturn& r = returns[i];
+        r.range_m = hits.range_m[i];
+        r.reflectivity = plain.reflectivity[i];
+        r.body = hits.body[i];
+        r.cos_incidence = plain.cos_incidence[i];
+        if (is_set(settings.sunlight, i)) {
+            const Vec3 direction = beams.direction[i];
+            r.sunlight = sunlight_on(tracer, at, hits[i], surface_of(tracer, at, hits, i, direction), -direction);
+        }
+    });
     std::uint32_t mirrored = 0;
-    for (std::size_t i = 0; i < beams.n; ++i) {
-        returns[i] = {};
-        if (!is_set(hits.met, i)) continue;
+    for_each_lane(met & ~plain.lanes, [&](std::size_t i) {
         const Path path = to_first_hit(at, beams, hits, i, settings);
-        if (!(path.range_m < settings.range_max_m)) continue;
+        if (!(path.range_m < settings.range_max_m)) return;
         if (goes_on(tracer, hits, i, settings))
             mirrored |= 1u << i;
         else
             put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
-    }
+    });
     if (mirrored != 0) follow_mirrors(tracer, at, beams, settings, mirrored, hits, returns);
 }
 

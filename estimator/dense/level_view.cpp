@@ -11,6 +11,8 @@
 namespace narpa {
 namespace {
 
+/// Of a pixel without noise.
+constexpr double kLeastVariance_dn2 = 1e-6;
 /// Margin about the target's bounds, in pixels and as a part of their extent.
 constexpr double kRoom_px = 6, kRoomPart = 0.1;
 /// Windows begin and end at multiples of this, so that small motions do not change them.
@@ -125,13 +127,17 @@ void LevelView::place(const Rigid3& T_camera_target) {
 
 void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& settings) {
     place(T_camera_target);
-    view_.render(T_camera_target, settings, true);
+    view_.render_with_variance(T_camera_target, settings);
     const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
         signal_[i] = signal_of(view_.radiance().pixels[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
+}
+
+void LevelView::predict(const Vector6& step) {
+    for (std::size_t i = 0; i < signal_.size(); ++i) signal_[i] += columns_[i].dot(step.cast<float>());
 }
 
 float LevelView::signal_of(const Rgb& radiance) const {
@@ -145,7 +151,7 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     BodyPoses turned = at_;
     turned.T_world_body[target_].q = normalized(at_.T_world_body[target_].q * exp_rotation(turn_rad));
     view_.begin_frame(turned, motion_, times_);
-    view_.render(T_camera_target, settings, true);
+    view_.render_with_variance(T_camera_target, settings);
     std::vector<float> change;
     for (std::size_t i = 0; i < signal_.size(); ++i)
         change.push_back(signal_of(view_.radiance().pixels[i]) - signal_[i]);
@@ -153,11 +159,35 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     return change;
 }
 
-void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
+void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness,
+                              Refine where) {
     place(T_camera_target);
-    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness);
+    const std::vector<float> weights = where == Refine::information ? this->weights() : std::vector<float>{};
+    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness, weights);
     differentiated_at_ = T_camera_target;
+    fineness_ = fineness;
     if (T_world_camera_) add_shading(T_camera_target, settings);
+}
+
+/// Inverse variances of the pixels without the render's noise; 0 where neither a pixel nor its neighbours are lit.
+std::vector<float> LevelView::weights() const {
+    std::vector<float> out(signal_.size());
+    const auto width = static_cast<std::size_t>(window_.width);
+    const auto is_lit = [&](std::size_t p) {
+        return signal_[p - 1] != 0 || signal_[p] != 0 || signal_[p + 1] != 0;
+    };
+    for (int y = 1; y < window_.height - 1; ++y)
+        for (int x = 1; x < window_.width - 1; ++x) {
+            const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            if (!is_lit(p - width) && !is_lit(p) && !is_lit(p + width)) continue;
+            const double signal = std::max(static_cast<double>(signal_[p]), 0.0),
+                         of_model = model_.light_rad * signal;
+            const double measured = measured_variance_.empty() ? 0 : static_cast<double>(measured_variance_[p]);
+            const double variance =
+                sensor_.variance_dn2(sensor_.black_dn + signal) / pixels_averaged_ + measured + of_model * of_model;
+            out[p] = static_cast<float>(1 / std::max(variance, kLeastVariance_dn2));
+        }
+    return out;
 }
 
 /// Adds what the shading changes by while the target turns under its light, by differences.

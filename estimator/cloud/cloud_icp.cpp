@@ -33,7 +33,7 @@ constexpr double kBesideCircle = 0.15;
 /// Other surfaces are looked for so near to a beam, in standard deviations of the range.
 constexpr double kElsewhere_sigmas = 2;
 /// An answer further from the start, in parts of the search, was not looked for: a symmetry led there.
-constexpr double kSearched = 1.5;
+constexpr double kSearched = 2.5;
 
 /// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
 struct Biweight {
@@ -71,9 +71,10 @@ bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& 
     const int from = all.observability.unobserved;
     if (from == 6 || some.observability.unobserved > from) return from < 6;
     const auto motions = all.observability.motions.rightCols(6 - from);
-    const Eigen::MatrixXd left = motions.transpose() * some.information * motions,
-                          whole = motions.transpose() * all.information * motions;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(left, whole, Eigen::EigenvaluesOnly);
+    using Restricted = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+    const Restricted left = motions.transpose() * some.information * motions,
+                     whole = motions.transpose() * all.information * motions;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Restricted> eigen(left, whole, Eigen::EigenvaluesOnly);
     return !(eigen.eigenvalues()[0] > 1 - kMost);
 }
 

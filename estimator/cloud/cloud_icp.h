@@ -66,7 +66,7 @@ public:
         : settings_(settings), association_(tracer, target) {}
 
     /// `search_m`: bound of the error of surfaces at the start, about distance * angle + shift; 0: no search around
-    /// the beams. An answer that is observed in all motions and further from the start than 1.5 times that is
+    /// the beams. An answer that is observed in all motions and further from the start than 2.5 times that is
     /// refused. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
     /// search that is not finite, or fewer than six beams that meet the model. Allocates only for more points than
     /// ever before, or an Error.

@@ -53,7 +53,7 @@ CheckedInformation checked_information(std::span<WeightedRow> rows, const PointS
     for (;;) {
         const Leverage first = largest(in, rows);
         if (!(first.value > 0)) return in;
-        const CheckedInformation with_both = in;
+        CheckedInformation with_both = in;
         leave_out(rows[first.row]);
         if (first.value > kHeldAlone) continue;
         const Leverage second = largest(in, rows);

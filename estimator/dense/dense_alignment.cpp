@@ -28,6 +28,12 @@ constexpr double kSurelyLinear = 0.2, kRise_sigmas = 4, kLeastRise = 0.5;
 /// Other minima are looked for so many standard deviations away.
 constexpr double kAside_sigmas = 8;
 
+/// The answer is that with the smaller loss.
+void keep_better(DenseEstimate& answer, DenseEstimate& other) {
+    other.renders = answer.renders;
+    if (other.excess_loss < answer.excess_loss) std::swap(answer, other);
+}
+
 /// One standard deviation of the motion that the image holds least.
 Vector6 weakest_motion(const DenseEstimate& e) {
     const Observability o = observability_of(e.covariance, norm(e.T_camera_body.t));
@@ -171,8 +177,7 @@ void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, co
         other = descend(frame, at, other.T_camera_body, to_the_end, frame_variance, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
-        other.renders = e.renders;
-        if (other.excess_loss < e.excess_loss) std::swap(e, other);
+        keep_better(e, other);
         const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
         const double worse = other.excess_loss - e.excess_loss;
         const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
@@ -203,18 +208,23 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).examine();
     if (const auto face = view.flat_face())
         starts.push_back({other_tilt(*face, e.T_camera_body.t) * e.T_camera_body.q, e.T_camera_body.t});
+    std::vector<std::pair<Rigid3, double>> minima{{e.T_camera_body, e.excess_loss}};
+    for (const Rival& r : std::exchange(fit.rivals, {}))
+        minima.emplace_back(r.T_sensor_target, e.excess_loss + r.worse_chi2);
     DenseOptions from_near = options;
     from_near.coarsest = std::min(options.coarsest, 2 * options.finest);
     for (const Rigid3& start : starts) {
         DenseEstimate other = descend(frame, at, start, from_near, frame_variance, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
-        other.renders = e.renders;
-        if (other.excess_loss < e.excess_loss) std::swap(e, other);
-        const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
-        const double worse = other.excess_loss - e.excess_loss;
+        minima.emplace_back(other.T_camera_body, other.excess_loss);
+        keep_better(e, other);
+    }
+    for (const auto& [T_camera_body, loss] : minima) {
+        const Vector6 apart = error_between(e.T_camera_body, T_camera_body);
+        const double worse = loss - e.excess_loss;
         if (normalised_error_squared(apart, e.covariance) > kElsewhere && worse < kAsLikely)
-            fit.rivals.push_back({other.T_camera_body, worse});
+            fit.rivals.push_back({T_camera_body, worse});
     }
     LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
     solver.examine();

@@ -335,7 +335,8 @@ Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double s
         fit.failed = fmt::format("{} of {} points lie on the model", e.explained, e.points - e.edges);
     else if (search_m > 0 && e.observability.unobserved == 0 && moved_m > kSearched * search_m)
         fit.failed =
-            fmt::format("surfaces are {:.3g} m from the guess, expected at most {:.3g} m", moved_m, search_m);
+            fmt::format("surfaces are {:.3g} m from the guess, expected at most {:.3g} m, {:g} times the search",
+                        moved_m, kSearched * search_m, kSearched);
     fit.observability = e.observability;
     fit.root_information = e.root_information;
     fit.rivals = e.rivals;

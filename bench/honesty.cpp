@@ -21,6 +21,7 @@ namespace {
 
 constexpr double kRadius_m = 2;  ///< of the targets made in code, about
 constexpr RangeNoise kRangeNoise{0.02, 5.1e-5};
+constexpr std::string_view kWrong = "wrong";  ///< the condition that needs another target
 
 /// An answer beside the truth.
 struct TrialResult {
@@ -119,7 +120,8 @@ class Campaign {
 public:
     Campaign(const HonestyOptions& o, Targets targets) : o_(o), targets_(std::move(targets)) {
         for (const std::string_view c : kHonestyConditions)
-            if (o.conditions.empty() || std::ranges::find(o.conditions, c) != o.conditions.end())
+            if (std::ranges::find(o.conditions, c) != o.conditions.end() ||
+                (o.conditions.empty() && (c != kWrong || targets_.size() > 1)))
                 conditions_.push_back(c);
     }
 
@@ -176,7 +178,7 @@ private:
                       const Rigid3& truth, Draw& d) {
         const WorldErrors world = WorldErrors::draw(o_.world, o_.distortion, d);
         const ApparentMotion moving = motion(d);
-        const KnownTarget& shown = condition == "wrong" && targets_.size() > 1 ? another(target, d) : target;
+        const KnownTarget& shown = condition == kWrong ? another(target, d) : target;
         const Scene scene = world.applied(shown.scene);
         std::optional<RenderScene> differs;
         if (world.any_of_scene()) differs.emplace(*RenderScene::create(scene));
@@ -223,7 +225,7 @@ private:
     TrialResult sweep(KnownTarget& target, std::string_view condition, const Rigid3& truth, Draw& d) {
         const WorldErrors world = WorldErrors::draw(o_.world, 0, d);
         const ApparentMotion moving = motion(d);
-        const KnownTarget& shown = condition == "wrong" && targets_.size() > 1 ? another(target, d) : target;
+        const KnownTarget& shown = condition == kWrong ? another(target, d) : target;
         std::optional<RenderScene> differs;
         const Scene scene = world.applied(shown.scene);
         if (world.any_of_scene()) differs.emplace(*RenderScene::create(scene));
@@ -271,7 +273,7 @@ private:
             const double z = condition == "beside" ? 0 : d.uniform(-1, 1);
             body.push_back({d.uniform(-1, 1), d.uniform(-1, 1), z});
             Vec3 there = world.scale * body.back() + world.mesh_m;
-            if (condition == "wrong") there = {d.uniform(-1, 1), d.uniform(-1, 1), d.uniform(-1, 1)};
+            if (condition == kWrong) there = {d.uniform(-1, 1), d.uniform(-1, 1), d.uniform(-1, 1)};
             const Vec3 p = seen * there;
             const double noise = condition == "blurred" ? 2 * sigma_px : sigma_px;
             pixels.push_back({world.focal * believed.fx * p.x / p.z + believed.cx + noise * d.normal(),
@@ -308,6 +310,8 @@ Result<std::vector<HonestyRow>> run_honesty(const HonestyOptions& o, int first, 
                                             const StopFlag& stop) {
     auto targets = known_targets(o);
     if (!targets) return targets.error();
+    if (targets->size() < 2 && std::ranges::find(o.conditions, kWrong) != o.conditions.end())
+        return Error{"condition \"wrong\" shows another target, expected at least two targets"};
     Campaign campaign(o, *std::move(targets));
     std::map<std::array<std::string, 3>, HonestyRow> rows;
     for (const std::string& method : o.methods)

@@ -84,6 +84,21 @@ TEST(Honesty, ATargetThatIsNone) {
     }
 }
 
+TEST(Honesty, AWrongTargetNeedsAnother) {
+    static TracingThreads threads(0);
+    const StopFlag stop{};
+    HonestyOptions o;
+    o.methods = {"icp"};
+    o.targets = {"craft"};
+    o.trials = 40;
+    for (const HonestyRow& row : run(o, 0)) EXPECT_NE(row.condition, "wrong");
+    o.conditions = {"wrong"};
+    const auto rows = run_honesty(
+        o, 0, threads, [](const std::string&) {}, stop);
+    ASSERT_FALSE(rows);
+    EXPECT_NE(rows.error().what.find("at least two targets"), std::string::npos) << rows.error().what;
+}
+
 /// A model that is wrong and told so: the answers are as far off, and say it.
 TEST(Honesty, ToldErrorsOfTheModelAreInTheCovariance) {
     HonestyOptions o;

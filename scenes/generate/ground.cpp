@@ -26,12 +26,6 @@ std::vector<Crater> craters() {
     return all;
 }
 
-/// A bowl with a raised rim that falls off outside; depth and rim are parts of the radius.
-double crater_height(double distance, double radius, double depth_part, double rim_part) {
-    const double r = distance / radius, depth = depth_part * radius, rim = rim_part * radius;
-    return r < 1 ? (depth + rim) * r * r - depth : rim * std::exp(-4 * (r - 1));
-}
-
 double hills(double x, double y) {
     double sum = 0, amplitude = 13, wavelength = 110;
     for (std::uint64_t octave = 0; octave < 6; ++octave, amplitude *= 0.47, wavelength *= 0.5)
@@ -70,7 +64,7 @@ void add_features(int count, double smallest_m, double largest_m, bool boulder, 
 
 /// A boulder is half of a flattened ball.
 double height_m(const Feature& f, double distance_m) {
-    if (!f.boulder) return crater_height(distance_m, f.radius_m, 0.22, 0.05);
+    if (!f.boulder) return f.radius_m * crater_profile(distance_m / f.radius_m, 0.22, 0.05);
     const double r = distance_m / f.radius_m;
     return r < 1 ? 0.7 * f.radius_m * std::sqrt(1 - r * r) : 0;
 }
@@ -99,7 +93,7 @@ Mesh build_terrain() {
         double z = hills(x, y);
         for (const Crater& c : holes)
             if (const double d = std::hypot(x - c.x, y - c.y); d < 2.5 * c.radius)
-                z += crater_height(d, c.radius, 0.3, 0.06);
+                z += c.radius * crater_profile(d / c.radius, 0.3, 0.06);
         return z;
     };
     Mesh mesh;

@@ -78,6 +78,22 @@ struct LidarPoint {
     [[nodiscard]] Vec3 position_m() const noexcept { return origin_m + range_m * direction; }
 };
 
+/// What each pulse lights, evenly by solid angle, where that is more than the beam of one shot: a flash LiDAR's
+/// whole field, about its y axis, in its own frame.
+struct LidarField {
+    enum class Kind : std::uint8_t {
+        beam,    ///< no more than each shot's own beam
+        plane,   ///< a rectangle on a plane across y
+        angles,  ///< a span of azimuths and one of elevations
+    };
+    Kind kind = Kind::beam;
+    double horizontal = 0, vertical = 0;  ///< half of it: tangents, or radians
+
+    /// `direction`: unit.
+    [[nodiscard]] bool contains(const Vec3& direction) const noexcept;
+    friend bool operator==(const LidarField&, const LidarField&) = default;
+};
+
 /// How the instrument appears on the network by default.
 struct LidarNetwork {
     std::uint16_t data_port = 0, position_port = 0;
@@ -131,6 +147,7 @@ struct LidarSpec {
     bool measures_velocity = false;
     double velocity_resolution_m_s = 0;  ///< of those in packets
     bool measures_sunlight = false;
+    LidarField lit{};
     LidarNetwork network{};
 };
 

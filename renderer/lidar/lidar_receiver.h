@@ -23,6 +23,7 @@
 #include "renderer/lidar/air_echo.h"
 #include "renderer/lidar/beam_cone.h"
 #include "renderer/lidar/beam_culling.h"
+#include "renderer/lidar/diffuse_multipath.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
 
@@ -52,17 +53,23 @@ public:
                           std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
 
 private:
-    /// Light and range of what is one echo.
+    /// Light and range of what is one echo; from the nearest to the farthest that is part of it.
     struct Echo {
         double light = 0, range_m = 0, velocity_m_s = 0;
+        double first_m = 0, last_m = 0;
     };
     using EchoList = std::array<Echo, kMostEchoes>;
     class Draws;
 
-    void trace(const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted, ShotSettings settings,
-               Draws& draws) noexcept;
-    [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept;
+    /// `first`: number of the first beam.
+    void trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
+               ShotSettings settings, Draws& draws) noexcept;
+    [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double farthest_m,
+                                      double n) noexcept;
+    static void add_light(const LidarReturn& r, double n, Echo& echo) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
+    [[nodiscard]] std::size_t add_multipath(std::span<LidarReturn> late, EchoList& echoes,
+                                            std::size_t n) const noexcept;
     [[nodiscard]] double noise_in(double sunlight) const noexcept;
     [[nodiscard]] LidarEcho detect(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                    Draws& draws) const noexcept;
@@ -87,6 +94,7 @@ private:
     BeamCulling culling_;
     Lanes<std::size_t> first_{};    ///< sub-ray in `met_` of each shot that may meet a body
     std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
+    DiffuseMultipath multipath_;
 };
 
 }  // namespace narpa

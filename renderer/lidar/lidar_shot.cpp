@@ -153,9 +153,9 @@ void reflect(Path& path, const Tracer& tracer, const HitBatch& hits, std::size_t
     path.throughput *= mean(m.specular) * mean(m.specular);  // there and back
 }
 
-/// The shots whose first hits are mirrors. `hits`: in, those; they become the latest.
+/// The shots whose first hits are mirrors. `hits`: those.
 void follow_mirrors(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
-                    std::uint32_t mirrored, HitBatch& hits, std::span<LidarReturn> returns) {
+                    std::uint32_t mirrored, HitBatch hits, std::span<LidarReturn> returns) {
     Lanes<Path> paths;
     for_each_lane(mirrored, [&](std::size_t i) { paths[i] = to_first_hit(at, beams, hits, i, settings); });
     for (int mirrors = 0; mirrored != 0 && mirrors < kMirrors; ++mirrors) {
@@ -203,6 +203,11 @@ void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, Ra
 void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
            std::span<LidarReturn> returns) noexcept {
     HitBatch hits;
+    shoot(tracer, at, beams, settings, returns, hits);
+}
+
+void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
+           std::span<LidarReturn> returns, HitBatch& hits) noexcept {
     tracer.intersect(at, beams, settings.bodies.empty() ? tracer.all_bodies() : settings.bodies, hits);
     std::fill_n(returns.begin(), beams.n, LidarReturn{});
     const std::uint32_t met = hits.met & lanes_below(beams.n);

@@ -53,7 +53,8 @@ enum class LidarReturns : std::uint8_t {
 /// What comes back of one shot. Where there is one echo, it is `strongest` and `last`, and `second` is none.
 struct LidarEchoes {
     LidarEcho strongest, second, last;
-    /// Of the surface that the axis meets, of a white one that faces the Sun; 0 where no one asks for it.
+    /// Of the surface that the axis meets and the air before it, of a white one that faces the Sun; 0 where no one
+    /// asks for it.
     float sunlight = 0;
 
     /// What a unit reports, in its packets' order; the second is none where there is one echo, or one is wanted.

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "base/constants.h"
+#include "renderer/scene/lidar_sunlight.h"
 
 namespace narpa {
 namespace {
@@ -54,7 +55,8 @@ LidarReceiver::LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint
       range_max_m_(lidar.range_max_m),
       shot_range_max_m_(model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_),
       mount_(lidar.mount),
-      sunlight_(model_.sunlight_noise > 0 || (lidar.model && lidar.model->spec().measures_sunlight)),
+      sunlight_(sees_sunlight(lidar)),
+      reports_sunlight_(lidar.model && lidar.model->spec().measures_sunlight),
       least_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
       random_(model_.range_noise_m > 0 || model_.range_noise_at_limit_m > 0 || model_.velocity_noise_m_s > 0),
       schedule_(seed),
@@ -76,16 +78,20 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
     const std::size_t sub_rays = cone_.size();
     const std::uint32_t meeting = culling_.find_meeting(at, beams);
     trace(at, beams, first, meeting, settings, draws);
-    const std::uint32_t possible = air_.is_possible() ? lanes_below(beams.n) : meeting;
+    const bool sees_air = air_.is_possible() || (bright_air_ && reports_sunlight_);
+    const std::uint32_t possible = sees_air ? lanes_below(beams.n) : meeting;
     for_each_lane(possible, [&](std::size_t i) {
         LidarEchoes& out = echoes[i] = {};
         const auto met =
             is_set(meeting, i) ? std::span(met_).subspan(first_[i], sub_rays) : std::span<LidarReturn>();
+        const double axis_m = met.empty() ? 0 : met.front().range_m;
         if (!met.empty()) out.sunlight = met.front().sunlight;
         EchoList list;
         std::size_t n = part(met, list);
         if (n > 0 && multipath_.is_on()) n = add_multipath(multipath_.of_beam(first_[i]), list, n);
-        if (n == 0 && !air_.is_possible()) return;
+        if (n == 0 && !sees_air) return;
+        if (bright_air_)
+            out.sunlight += sunlight_in_air(at, beams[i], axis_m, uniform(draws.of_echo(kAirEcho).w1[i]));
         const double noise = noise_in(static_cast<double>(out.sunlight));
         double most = -1, second = -1;
         const auto report = [&](const LidarEcho& echo, double light) {
@@ -107,6 +113,14 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
         for (std::size_t k = 0; k < n; ++k) report(detect(list[k], noise, i, k, draws), list[k].light);
     });
     return possible;
+}
+
+/// That the medium scatters into the beam, before what its axis meets at `axis_m` (0: nothing); in units of a white
+/// surface that faces the Sun.
+float LidarReceiver::sunlight_in_air(const BodyPoses& at, const Ray& beam, double axis_m, double u) const noexcept {
+    const double range_m = axis_m > 0 ? axis_m : kInfinity;
+    return static_cast<float>(std::numbers::pi / tracer_.scene().sun->irradiance_w_m2 *
+                              medium_->lidar_in_scattering(at, beam, range_m, u));
 }
 
 /// Of the receiver, over that in the dark.

@@ -38,9 +38,11 @@ public:
     /// alone.
     LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
-    /// Dims what comes back, and sends some back itself; null, as at first: a vacuum. It must outlive this.
+    /// Dims what comes back, sends some back itself, and scatters sunlight into the beams; null, as at first: a
+    /// vacuum. It must outlive this.
     void set_medium(const Medium* medium) noexcept {
         medium_ = medium;
+        bright_air_ = medium != nullptr && sunlight_ && tracer_.scene().sun.has_value();
         air_ = AirEcho(model_, least_light_, medium);
     }
 
@@ -70,6 +72,8 @@ private:
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
     [[nodiscard]] std::size_t add_multipath(std::span<LidarReturn> late, EchoList& echoes,
                                             std::size_t n) const noexcept;
+    [[nodiscard]] float sunlight_in_air(const BodyPoses& at, const Ray& beam, double axis_m,
+                                        double u) const noexcept;
     [[nodiscard]] double noise_in(double sunlight) const noexcept;
     [[nodiscard]] LidarEcho detect(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                    Draws& draws) const noexcept;
@@ -83,8 +87,10 @@ private:
     double range_max_m_;
     double shot_range_max_m_;  ///< beyond `range_max_m_` where ranges wrap
     int mount_;
-    bool sunlight_;       ///< is wanted
-    double least_light_;  ///< rho / range^2; 0: all is detected
+    bool sunlight_;            ///< is wanted
+    bool reports_sunlight_;    ///< also where there is no echo
+    bool bright_air_ = false;  ///< scatters sunlight that is wanted
+    double least_light_;       ///< rho / range^2; 0: all is detected
     bool random_;
     PhiloxSchedule schedule_;
     std::uint32_t stream_;

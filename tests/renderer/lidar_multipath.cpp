@@ -71,11 +71,11 @@ public:
 };
 
 /// Over shots: of the light, and of light times range. With standard errors of the means.
-struct Light {
+struct SeenLight {
     double light = 0, moment = 0, light_error = 0, moment_error = 0;
 };
-Light mean_light(const std::vector<LidarEchoes>& shots) {
-    Light mean, square;
+SeenLight mean_light(const std::vector<LidarEchoes>& shots) {
+    SeenLight mean, square;
     const auto n = static_cast<double>(shots.size());
     for (const LidarEchoes& e : shots) {
         const double r = e.strongest.range_m, light = static_cast<double>(e.strongest.reflectivity) / (r * r);
@@ -98,7 +98,7 @@ TEST(LidarMultipath, InsideOfASphereKeepsTheEnergy) {
                 half > 0 ? 4 * std::atan(half * 0.5 * half / std::sqrt(1 + 1.25 * half * half)) : 4 * kPi;
             add_sphere(inside.scene, 10, {});
             inside.lidar.receiver.pulse_length_m = kLongPulse_m;
-            const Light seen = mean_light(inside.shoot({0.1, 0.05, 1}, half > 0 ? 8000 : 500));
+            const SeenLight seen = mean_light(inside.shoot({0.1, 0.05, 1}, half > 0 ? 8000 : 500));
             const double direct = albedo / 100, share = albedo * solid_angle / (4 * kPi);
             EXPECT_NEAR(seen.light, direct * (1 + share), 4 * seen.light_error + 1e-6 * direct) << half;
             EXPECT_LT(seen.light_error, 0.01 * direct * share);
@@ -116,10 +116,10 @@ public:
         add_plate(kDeep, 2 * kHigh, exp_rotation({0, kPi / 2, 0}), {kCorner, 0, kRange - 0.5 * kDeep}, 1);
     }
     /// What the point of the wall in this direction sends back, directly and by way of the side that is lit.
-    [[nodiscard]] Light expected(const Vec3& direction) const {
+    [[nodiscard]] SeenLight expected(const Vec3& direction) const {
         const Vec3 b = kRange / direction.z * direction;
         const double r_b = norm(b);
-        Light light;
+        SeenLight light;
         light.light = static_cast<double>(kWall) * (kRange / r_b) / (r_b * r_b);
         light.moment = light.light * r_b;
         constexpr int kCells = 1200;
@@ -151,7 +151,8 @@ TEST(LidarMultipath, InACornerIsTheQuadrature) {
                 if (sub_rays > 1) corner.mount_on_a_turned_body();
                 corner.lidar.receiver.sub_rays = sub_rays;
                 corner.lidar.receiver.beam_divergence_rad = sub_rays > 1 ? 1e-4 : 0;
-                const Light seen = mean_light(corner.shoot(direction, 4000)), expected = corner.expected(direction);
+                const SeenLight seen = mean_light(corner.shoot(direction, 4000)),
+                                expected = corner.expected(direction);
                 EXPECT_NEAR(seen.light, expected.light, 4 * seen.light_error + 2e-6) << direction.x;
                 EXPECT_NEAR(seen.moment, expected.moment, 4 * seen.moment_error + 2e-5) << direction.x;
                 const double bias_m = seen.moment / seen.light - expected.moment / expected.light;
@@ -187,7 +188,7 @@ TEST(LidarMultipath, OfANarrowBeamIsFromWithinTheBeam) {
     // With the corner itself in the beam the light grows, and the range by less than the beam is wide.
     const std::vector<LidarEchoes> with = corner.shoot({-0.2, 0, 1}, 2000);
     corner.lidar.receiver.multipath = Multipath::none;
-    const Light direct = mean_light(corner.shoot({-0.2, 0, 1}, 2000)), seen = mean_light(with);
+    const SeenLight direct = mean_light(corner.shoot({-0.2, 0, 1}, 2000)), seen = mean_light(with);
     EXPECT_GT(seen.light, 1.02 * direct.light);
     EXPECT_LT(seen.light, 1.5 * direct.light);
     EXPECT_GT(seen.moment / seen.light, direct.moment / direct.light);

@@ -127,7 +127,7 @@ void LidarUnit::trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcep
 
 void LidarUnit::trace_truth(std::int64_t start_ns) noexcept {
     const ShotSettings settings{.range_max_m = lidar_.range_max_m,
-                                .multipath = lidar_.receiver.multipath,
+                                .multipath = lidar_.receiver.multipath != LidarReceiverModel::Multipath::none,
                                 .motions = motions_,
                                 .mount = lidar_.mount,
                                 .medium = world_.render_scene().medium()};

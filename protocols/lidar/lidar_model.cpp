@@ -35,6 +35,17 @@ void add_lidar_make(const LidarMake& make) {
     makes().push_back(&make);
 }
 
+bool LidarField::contains(const Vec3& d) const noexcept {
+    switch (kind) {
+        case Kind::beam: return false;
+        case Kind::plane: return d.y > 0 && std::abs(d.x) <= d.y * horizontal && std::abs(d.z) <= d.y * vertical;
+        case Kind::angles:
+            return std::abs(std::atan2(d.x, d.y)) <= horizontal &&
+                   std::abs(std::atan2(d.z, std::hypot(d.x, d.y))) <= vertical;
+    }
+    return false;
+}
+
 std::int64_t LidarModel::sweep(std::int64_t packet) const noexcept {
     return std::llround(std::floor(static_cast<double>(packet_start_ns(packet)) * 1e-9 * spec_.rate_hz));
 }

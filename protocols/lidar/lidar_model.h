@@ -53,7 +53,8 @@ enum class LidarReturns : std::uint8_t {
 /// What comes back of one shot. Where there is one echo, it is `strongest` and `last`, and `second` is none.
 struct LidarEchoes {
     LidarEcho strongest, second, last;
-    /// Of the surface that the axis meets, of a white one that faces the Sun; 0 where no one asks for it.
+    /// Of the surface that the axis meets and the air before it, of a white one that faces the Sun; 0 where no one
+    /// asks for it.
     float sunlight = 0;
 
     /// What a unit reports, in its packets' order; the second is none where there is one echo, or one is wanted.
@@ -76,6 +77,22 @@ struct LidarPoint {
     double velocity_m_s = 0;       ///< as in LidarEcho
 
     [[nodiscard]] Vec3 position_m() const noexcept { return origin_m + range_m * direction; }
+};
+
+/// What each pulse lights, evenly by solid angle, where that is more than the beam of one shot: a flash LiDAR's
+/// whole field, about its y axis, in its own frame.
+struct LidarField {
+    enum class Kind : std::uint8_t {
+        beam,    ///< no more than each shot's own beam
+        plane,   ///< a rectangle on a plane across y
+        angles,  ///< a span of azimuths and one of elevations
+    };
+    Kind kind = Kind::beam;
+    double horizontal = 0, vertical = 0;  ///< half of it: tangents, or radians
+
+    /// `direction`: unit.
+    [[nodiscard]] bool contains(const Vec3& direction) const noexcept;
+    friend bool operator==(const LidarField&, const LidarField&) = default;
 };
 
 /// How the instrument appears on the network by default.
@@ -131,6 +148,7 @@ struct LidarSpec {
     bool measures_velocity = false;
     double velocity_resolution_m_s = 0;  ///< of those in packets
     bool measures_sunlight = false;
+    LidarField lit{};
     LidarNetwork network{};
 };
 

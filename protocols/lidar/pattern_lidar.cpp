@@ -151,6 +151,7 @@ private:
                 .range_resolution_m = pattern.range_resolution_m,
                 .measures_velocity = pattern.velocity_resolution_m_s > 0,
                 .velocity_resolution_m_s = pattern.velocity_resolution_m_s,
+                .lit = pattern.lit,
                 .network = network_of(pattern)};
     }
 

@@ -30,6 +30,7 @@ struct LidarPattern {
     double latency_s = 0;  ///< from a packet's last shot until it is sent
     std::uint16_t data_port = 2370;
     std::vector<PatternShot> shots;  ///< of a frame, in firing order
+    LidarField lit{};                ///< by each pulse
 
     static constexpr std::size_t kMostShots = 1'000'000;
     /// Poses are kept this long.

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "base/constants.h"
+#include "renderer/scene/lidar_sunlight.h"
 
 namespace narpa {
 namespace {
@@ -54,19 +55,21 @@ LidarReceiver::LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint
       range_max_m_(lidar.range_max_m),
       shot_range_max_m_(model_.range_ambiguity_m > 0 ? kInfinity : range_max_m_),
       mount_(lidar.mount),
-      sunlight_(model_.sunlight_noise > 0 || (lidar.model && lidar.model->spec().measures_sunlight)),
+      sunlight_(sees_sunlight(lidar)),
+      reports_sunlight_(lidar.model && lidar.model->spec().measures_sunlight),
       least_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
       random_(model_.range_noise_m > 0 || model_.range_noise_at_limit_m > 0 || model_.velocity_noise_m_s > 0),
       schedule_(seed),
       stream_(kStream + static_cast<std::uint32_t>(index)),
       cone_(model_.beam_divergence_rad, model_.sub_rays),
       culling_(tracer, cone_.tangent(), shot_range_max_m_),
-      met_(kLanes * cone_.size()) {}
+      met_(kLanes * cone_.size()),
+      multipath_(tracer, lidar, seed, index, cone_.size()) {}
 
 std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
                                      std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
     const ShotSettings settings{.range_max_m = shot_range_max_m_,
-                                .multipath = model_.multipath,
+                                .multipath = model_.multipath != LidarReceiverModel::Multipath::none,
                                 .sunlight = sunlight_ ? ~0u : 0u,
                                 .motions = motions,
                                 .mount = mount_,
@@ -74,16 +77,21 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
     Draws draws(*this, first);
     const std::size_t sub_rays = cone_.size();
     const std::uint32_t meeting = culling_.find_meeting(at, beams);
-    trace(at, beams, meeting, settings, draws);
-    const std::uint32_t possible = air_.is_possible() ? lanes_below(beams.n) : meeting;
+    trace(at, beams, first, meeting, settings, draws);
+    const bool sees_air = air_.is_possible() || (bright_air_ && reports_sunlight_);
+    const std::uint32_t possible = sees_air ? lanes_below(beams.n) : meeting;
     for_each_lane(possible, [&](std::size_t i) {
         LidarEchoes& out = echoes[i] = {};
         const auto met =
             is_set(meeting, i) ? std::span(met_).subspan(first_[i], sub_rays) : std::span<LidarReturn>();
+        const double axis_m = met.empty() ? 0 : met.front().range_m;
         if (!met.empty()) out.sunlight = met.front().sunlight;
         EchoList list;
-        const std::size_t n = part(met, list);
-        if (n == 0 && !air_.is_possible()) return;
+        std::size_t n = part(met, list);
+        if (n > 0 && multipath_.is_on()) n = add_multipath(multipath_.of_beam(first_[i]), list, n);
+        if (n == 0 && !sees_air) return;
+        if (bright_air_)
+            out.sunlight += sunlight_in_air(at, beams[i], axis_m, uniform(draws.of_echo(kAirEcho).w1[i]));
         const double noise = noise_in(static_cast<double>(out.sunlight));
         double most = -1, second = -1;
         const auto report = [&](const LidarEcho& echo, double light) {
@@ -107,6 +115,14 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
     return possible;
 }
 
+/// That the medium scatters into the beam, before what its axis meets at `axis_m` (0: nothing); in units of a white
+/// surface that faces the Sun.
+float LidarReceiver::sunlight_in_air(const BodyPoses& at, const Ray& beam, double axis_m, double u) const noexcept {
+    const double range_m = axis_m > 0 ? axis_m : kInfinity;
+    return static_cast<float>(std::numbers::pi / tracer_.scene().sun->irradiance_w_m2 *
+                              medium_->lidar_in_scattering(at, beam, range_m, u));
+}
+
 /// Of the receiver, over that in the dark.
 double LidarReceiver::noise_in(double sunlight) const noexcept {
     return std::sqrt(1 + model_.sunlight_noise * sunlight);
@@ -128,8 +144,8 @@ LidarReceiver::Echo LidarReceiver::air_echo(const BodyPoses& at, const Ray& beam
 }
 
 /// Sub-rays of a beam run side by side, so they are traced together, through the bodies that their beams may meet.
-void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted, ShotSettings settings,
-                          Draws& draws) noexcept {
+void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
+                          ShotSettings settings, Draws& draws) noexcept {
     const std::size_t sub_rays = cone_.size();
     Lanes<std::size_t> beam;
     Lanes<BeamCone::Across> across{};
@@ -142,6 +158,7 @@ void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint3
     const bool sunlight = settings.sunlight != 0;
     for (std::size_t k = 0; k < count * sub_rays;) {
         RayBatch rays;
+        DiffuseMultipath::SubRays of_beams;
         std::uint32_t shots = 0;
         settings.sunlight = 0;
         const std::size_t begin = k;
@@ -149,17 +166,34 @@ void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint3
             const std::size_t i = beam[k / sub_rays], s = k % sub_rays, n = std::min(sub_rays - s, kLanes - rays.n);
             // Of the first sub-ray alone, which is the nearest to the axis.
             if (sunlight && s == 0) settings.sunlight |= 1u << rays.n;
+            if (multipath_.is_on())
+                for (std::size_t j = 0; j < n; ++j)
+                    of_beams.put(rays.n + j, first + i, s + j, k + j, beams.direction[i]);
             cone_.append(beams[i], across[i], s, n, rays);
             shots |= 1u << i;
             k += n;
         }
         settings.bodies = culling_.bodies_of(shots);
-        shoot(tracer_, at, rays, settings, std::span(met_).subspan(begin, rays.n));
+        const auto met = std::span(met_).subspan(begin, rays.n);
+        HitBatch hits;
+        shoot(tracer_, at, rays, settings, met, hits);
+        if (multipath_.is_on()) multipath_.trace(at, rays, of_beams, hits, met, settings);
     }
 }
 
+/// Of one of `n` rays of a beam.
+void LidarReceiver::add_light(const LidarReturn& r, double n, Echo& echo) noexcept {
+    const double light = light_of(r) / n;
+    if (!(light > 0)) return;
+    const double share = light / (echo.light + light);
+    echo.light += light;
+    echo.range_m += share * (r.range_m - echo.range_m);
+    echo.velocity_m_s += share * (r.velocity_m_s - echo.velocity_m_s);
+}
+
 /// Of `n` sub-rays those that make one echo, whose nearest is at `nearest_m`.
-LidarReceiver::Echo LidarReceiver::echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept {
+LidarReceiver::Echo LidarReceiver::echo_of(std::span<const LidarReturn> met, double nearest_m, double farthest_m,
+                                           double n) noexcept {
     double light = 0, moment = 0, velocity = 0, velocity_of_nearest = 0;
     for (const LidarReturn& r : met) {
         if (!(r.range_m > 0)) continue;
@@ -169,8 +203,8 @@ LidarReceiver::Echo LidarReceiver::echo_of(std::span<const LidarReturn> met, dou
         moment += l * (r.range_m - nearest_m);
         velocity += l * r.velocity_m_s;
     }
-    if (!(light > 0)) return {light, nearest_m, velocity_of_nearest};
-    return {light, nearest_m + moment / light, velocity / light};
+    if (!(light > 0)) return {light, nearest_m, velocity_of_nearest, nearest_m, farthest_m};
+    return {light, nearest_m + moment / light, velocity / light, nearest_m, farthest_m};
 }
 
 /// Returns the number of echoes, the nearest first. Sorts the sub-rays by range where there may be several.
@@ -179,7 +213,7 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
     if (sub_rays.size() == 1) {
         const LidarReturn& r = sub_rays.front();
         if (!(r.range_m > 0)) return 0;
-        echoes[0] = {light_of(r), r.range_m, r.velocity_m_s};
+        echoes[0] = {light_of(r), r.range_m, r.velocity_m_s, r.range_m, r.range_m};
         return 1;
     }
     const auto n = static_cast<double>(sub_rays.size());
@@ -190,7 +224,7 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
     }
     if (!(farthest_m > 0)) return 0;
     if (farthest_m - nearest_m <= model_.pulse_length_m) {
-        echoes[0] = echo_of(sub_rays, nearest_m, n);
+        echoes[0] = echo_of(sub_rays, nearest_m, farthest_m, n);
         return 1;
     }
     const auto end =
@@ -202,10 +236,42 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
     for (auto begin = sub_rays.begin(); begin != end && count < kMostEchoes; ++count) {
         auto next = begin + 1;
         while (next != end && next->range_m - (next - 1)->range_m <= gap_m) ++next;
-        echoes[count] = echo_of({begin, next}, begin->range_m, n);
+        echoes[count] = echo_of({begin, next}, begin->range_m, (next - 1)->range_m, n);
         begin = next;
     }
     return count;
+}
+
+/// What arrives within a pulse's length of an echo is part of it. Of what comes later, the pulse's length with the
+/// most light is an echo of its own. `late`: of one beam, of which each brings an equal share; its order is lost.
+/// Returns the number of echoes, the nearest first.
+std::size_t LidarReceiver::add_multipath(std::span<LidarReturn> late, EchoList& echoes,
+                                         std::size_t n) const noexcept {
+    const auto rays = static_cast<double>(late.size());
+    std::size_t later = 0;
+    for (const LidarReturn& r : late) {
+        if (!(r.range_m > 0)) continue;
+        std::size_t k = n;
+        while (k > 0 && !(r.range_m >= echoes[k - 1].first_m)) --k;
+        if (k == 0 || r.range_m > echoes[k - 1].last_m + model_.pulse_length_m)
+            late[later++] = r;
+        else
+            add_light(r, rays, echoes[k - 1]);
+    }
+    if (later == 0 || n == kMostEchoes) return n;
+    late = late.first(later);
+    std::ranges::sort(late, {}, &LidarReturn::range_m);
+    Echo strongest, window;
+    for (std::size_t begin = 0, end = 0; begin < later; ++begin) {
+        while (end < later && late[end].range_m <= late[begin].range_m + model_.pulse_length_m) ++end;
+        window = {};
+        for (const LidarReturn& r : late.subspan(begin, end - begin)) add_light(r, rays, window);
+        if (window.light > strongest.light) strongest = window;
+    }
+    const auto place = std::ranges::upper_bound(std::span(echoes).first(n), strongest.range_m, {}, &Echo::range_m);
+    std::copy_backward(place, std::span(echoes).first(n).end(), std::span(echoes).first(n + 1).end());
+    *place = strongest;
+    return n + 1;
 }
 
 /// None where the echo is not detected.

@@ -23,6 +23,7 @@
 #include "renderer/lidar/air_echo.h"
 #include "renderer/lidar/beam_cone.h"
 #include "renderer/lidar/beam_culling.h"
+#include "renderer/lidar/diffuse_multipath.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
 
@@ -37,9 +38,11 @@ public:
     /// alone.
     LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
-    /// Dims what comes back, and sends some back itself; null, as at first: a vacuum. It must outlive this.
+    /// Dims what comes back, sends some back itself, and scatters sunlight into the beams; null, as at first: a
+    /// vacuum. It must outlive this.
     void set_medium(const Medium* medium) noexcept {
         medium_ = medium;
+        bright_air_ = medium != nullptr && sunlight_ && tracer_.scene().sun.has_value();
         air_ = AirEcho(model_, least_light_, medium);
     }
 
@@ -52,17 +55,25 @@ public:
                           std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
 
 private:
-    /// Light and range of what is one echo.
+    /// Light and range of what is one echo; from the nearest to the farthest that is part of it.
     struct Echo {
         double light = 0, range_m = 0, velocity_m_s = 0;
+        double first_m = 0, last_m = 0;
     };
     using EchoList = std::array<Echo, kMostEchoes>;
     class Draws;
 
-    void trace(const BodyPoses& at, const RayBatch& beams, std::uint32_t wanted, ShotSettings settings,
-               Draws& draws) noexcept;
-    [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double n) noexcept;
+    /// `first`: number of the first beam.
+    void trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
+               ShotSettings settings, Draws& draws) noexcept;
+    [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double farthest_m,
+                                      double n) noexcept;
+    static void add_light(const LidarReturn& r, double n, Echo& echo) noexcept;
     [[nodiscard]] std::size_t part(std::span<LidarReturn> sub_rays, EchoList& echoes) const noexcept;
+    [[nodiscard]] std::size_t add_multipath(std::span<LidarReturn> late, EchoList& echoes,
+                                            std::size_t n) const noexcept;
+    [[nodiscard]] float sunlight_in_air(const BodyPoses& at, const Ray& beam, double axis_m,
+                                        double u) const noexcept;
     [[nodiscard]] double noise_in(double sunlight) const noexcept;
     [[nodiscard]] LidarEcho detect(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                    Draws& draws) const noexcept;
@@ -76,8 +87,10 @@ private:
     double range_max_m_;
     double shot_range_max_m_;  ///< beyond `range_max_m_` where ranges wrap
     int mount_;
-    bool sunlight_;       ///< is wanted
-    double least_light_;  ///< rho / range^2; 0: all is detected
+    bool sunlight_;            ///< is wanted
+    bool reports_sunlight_;    ///< also where there is no echo
+    bool bright_air_ = false;  ///< scatters sunlight that is wanted
+    double least_light_;       ///< rho / range^2; 0: all is detected
     bool random_;
     PhiloxSchedule schedule_;
     std::uint32_t stream_;
@@ -87,6 +100,7 @@ private:
     BeamCulling culling_;
     Lanes<std::size_t> first_{};    ///< sub-ray in `met_` of each shot that may meet a body
     std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
+    DiffuseMultipath multipath_;
 };
 
 }  // namespace narpa

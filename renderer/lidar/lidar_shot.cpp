@@ -24,20 +24,24 @@ double mean(const Rgb& c) {
 
 /// A shot on its way from mirror to mirror.
 struct Path {
-    double range_m = 0, throughput = 1;
+    double range_m = 0, throughput = 1;  ///< of light there and back
+    double one_way = 1;                  ///< of light back alone, as the Sun's
     Vec3 start{}, direction{};
     Vec3 velocity{};  ///< of the start
     double rate_m_s = 0;
 };
 
 float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Surface& surface,
-                  const Vec3& back) {
+                  const Vec3& back, const Medium* medium) {
     const auto& sun = tracer.scene().sun;
     if (!sun) return 0;
     const double cosine = dot(surface.normal, sun->direction);
     if (cosine <= 0 || tracer.occluded(at, hit, sun->direction, std::numeric_limits<double>::infinity())) return 0;
-    return static_cast<float>(std::numbers::pi * cosine *
-                              mean(bsdf(surface, surface.normal, sun->direction, back)));
+    const auto light =
+        static_cast<float>(std::numbers::pi * cosine * mean(bsdf(surface, surface.normal, sun->direction, back)));
+    if (medium == nullptr) return light;
+    return light * static_cast<float>(medium->lidar_transmittance(at, {hit.position, sun->direction, hit.time},
+                                                                  std::numeric_limits<double>::infinity()));
 }
 
 /// As surface_at, of a lane. Most surfaces have no more than a picture of their colour: for these nothing else of
@@ -87,7 +91,7 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
 
 /// What the shot meets at the end of its path. In place: a copy of what was just written in parts is slow.
 void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i, const Path& path,
-                bool sunlight, LidarReturn& r) {
+                const ShotSettings& settings, LidarReturn& r) {
     const Vec3 back = -path.direction;
     const Surface surface = surface_of(tracer, at, hits, i, path.direction);
     const double cosine = dot(surface.normal, back);
@@ -98,8 +102,9 @@ void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits,
     r.body = hits.body[i];
     r.cos_incidence = static_cast<float>(cosine);
     r.velocity_m_s = path.rate_m_s;
-    if (sunlight)
-        r.sunlight = static_cast<float>(path.throughput) * sunlight_on(tracer, at, hits[i], surface, back);
+    if (is_set(settings.sunlight, i))
+        r.sunlight =
+            static_cast<float>(path.one_way) * sunlight_on(tracer, at, hits[i], surface, back, settings.medium);
 }
 
 /// By the air on the piece of the path that ends in the hit, there and back.
@@ -108,6 +113,7 @@ void dim(Path& path, const BodyPoses& at, const Vec3& from, const HitBatch& hits
     const double passes =
         medium.lidar_transmittance(at, {from, path.direction, hits.time[i]}, norm(hits.position[i] - from));
     path.throughput *= passes * passes;
+    path.one_way *= passes;
 }
 
 /// Takes the hit as the end of a piece of the path.
@@ -150,12 +156,13 @@ void reflect(Path& path, const Tracer& tracer, const HitBatch& hits, std::size_t
     const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
     const Vec3 n = hits.shading_normal[i], d = path.direction;
     path.direction = normalized(d - 2 * dot(d, n) * n);
-    path.throughput *= mean(m.specular) * mean(m.specular);  // there and back
+    path.throughput *= mean(m.specular) * mean(m.specular);
+    path.one_way *= mean(m.specular);
 }
 
-/// The shots whose first hits are mirrors. `hits`: in, those; they become the latest.
+/// The shots whose first hits are mirrors. `hits`: those.
 void follow_mirrors(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
-                    std::uint32_t mirrored, HitBatch& hits, std::span<LidarReturn> returns) {
+                    std::uint32_t mirrored, HitBatch hits, std::span<LidarReturn> returns) {
     Lanes<Path> paths;
     for_each_lane(mirrored, [&](std::size_t i) { paths[i] = to_first_hit(at, beams, hits, i, settings); });
     for (int mirrors = 0; mirrored != 0 && mirrors < kMirrors; ++mirrors) {
@@ -175,7 +182,7 @@ void follow_mirrors(const Tracer& tracer, const BodyPoses& at, const RayBatch& b
             if (goes_on(tracer, hits, i, settings))
                 mirrored |= 1u << i;
             else
-                put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
+                put_return(tracer, at, hits, i, path, settings, returns[i]);
         });
     }
 }
@@ -203,6 +210,11 @@ void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, Ra
 void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
            std::span<LidarReturn> returns) noexcept {
     HitBatch hits;
+    shoot(tracer, at, beams, settings, returns, hits);
+}
+
+void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
+           std::span<LidarReturn> returns, HitBatch& hits) noexcept {
     tracer.intersect(at, beams, settings.bodies.empty() ? tracer.all_bodies() : settings.bodies, hits);
     std::fill_n(returns.begin(), beams.n, LidarReturn{});
     const std::uint32_t met = hits.met & lanes_below(beams.n);
@@ -220,7 +232,8 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
         r.cos_incidence = plain.cos_incidence[i];
         if (is_set(settings.sunlight, i)) {
             const Vec3 direction = beams.direction[i];
-            r.sunlight = sunlight_on(tracer, at, hits[i], surface_of(tracer, at, hits, i, direction), -direction);
+            r.sunlight =
+                sunlight_on(tracer, at, hits[i], surface_of(tracer, at, hits, i, direction), -direction, nullptr);
         }
     });
     std::uint32_t mirrored = 0;
@@ -230,7 +243,7 @@ void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, con
         if (goes_on(tracer, hits, i, settings))
             mirrored |= 1u << i;
         else
-            put_return(tracer, at, hits, i, path, is_set(settings.sunlight, i), returns[i]);
+            put_return(tracer, at, hits, i, path, settings, returns[i]);
     });
     if (mirrored != 0) follow_mirrors(tracer, at, beams, settings, mirrored, hits, returns);
 }

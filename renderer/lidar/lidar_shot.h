@@ -45,6 +45,9 @@ void place_beams(const BodyPoses& at, int mount, const Rigid3& T_mount_lidar, Ra
 /// the range where a body turns. Light is taken as infinitely fast; relative error v / c.
 void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
            std::span<LidarReturn> returns) noexcept;
+/// The same. `hits`: out, what the shots meet first.
+void shoot(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
+           std::span<LidarReturn> returns, HitBatch& hits) noexcept;
 [[nodiscard]] LidarReturn shoot(const Tracer& tracer, const BodyPoses& at, const Ray& beam,
                                 const ShotSettings& settings) noexcept;
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "renderer/scene/lidar_sunlight.h"
+
 namespace narpa {
 namespace {
 
@@ -22,6 +24,14 @@ AirResolution resolution_of(const Atmosphere& a) {
     return r;
 }
 
+/// The noise that it makes is a square root: 1 % of the light will do.
+AirResolution lidar_resolution_of(const Atmosphere& a) {
+    AirResolution r;
+    r.steps = std::min(a.steps, 8);
+    r.heights = 12;
+    return r;
+}
+
 double radius_of(const Scene& scene) {
     return scene.sun ? 0.5 * scene.sun->angular_diameter_rad : 0;
 }
@@ -34,6 +44,9 @@ AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)
       light_(Air(scene.atmosphere->air, scene.atmosphere->samples_per_band), resolution_of(*scene.atmosphere),
              radius_of(scene), threads),
       lidar_air_(scene.atmosphere->air, kLidar_m, scene.atmosphere->steps) {
+    if (std::ranges::any_of(scene.lidars, sees_sunlight))
+        lidar_light_.emplace(Air(scene.atmosphere->air, kLidar_m), lidar_resolution_of(*scene.atmosphere),
+                             radius_of(scene), threads);
     if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body_].shape)) {
         const double radius = scene.atmosphere->air.ground_radius_m;
         scale_ = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
@@ -109,6 +122,17 @@ double AtmosphereMedium::lidar_transmittance(const BodyPoses& at, const Ray& ray
     const Vec3 toward = frame.direction(ray.direction);
     const double metre = norm(toward);
     return lidar_air_.transmittance(frame.point(ray.origin), toward / metre, range_m * metre);
+}
+
+double AtmosphereMedium::lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
+                                             double) const noexcept {
+    if (!lidar_light_ || !sun_) return 0;
+    const Frame frame = frame_at(at, ray.time);
+    const Vec3 toward = frame.direction(ray.direction);
+    const double metre = norm(toward);
+    const Vec3 sun = *to_sun(frame);
+    const AirLight light = air_along(*lidar_light_, frame.point(ray.origin), toward / metre, range_m * metre, &sun);
+    return sun_->irradiance_w_m2 * static_cast<double>(light.in_scattering.x);
 }
 
 /// Lengths are the world's: the ellipsoid's scale changes them by 0.3 %.

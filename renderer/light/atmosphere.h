@@ -32,6 +32,9 @@ public:
                               double time) const noexcept override;
     [[nodiscard]] double lidar_transmittance(const BodyPoses& at, const Ray& ray,
                                              double range_m) const noexcept override;
+    /// Of scenes whose LiDARs see sunlight; else 0.
+    [[nodiscard]] double lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
+                                             double u) const noexcept override;
     [[nodiscard]] Backscatter lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
                                                 double to_m) const noexcept override;
     [[nodiscard]] double most_lidar_backscatter_1_m() const noexcept override { return lidar_air_.most_1_m(); }
@@ -62,6 +65,7 @@ private:
     ScatteredLight light_;
     std::unique_ptr<AirCells> cells_ = std::make_unique<AirCells>();  ///< what frames have integrated
     LidarAir lidar_air_;
+    std::optional<ScatteredLight> lidar_light_;  ///< at the wavelength of LiDARs
 };
 
 }  // namespace narpa

@@ -56,6 +56,11 @@ public:
                                                      double range_m) const noexcept {
         return static_cast<double>(mean_band(transmittance(at, ray, range_m)));
     }
+    /// As `along`: radiance of scattered sunlight at the wavelength of LiDARs, W m^-2 sr^-1.
+    [[nodiscard]] virtual double lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
+                                                     double u) const noexcept {
+        return static_cast<double>(mean_band(along(at, ray, range_m, u).in_scattering));
+    }
     /// What the medium itself sends back of a LiDAR's pulse from between two ranges, 0 < from_m < to_m: pi times
     /// the integral of backscatter * transmittance^2 / range^2, so that a diffuse surface sends reflectivity *
     /// transmittance^2 / range^2; and its mean range.

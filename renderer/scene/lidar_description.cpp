@@ -75,7 +75,7 @@ std::vector<PatternShot> shots_of(const Grid& g) {
     return shots;
 }
 
-std::vector<PatternShot> read_grid(TableReader table) {
+void read_grid(TableReader table, LidarPattern& pattern) {
     static constexpr std::array<std::pair<std::string_view, Spacing>, 2> kSpacings{
         {{"tangents", Spacing::tangents}, {"angles", Spacing::angles}}};
     static constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
@@ -103,9 +103,15 @@ std::vector<PatternShot> read_grid(TableReader table) {
     if (g.columns * g.rows > most_shots) {
         table.fail("columns",
                    fmt::format("{} x {} shots a frame, expected at most {}", g.columns, g.rows, most_shots));
-        return {};
+        return;
     }
-    return shots_of(g);
+    pattern.shots = shots_of(g);
+    if (g.scan != Scan::flash) return;
+    const double h = 0.5 * g.horizontal_rad, v = 0.5 * g.vertical_rad;
+    if (g.spacing == Spacing::tangents)
+        pattern.lit = {LidarField::Kind::plane, std::tan(h), std::tan(v)};
+    else
+        pattern.lit = {LidarField::Kind::angles, h, v};
 }
 
 std::vector<PatternShot> read_spin(TableReader table) {
@@ -172,22 +178,23 @@ Result<std::vector<PatternShot>> read_shots(const std::string& file) {
     return shots;
 }
 
-std::vector<PatternShot> read_pattern(TableReader& root, TableReader& head, const std::string& file) {
+void read_pattern(TableReader& root, TableReader& head, const std::string& file, LidarPattern& pattern) {
     const bool grid = root.has("grid"), spin = root.has("spin"), beams = root.has("beam"),
                shots = head.has("shots");
     if (grid + spin + beams + shots != 1) {
         head.fail("shots", "expected one of [grid], [spin], [[beam]] and shots = \"FILE.csv\" in [lidar]");
-        return {};
+        return;
     }
-    if (auto table = grid ? root.table("grid") : std::nullopt) return read_grid(*table);
-    if (auto table = spin ? root.table("spin") : std::nullopt) return read_spin(*table);
-    if (beams) return read_beams(root.tables("beam"));
-    if (const auto named = head.text("shots")) {
+    if (auto table = grid ? root.table("grid") : std::nullopt) return read_grid(*table, pattern);
+    if (auto table = spin ? root.table("spin") : std::nullopt) pattern.shots = read_spin(*table);
+    if (beams) pattern.shots = read_beams(root.tables("beam"));
+    if (const auto named = shots ? head.text("shots") : std::nullopt) {
         auto read = read_shots(beside(file, *named));
-        if (read) return *std::move(read);
-        head.fail("shots", read.error().text());
+        if (read)
+            pattern.shots = *std::move(read);
+        else
+            head.fail("shots", read.error().text());
     }
-    return {};
 }
 
 void read_head(TableReader& head, LidarPattern& p) {
@@ -223,7 +230,7 @@ Result<LidarMake> read_description(const std::string& file) {
         root.require("lidar", "a table [lidar]");
         if (auto head = root.table("lidar")) {
             read_head(*head, *pattern);
-            pattern->shots = read_pattern(root, *head, file);
+            read_pattern(root, *head, file, *pattern);
             head->finish();
         }
         root.finish();

@@ -25,7 +25,10 @@ void read_beam(TableReader& table, LidarReceiverModel& r) {
     if (r.sub_rays > 1 && r.beam_divergence_rad == 0)
         table.require("beam_divergence_rad", "a number > 0, as sub_rays sample the beam's cone");
     r.pulse_length_m = table.number("pulse_length_m", kLength).value_or(r.pulse_length_m);
-    r.multipath = table.boolean("multipath").value_or(false);
+    using enum LidarReceiverModel::Multipath;
+    static constexpr std::array<std::pair<std::string_view, LidarReceiverModel::Multipath>, 3> kMultipaths{
+        {{"none", none}, {"mirrors", mirrors}, {"diffuse", diffuse}}};
+    r.multipath = table.choice<LidarReceiverModel::Multipath>("multipath", kMultipaths).value_or(none);
 }
 
 void read_detection(TableReader& table, LidarReceiverModel& r) {
@@ -128,6 +131,10 @@ LidarSettings read_settings(TableReader& table, const LidarMake& make, const std
     return settings;
 }
 
+bool lights_an_area(const Lidar& lidar) {
+    return lidar.receiver.beam_divergence_rad > 0 || lidar.model->spec().lit.kind != LidarField::Kind::beam;
+}
+
 }  // namespace
 
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
@@ -144,6 +151,10 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
                             .value_or(make.range_m_default);
     lidar.receiver = read_receiver(table);
     lidar.receiver.range_min_m = table.number("range_min_m", {.low = 0, .high = range_m_most}).value_or(0);
+    if (lidar.receiver.multipath == LidarReceiverModel::Multipath::diffuse && !lights_an_area(lidar))
+        table.fail("multipath",
+                   "\"diffuse\" is of beams that light an area: expected a beam_divergence_rad, or a model whose "
+                   "[grid] is a flash");
     table.finish();
     return lidar;
 }

@@ -214,7 +214,12 @@ struct LidarReceiverModel {
     double beam_divergence_rad = 0;  ///< full angle of the evenly lit cone of the beam
     int sub_rays = 1;                ///< that sample the cone: 1, or kLeastSubRays to kMostSubRays
     double pulse_length_m = 0.9;     ///< surfaces closer in range than this make one echo: c / 2 * duration
-    bool multipath = false;          ///< a beam goes on from mirrors
+    enum class Multipath : std::uint8_t {
+        none,
+        mirrors,  ///< a beam goes on from mirrors
+        diffuse,  ///< and what it lights lights the surfaces around
+    };
+    Multipath multipath = Multipath::none;
 
     double range_min_m = 0;            ///< echoes from nearer are lost
     double range_at_10_percent_m = 0;  ///< where a surface of 10 %, across the beam, is just detected; 0: no limit

@@ -101,6 +101,28 @@ TEST_F(PatternLidars, AFlashFiresAllAtOnce) {
     EXPECT_NEAR(corner.z / corner.y, std::tan(20 * kDegree) * 19 / 20, 1e-12);
 }
 
+/// Inside of the sphere, whose points all light each other evenly: rho^2 W / (4 pi R^2) more light at each, W being
+/// the solid angle of the field.
+TEST_F(PatternLidars, APulseOfAFlashLightsItsWholeField) {
+    const auto made = world(std::string(kHead) + kGrid, "multipath = \"diffuse\"\npulse_length_m = 1000\n");
+    LidarUnit unit(*made, 0, true);
+    double light = 0;
+    int shots = 0;
+    for (std::int64_t p = 0; unit.sweep(p) < 2; ++p) {
+        unit.fire(p);
+        for (std::size_t i = 0; i < unit.shots().size(); ++i, ++shots) {
+            const auto& echo = unit.echoes()[i].strongest;
+            const auto& truth = unit.truth()[i];
+            light += static_cast<double>(echo.reflectivity) / (echo.range_m * echo.range_m) -
+                     static_cast<double>(truth.reflectivity) / (truth.range_m * truth.range_m);
+        }
+    }
+    const double a = std::tan(30 * kDegree), b = std::tan(20 * kDegree),
+                 solid_angle = 4 * std::atan(a * b / std::sqrt(1 + a * a + b * b));
+    const double expected = 0.36 * solid_angle / (4 * kPi * 900);
+    EXPECT_NEAR(light / shots, expected, 0.08 * expected);
+}
+
 TEST_F(PatternLidars, ARasterFiresCellAfterCellThereAndBack) {
     const auto shots = check_frames(*world(
         std::string(kHead) + kGrid + "spacing = \"angles\"\nscan = \"rows\"\ntwo_way = true\nscan_share = 0.9"));

@@ -253,7 +253,8 @@ TEST(LidarReceiver, MirrorsSendNothingBackUnlessBeamsGoOn) {
     add_mesh(target.scene, plate(4, 4), {exp_rotation({0, kPi / 2, 0}), {-7, 0, 10}});
     add_mesh(target.scene, plate(4, 4), {exp_rotation({0, kPi / 2, 0}), {7, 0, 10}});
     EXPECT_TRUE(ranges(target.shoot({.range_at_10_percent_m = 1000}, 1)).empty());
-    const LidarEchoes e = target.shoot({.multipath = true, .range_at_10_percent_m = 1000}, 1)[0];
+    const LidarEchoes e =
+        target.shoot({.multipath = LidarReceiverModel::Multipath::mirrors, .range_at_10_percent_m = 1000}, 1)[0];
     EXPECT_NEAR(e.strongest.range_m, 17, 1e-6);
     EXPECT_NEAR(e.strongest.reflectivity, 0.5 * 0.9 * 0.9, 1e-5);
 }

@@ -3,23 +3,17 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "base/constants.h"
-#include "estimator/pose/median.h"
-
 namespace narpa {
 namespace {
 
-/// Half the window over which a match's noise is summed: that of the optical flow.
-constexpr int kHalfWindow_px = 10;
 /// A match whose residual exceeds this many times the median is an outlier.
 constexpr double kOutlier = 4;
-/// Median of the length of a residual of unit variance in u and in v: Rayleigh's.
-constexpr double kRayleighMedian = 1.17741;
 /// Neighbouring rays this far off must meet the surface that the feature's own ray met.
 constexpr double kNeighbour_px = 1.5;
 /// They may lie off its tangent plane by this many pixels' worth of depth: a bend is a corner, a step is an
@@ -30,41 +24,66 @@ constexpr double kStep_px = 6;
 constexpr double kFewestFreedom = 3;
 /// Steps of a smaller normalised square are noise: each view selects other features.
 constexpr double kSettledSquared = 9;
+/// Points move by so much in the turns by which the response is measured, RMS.
+constexpr double kTurn_px = 2;
+/// Fewer flows do not say what motion they show.
+constexpr std::size_t kFewestFlows = 5;
+/// Of a motion of which matches show nothing: so little that its variance is beyond all limits.
+constexpr double kLeastShown = 1e-4;
+/// Answers from two starts whose distance has a larger normalised square are two poses.
+constexpr double kSameSquared = 30;
 /// Side of the blocks in which the target is searched.
 constexpr int kBlock_px = 6;
-
-/// Infinite where the point has no image.
-Pixel project(const CameraModel& camera, const Vec3& p) {
-    const auto image = camera.project(p);
-    return image ? Pixel{image->x, image->y} : Pixel{kInfinity, kInfinity};
-}
-
-/// Part of a window's side that it shares with another so far away.
-double overlap(double distance_px) {
-    return std::max(0.0, 1 - std::abs(distance_px) / (2 * kHalfWindow_px + 1));
-}
-
-double root_mean_square(const std::vector<double>& lengths) {
-    const Eigen::Map<const Eigen::VectorXd> all(lengths.data(), static_cast<Eigen::Index>(lengths.size()));
-    return lengths.empty() ? 0 : std::sqrt(all.squaredNorm() / static_cast<double>(lengths.size()));
-}
 
 /// More than half of a match's window is clipped in the frame: its gradients are not the light's.
 bool is_clipped(const MeasuredImage& frame, double u, double v) {
     if (frame.clipped.empty()) return false;
     const int x0 = static_cast<int>(std::lround(u)), y0 = static_cast<int>(std::lround(v));
     int clipped = 0, all = 0;
-    for (int y = std::max(0, y0 - kHalfWindow_px); y <= std::min(frame.height - 1, y0 + kHalfWindow_px); ++y)
-        for (int x = std::max(0, x0 - kHalfWindow_px); x <= std::min(frame.width - 1, x0 + kHalfWindow_px); ++x) {
+    for (int y = std::max(0, y0 - kFlowHalfWindow_px); y <= std::min(frame.height - 1, y0 + kFlowHalfWindow_px);
+         ++y)
+        for (int x = std::max(0, x0 - kFlowHalfWindow_px); x <= std::min(frame.width - 1, x0 + kFlowHalfWindow_px);
+             ++x) {
             clipped += frame.clipped[frame.index(x, y)] != 0;
             ++all;
         }
     return 2 * clipped > all;
 }
 
-/// Standard deviation of residuals in u and in v, from the median of their lengths.
-double scale_of(std::vector<double> lengths) {
-    return upper_median(std::span(lengths)) / kRayleighMedian;
+/// The motion of the target that these flows between two views look like, if all are of points of the body. Zero
+/// with too few of them.
+Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& jacobians, double floor_px,
+                     std::vector<FeatureMatch> flows) {
+    constexpr int kRounds = 3;  // the first two find outliers
+    Vector6 motion = Vector6::Zero();
+    const auto flow = [](const FeatureMatch& m) {
+        return Eigen::Vector2d(m.frame_u - m.view_u, m.frame_v - m.view_v);
+    };
+    for (int round = 0; round < kRounds && flows.size() >= kFewestFlows; ++round) {
+        Matrix6 H = Matrix6::Zero();
+        Vector6 gradient = Vector6::Zero();
+        for (const FeatureMatch& m : flows) {
+            const Eigen::Matrix<double, 6, 2> weighted =
+                jacobians[m.point].transpose() * points.match_covariance(m.point, floor_px).inverse();
+            H += weighted * jacobians[m.point];
+            gradient += weighted * flow(m);
+        }
+        motion = H.ldlt().solve(gradient);
+        std::vector<double> lengths;
+        for (const FeatureMatch& m : flows) lengths.push_back((jacobians[m.point] * motion - flow(m)).norm());
+        const double most_px = kOutlier * scale_of(lengths);
+        std::erase_if(
+            flows, [&](const FeatureMatch& m) { return (jacobians[m.point] * motion - flow(m)).norm() > most_px; });
+    }
+    return motion;
+}
+
+/// The inverse of a response. Motions of which it shows more than there is count as shown as they are.
+Matrix6 inverse_where_less(const Matrix6& response) {
+    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(response.transpose() * response);
+    const Vector6 shown = eigen.eigenvalues().cwiseMax(kLeastShown * kLeastShown).cwiseSqrt();
+    const Vector6 scale = (shown.cwiseMin(1).cwiseProduct(shown)).cwiseInverse();
+    return eigen.eigenvectors() * scale.asDiagonal() * eigen.eigenvectors().transpose() * response.transpose();
 }
 
 }  // namespace
@@ -73,123 +92,6 @@ std::string_view name(FeatureStatus status) noexcept {
     constexpr std::array<std::string_view, 4> names{"settled", "unsettled", "few matches", "no pose"};
     return names[static_cast<std::size_t>(status)];
 }
-
-/// Correspondences of one view.
-struct FeatureAlignment::Points {
-    std::vector<Vec3> body_m;
-    std::vector<Pixel> pixels;
-    std::vector<Eigen::Matrix2d> noise;  ///< of the sensor alone
-
-    /// Of a match, where all scatter by `floor_px` beyond the sensor's noise.
-    [[nodiscard]] Eigen::Matrix2d match_covariance(std::size_t i, double floor_px) const {
-        return noise[i] + floor_px * floor_px * Eigen::Matrix2d::Identity();
-    }
-    [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const {
-        std::vector<PixelCovariance> all;
-        all.reserve(size());
-        for (std::size_t i = 0; i < size(); ++i) {
-            const Eigen::Matrix2d S = match_covariance(i, floor_px);
-            all.push_back({S(0, 0), S(0, 1), S(1, 1)});
-        }
-        return all;
-    }
-    [[nodiscard]] std::size_t size() const { return body_m.size(); }
-
-    [[nodiscard]] std::vector<double> residuals_px(const CameraModel& camera, const Rigid3& T) const {
-        std::vector<double> lengths;
-        lengths.reserve(size());
-        for (std::size_t i = 0; i < size(); ++i) {
-            const Pixel p = project(camera, T * body_m[i]);
-            lengths.push_back(std::hypot(p.u - pixels[i].u, p.v - pixels[i].v));
-        }
-        return lengths;
-    }
-    void keep(const std::vector<std::uint8_t>& wanted) {
-        std::size_t n = 0;
-        for (std::size_t i = 0; i < size(); ++i)
-            if (wanted[i] != 0) body_m[n] = body_m[i], pixels[n] = pixels[i], noise[n] = noise[i], ++n;
-        body_m.resize(n), pixels.resize(n), noise.resize(n);
-    }
-    /// Of the matches' Jacobians in units of their errors: w w', and overlap_ij w_i w_j' of all pairs whose windows
-    /// overlap, by which part their errors are the same.
-    struct Sums {
-        Matrix6 information = Matrix6::Zero(), shared = Matrix6::Zero();
-    };
-    [[nodiscard]] Sums sums(const CameraModel& camera, const Rigid3& T, double floor_px) const {
-        std::vector<Eigen::Matrix<double, 6, 2>> whitened;
-        whitened.reserve(size());
-        for (std::size_t i = 0; i < size(); ++i)
-            whitened.emplace_back(match_covariance(i, floor_px)
-                                      .llt()
-                                      .matrixL()
-                                      .solve(reprojection_jacobian(camera, T, body_m[i]))
-                                      .transpose());
-        Sums out;
-        for (std::size_t i = 0; i < size(); ++i) {
-            out.information += whitened[i] * whitened[i].transpose();
-            for (std::size_t j = 0; j < i; ++j) {
-                const double part = overlap(pixels[i].u - pixels[j].u) * overlap(pixels[i].v - pixels[j].v);
-                if (part <= 0) continue;
-                const Matrix6 pair = part * whitened[i] * whitened[j].transpose();
-                out.shared += pair + pair.transpose();
-            }
-        }
-        return out;
-    }
-    /// Expected chi^2 of the residuals: the pose takes up more than six numbers' worth of errors that matches
-    /// share.
-    [[nodiscard]] double freedom(const CameraModel& camera, const Rigid3& T, double floor_px) const {
-        const Sums s = sums(camera, T, floor_px);
-        return 2 * static_cast<double>(size()) - 6 - s.information.ldlt().solve(s.shared).trace();
-    }
-    /// How much larger the errors of the pose may be than `covariance` says, in variance, at least 1: by the
-    /// scatter of the pulls of parts of the target, whose matches share errors of model and light (clustered
-    /// residuals: K.-Y. Liang, S. Zeger, Biometrika 73, 1986). C: the inverse of the matches' information.
-    [[nodiscard]] double inflation(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
-                                   const Matrix6& covariance, double floor_px) const {
-        constexpr int kParts = 4;  // each way
-        double left = kInfinity, top = kInfinity, right = -kInfinity, bottom = -kInfinity;
-        for (const Pixel& p : pixels)
-            left = std::min(left, p.u), right = std::max(right, p.u), top = std::min(top, p.v),
-            bottom = std::max(bottom, p.v);
-        const double side = std::max({right - left, bottom - top, 1.0}) * (1 + 1e-9) / kParts;
-        std::array<Vector6, kParts * kParts> pulls;
-        std::array<int, kParts * kParts> members{};
-        pulls.fill(Vector6::Zero());
-        for (std::size_t i = 0; i < size(); ++i) {
-            const auto part = static_cast<std::size_t>((pixels[i].v - top) / side) * kParts +
-                              static_cast<std::size_t>((pixels[i].u - left) / side);
-            const Eigen::Matrix2d S = match_covariance(i, floor_px);
-            const Pixel p = project(camera, T * body_m[i]);
-            const Eigen::Vector2d r(pixels[i].u - p.u, pixels[i].v - p.v);
-            pulls[part] += reprojection_jacobian(camera, T, body_m[i]).transpose() * S.inverse() * r;
-            ++members[part];
-        }
-        Matrix6 scatter = Matrix6::Zero();
-        for (const Vector6& pull : pulls) scatter += pull * pull.transpose();
-        const auto parts = static_cast<double>(std::ranges::count_if(members, [](int n) { return n > 0; }));
-        constexpr double kUnknowns = 6;
-        const double few = parts / std::max(1.0, parts - kUnknowns);
-        return std::max(1.0, few * (covariance.inverse() * C * scatter * C).trace() / kUnknowns);
-    }
-    /// The excess error of a match beyond the sensor's noise that makes chi^2 equal to its degrees of freedom; 0
-    /// where the noise suffices.
-    [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T, double freedom) const {
-        const auto chi2 = [&](double floor) {
-            double sum = 0;
-            for (std::size_t i = 0; i < size(); ++i) {
-                const Pixel p = project(camera, T * body_m[i]);
-                const Eigen::Vector2d r(p.u - pixels[i].u, p.v - pixels[i].v);
-                sum += r.dot(match_covariance(i, floor).inverse() * r);
-            }
-            return sum;
-        };
-        double low = 0, high = 10;
-        if (chi2(low) <= freedom) return 0;
-        for (int k = 0; k < 40; ++k) (chi2(0.5 * (low + high)) > freedom ? low : high) = 0.5 * (low + high);
-        return high;
-    }
-};
 
 FeatureAlignment::FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                    const BodyPoses& at, const FeatureSettings& settings)
@@ -244,7 +146,7 @@ void FeatureAlignment::find_target() {
 
 /// Features of the view as it was rendered last that lie on the target, and where the frame has them.
 void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
-                              Points& points) {
+                              ModelMatches& points) {
     points = {};
     const auto target = static_cast<int>(view_.target());
     find_target();
@@ -265,28 +167,73 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
                                                       {u, v - kNeighbour_px}}},
                            hits);
         if (hits.body[0] != target || !on_smooth_surface(hits) || is_clipped(frame, m.frame_u, m.frame_v)) continue;
-        const Eigen::Matrix2d C = flow_covariance(view_bytes, frame_bytes, m, kHalfWindow_px);
+        const Eigen::Matrix2d C = flow_covariance(view_bytes, frame_bytes, m);
         if (!(C(0, 0) > 0 && C(1, 1) > 0)) continue;
         points.body_m.push_back(T_target_world * hits.position[0]);
+        points.in_view.push_back({u, v});
         points.pixels.push_back({m.frame_u, m.frame_v});
         points.noise.push_back(C);
     }
 }
 
+/// What matches show of the target's motions from the pose of the last view, as errors (pose_estimate.h): the
+/// identity where all are of points of the body. Outlines and shading do not turn with it. Motions that move the
+/// image as a whole are shown as they are; turns across the line of sight are measured, from view to view.
+Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& scale,
+                                   const FrameSettings& settings, const Rigid3& T_camera_target, double floor_px) {
+    const CameraModelHandle model(view_.camera());
+    std::vector<Matrix26> jacobians;
+    for (const Vec3& p : points.body_m) jacobians.push_back(reprojection_jacobian(*model, T_camera_target, p));
+    const ByteImage here = scale.scaled(view_.radiance());
+    const Eigen::Vector3d sight = to_eigen(normalized(T_camera_target.t)), across = sight.unitOrthogonal();
+    Matrix6 shown = Matrix6::Identity();
+    for (const Eigen::Vector3d& axis : {across, Eigen::Vector3d(sight.cross(across))}) {
+        double squares = 0;
+        for (const Matrix26& J : jacobians) squares += (J.leftCols<3>() * axis).squaredNorm();
+        const double angle_rad = kTurn_px / std::sqrt(squares / static_cast<double>(points.size()));
+        Vector6 turn = Vector6::Zero();
+        turn.head<3>() = axis;
+        view_.render(displaced(T_camera_target, angle_rad * turn), settings, false);
+        const Vector6 motion = motion_shown(points, jacobians, floor_px,
+                                            track_points(here, scale.scaled(view_.radiance()), points.in_view));
+        shown += (motion / angle_rad - (1 - kLeastShown) * turn) * turn.transpose();
+    }
+    return shown;
+}
+
+/// Outlines, and edges along which a match can slide, hold answers near where they started. So a start beyond the
+/// answer, as far as the guess is before it, must lead to it; what the two are apart is part of the error.
+void FeatureAlignment::compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                             const ApparentMotion& motion, FeatureEstimate& e, Fit& fit) {
+    const Vector6 moved = error_between(guess, e.T_camera_target);
+    if (normalised_error_squared(moved, e.covariance) < kSettledSquared) return;  // the same start again
+    const FeatureEstimate other = estimate(frame, at, displaced(e.T_camera_target, moved), motion);
+    if (!other.has_pose()) {
+        fit.failed = fmt::format("the guess mirrored in the answer leads to no pose: {}", name(other.status));
+        return;
+    }
+    const Vector6 apart = error_between(e.T_camera_target, other.T_camera_target);
+    if (normalised_error_squared(apart, e.covariance + other.covariance) > kSameSquared)
+        fit.rivals.push_back({other.T_camera_target, 0});
+    e.covariance += apart * apart.transpose();
+}
+
 FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                         const ApparentMotion& motion) {
     FeatureEstimate e = estimate(frame, at, guess, motion);
+    Fit fit;
+    if (!e.has_pose())
+        fit.failed = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
+    else if (e.floor_px > settings_.floor_most_px)
+        fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
+                                 settings_.floor_most_px);
+    else
+        compare_with_mirrored(frame, at, guess, motion, e, fit);
     const PoseShifts by_model = image_shifts(settings_.model, e.T_camera_target, motion);
     const Matrix6 of_model = by_model * by_model.transpose();
     e.covariance += of_model, e.bound += of_model;
-    Fit fit;
-    if (e.status == FeatureStatus::few_matches || e.status == FeatureStatus::no_pose)
-        fit.failed = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
-    else
+    if (e.has_pose())
         observe(e.T_camera_target, e.covariance, fit), compare_with_guess(e.T_camera_target, guess, fit);
-    if (fit.failed.empty() && e.floor_px > settings_.floor_most_px)
-        fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
-                                 settings_.floor_most_px);
     e.answer = judge(std::move(fit));
     return e;
 }
@@ -305,7 +252,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     render_settings.seed = settings_.seed;
     PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
     double floor_px = 1;  // until there are matches
-    Points points;
+    ModelMatches points;
+    Rigid3 T_of_view = guess;
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();
         view_.render(estimate.T_camera_target, render_settings, false);
@@ -345,16 +293,12 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
             estimate.status = FeatureStatus::no_pose;
             return estimate;
         }
-        std::vector<double> moved;
-        for (const Vec3& p : points.body_m) {
-            const Pixel a = project(camera, estimate.T_camera_target * p),
-                        b = project(camera, fit.T_camera_body * p);
-            moved.push_back(std::hypot(a.u - b.u, a.v - b.v));
-        }
+        const double moved_px = points.moved_px(camera, estimate.T_camera_target, fit.T_camera_body);
         estimate.agreeing = static_cast<int>(points.size());
         round.before_px = root_mean_square(points.residuals_px(camera, estimate.T_camera_target));
         round.after_px = root_mean_square(points.residuals_px(camera, fit.T_camera_body));
         const Vector6 step = error_between(estimate.T_camera_target, fit.T_camera_body);
+        T_of_view = estimate.T_camera_target;
         estimate.T_camera_target = fit.T_camera_body;
         const double freedom = points.freedom(camera, fit.T_camera_body, floor_px);
         if (!(freedom >= kFewestFreedom)) {
@@ -368,7 +312,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         estimate.covariance *= freedom / (freedom - 2);
         estimate.covariance *= points.inflation(camera, fit.T_camera_body, C, estimate.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
-        if (root_mean_square(moved) < settings_.settled_px ||
+        if (moved_px < settings_.settled_px ||
             normalised_error_squared(step, estimate.covariance) < kSettledSquared) {
             estimate.status = FeatureStatus::settled;
             break;
@@ -377,6 +321,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
+    const Matrix6 unshown = inverse_where_less(response(points, scale, render_settings, T_of_view, floor_px));
+    estimate.covariance = unshown * estimate.covariance * unshown.transpose();
     const std::vector<PixelCovariance> of_noise = points.covariances(0);
     estimate.bound =
         refiner.refine({model, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;

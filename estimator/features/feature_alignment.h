@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/features/feature_matcher.h"
+#include "estimator/features/model_matches.h"
 #include "estimator/pose/answer.h"
 #include "estimator/pose/model_uncertainty.h"
 #include "estimator/pose/pnp_refine.h"
@@ -46,14 +47,19 @@ struct FeatureEstimate {
     FeatureStatus status = FeatureStatus::few_matches;
     Rigid3 T_camera_target{};
     /// From the sensor's noise and the excess scatter of the matches, both correlated between matches whose windows
-    /// overlap, in proportion to the overlap; and from the model's uncertainty.
+    /// overlap, in proportion to the overlap, and larger where matches show less of a motion than points of the
+    /// body would; from the distance to the answer of a second start; and from the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
     /// Cramer-Rao for these points with the sensor's noise and the model's uncertainty alone.
     Matrix6 bound = Matrix6::Zero();
     int agreeing = 0;
-    double floor_px = 0;  ///< of the matches: their scatter beyond the sensor's noise
-    std::vector<FeatureRound> rounds;
+    double floor_px = 0;               ///< of the matches: their scatter beyond the sensor's noise
+    std::vector<FeatureRound> rounds;  ///< from the guess
     Answer answer;
+
+    [[nodiscard]] bool has_pose() const noexcept {
+        return status == FeatureStatus::settled || status == FeatureStatus::unsettled;
+    }
 };
 
 /// Keeps its memory from frame to frame.
@@ -72,11 +78,15 @@ public:
     void set_detector(const Detector& detector);
 
 private:
-    struct Points;
     [[nodiscard]] FeatureEstimate estimate(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                            const ApparentMotion& motion);
-    void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale, Points& points);
+    void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
+                ModelMatches& points);
     void find_target();
+    [[nodiscard]] Matrix6 response(const ModelMatches& points, const ByteScale& scale,
+                                   const FrameSettings& settings, const Rigid3& T_camera_target, double floor_px);
+    void compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                               const ApparentMotion& motion, FeatureEstimate& e, Fit& fit);
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;
 
     ModelView view_;

@@ -12,7 +12,7 @@ namespace {
 
 /// Largest forward-backward error of a tracked corner, px.
 constexpr float kRoundTrip_px = 0.5f;
-constexpr int kFlowWindow_px = 21, kFlowLevels = 4;
+constexpr int kFlowWindow_px = 2 * kFlowHalfWindow_px + 1, kFlowLevels = 4;
 /// Part of the frame's pixels that may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
 /// Of rounding to whole steps.
@@ -68,10 +68,19 @@ SingleThreadedOpenCv::~SingleThreadedOpenCv() {
 std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& frame,
                                         const std::vector<std::uint8_t>& on_target, int most) {
     const cv::Mat mask(view.height, view.width, CV_8U, const_cast<std::uint8_t*>(on_target.data()));
+    std::vector<cv::Point2f> corners;
+    cv::goodFeaturesToTrack(as_mat(view), corners, most, 0.01, 5, mask, 5);
+    std::vector<Pixel> points;
+    for (const cv::Point2f& c : corners) points.push_back({c.x, c.y});
+    return track_points(view, frame, points);
+}
+
+std::vector<FeatureMatch> track_points(const ByteImage& view, const ByteImage& frame,
+                                       std::span<const Pixel> points) {
     std::vector<FeatureMatch> matches;
+    if (points.empty()) return matches;
     std::vector<cv::Point2f> start, there, home;
-    cv::goodFeaturesToTrack(as_mat(view), start, most, 0.01, 5, mask, 5);
-    if (start.empty()) return matches;
+    for (const Pixel& p : points) start.emplace_back(static_cast<float>(p.u), static_cast<float>(p.v));
     std::vector<cv::Mat> view_levels, frame_levels;
     const cv::Size window(kFlowWindow_px, kFlowWindow_px);
     cv::buildOpticalFlowPyramid(as_mat(view), view_levels, window, kFlowLevels);
@@ -84,13 +93,12 @@ std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& 
     for (std::size_t i = 0; i < start.size(); ++i) {
         const cv::Point2f missed = home[i] - start[i];
         if (found[i] != 0 && found_back[i] != 0 && std::hypot(missed.x, missed.y) < kRoundTrip_px)
-            matches.push_back({start[i].x, start[i].y, there[i].x, there[i].y});
+            matches.push_back({start[i].x, start[i].y, there[i].x, there[i].y, i});
     }
     return matches;
 }
 
-Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, const FeatureMatch& match,
-                                int half_px) {
+Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, const FeatureMatch& match) {
     const int view_u = static_cast<int>(std::lround(match.view_u)),
               view_v = static_cast<int>(std::lround(match.view_v)),
               frame_u = static_cast<int>(std::lround(match.frame_u)),
@@ -99,8 +107,8 @@ Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, c
         return static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(u);
     };
     Eigen::Matrix2d G = Eigen::Matrix2d::Zero(), of_noise = Eigen::Matrix2d::Zero();
-    for (int dv = -half_px; dv <= half_px; ++dv)
-        for (int du = -half_px; du <= half_px; ++du) {
+    for (int dv = -kFlowHalfWindow_px; dv <= kFlowHalfWindow_px; ++dv)
+        for (int du = -kFlowHalfWindow_px; du <= kFlowHalfWindow_px; ++du) {
             const int u = view_u + du, v = view_v + dv;
             if (u < 1 || v < 1 || u > view.width - 2 || v > view.height - 2) continue;
             const Eigen::Vector2d g(

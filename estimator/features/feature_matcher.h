@@ -4,9 +4,11 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <vector>
 
+#include "estimator/pose/pnp_points.h"
 #include "estimator/view/measured_image.h"
 #include "renderer/film/camera_image.h"
 
@@ -44,6 +46,7 @@ private:
 struct FeatureMatch {
     double view_u = 0, view_v = 0;
     double frame_u = 0, frame_v = 0;
+    std::size_t point = 0;  ///< which of the points tracked
 };
 
 /// While it exists OpenCV uses the calling threads alone, in the whole process; then as many as before.
@@ -58,15 +61,22 @@ private:
     int before_;
 };
 
+/// Half the window over which the optical flow sums.
+inline constexpr int kFlowHalfWindow_px = 10;
+
 /// Corners of least eigenvalue (Shi and Tomasi 1994), tracked by pyramidal optical flow (Bouguet 2001) into the
 /// frame and back. `most`: at most so many corners. `on_target`: mask of the view, non-zero where corners may lie.
 [[nodiscard]] std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& frame,
                                                       const std::vector<std::uint8_t>& on_target, int most);
 
+/// The same for given points of the view; those not found are left out.
+[[nodiscard]] std::vector<FeatureMatch> track_points(const ByteImage& view, const ByteImage& frame,
+                                                     std::span<const Pixel> points);
+
 /// Covariance (px^2; u, v) of a point tracked by optical flow into `frame`, of the noise of its pixels: G^-1 (sum
-/// of variance g g') G^-1 over the window, g the gradients of the view and G the sum of g g'. The window reaches
-/// `half_px` to each side. Zero where G is singular: no corner.
+/// of variance g g') G^-1 over the flow's window, g the gradients of the view and G the sum of g g'. Zero where G
+/// is singular: no corner.
 [[nodiscard]] Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame,
-                                              const FeatureMatch& match, int half_px);
+                                              const FeatureMatch& match);
 
 }  // namespace narpa

@@ -18,7 +18,27 @@ double left_after(double step, double ratio) {
     return step * ratio / (1 - ratio);
 }
 
+double ratio_of(double last, double before) {
+    return before == 0 ? kRatioOfTwo : std::clamp(last / before, kLeastRatio, kMostRatio);
+}
+
+double squared(float step) {
+    return static_cast<double>(step) * static_cast<double>(step);
+}
+
 }  // namespace
+
+void VarianceRatio::add(const PixelMean& mean, double independent) noexcept {
+    if (mean.count() < 4) return;
+    last_ += squared(mean.step()), before_ += squared(mean.step_before());
+    independent_ += independent * mean.count() / std::bit_floor(mean.count());
+}
+
+double VarianceRatio::value() const noexcept {
+    if (independent_ == 0) return 1;
+    const double ratio = ratio_of(last_, before_);
+    return std::min(1.0, left_after((last_ + ratio * before_) / 2, ratio) / independent_);
+}
 
 void FrameError::add_centres(const TileContrast& contrast, double tiles) noexcept {
     float sum = 0;
@@ -28,7 +48,6 @@ void FrameError::add_centres(const TileContrast& contrast, double tiles) noexcep
 
 void FrameError::Part::add(const PixelMean& mean) noexcept {
     const auto level = static_cast<std::size_t>(std::bit_width(mean.count()) - 1);
-    const auto squared = [](float step) { return static_cast<double>(step) * static_cast<double>(step); };
     steps[level].last += squared(mean.step());
     if (level > 1) steps[level].before += squared(mean.step_before());
     shares[level] += static_cast<double>(std::bit_floor(mean.count())) / mean.count();
@@ -72,9 +91,8 @@ double FrameError::Part::squared_error() const noexcept {
     for (std::size_t level = 1; level < kDoublings; ++level) {
         if (pixels[level] == 0) continue;
         const auto [last, before] = steps[level];
-        const double ratio =
-            level == 1 || before == 0 ? kRatioOfTwo : std::clamp(last / before, kLeastRatio, kMostRatio);
-        sum += left_after(last, ratio) * shares[level] / static_cast<double>(pixels[level]);
+        sum += left_after(last, ratio_of(last, level == 1 ? 0 : before)) * shares[level] /
+               static_cast<double>(pixels[level]);
     }
     return sum;
 }

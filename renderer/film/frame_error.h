@@ -18,6 +18,20 @@
 
 namespace narpa {
 
+/// How the variance of pixels' means, together, compares with that of as many independent samples: 1 for noise,
+/// less where samples are stratified. From the last two steps of pixels with four samples or more.
+class VarianceRatio {
+public:
+    /// `independent`: variance of the mean if its samples were independent.
+    void add(const PixelMean& mean, double independent) noexcept;
+    /// At most 1; 1 where no pixel has four samples.
+    [[nodiscard]] double value() const noexcept;
+
+private:
+    double last_ = 0, before_ = 0;  ///< steps squared
+    double independent_ = 0;
+};
+
 class FrameError {
 public:
     /// A tile whose pixels show their centres, and that stands for so many.

@@ -208,7 +208,10 @@ void FramePasses::show_samples(Worker& w, const Tile& t, RadianceImage& out, std
         out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
         w.error.add(means[at]);
     });
-    if (variance != nullptr) put_variances(t, spread, spread_by_paths, out.width, *variance);
+    if (variance == nullptr) return;
+    t.each_pixel([&](int x, int y, std::size_t) { (*variance)[index_of(x, y, out.width)] = 0; });
+    add_variances(t, spread, means, &PixelMeans::direct, out.width, *variance);
+    add_variances(t, spread_by_paths, means, &PixelMeans::path, out.width, *variance);
 }
 
 void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) {

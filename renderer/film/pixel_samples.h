@@ -72,14 +72,15 @@ struct PixelMeans {
 /// Samples that the neighbours' common variance counts for in a pixel's own.
 inline constexpr double kPriorCount = 64;
 
-/// Variance of each pixel's mean, for pixels side by side with equally many samples, at least two.
+/// Variance of each pixel's mean as if its samples were independent, for pixels side by side with equally many
+/// samples, at least two.
 ///
 /// A pixel's own sample variance is unreliable below about 64 samples: most pixels with a small bright spot have
 /// not met it yet and report zero; where the radiance is spread over decades, the 95 % interval holds the truth in
 /// 65 % (4 samples) to 83 % (64) of pixels. So the neighbours' pooled variance enters as kPriorCount samples more,
 /// and as the neighbours may be smoother than the pixel itself, its own variance is a lower bound. The result is
-/// rather too large than too small: by 0.4 in 4 samples, 0.1 in 64 where all pixels are alike; and low-discrepancy
-/// samples do better than their variance.
+/// rather too large than too small: by 0.4 in 4 samples, 0.1 in 64 where all pixels are alike. What low-discrepancy
+/// samples gain is VarianceRatio's part (frame_error.h).
 inline void variances_of_means(std::span<const PixelSamples> pixels, std::span<double> variances) {
     double pooled = 0;
     for (const PixelSamples& p : pixels) pooled += p.squared_deviations() / (p.count() - 1);

@@ -239,43 +239,60 @@ void add_subpixel_light(const Frame& f, const Tile& t, RadianceImage& out, std::
         for (int x = 0; x < t.width; x += kBlock) add_subpixel_bodies(f, block_of(t, x, y), out, variance);
 }
 
-/// Of each pixel's mean, block by block.
+/// Of each pixel's mean: that of independent samples, block by block, times the tile's ratio. Adds to `variance`.
 template <class Tile>
-void put_variances(const Tile& t, const PerPixel<PixelSamples>& direct, const PerPixel<PixelSamples>& path,
-                   int image_width, std::vector<float>& variance) {
-    for (int by = 0; by < t.height; by += kBlock)
-        for (int bx = 0; bx < t.width; bx += kBlock) {
-            const PixelBlock block = block_of(t, bx, by);
-            for (std::size_t i = 0; i < block.n; ++i) variance[block.index(i, image_width)] = 0;
-            for (const auto* part : {&direct, &path}) {
-                Lanes<PixelSamples> of_block;
-                Lanes<double> of_means;
-                for (std::size_t i = 0; i < block.n; ++i)
-                    of_block[i] = (*part)[place_in_tile(block.x[i] - t.x, block.y[i] - t.y)];
-                if (of_block[0].count() == 0) continue;
-                variances_of_means(std::span(of_block).first(block.n), of_means);
-                for (std::size_t i = 0; i < block.n; ++i)
-                    variance[block.index(i, image_width)] += static_cast<float>(of_means[i]);
+void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const PerPixel<PixelMeans>& means,
+                   PixelMean PixelMeans::*part, int image_width, std::vector<float>& variance) {
+    PerPixel<double> independent;
+    for (int y = 0; y < t.height; y += kBlock)
+        for (int x = 0; x < t.width; x += kBlock) {
+            const PixelBlock block = block_of(t, x, y);
+            Lanes<std::size_t> place;
+            Lanes<PixelSamples> of_block;
+            Lanes<double> of_means;
+            for (std::size_t i = 0; i < block.n; ++i) {
+                place[i] = place_in_tile(block.x[i] - t.x, block.y[i] - t.y);
+                of_block[i] = spread[place[i]];
             }
+            if (of_block[0].count() == 0) return;
+            variances_of_means(std::span(of_block).first(block.n), of_means);
+            for (std::size_t i = 0; i < block.n; ++i) independent[place[i]] = of_means[i];
         }
+    VarianceRatio ratio;
+    t.each_pixel([&](int, int, std::size_t at) { ratio.add(means[at].*part, independent[at]); });
+    t.each_pixel([&](int x, int y, std::size_t at) {
+        variance[index_of(x, y, image_width)] += static_cast<float>(ratio.value() * independent[at]);
+    });
 }
 
 /// The same where pixels have samples of their own number, or show their centres.
 template <class Tile>
 void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, int image_width,
                    std::vector<float>& variance) {
-    const auto at_least = [](const PixelMean& mean, float one) {
-        if (mean.count() == 0) return 0.0f;
-        const float step = mean.count() == 1 ? 0 : mean.step();
-        return std::max(step * step, one / static_cast<float>(mean.count()));
+    const auto of_path = [&](std::size_t at) {
+        const bool alone = means[at].direct.count() == 0;
+        return contrast.reused[at] + (alone ? contrast.edge[at] + std::max(contrast.noise[at], 0.0f) : 0);
+    };
+    const auto of_direct = [&](std::size_t at) { return contrast.edge[at] + std::max(contrast.noise[at], 0.0f); };
+    const auto of_mean = [](const PixelMean& mean, float one) {
+        return mean.count() == 0 ? 0 : static_cast<double>(one) / mean.count();
+    };
+    VarianceRatio direct, path;
+    t.each_pixel([&](int, int, std::size_t at) {
+        direct.add(means[at].direct, of_mean(means[at].direct, of_direct(at)));
+        path.add(means[at].path, of_mean(means[at].path, of_path(at)));
+    });
+    // Contrasts know nothing of what lies between the pixels' centres: a glint shows in the steps alone.
+    const auto at_least = [](const PixelMean& mean, double expected) {
+        if (mean.count() < 2) return expected;
+        return std::max(expected, static_cast<double>(mean.step()) * static_cast<double>(mean.step()));
     };
     t.each_pixel([&](int x, int y, std::size_t at) {
-        const auto& [direct, path] = means[at];
-        const float reused = contrast.reused[at], one = contrast.edge[at] + std::max(contrast.noise[at], 0.0f);
-        const bool alone = direct.count() == 0;
+        const auto& [d, p] = means[at];
+        const double sampled = at_least(d, direct.value() * of_mean(d, of_direct(at))) +
+                               at_least(p, path.value() * of_mean(p, of_path(at)));
         variance[index_of(x, y, image_width)] =
-            means[at].count() > 0 ? at_least(direct, one) + at_least(path, alone ? one + reused : reused)
-                                  : contrast.centre[at];
+            means[at].count() > 0 ? static_cast<float>(sampled) : contrast.centre[at];
     });
 }
 

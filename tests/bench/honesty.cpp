@@ -30,6 +30,18 @@ TEST(Honesty, DenseTrialsThatLied) {
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
+/// Matches of outlines, of shading and along edges, which end where the start left them.
+TEST(Honesty, FeatureTrialsThatLied) {
+    HonestyOptions o;
+    o.methods = {"features"};
+    o.trials = 1;
+    o.size = 240;
+    for (const int trial :
+         {20467, 20191, 20769, 21232, 20275, 20277, 20292, 20829, 21163, 20132, 20757, 21300, 20691, 21083})
+        for (const HonestyRow& row : run(o, trial))
+            EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
+}
+
 /// Sweeps in which one or two points held a motion, lay on the wrong face, or were explained by a symmetry far from
 /// the start.
 TEST(Honesty, LidarTrialsThatLied) {

@@ -159,7 +159,7 @@ TEST(FlowNoise, ScattersAsPredicted) {
         ASSERT_EQ(matches.size(), 1u);
         all.push_back(matches[0]);
         mean_u += matches[0].frame_u / kTrials, mean_v += matches[0].frame_v / kTrials;
-        predicted += flow_covariance(in_view, in_frame, matches[0], 10).trace();
+        predicted += flow_covariance(in_view, in_frame, matches[0]).trace();
     }
     for (const FeatureMatch& m : all) measured += std::pow(m.frame_u - mean_u, 2) + std::pow(m.frame_v - mean_v, 2);
     EXPECT_NEAR(measured / predicted, 1, 0.25);

@@ -168,6 +168,33 @@ TEST(Interval, OfASmoothPictureHoldsTheTruth) {
     }
 }
 
+// Independent samples would have 3 to 30 times the variance.
+TEST(Interval, OfStratifiedSamplesIsAsLargeAsTheScatterOfFrames) {
+    Scene s;
+    s.materials.push_back(lambert(0.5f));
+    add_mesh(s, icosphere(2, 1, false));
+    add_sun(s, {0.4, 0.5, 1});
+    s.ambient = {20, 20, 20};
+    const auto render_scene = RenderScene::create(s, 1);
+    ASSERT_TRUE(render_scene);
+    const Camera c = camera(48, 48, 60);
+    const Rigid3 T = looking({2.5, 1, 1.5}, {0, 0, 0});
+    for (const int spp : {4, 16, 64, 100}) {
+        double stated = 0, scattered = 0;
+        for (std::uint32_t frame = 0; frame < 16; ++frame) {
+            const Shot a = shoot_frame(*render_scene, c, T, spp, 2 * frame);
+            const Shot b = shoot_frame(*render_scene, c, T, spp, 2 * frame + 1);
+            for (std::size_t i = 0; i < a.image.pixels.size(); ++i) {
+                const double difference = mean_of(a.image.pixels[i]) - mean_of(b.image.pixels[i]);
+                scattered += difference * difference;
+                stated += static_cast<double>(a.aovs.variance[i]) + static_cast<double>(b.aovs.variance[i]);
+            }
+        }
+        EXPECT_GT(stated / scattered, 0.8) << spp;
+        EXPECT_LT(stated / scattered, 2) << spp;
+    }
+}
+
 TEST(Interval, OfASphereOnAFewThousandthsOfAPixelHoldsTheTruth) {
     // The target: 10 m at 100 km, full phase, 0.0137 px^2, anywhere about the middle of one pixel.
     constexpr double distance = 1e5, f = 1319.4792168823421;

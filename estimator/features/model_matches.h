@@ -1,0 +1,56 @@
+/// estimator/features/model_matches.h - points of the model with their images in a frame, and what the scatter of
+/// these says of a pose.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/pose/pnp_points.h"
+#include "estimator/pose/pose_estimate.h"
+#include "renderer/projection/camera_model.h"
+
+namespace narpa {
+
+/// Correspondences of one view.
+struct ModelMatches {
+    std::vector<Vec3> body_m;
+    std::vector<Pixel> in_view, pixels;  ///< where the view has the point, and where the frame has it
+    std::vector<Eigen::Matrix2d> noise;  ///< of `pixels`, of the sensor alone
+
+    [[nodiscard]] std::size_t size() const { return body_m.size(); }
+    void keep(const std::vector<std::uint8_t>& wanted);
+
+    /// Of a match, where all scatter by `floor_px` beyond the sensor's noise.
+    [[nodiscard]] Eigen::Matrix2d match_covariance(std::size_t i, double floor_px) const;
+    [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const;
+
+    [[nodiscard]] std::vector<double> residuals_px(const CameraModel& camera, const Rigid3& T) const;
+    /// How far the points' images are apart at two poses, root mean square.
+    [[nodiscard]] double moved_px(const CameraModel& camera, const Rigid3& from, const Rigid3& to) const;
+
+    /// Of the matches' Jacobians in units of their errors: w w', and overlap_ij w_i w_j' of all pairs whose windows
+    /// overlap, by which part their errors are the same.
+    struct Sums {
+        Matrix6 information = Matrix6::Zero(), shared = Matrix6::Zero();
+    };
+    [[nodiscard]] Sums sums(const CameraModel& camera, const Rigid3& T, double floor_px) const;
+    /// Expected chi^2 of the residuals: the pose takes up more than six numbers' worth of errors that matches
+    /// share.
+    [[nodiscard]] double freedom(const CameraModel& camera, const Rigid3& T, double floor_px) const;
+    /// How much larger the errors of the pose may be than `covariance` says, in variance, at least 1: by the
+    /// scatter of the pulls of parts of the target, whose matches share errors of model and light (clustered
+    /// residuals: K.-Y. Liang, S. Zeger, Biometrika 73, 1986). C: the inverse of the matches' information.
+    [[nodiscard]] double inflation(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
+                                   const Matrix6& covariance, double floor_px) const;
+    /// The excess error of a match beyond the sensor's noise that makes chi^2 equal to its degrees of freedom; 0
+    /// where the noise suffices.
+    [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T, double freedom) const;
+};
+
+[[nodiscard]] double root_mean_square(const std::vector<double>& lengths);
+/// Standard deviation of residuals in u and in v, from the median of their lengths.
+[[nodiscard]] double scale_of(std::vector<double> lengths);
+
+}  // namespace narpa

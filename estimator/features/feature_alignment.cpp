@@ -78,12 +78,15 @@ Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& ja
     return motion;
 }
 
-/// The inverse of a response. Motions of which it shows more than there is count as shown as they are.
-Matrix6 inverse_where_less(const Matrix6& response) {
-    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(response.transpose() * response);
-    const Vector6 shown = eigen.eigenvalues().cwiseMax(kLeastShown * kLeastShown).cwiseSqrt();
-    const Vector6 scale = (shown.cwiseMin(1).cwiseProduct(shown)).cwiseInverse();
-    return eigen.eigenvectors() * scale.asDiagonal() * eigen.eigenvectors().transpose() * response.transpose();
+/// The covariance of a pose whose matches respond to motions like this: C^(1/2) (A' A)^-1 C^(T/2), A = C^(-1/2) R
+/// C^(1/2). Motions of which they show more than there is count as shown as they are.
+Matrix6 widened(const Matrix6& covariance, const Matrix6& response) {
+    const Matrix6 root = covariance.llt().matrixL();
+    const Matrix6 shown = root.triangularView<Eigen::Lower>().solve(response * root);
+    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(shown.transpose() * shown);
+    const Vector6 squares = eigen.eigenvalues().cwiseMin(1).cwiseMax(kLeastShown * kLeastShown);
+    const Matrix6 out = root * eigen.eigenvectors();
+    return out * squares.cwiseInverse().asDiagonal() * out.transpose();
 }
 
 }  // namespace
@@ -321,8 +324,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
-    const Matrix6 unshown = inverse_where_less(response(points, scale, render_settings, T_of_view, floor_px));
-    estimate.covariance = unshown * estimate.covariance * unshown.transpose();
+    estimate.covariance =
+        widened(estimate.covariance, response(points, scale, render_settings, T_of_view, floor_px));
     const std::vector<PixelCovariance> of_noise = points.covariances(0);
     estimate.bound =
         refiner.refine({model, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;

@@ -130,7 +130,7 @@ protected:
         const auto T_world_camera = [&](double t_s) { return Rigid3{exp_rotation(t_s * rate), t_s * velocity}; };
         const CameraPose path{T_world_camera(-half_s), T_world_camera(half_s), 0.5 * times.row_s / half_s};
         FrameSettings settings;
-        settings.spp = 256;
+        settings.spp = 64;
         settings.seed = 5;
         settings.frame = number;
         RadianceImage radiance(camera.width, camera.height);
@@ -167,7 +167,7 @@ TEST_P(ExposedOverTime, DenseAlignmentReachesItsBound) {
     DenseAlignment dense(*render_scene, camera, 0), ignoring(*render_scene, still, 0);
     DenseOptions options;
     options.motion = motion;
-    options.rays_per_pixel = 96;  // what blurs needs more: 16 give 19 for the global shutter, beside 6
+    options.rays_per_pixel = 256;  // four times the frame's samples: few enough errors of its own
     constexpr int kFrames = 3;
     double over_bound = 0, ignored = 0;
     for (std::uint32_t k = 0; k < kFrames; ++k) {

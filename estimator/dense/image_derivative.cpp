@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -27,11 +28,11 @@ constexpr double kLeastCosine = 0.02;
 constexpr int kHalvings = 10;
 /// Step of the finite difference of the BSDF, as a part of the range.
 constexpr double kViewStep = 1e-3;
-/// Points of a pixel, each way, at which that difference is taken.
-constexpr int kShadingPoints = 2;
-/// Rays each way in any pixel; more where the radiance varies by more than this part of the sensor's noise.
+/// Rays each way in any pixel; more in the pixels that hold this part of the information by those.
 constexpr int kAnywhere = 3;
-constexpr double kVarying = 1;
+constexpr double kRefined = 0.85;
+/// Pixels side by side that are traced together.
+constexpr int kMostInStrip = 8;
 /// Parts of an exposure for each pixel of motion during it, and at the most.
 constexpr double kPartsPerPixel = 1, kMostParts = 8;
 
@@ -102,15 +103,15 @@ struct RaySample {
     Vec3 position{}, normal{}, ray_direction{};  ///< world
 };
 
-class PixelPatch {
+/// Pixels side by side, and the ring of grid points around them.
+class Strip {
 public:
-    /// Traces a pixel and the ring of grid points around it, without the ring's corners.
-    void trace(const FineGrid& grid, const SensorModel& sensor, int x, int y) {
-        const int s = grid.fineness;
+    /// Traces all but the ring's corners.
+    void trace(const FineGrid& grid, const SensorModel& sensor, int x, int y, int pixels) {
+        const int s = grid.fineness, end = pixels * s;
         const Frame& f = grid.frame;
-        side_ = s + 2;
-        points_.resize(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
-        sees_anything_ = false;
+        width_ = end + 2;
+        points_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(s + 2));
         CameraBatch p;
         CameraSamples samples;
         samples.centre = true;
@@ -124,7 +125,6 @@ public:
                 RaySample& seen = points_[place[i]];
                 seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
                 if (p.hits.body[i] < 0) continue;
-                sees_anything_ = true;
                 seen.body = p.hits.body[i];
                 seen.range_m = p.hits.range_m[i];
                 seen.position = p.hits.position[i];
@@ -133,30 +133,28 @@ public:
             samples.n = 0;
         };
         for (int j = -1; j <= s; ++j)
-            for (int i = -1; i <= s; ++i) {
-                if ((i == -1 || i == s) && (j == -1 || j == s)) continue;
+            for (int i = -1; i <= end; ++i) {
+                if ((i == -1 || i == end) && (j == -1 || j == s)) continue;
                 const int fine_x = x * s + i, fine_y = y * s + j;
                 samples.x[samples.n] = fine_x, samples.y[samples.n] = fine_y;
                 samples.number[samples.n] =
                     static_cast<std::uint32_t>(fine_y) * static_cast<std::uint32_t>(grid.camera.width) +
                     static_cast<std::uint32_t>(fine_x);
-                place[samples.n++] = static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
-                                     static_cast<std::size_t>(i + 1);
+                place[samples.n++] = index(i, j);
                 if (samples.n == kLanes) trace();
             }
         if (samples.n > 0) trace();
     }
 
-    /// Point (i, j) of the pixel's own, 0 .. fineness - 1, or of the ring, -1 and fineness.
-    [[nodiscard]] const RaySample& at(int i, int j) const {
-        return points_[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
-                       static_cast<std::size_t>(i + 1)];
-    }
-    [[nodiscard]] bool sees_anything() const noexcept { return sees_anything_; }
+    /// Point (i, j), counted from the first pixel's first.
+    [[nodiscard]] const RaySample& at(int i, int j) const { return points_[index(i, j)]; }
 
 private:
-    int side_ = 0;
-    bool sees_anything_ = false;
+    [[nodiscard]] std::size_t index(int i, int j) const {
+        return static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(i + 1);
+    }
+
+    int width_ = 0;
     std::vector<RaySample> points_;
 };
 
@@ -170,8 +168,15 @@ struct RowView {
 /// The first two terms of one pixel, on one grid.
 class PixelSides {
 public:
-    PixelSides(const FineGrid& grid, const PixelPatch& patch, int x, int y, const RowView& view)
-        : grid_(grid), patch_(patch), x_(x), y_(y), view_(view), fine_row_s_(view.row_s / grid.fineness) {}
+    /// Of the strip's pixel `k`, which is pixel (x, y) of the image.
+    PixelSides(const FineGrid& grid, const Strip& strip, int k, int x, int y, const RowView& view)
+        : grid_(grid),
+          strip_(strip),
+          first_(k * grid.fineness),
+          x_(x),
+          y_(y),
+          view_(view),
+          fine_row_s_(view.row_s / grid.fineness) {}
 
     /// Sum over the sides within the pixel and its share of those on its border.
     Row sum() {
@@ -185,8 +190,6 @@ public:
         if (fine_row_s_ == 0) add_by_direction();
         return sum_ / (static_cast<double>(s) * s);
     }
-    /// Total variation of the signal across the pixel, DN; after `sum`.
-    [[nodiscard]] double change() const { return jumps_ / grid_.fineness; }
 
 private:
     /// From the sample on the nearer surface to its neighbour, grid points.
@@ -220,10 +223,9 @@ private:
 
     /// The side between a and b, its neighbour to the right or below.
     void add(int ia, int ja, int ib, int jb) {
-        const RaySample &a = patch_.at(ia, ja), &b = patch_.at(ib, jb);
+        const RaySample &a = strip_.at(first_ + ia, ja), &b = strip_.at(first_ + ib, jb);
         const double jump = a.signal - b.signal;
         if (jump == 0) return;
-        jumps_ += std::abs(jump);
         const bool near_is_a = a.range_m <= b.range_m;
         const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
         if (near.body < 0 || near.body == grid_.camera.mount) return;
@@ -231,11 +233,12 @@ private:
         const Side side{x_ * s + (near_is_a ? ia : ib), y_ * s + (near_is_a ? ja : jb), to_far * (ib - ia),
                         to_far * (jb - ja), jump};
         // A side on the border counts half for this pixel, except a contour, whose position is known.
+        const bool a_within = within(ia, ja), b_within = within(ib, jb);
         if (is_contour(a, b))
-            contours_.push_back({side, &far, near.range_m, within(near_is_a ? ia : ib, near_is_a ? ja : jb),
-                                 within(near_is_a ? ib : ia, near_is_a ? jb : ja)});
+            contours_.push_back(
+                {side, &far, near.range_m, near_is_a ? a_within : b_within, near_is_a ? b_within : a_within});
         else
-            add(side, 0.5, near.range_m, 0.5 * within(ia, ja) + 0.5 * within(ib, jb));
+            add(side, 0.5, near.range_m, 0.5 * a_within + 0.5 * b_within);
     }
 
     /// `along`: where between the nearer sample, 0, and the other, 1, the edge lies.
@@ -319,47 +322,81 @@ private:
     }
 
     const FineGrid& grid_;
-    const PixelPatch& patch_;
+    const Strip& strip_;
+    const int first_;
     const int x_, y_;
     const RowView& view_;
     const double fine_row_s_;
     Row sum_ = Row::Zero();
     Jumps across_x_, across_y_;
     std::vector<Contour> contours_;
-    double jumps_ = 0;
 };
 
-/// The third term: change of reflected sunlight with the direction to the camera, by central differences of the
-/// BSDF.
+/// The third term, at the pixel's centre: change of reflected sunlight with the direction to the camera, by central
+/// differences of the BSDF.
 Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, const Vec3& t_camera_target) {
-    Vec3 per_metre{};  // DN per metre of the surface against the camera, world axes
-    for (int j = 0; j < kShadingPoints; ++j)
-        for (int i = 0; i < kShadingPoints; ++i) {
-            constexpr double kStep = 1.0 / kShadingPoints, kFirst = 0.5 * kStep - 0.5;
-            const Ray ray = ray_through(f, x + kFirst + kStep * i, y + kFirst + kStep * j);
-            const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-            if (hit.body < 0 || hit.body == f.camera.mount) continue;
-            if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) continue;
-            const Surface surface =
-                surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m * kStep / f.model->pixels_per_radian());
-            const Vec3& to_sun = f.sun->centre();
-            const double cosine = dot(surface.normal, to_sun);
-            if (cosine <= 0 || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) continue;
-            const Vec3 seen = hit.range_m * ray.direction;
-            const auto shine = [&](const Vec3& displaced) {
-                return signal_of(sensor, bsdf(surface, surface.normal, to_sun, -normalized(displaced)));
-            };
-            const double d = kViewStep * hit.range_m;
-            const Vec3 change{shine(seen + Vec3{d, 0, 0}) - shine(seen - Vec3{d, 0, 0}),
-                              shine(seen + Vec3{0, d, 0}) - shine(seen - Vec3{0, d, 0}),
-                              shine(seen + Vec3{0, 0, d}) - shine(seen - Vec3{0, 0, d})};
-            per_metre += (cosine * static_cast<double>(f.sun->irradiance()) / (2 * d)) * change;
-        }
-    // Against the target's axes the camera moves by what the target's origin moves, less what turns it about there.
-    const Vec3 g = conjugate(f.T_world_camera.q) * per_metre / (kShadingPoints * kShadingPoints);
+    const Ray ray = ray_through(f, x, y);
+    const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
+    if (hit.body < 0 || hit.body == f.camera.mount) return Row::Zero();
+    if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) return Row::Zero();
+    const Surface surface =
+        surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m / f.model->pixels_per_radian());
+    const Vec3& to_sun = f.sun->centre();
+    const double cosine = dot(surface.normal, to_sun);
+    if (cosine <= 0 || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) return Row::Zero();
+    const Vec3 seen = hit.range_m * ray.direction;
+    const auto shine = [&](const Vec3& displaced) {
+        return signal_of(sensor, bsdf(surface, surface.normal, to_sun, -normalized(displaced)));
+    };
+    const double d = kViewStep * hit.range_m;
+    const Vec3 change{shine(seen + Vec3{d, 0, 0}) - shine(seen - Vec3{d, 0, 0}),
+                      shine(seen + Vec3{0, d, 0}) - shine(seen - Vec3{0, d, 0}),
+                      shine(seen + Vec3{0, 0, d}) - shine(seen - Vec3{0, 0, d})};
+    // DN per metre of the surface against the camera. Against the target's axes the camera moves by what the
+    // target's origin moves, less what turns it about there.
+    const Vec3 per_metre = (cosine * static_cast<double>(f.sun->irradiance()) / (2 * d)) * change;
+    const Vec3 g = conjugate(f.T_world_camera.q) * per_metre;
     Row row;
     row << to_eigen(-cross(t_camera_target, g)), to_eigen(g);
     return row;
+}
+
+/// The pixels that hold kRefined of the information about the pose, by these derivatives: 1. `weights`: inverse
+/// variances; none: all pixels in which anything changes.
+void choose(std::span<const PixelDerivative> derivative, std::span<const float> weights,
+            std::vector<std::uint8_t>& chosen) {
+    chosen.assign(derivative.size(), 0);
+    if (weights.empty()) {
+        for (std::size_t p = 0; p < chosen.size(); ++p) chosen[p] = derivative[p].isZero(0) ? 0 : 1;
+        return;
+    }
+    Matrix6 information = Matrix6::Zero();
+    for (std::size_t p = 0; p < chosen.size(); ++p)
+        if (!derivative[p].isZero(0))
+            information.selfadjointView<Eigen::Lower>().rankUpdate(derivative[p].cast<double>(),
+                                                                   static_cast<double>(weights[p]));
+    const Eigen::LLT<Matrix6> root(information);
+    if (root.info() != Eigen::Success) return choose(derivative, {}, chosen);
+    struct Part {
+        double of_information;
+        std::size_t pixel;
+    };
+    std::vector<Part> parts;
+    parts.reserve(chosen.size());
+    double sum = 0;
+    for (std::size_t p = 0; p < chosen.size(); ++p) {
+        if (derivative[p].isZero(0)) continue;
+        const Vector6 g = derivative[p].cast<double>();
+        parts.push_back({static_cast<double>(weights[p]) * root.matrixL().solve(g).squaredNorm(), p});
+        sum += parts.back().of_information;
+    }
+    std::ranges::sort(parts, std::ranges::greater{}, &Part::of_information);
+    double held = 0;
+    for (const Part& part : parts) {
+        if (held > kRefined * sum) break;
+        held += part.of_information;
+        chosen[part.pixel] = 1;
+    }
 }
 
 }  // namespace
@@ -384,8 +421,8 @@ void ImageDerivative::begin_frame(const BodyPoses& at, const ApparentMotion& mot
 }
 
 std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                                     const FrameSettings& settings, int fineness) {
-    std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
+                                                     const FrameSettings& settings, int fineness,
+                                                     std::span<const float> weights) {
     const double range_m = std::max(norm(T_camera_target.t), 1e-9);
     const double blur_rad = times_.exposure_s *
                             (norm(motion_.velocity_m_s) +
@@ -393,45 +430,74 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
                             range_m;
     const double blur_px = blur_rad * CameraModelHandle(camera_)->pixels_per_radian();
     const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMostParts));
-    for (int k = 0; k < parts; ++k)
-        add(T_camera_target, sensor, settings, fineness, times_.part(k, parts), 1.0F / static_cast<float>(parts));
+    (void)place_camera(T_camera_target, camera_, target_, at_);
+    const auto add_parts = [&](int of_grid) {
+        for (std::size_t p = 0; p < chosen_.size(); ++p)
+            if (chosen_[p] != 0) derivative_[p].setZero();
+        for (int k = 0; k < parts; ++k)
+            add(T_camera_target, sensor, settings, of_grid, times_.part(k, parts),
+                1.0F / static_cast<float>(parts));
+    };
+    std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
+    chosen_.assign(derivative_.size(), 1);
+    for (std::size_t p = 0; p < weights.size(); ++p) chosen_[p] = weights[p] > 0 ? 1 : 0;
+    add_parts(std::min(fineness, kAnywhere));
+    if (fineness > kAnywhere) {
+        choose(derivative_, weights, chosen_);
+        add_parts(fineness);
+    }
+    if (view_dependent_)
+        for (int k = 0; k < parts; ++k)
+            add_shading(T_camera_target, sensor, settings, weights, times_.part(k, parts),
+                        1.0F / static_cast<float>(parts));
     if (optics_.any()) apply_optics();
     return derivative_;
 }
 
-void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
-                          int fineness, const RowTimes& times, float weight) {
-    (void)place_camera(T_camera_target, camera_, target_, at_);
-    const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
-    const FineGrid coarse(render_scene_, at_, camera_, seen, settings, std::min(fineness, kAnywhere));
-    const FrameSettings plain = settings;
-    const Frame frame = make_frame(render_scene_, at_, camera_, seen.path(1, camera_.height), plain);
-    const FineGrid fine(render_scene_, at_, camera_, seen, settings, fineness);
-    const double varying_dn = kVarying * std::sqrt(sensor.variance_dn2(sensor.black_dn));
-    const auto pixel = [&](PixelPatch& patch, int x, int y, const RowView& view) -> Row {
-        patch.trace(coarse, sensor, x, y);
-        if (!patch.sees_anything()) return Row::Zero();
-        PixelSides sides(coarse, patch, x, y, view);
-        Row sum = sides.sum();
-        if (fineness > kAnywhere && sides.change() > varying_dn) {
-            patch.trace(fine, sensor, x, y);
-            sum = PixelSides(fine, patch, x, y, view).sum();
-        }
-        if (!view_dependent_) return sum;
-        return sum + shading_change(frame, sensor, x, y, view.t_camera_target);
-    };
+template <class Do>
+void ImageDerivative::each_row(const Rigid3& T_camera_target, const RowTimes& times, float weight, Do&& rows) {
     tbb::parallel_for(1, std::max(camera_.height - 1, 1), [&](int y) {
         const FlushDenormals flush;
-        PixelPatch patch;
         const double t_s = times.at(y);
         const RowView view{moved(T_camera_target, motion_, t_s).t, motion_, times.row_s};
         const Quat back = exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to that of mid-exposure
-        for (int x = 1; x < camera_.width - 1; ++x) {
-            Row row = pixel(patch, x, y, view);
+        const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width);
+        rows(y, view, [&](int x, Row row) {
             if (t_s != 0) row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
-            derivative_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) +
-                        static_cast<std::size_t>(x)] += weight * row.cast<float>();
+            derivative_[first + static_cast<std::size_t>(x)] += weight * row.cast<float>();
+        });
+    });
+}
+
+void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
+                          int fineness, const RowTimes& times, float weight) {
+    const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
+    const FineGrid grid(render_scene_, at_, camera_, seen, settings, fineness);
+    each_row(T_camera_target, times, weight, [&](int y, const RowView& view, auto&& put) {
+        Strip strip;
+        const std::uint8_t* const chosen =
+            &chosen_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width)];
+        const int end = camera_.width - 1;
+        for (int x = 1; x < end; ++x) {
+            int pixels = 0;
+            while (pixels < kMostInStrip && x + pixels < end && chosen[x + pixels] != 0) ++pixels;
+            if (pixels == 0) continue;
+            strip.trace(grid, sensor, x, y, pixels);
+            for (int k = 0; k < pixels; ++k) put(x + k, PixelSides(grid, strip, k, x + k, y, view).sum());
+            x += pixels - 1;
         }
+    });
+}
+
+void ImageDerivative::add_shading(const Rigid3& T_camera_target, const SensorModel& sensor,
+                                  const FrameSettings& settings, std::span<const float> weights,
+                                  const RowTimes& times, float weight) {
+    const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
+    const Frame frame = make_frame(render_scene_, at_, camera_, seen.path(1, camera_.height), settings);
+    each_row(T_camera_target, times, weight, [&](int y, const RowView& view, auto&& put) {
+        for (int x = 1; x < camera_.width - 1; ++x)
+            if (weights.empty() || weights[static_cast<std::size_t>(y * camera_.width + x)] > 0)
+                put(x, shading_change(frame, sensor, x, y, view.t_camera_target));
     });
 }
 

@@ -6,13 +6,13 @@
 ///
 ///   dT/dpose = - mean(v . grad L) + sum over edges of (L_near - L_far) (v_near . n) length / area + mean(dL/dview)
 ///
-/// The first two terms are computed together: L is sampled on a grid of rays in each pixel, finer where it varies,
-/// and each side between two neighbours is an edge across which L jumps and which moves with the nearer of the two
-/// surfaces. Textures, creases, shadow edges and silhouettes are all included, none twice; a staircase of sides
-/// sums to the edge itself, as the sum of n length is the same. Where two neighbours are not on one surface the
-/// edge is an occluding contour: bisection by rays finds its position, hence its pixel, and the range of the nearer
-/// surface there. (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans.
-/// Graph. 37(6), 2018, sample edges at random; here the points are on a grid.)
+/// The first two terms are computed together: L is sampled on a grid of rays in each pixel, finer in those that
+/// hold the information, and each side between two neighbours is an edge across which L jumps and which moves with
+/// the nearer of the two surfaces. Textures, creases, shadow edges and silhouettes are all included, none twice; a
+/// staircase of sides sums to the edge itself, as the sum of n length is the same. Where two neighbours are not on
+/// one surface the edge is an occluding contour: between two pixels, bisection by rays finds in which of them it
+/// is. (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans. Graph. 37(6),
+/// 2018, sample edges at random; here the points are on a grid.)
 ///
 /// The target's illumination does not change with the pose (ModelView): shadows move with the surface, the radiance
 /// of a Lambert surface is constant, and for other materials direct sunlight changes as the BSDF does with the
@@ -46,15 +46,23 @@ public:
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times);
 
     /// Jacobian of the predicted DN at this pose, without clipping. Row-major; zero in the outermost pixels, which
-    /// lack neighbours. `fineness` >= 1: rays each way in a pixel where the radiance varies. Runs on the calling
-    /// thread's TBB arena; the same on any number of threads.
+    /// lack neighbours. `fineness` >= 1: rays each way in the pixels that hold the information about the pose by a
+    /// coarse grid. `weights`: inverse variances of the pixels, DN^-2, 0: left out; empty: all pixels in which
+    /// light changes. Runs on the calling thread's TBB arena; the same on any number of threads.
     std::span<const PixelDerivative> at(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                        const FrameSettings& settings, int fineness);
+                                        const FrameSettings& settings, int fineness,
+                                        std::span<const float> weights = {});
 
 private:
-    /// Adds it, times `weight`, for a moment of each row.
+    /// Calls rows(y, view of the row, put) for each row; put(x, derivative) adds that, times `weight`.
+    template <class Do>
+    void each_row(const Rigid3& T_camera_target, const RowTimes& times, float weight, Do&& rows);
+    /// Adds the first two terms of the chosen pixels for a moment of each row.
     void add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings, int fineness,
              const RowTimes& times, float weight);
+    /// Adds the third.
+    void add_shading(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
+                     std::span<const float> weights, const RowTimes& times, float weight);
     void apply_optics();
 
     const RenderScene& render_scene_;
@@ -67,6 +75,7 @@ private:
     ImageOptics optics_;
     RadianceImage before_optics_, after_optics_;
     std::vector<PixelDerivative> derivative_;
+    std::vector<std::uint8_t> chosen_;  ///< pixels of the next `add`: not 0
 };
 
 }  // namespace narpa

@@ -12,6 +12,8 @@
 namespace narpa {
 namespace {
 
+/// Of a pixel without noise.
+constexpr double kLeastVariance_dn2 = 1e-6;
 /// Margin about the target's bounds, in pixels and as a part of their extent.
 constexpr double kRoom_px = 6, kRoomPart = 0.1;
 /// Windows begin and end at multiples of this, so that small motions do not change them.
@@ -126,13 +128,17 @@ void LevelView::place(const Rigid3& T_camera_target) {
 
 void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& settings) {
     place(T_camera_target);
-    view_.render(T_camera_target, settings, true);
+    view_.render_with_variance(T_camera_target, settings);
     const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
         signal_[i] = signal_of(view_.radiance().pixels[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
+}
+
+void LevelView::predict(const Vector6& step) {
+    for (std::size_t i = 0; i < signal_.size(); ++i) signal_[i] += columns_[i].dot(step.cast<float>());
 }
 
 float LevelView::signal_of(const Rgb& radiance) const {
@@ -146,7 +152,7 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     BodyPoses turned = at_;
     turned.T_world_body[target_].q = normalized(at_.T_world_body[target_].q * exp_rotation(turn_rad));
     view_.begin_frame(turned, motion_, times_);
-    view_.render(T_camera_target, settings, true);
+    view_.render_with_variance(T_camera_target, settings);
     std::vector<float> change;
     for (std::size_t i = 0; i < signal_.size(); ++i)
         change.push_back(signal_of(view_.radiance().pixels[i]) - signal_[i]);
@@ -154,11 +160,35 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     return change;
 }
 
-void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
+void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness,
+                              Refine where) {
     place(T_camera_target);
-    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness);
+    const std::vector<float> weights = where == Refine::information ? this->weights() : std::vector<float>{};
+    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness, weights);
     differentiated_at_ = T_camera_target;
+    fineness_ = fineness;
     if (T_world_camera_) add_shading(T_camera_target, settings);
+}
+
+/// Inverse variances of the pixels without the render's noise; 0 where neither a pixel nor its neighbours are lit.
+std::vector<float> LevelView::weights() const {
+    std::vector<float> out(signal_.size());
+    const auto width = static_cast<std::size_t>(window_.width);
+    const auto is_lit = [&](std::size_t p) {
+        return signal_[p - 1] != 0 || signal_[p] != 0 || signal_[p + 1] != 0;
+    };
+    for (int y = 1; y < window_.height - 1; ++y)
+        for (int x = 1; x < window_.width - 1; ++x) {
+            const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            if (!is_lit(p - width) && !is_lit(p) && !is_lit(p + width)) continue;
+            const double signal = std::max(static_cast<double>(signal_[p]), 0.0),
+                         of_model = model_.light_rad * signal;
+            const double measured = measured_variance_.empty() ? 0 : static_cast<double>(measured_variance_[p]);
+            const double variance =
+                sensor_.variance_dn2(sensor_.black_dn + signal) / pixels_averaged_ + measured + of_model * of_model;
+            out[p] = static_cast<float>(1 / std::max(variance, kLeastVariance_dn2));
+        }
+    return out;
 }
 
 /// Adds what the shading changes by while the target turns under its light, by differences.
@@ -176,18 +206,27 @@ void LevelView::add_shading(const Rigid3& T_camera_target, const FrameSettings& 
 }
 
 std::optional<Vec3> LevelView::flat_face() const {
+    constexpr int kRaysAcross = 32;
     constexpr double kSteps = 100;  // of a normal's components
-    std::map<std::array<long, 3>, std::size_t> faces;
-    std::size_t pixels = 0;
-    const Aovs& aovs = view_.aovs();
-    for (std::size_t i = 0; i < aovs.body.size(); ++i) {
-        if (aovs.body[i] != static_cast<int>(target_)) continue;
-        const Vec3& n = aovs.normal[i];
-        ++faces[{std::lround(kSteps * n.x), std::lround(kSteps * n.y), std::lround(kSteps * n.z)}];
-        ++pixels;
-    }
+    const int step = std::max(1, std::max(window_.width, window_.height) / kRaysAcross);
+    std::map<std::array<long, 3>, int> faces;
+    int all = 0;
+    HitBatch hits;
+    for (int y = 0; y < window_.height; y += step)
+        for (int x = 0; x < window_.width;) {
+            std::array<ImagePoint, kLanes> points;
+            std::size_t n = 0;
+            for (; n < kLanes && x < window_.width; x += step) points[n++] = {1.0 * x, 1.0 * y};
+            view_.trace_pixels(std::span(points).first(n), hits);
+            for (std::size_t lane = 0; lane < n; ++lane) {
+                if (hits.body[lane] != static_cast<int>(target_)) continue;
+                const Vec3 face = kSteps * hits.geometric_normal[lane];
+                ++faces[{std::lround(face.x), std::lround(face.y), std::lround(face.z)}];
+                ++all;
+            }
+        }
     const auto largest = std::ranges::max_element(faces, {}, [](const auto& face) { return face.second; });
-    if (largest == faces.end() || 3 * largest->second < pixels) return {};
+    if (largest == faces.end() || 3 * largest->second < all) return {};
     const auto& [x, y, z] = largest->first;
     return conjugate(view_.T_world_camera().q) *
            normalized(Vec3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});

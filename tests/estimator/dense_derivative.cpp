@@ -4,8 +4,10 @@
 // however far apart these are: so the poses can be so far apart that the noise of the renders does not matter.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "estimator/dense/image_derivative.h"
 #include "estimator/view/model_view.h"
@@ -165,6 +167,42 @@ TEST(ImageDerivative, OfTheDockingScene) {
     camera.cx = 10, camera.cy = 5;
     const auto errors = relative_errors(*render_scene, camera, 0, inverse(T_world_camera), r);
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.17) << "column " << k;
+}
+
+/// The fine grid is for the pixels that hold most of the information; those of no weight are left out.
+TEST(ImageDerivative, LooksCloselyWhereTheInformationIs) {
+    const auto scene = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+    ASSERT_TRUE(scene) << scene.error().text();
+    const auto render_scene = RenderScene::create(*scene);
+    ASSERT_TRUE(render_scene);
+    const Rigid3 pose = inverse(
+        Rigid3{scene->bodies[1].initial.T_world_body.q * scene->cameras[0].T_mount_camera.q, {10, 0.4, -0.3}});
+    Camera camera = pinhole(40, 400);
+    camera.cx = 10, camera.cy = 5;
+    const BodyPoses at = placement_of(*scene);
+    ImageDerivative derivative(*render_scene, camera, 0, at);
+    const auto by = [&](int fineness, std::span<const float> weights) {
+        const auto J = derivative.at(pose, unit_sensor(), {}, fineness, weights);
+        return std::vector<PixelDerivative>(J.begin(), J.end());
+    };
+    std::vector<float> weights(40 * 40, 1);
+    const auto coarse = by(3, weights), fine = by(8, {}), mixed = by(8, weights);
+    int looked_at = 0, closely = 0;
+    double held = 0, all = 0;
+    for (std::size_t p = 0; p < fine.size(); ++p) {
+        if (fine[p].isZero(0)) continue;
+        ++looked_at;
+        all += static_cast<double>(fine[p].squaredNorm());
+        if (mixed[p] == coarse[p] && mixed[p] != fine[p]) continue;
+        EXPECT_EQ(mixed[p], fine[p]) << p;
+        ++closely;
+        held += static_cast<double>(mixed[p].squaredNorm());
+    }
+    EXPECT_LT(closely, 0.6 * looked_at);
+    EXPECT_GT(held, 0.7 * all);
+    std::fill(weights.begin() + 20 * 40, weights.end(), 0.0F);
+    const auto upper = by(8, weights);
+    for (std::size_t p = 20 * 40; p < upper.size(); ++p) EXPECT_TRUE(upper[p].isZero(0)) << p;
 }
 
 }  // namespace

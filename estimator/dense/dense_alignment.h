@@ -27,8 +27,8 @@ struct DenseOptions {
     int iterations = 16;           ///< at most, on each level
     int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
     double rays_per_pixel = 16;    ///< of the finest level's images, on average over pixels that show the target;
-                                   ///< those of the last step take eight times as many
-    int fineness = 6;              ///< of the last derivative: rays each way in a pixel where the light changes
+                                   ///< those of the last step take six times as many
+    int fineness = 6;              ///< of the last derivative: lines each way across a pixel
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;

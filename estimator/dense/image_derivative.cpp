@@ -20,19 +20,18 @@ namespace {
 
 using Row = Eigen::Matrix<double, 6, 1>;
 
+std::size_t index_in(int width, int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
 /// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
 constexpr double kSurfaceSteps = 2.5;
 /// Lower limit of the cosine between ray and normal in that prediction.
 constexpr double kLeastCosine = 0.02;
-/// Bisections between two rays in the search for a contour.
-constexpr int kHalvings = 10;
 /// Step of the finite difference of the BSDF, as a part of the range.
 constexpr double kViewStep = 1e-3;
-/// Rays each way in any pixel; more in the pixels that hold this part of the information by those.
-constexpr int kAnywhere = 3;
-constexpr double kRefined = 0.85;
-/// Pixels side by side that are traced together.
-constexpr int kMostInStrip = 8;
+/// Pixels, each way, whose borders are traced together.
+constexpr int kSquare = 8;
 /// Parts of an exposure for each pixel of motion during it, and at the most.
 constexpr double kPartsPerPixel = 1, kMostParts = 8;
 
@@ -103,59 +102,99 @@ struct RaySample {
     Vec3 position{}, normal{}, ray_direction{};  ///< world
 };
 
-/// Pixels side by side, and the ring of grid points around them.
-class Strip {
+/// Traces rays through any points of a grid, to the centre of the Sun from there.
+class PointTracer {
 public:
-    /// Traces all but the ring's corners.
-    void trace(const FineGrid& grid, const SensorModel& sensor, int x, int y, int pixels) {
-        const int s = grid.fineness, end = pixels * s;
-        const Frame& f = grid.frame;
-        width_ = end + 2;
-        points_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(s + 2));
-        CameraBatch p;
-        CameraSamples samples;
-        samples.centre = true;
-        samples.sample.fill(0);
-        Lanes<std::size_t> place;
-        const auto trace = [&] {
-            RgbLanes radiance;
-            trace_rays(f, samples, f.tracer.all_bodies(), p);
-            f.integrator.radiance(f, p, radiance);
-            for (std::size_t i = 0; i < samples.n; ++i) {
-                RaySample& seen = points_[place[i]];
-                seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
-                if (p.hits.body[i] < 0) continue;
-                seen.body = p.hits.body[i];
-                seen.range_m = p.hits.range_m[i];
-                seen.position = p.hits.position[i];
-                seen.normal = p.hits.geometric_normal[i];
-            }
-            samples.n = 0;
-        };
-        for (int j = -1; j <= s; ++j)
-            for (int i = -1; i <= end; ++i) {
-                if ((i == -1 || i == end) && (j == -1 || j == s)) continue;
-                const int fine_x = x * s + i, fine_y = y * s + j;
-                samples.x[samples.n] = fine_x, samples.y[samples.n] = fine_y;
-                samples.number[samples.n] =
-                    static_cast<std::uint32_t>(fine_y) * static_cast<std::uint32_t>(grid.camera.width) +
-                    static_cast<std::uint32_t>(fine_x);
-                place[samples.n++] = index(i, j);
-                if (samples.n == kLanes) trace();
-            }
-        if (samples.n > 0) trace();
+    PointTracer(const FineGrid& grid, const SensorModel& sensor) : grid_(grid), f_(grid.frame), sensor_(sensor) {
+        p_.sample.fill(0);
+        if (f_.sun) p_.to_sun.fill(f_.sun->centre());
     }
-
-    /// Point (i, j), counted from the first pixel's first.
-    [[nodiscard]] const RaySample& at(int i, int j) const { return points_[index(i, j)]; }
+    /// `seen` is written by the next `trace`, if not before.
+    void put(double x, double y, RaySample& seen) {
+        x_[n_] = x, y_[n_] = y;
+        p_.number[n_] = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(grid_.camera.width) +
+                        static_cast<std::uint32_t>(x);
+        seen_[n_++] = &seen;
+        if (n_ == kLanes) trace();
+    }
+    void trace() {
+        if (n_ == 0) return;
+        p_.rays.n = n_;
+        if (f_.over_time)
+            for (std::size_t i = 0; i < n_; ++i) p_.rays.put(i, ray_through(f_, x_[i], y_[i]));
+        else
+            f_.model->directions(f_.T_world_camera.q, x_, y_, p_.rays.direction),
+                p_.rays.origin.fill(f_.T_world_camera.t);
+        f_.tracer.intersect(f_.at, p_.rays, f_.tracer.all_bodies(), p_.hits);
+        if (f_.subpixel_bodies.any())
+            for (std::size_t i = 0; i < n_; ++i) p_.hits.put(i, f_.subpixel_bodies.beyond(p_.rays[i], p_.hits[i]));
+        RgbLanes radiance;
+        f_.integrator.radiance(f_, p_, radiance);
+        for (std::size_t i = 0; i < n_; ++i) {
+            RaySample& seen = *seen_[i];
+            seen = {signal_of(sensor_, radiance[i]), -1, kInfinity, {}, {}, p_.rays.direction[i]};
+            if (p_.hits.body[i] < 0) continue;
+            seen.body = p_.hits.body[i];
+            seen.range_m = p_.hits.range_m[i];
+            seen.position = p_.hits.position[i];
+            seen.normal = p_.hits.geometric_normal[i];
+        }
+        n_ = 0;
+    }
 
 private:
-    [[nodiscard]] std::size_t index(int i, int j) const {
-        return static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(i + 1);
+    const FineGrid& grid_;
+    const Frame& f_;
+    const SensorModel& sensor_;
+    CameraBatch p_;
+    std::size_t n_ = 0;
+    Lanes<double> x_{}, y_{};
+    Lanes<RaySample*> seen_{};
+};
+
+/// Pixels of the image that are traced together.
+struct Square {
+    int x, y, columns, rows;
+};
+
+/// Points on the borders of a square's chosen pixels, as many on each as the grid has in a pixel's side.
+class Borders {
+public:
+    Borders(int fineness, const Square& square)
+        : n_(fineness), square_(square), left_(index(0, square.rows, 0)), upper_(index(0, square.rows + 1, 0)) {}
+
+    [[nodiscard]] const Square& square() const noexcept { return square_; }
+
+    void trace(const FineGrid& grid, const SensorModel& sensor, std::span<const std::uint8_t> chosen) {
+        const int width = grid.camera.width / n_;
+        const auto is_chosen = [&](int c, int r) {
+            return c >= 0 && r >= 0 && c < square_.columns && r < square_.rows &&
+                   chosen[index_in(width, square_.x + c, square_.y + r)] != 0;
+        };
+        PointTracer tracer(grid, sensor);
+        for (int r = 0; r <= square_.rows; ++r)
+            for (int c = 0; c <= square_.columns; ++c) {
+                const int x = (square_.x + c) * n_, y = (square_.y + r) * n_;
+                if (is_chosen(c, r - 1) || is_chosen(c, r))
+                    for (int i = 0; i < n_; ++i) tracer.put(x + i, y - 0.5, upper_[index(c, r, i)]);
+                if (is_chosen(c - 1, r) || is_chosen(c, r))
+                    for (int i = 0; i < n_; ++i) tracer.put(x - 0.5, y + i, left_[index(c, r, i)]);
+            }
+        tracer.trace();
+    }
+    /// Point i on the left border of the square's pixel (c, r), from above.
+    [[nodiscard]] const RaySample& left(int c, int r, int i) const { return left_[index(c, r, i)]; }
+    /// Point i on its upper border, from the left.
+    [[nodiscard]] const RaySample& upper(int c, int r, int i) const { return upper_[index(c, r, i)]; }
+
+private:
+    [[nodiscard]] std::size_t index(int c, int r, int i) const {
+        return index_in(square_.columns + 1, c, r) * static_cast<std::size_t>(n_) + static_cast<std::size_t>(i);
     }
 
-    int width_ = 0;
-    std::vector<RaySample> points_;
+    const int n_;
+    const Square square_;
+    std::vector<RaySample> left_, upper_;
 };
 
 /// While a row is exposed.
@@ -165,34 +204,35 @@ struct RowView {
     double row_s = 0;  ///< to the next row
 };
 
-/// The first two terms of one pixel, on one grid.
+/// The first two terms of one pixel.
 class PixelSides {
 public:
-    /// Of the strip's pixel `k`, which is pixel (x, y) of the image.
-    PixelSides(const FineGrid& grid, const Strip& strip, int k, int x, int y, const RowView& view)
+    /// Of the square's pixel (column, row).
+    PixelSides(const FineGrid& grid, const Borders& borders, int column, int row, const RowView& view)
         : grid_(grid),
-          strip_(strip),
-          first_(k * grid.fineness),
-          x_(x),
-          y_(y),
+          borders_(borders),
+          column_(column),
+          row_(row),
+          x_(borders.square().x + column),
+          y_(borders.square().y + row),
           view_(view),
           fine_row_s_(view.row_s / grid.fineness) {}
 
-    /// Sum over the sides within the pixel and its share of those on its border.
+    /// Sum over the lines from border to border.
     Row sum() {
-        const int s = grid_.fineness;
-        for (int j = 0; j < s; ++j)
-            for (int i = -1; i < s; ++i) {
-                add(i, j, i + 1, j);
-                add(j, i, j, i + 1);
-            }
+        const int n = grid_.fineness;
+        const double left = x_ * n - 0.5, top = y_ * n - 0.5;
+        for (int i = 0; i < n; ++i) {
+            add(borders_.left(column_, row_, i), borders_.left(column_ + 1, row_, i), left, y_ * n + i, n, 0);
+            add(borders_.upper(column_, row_, i), borders_.upper(column_, row_ + 1, i), x_ * n + i, top, 0, n);
+        }
         add_contours();
         if (fine_row_s_ == 0) add_by_direction();
-        return sum_ / (static_cast<double>(s) * s);
+        return sum_ / (static_cast<double>(n) * n);
     }
 
 private:
-    /// From the sample on the nearer surface to its neighbour, grid points.
+    /// From the sample on the nearer surface to that on the opposite border, grid points.
     struct Side {
         double x, y, dx, dy;
         double jump;  ///< DN, left or upper minus right or lower sample
@@ -205,7 +245,6 @@ private:
         Side side;
         const RaySample* far;
         double range_m;  ///< of the nearer surface
-        bool near_within, far_within;
         double on_near = 0, on_far = 1;
 
         [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
@@ -217,39 +256,28 @@ private:
         }
     };
 
-    [[nodiscard]] bool within(int i, int j) const {
-        return i >= 0 && j >= 0 && i < grid_.fineness && j < grid_.fineness;
-    }
-
-    /// The side between a and b, its neighbour to the right or below.
-    void add(int ia, int ja, int ib, int jb) {
-        const RaySample &a = strip_.at(first_ + ia, ja), &b = strip_.at(first_ + ib, jb);
+    /// The line from a at (x, y) to b.
+    void add(const RaySample& a, const RaySample& b, double x, double y, double dx, double dy) {
         const double jump = a.signal - b.signal;
         if (jump == 0) return;
         const bool near_is_a = a.range_m <= b.range_m;
         const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
         if (near.body < 0 || near.body == grid_.camera.mount) return;
-        const double s = grid_.fineness, to_far = near_is_a ? 1 : -1;
-        const Side side{x_ * s + (near_is_a ? ia : ib), y_ * s + (near_is_a ? ja : jb), to_far * (ib - ia),
-                        to_far * (jb - ja), jump};
-        // A side on the border counts half for this pixel, except a contour, whose position is known.
-        const bool a_within = within(ia, ja), b_within = within(ib, jb);
+        const Side side = near_is_a ? Side{x, y, dx, dy, jump} : Side{x + dx, y + dy, -dx, -dy, jump};
         if (is_contour(a, b))
-            contours_.push_back(
-                {side, &far, near.range_m, near_is_a ? a_within : b_within, near_is_a ? b_within : a_within});
+            contours_.push_back({side, &far, near.range_m});
         else
-            add(side, 0.5, near.range_m, 0.5 * a_within + 0.5 * b_within);
+            add(side, 0.5, 2 / (1 / a.range_m + 1 / b.range_m));
     }
 
     /// `along`: where between the nearer sample, 0, and the other, 1, the edge lies.
-    void add(const Side& side, double along, double range_m, double share) {
-        const double jump = share * side.jump;
+    void add(const Side& side, double along, double range_m) {
         if (fine_row_s_ == 0) {
             Jumps& jumps = side.dy == 0 ? across_x_ : across_y_;
-            jumps.sum += jump;
-            jumps.over_range += jump / range_m;
+            jumps.sum += side.jump;
+            jumps.over_range += side.jump / range_m;
         } else {
-            sum_ += jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
+            sum_ += side.jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
         }
     }
 
@@ -270,7 +298,8 @@ private:
         add_sides(across_y_, J.y);
     }
 
-    /// Bisects contours side by side: where between two samples the nearer surface ends, and its range there.
+    /// Bisects contours side by side, as often as there are lines: where between two samples the nearer surface
+    /// ends, and its range there.
     void add_contours() {
         const Frame& f = grid_.frame;
         RayBatch rays;
@@ -278,7 +307,7 @@ private:
         for (std::size_t first = 0; first < contours_.size(); first += kLanes) {
             rays.n = std::min(kLanes, contours_.size() - first);
             const std::span<Contour> batch(&contours_[first], rays.n);
-            for (int k = 0; k < kHalvings; ++k) {
+            for (int k = 0; k < grid_.fineness; ++k) {
                 for (std::size_t i = 0; i < batch.size(); ++i) {
                     const Contour& c = batch[i];
                     rays.put(i,
@@ -287,13 +316,12 @@ private:
                 f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
                 for (std::size_t i = 0; i < batch.size(); ++i) batch[i].halve(hits.body[i], hits.range_m[i]);
             }
-            for (const Contour& c : batch)
-                add(c.side, c.middle(), c.range_m, (c.middle() < 0.5 ? c.near_within : c.far_within) ? 1 : 0);
+            for (const Contour& c : batch) add(c.side, c.middle(), c.range_m);
         }
         contours_.clear();
     }
 
-    /// True where the two are not neighbouring points of one surface, by the slopes from their normals.
+    /// True where the two are not points of one surface, by the slopes from their normals.
     static bool is_contour(const RaySample& a, const RaySample& b) {
         if (a.body != b.body) return true;
         const double cosine =
@@ -322,9 +350,8 @@ private:
     }
 
     const FineGrid& grid_;
-    const Strip& strip_;
-    const int first_;
-    const int x_, y_;
+    const Borders& borders_;
+    const int column_, row_, x_, y_;
     const RowView& view_;
     const double fine_row_s_;
     Row sum_ = Row::Zero();
@@ -361,44 +388,6 @@ Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, cons
     return row;
 }
 
-/// The pixels that hold kRefined of the information about the pose, by these derivatives: 1. `weights`: inverse
-/// variances; none: all pixels in which anything changes.
-void choose(std::span<const PixelDerivative> derivative, std::span<const float> weights,
-            std::vector<std::uint8_t>& chosen) {
-    chosen.assign(derivative.size(), 0);
-    if (weights.empty()) {
-        for (std::size_t p = 0; p < chosen.size(); ++p) chosen[p] = derivative[p].isZero(0) ? 0 : 1;
-        return;
-    }
-    Matrix6 information = Matrix6::Zero();
-    for (std::size_t p = 0; p < chosen.size(); ++p)
-        if (!derivative[p].isZero(0))
-            information.selfadjointView<Eigen::Lower>().rankUpdate(derivative[p].cast<double>(),
-                                                                   static_cast<double>(weights[p]));
-    const Eigen::LLT<Matrix6> root(information);
-    if (root.info() != Eigen::Success) return choose(derivative, {}, chosen);
-    struct Part {
-        double of_information;
-        std::size_t pixel;
-    };
-    std::vector<Part> parts;
-    parts.reserve(chosen.size());
-    double sum = 0;
-    for (std::size_t p = 0; p < chosen.size(); ++p) {
-        if (derivative[p].isZero(0)) continue;
-        const Vector6 g = derivative[p].cast<double>();
-        parts.push_back({static_cast<double>(weights[p]) * root.matrixL().solve(g).squaredNorm(), p});
-        sum += parts.back().of_information;
-    }
-    std::ranges::sort(parts, std::ranges::greater{}, &Part::of_information);
-    double held = 0;
-    for (const Part& part : parts) {
-        if (held > kRefined * sum) break;
-        held += part.of_information;
-        chosen[part.pixel] = 1;
-    }
-}
-
 }  // namespace
 
 ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& camera, std::size_t target,
@@ -422,7 +411,7 @@ void ImageDerivative::begin_frame(const BodyPoses& at, const ApparentMotion& mot
 
 std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_target, const SensorModel& sensor,
                                                      const FrameSettings& settings, int fineness,
-                                                     std::span<const float> weights) {
+                                                     std::span<const std::uint8_t> chosen) {
     const double range_m = std::max(norm(T_camera_target.t), 1e-9);
     const double blur_rad = times_.exposure_s *
                             (norm(motion_.velocity_m_s) +
@@ -431,40 +420,41 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
     const double blur_px = blur_rad * CameraModelHandle(camera_)->pixels_per_radian();
     const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMostParts));
     (void)place_camera(T_camera_target, camera_, target_, at_);
-    const auto add_parts = [&](int of_grid) {
-        for (std::size_t p = 0; p < chosen_.size(); ++p)
-            if (chosen_[p] != 0) derivative_[p].setZero();
-        for (int k = 0; k < parts; ++k)
-            add(T_camera_target, sensor, settings, of_grid, times_.part(k, parts),
-                1.0F / static_cast<float>(parts));
-    };
     std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
     chosen_.assign(derivative_.size(), 1);
-    for (std::size_t p = 0; p < weights.size(); ++p) chosen_[p] = weights[p] > 0 ? 1 : 0;
-    add_parts(std::min(fineness, kAnywhere));
-    if (fineness > kAnywhere) {
-        choose(derivative_, weights, chosen_);
-        add_parts(fineness);
-    }
+    std::ranges::copy(chosen, chosen_.begin());
+    for (int k = 0; k < parts; ++k)
+        add(T_camera_target, sensor, settings, fineness, times_.part(k, parts), 1.0F / static_cast<float>(parts));
     if (view_dependent_)
         for (int k = 0; k < parts; ++k)
-            add_shading(T_camera_target, sensor, settings, weights, times_.part(k, parts),
-                        1.0F / static_cast<float>(parts));
+            add_shading(T_camera_target, sensor, settings, times_.part(k, parts), 1.0F / static_cast<float>(parts));
     if (optics_.any()) apply_optics();
     return derivative_;
 }
 
 template <class Do>
-void ImageDerivative::each_row(const Rigid3& T_camera_target, const RowTimes& times, float weight, Do&& rows) {
-    tbb::parallel_for(1, std::max(camera_.height - 1, 1), [&](int y) {
+void ImageDerivative::each_square(const Rigid3& T_camera_target, const RowTimes& times, float weight, Do&& act) {
+    const int across = (camera_.width - 3) / kSquare + 1, down = (camera_.height - 3) / kSquare + 1;
+    if (camera_.width < 3 || camera_.height < 3) return;
+    tbb::parallel_for(0, across * down, [&](int number) {
         const FlushDenormals flush;
-        const double t_s = times.at(y);
-        const RowView view{moved(T_camera_target, motion_, t_s).t, motion_, times.row_s};
-        const Quat back = exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to that of mid-exposure
-        const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width);
-        rows(y, view, [&](int x, Row row) {
-            if (t_s != 0) row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
-            derivative_[first + static_cast<std::size_t>(x)] += weight * row.cast<float>();
+        const int x = 1 + kSquare * (number % across), y = 1 + kSquare * (number / across);
+        const Square square{x, y, std::min(kSquare, camera_.width - 1 - x),
+                            std::min(kSquare, camera_.height - 1 - y)};
+        act(square, [&](auto&& derivative) {
+            for (int r = 0; r < square.rows; ++r) {
+                const double t_s = times.at(y + r);
+                const RowView view{moved(T_camera_target, motion_, t_s).t, motion_, times.row_s};
+                const Quat back =
+                    exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to mid-exposure's
+                for (int c = 0; c < square.columns; ++c) {
+                    const std::size_t p = index_in(camera_.width, x + c, y + r);
+                    if (chosen_[p] == 0) continue;
+                    Row row = derivative(c, r, view);
+                    if (t_s != 0) row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
+                    derivative_[p] += weight * row.cast<float>();
+                }
+            }
         });
     });
 }
@@ -473,31 +463,21 @@ void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sens
                           int fineness, const RowTimes& times, float weight) {
     const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
     const FineGrid grid(render_scene_, at_, camera_, seen, settings, fineness);
-    each_row(T_camera_target, times, weight, [&](int y, const RowView& view, auto&& put) {
-        Strip strip;
-        const std::uint8_t* const chosen =
-            &chosen_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width)];
-        const int end = camera_.width - 1;
-        for (int x = 1; x < end; ++x) {
-            int pixels = 0;
-            while (pixels < kMostInStrip && x + pixels < end && chosen[x + pixels] != 0) ++pixels;
-            if (pixels == 0) continue;
-            strip.trace(grid, sensor, x, y, pixels);
-            for (int k = 0; k < pixels; ++k) put(x + k, PixelSides(grid, strip, k, x + k, y, view).sum());
-            x += pixels - 1;
-        }
+    each_square(T_camera_target, times, weight, [&](const Square& square, auto&& each) {
+        Borders borders(grid.fineness, square);
+        borders.trace(grid, sensor, chosen_);
+        each([&](int c, int r, const RowView& view) { return PixelSides(grid, borders, c, r, view).sum(); });
     });
 }
 
 void ImageDerivative::add_shading(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                  const FrameSettings& settings, std::span<const float> weights,
-                                  const RowTimes& times, float weight) {
+                                  const FrameSettings& settings, const RowTimes& times, float weight) {
     const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
     const Frame frame = make_frame(render_scene_, at_, camera_, seen.path(1, camera_.height), settings);
-    each_row(T_camera_target, times, weight, [&](int y, const RowView& view, auto&& put) {
-        for (int x = 1; x < camera_.width - 1; ++x)
-            if (weights.empty() || weights[static_cast<std::size_t>(y * camera_.width + x)] > 0)
-                put(x, shading_change(frame, sensor, x, y, view.t_camera_target));
+    each_square(T_camera_target, times, weight, [&](const Square& square, auto&& each) {
+        each([&](int c, int r, const RowView& view) {
+            return shading_change(frame, sensor, square.x + c, square.y + r, view.t_camera_target);
+        });
     });
 }
 

@@ -41,12 +41,12 @@ constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
 /// Least eigenvalue of the pose's information, scaled to a unit diagonal.
 constexpr double kLeastInformation = 1e-10;
-/// Coarse levels use this part of the rays and a grid coarser by this factor. The finest takes one ray a pixel for
-/// the derivative until its last steps.
+/// Coarse levels use this part of the rays. All steps but the finest level's last take a derivative by so many
+/// times fewer lines.
 constexpr double kCoarseRays = 0.5;
 constexpr int kCoarseFineness = 3;
 /// The last step uses this many times the rays.
-constexpr double kPolishRays = 4;
+constexpr double kPolishRays = 6;
 /// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
 constexpr int kMostPolishes = 5;
 constexpr double kPolished_sigmas = 1;
@@ -109,7 +109,7 @@ DenseStatus LevelSolver::run(bool first) {
     double least = std::numeric_limits<double>::infinity();
     int stalled = 0;
     for (int k = 0; k < o_.iterations; ++k) {
-        differentiate(kDerivativeServes_px, coarse_ ? std::max(1, o_.fineness / kCoarseFineness) : 1);
+        differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
         if (!linearise()) return DenseStatus::too_few_pixels;
         if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
@@ -193,7 +193,7 @@ void LevelSolver::finish() {
 void LevelSolver::examine() {
     rays_ *= kPolishRays;
     render(e_.T_camera_body);
-    differentiate(kDerivativeServes_px, 1);
+    differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
     linearise();
 }
 
@@ -263,7 +263,7 @@ void LevelSolver::differentiate(double reach_px, int fineness) {
     const std::optional<Rigid3>& there = view_.differentiated_at();
     const bool fine_enough = view_.fineness() >= fineness;
     if (there && fine_enough && distance_px(error_between(*there, e_.T_camera_body)) < reach_px) return;
-    view_.differentiate(e_.T_camera_body, settings_, fineness, LevelView::Refine::information);
+    view_.differentiate(e_.T_camera_body, settings_, fineness);
 }
 
 /// False where the pose is not observable.

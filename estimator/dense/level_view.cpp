@@ -12,8 +12,6 @@
 namespace narpa {
 namespace {
 
-/// Of a pixel without noise.
-constexpr double kLeastVariance_dn2 = 1e-6;
 /// Margin about the target's bounds, in pixels and as a part of their extent.
 constexpr double kRoom_px = 6, kRoomPart = 0.1;
 /// Windows begin and end at multiples of this, so that small motions do not change them.
@@ -160,19 +158,16 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     return change;
 }
 
-void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness,
-                              Refine where) {
+void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
     place(T_camera_target);
-    const std::vector<float> weights = where == Refine::information ? this->weights() : std::vector<float>{};
-    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness, weights);
-    differentiated_at_ = T_camera_target;
-    fineness_ = fineness;
+    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness, lit());
+    differentiated_at_ = T_camera_target, fineness_ = fineness;
     if (T_world_camera_) add_shading(T_camera_target, settings);
 }
 
-/// Inverse variances of the pixels without the render's noise; 0 where neither a pixel nor its neighbours are lit.
-std::vector<float> LevelView::weights() const {
-    std::vector<float> out(signal_.size());
+/// Not 0 where a pixel or its neighbours are lit.
+std::vector<std::uint8_t> LevelView::lit() const {
+    std::vector<std::uint8_t> out(signal_.size());
     const auto width = static_cast<std::size_t>(window_.width);
     const auto is_lit = [&](std::size_t p) {
         return signal_[p - 1] != 0 || signal_[p] != 0 || signal_[p + 1] != 0;
@@ -180,13 +175,7 @@ std::vector<float> LevelView::weights() const {
     for (int y = 1; y < window_.height - 1; ++y)
         for (int x = 1; x < window_.width - 1; ++x) {
             const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
-            if (!is_lit(p - width) && !is_lit(p) && !is_lit(p + width)) continue;
-            const double signal = std::max(static_cast<double>(signal_[p]), 0.0),
-                         of_model = model_.light_rad * signal;
-            const double measured = measured_variance_.empty() ? 0 : static_cast<double>(measured_variance_[p]);
-            const double variance =
-                sensor_.variance_dn2(sensor_.black_dn + signal) / pixels_averaged_ + measured + of_model * of_model;
-            out[p] = static_cast<float>(1 / std::max(variance, kLeastVariance_dn2));
+            out[p] = is_lit(p - width) || is_lit(p) || is_lit(p + width) ? 1 : 0;
         }
     return out;
 }

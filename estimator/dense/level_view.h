@@ -46,12 +46,9 @@ public:
     /// axes, and seen at the same pose.
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                        const Vec3& turn_rad);
-    /// Where the derivative's grid is `fineness` rays each way.
-    enum class Refine : std::uint8_t { everywhere, information };
-    /// At the pose of the latest render.
-    void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness,
-                       Refine where = Refine::everywhere);
-    /// The pose of this frame's latest Jacobian, and its grid.
+    /// At the pose of the latest render, where that has light.
+    void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
+    /// The pose of this frame's latest Jacobian, and its fineness.
     [[nodiscard]] const std::optional<Rigid3>& differentiated_at() const noexcept { return differentiated_at_; }
     [[nodiscard]] int fineness() const noexcept { return fineness_; }
     /// Of the target's surface at the latest render's pose at least a third has this normal, camera axes: a flat
@@ -63,7 +60,7 @@ public:
 private:
     [[nodiscard]] float signal_of(const Rgb& radiance) const;
     void place(const Rigid3& T_camera_target);
-    [[nodiscard]] std::vector<float> weights() const;
+    [[nodiscard]] std::vector<std::uint8_t> lit() const;
     void add_shading(const Rigid3& T_camera_target, const FrameSettings& settings);
 
     const SensorModel& sensor_;

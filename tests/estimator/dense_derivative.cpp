@@ -169,8 +169,8 @@ TEST(ImageDerivative, OfTheDockingScene) {
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.17) << "column " << k;
 }
 
-/// The fine grid is for the pixels that hold most of the information; those of no weight are left out.
-TEST(ImageDerivative, LooksCloselyWhereTheInformationIs) {
+/// Pixels that are not chosen are left out; the others do not depend on it.
+TEST(ImageDerivative, LooksAtTheChosenPixels) {
     const auto scene = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
     ASSERT_TRUE(scene) << scene.error().text();
     const auto render_scene = RenderScene::create(*scene);
@@ -181,28 +181,19 @@ TEST(ImageDerivative, LooksCloselyWhereTheInformationIs) {
     camera.cx = 10, camera.cy = 5;
     const BodyPoses at = placement_of(*scene);
     ImageDerivative derivative(*render_scene, camera, 0, at);
-    const auto by = [&](int fineness, std::span<const float> weights) {
-        const auto J = derivative.at(pose, unit_sensor(), {}, fineness, weights);
+    const auto by = [&](std::span<const std::uint8_t> chosen) {
+        const auto J = derivative.at(pose, unit_sensor(), {}, 4, chosen);
         return std::vector<PixelDerivative>(J.begin(), J.end());
     };
-    std::vector<float> weights(40 * 40, 1);
-    const auto coarse = by(3, weights), fine = by(8, {}), mixed = by(8, weights);
-    int looked_at = 0, closely = 0;
-    double held = 0, all = 0;
-    for (std::size_t p = 0; p < fine.size(); ++p) {
-        if (fine[p].isZero(0)) continue;
-        ++looked_at;
-        all += static_cast<double>(fine[p].squaredNorm());
-        if (mixed[p] == coarse[p] && mixed[p] != fine[p]) continue;
-        EXPECT_EQ(mixed[p], fine[p]) << p;
-        ++closely;
-        held += static_cast<double>(mixed[p].squaredNorm());
+    std::vector<std::uint8_t> chosen(40 * 40);
+    for (std::size_t p = 0; p < chosen.size(); ++p) chosen[p] = p % 3 == 0 ? 1 : 0;
+    const auto all = by({}), some = by(chosen);
+    int looked_at = 0;
+    for (std::size_t p = 0; p < all.size(); ++p) {
+        EXPECT_EQ(some[p], chosen[p] != 0 ? all[p] : PixelDerivative(PixelDerivative::Zero())) << p;
+        looked_at += some[p].isZero(0) ? 0 : 1;
     }
-    EXPECT_LT(closely, 0.6 * looked_at);
-    EXPECT_GT(held, 0.7 * all);
-    std::fill(weights.begin() + 20 * 40, weights.end(), 0.0F);
-    const auto upper = by(8, weights);
-    for (std::size_t p = 20 * 40; p < upper.size(); ++p) EXPECT_TRUE(upper[p].isZero(0)) << p;
+    EXPECT_GT(looked_at, 300);
 }
 
 }  // namespace

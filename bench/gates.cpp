@@ -93,9 +93,9 @@ void measure_cover(const World& world, std::size_t far, std::size_t edge, std::s
     Maker of_far(world, far, threads), of_edge(world, edge, threads), of_filled(world, filled, threads);
     std::vector<double> far_s, edge_s, filled_s;
     for (int k = 0; k < rounds; ++k) {
-        far_s.push_back(of_far.make().frame_s());
-        edge_s.push_back(of_edge.make().frame_s());
-        filled_s.push_back(of_filled.make().frame_s());
+        far_s.push_back(of_far.make().radiance_s);
+        edge_s.push_back(of_edge.make().radiance_s);
+        filled_s.push_back(of_filled.make().radiance_s);
     }
     out.far_s = median(far_s), out.edge_s = median(edge_s), out.filled_s = median(filled_s);
 }

@@ -26,7 +26,8 @@ struct FrameCost {
 struct CraftRatios {
     FrameCost near, far;  ///< of those cameras, beside Embree's calls on the same rays
     /// Radiance of frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at
-    /// its edge, and all of, both from near by through one lens. Without the detector, which gives every pixel noise.
+    /// its edge, and all of, both from near by through one lens. Without the detector, which gives every pixel
+    /// noise.
     double far_s = 0, edge_s = 0, filled_s = 0;
     /// With all bodies at rest, and with each of them somewhere else (by 0.1 mm and 0.01 mrad, so that it shows the
     /// same) in every frame.

@@ -26,6 +26,10 @@ constexpr double kFewestFreedom = 3;
 constexpr double kSettledSquared = 9;
 /// Points move by so much in the turns by which the response is measured, RMS.
 constexpr double kTurn_px = 2;
+/// Of so many matches most are of points of the body: their response is not measured.
+constexpr int kMany = 30;
+/// Matches that were nearer to a guess than this, RMS, need no second start.
+constexpr double kNear_px = 2 * kTurn_px;
 /// Fewer flows do not say what motion they show.
 constexpr std::size_t kFewestFlows = 5;
 /// Of a motion of which matches show nothing: so little that its variance is beyond all limits.
@@ -208,8 +212,8 @@ Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& 
 /// answer, as far as the guess is before it, must lead to it; what the two are apart is part of the error.
 void FeatureAlignment::compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                              const ApparentMotion& motion, FeatureEstimate& e, Fit& fit) {
+    if (e.rounds.front().before_px < kNear_px) return;
     const Vector6 moved = error_between(guess, e.T_camera_target);
-    if (normalised_error_squared(moved, e.covariance) < kSettledSquared) return;  // the same start again
     const FeatureEstimate other = estimate(frame, at, displaced(e.T_camera_target, moved), motion);
     if (!other.has_pose()) {
         fit.failed = fmt::format("the guess mirrored in the answer leads to no pose: {}", name(other.status));
@@ -324,8 +328,9 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
-    estimate.covariance =
-        widened(estimate.covariance, response(points, scale, render_settings, T_of_view, floor_px));
+    if (estimate.agreeing < kMany)
+        estimate.covariance =
+            widened(estimate.covariance, response(points, scale, render_settings, T_of_view, floor_px));
     const std::vector<PixelCovariance> of_noise = points.covariances(0);
     estimate.bound =
         refiner.refine({model, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;

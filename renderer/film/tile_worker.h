@@ -260,8 +260,9 @@ void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const Pe
         }
     VarianceRatio ratio;
     t.each_pixel([&](int, int, std::size_t at) { ratio.add(means[at].*part, independent[at]); });
+    const double value = ratio.value();
     t.each_pixel([&](int x, int y, std::size_t at) {
-        variance[index_of(x, y, image_width)] += static_cast<float>(ratio.value() * independent[at]);
+        variance[index_of(x, y, image_width)] += static_cast<float>(value * independent[at]);
     });
 }
 
@@ -277,11 +278,12 @@ void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileC
     const auto of_mean = [](const PixelMean& mean, float one) {
         return mean.count() == 0 ? 0 : static_cast<double>(one) / mean.count();
     };
-    VarianceRatio direct, path;
+    VarianceRatio ratio_of_direct, ratio_of_path;
     t.each_pixel([&](int, int, std::size_t at) {
-        direct.add(means[at].direct, of_mean(means[at].direct, of_direct(at)));
-        path.add(means[at].path, of_mean(means[at].path, of_path(at)));
+        ratio_of_direct.add(means[at].direct, of_mean(means[at].direct, of_direct(at)));
+        ratio_of_path.add(means[at].path, of_mean(means[at].path, of_path(at)));
     });
+    const double direct = ratio_of_direct.value(), path = ratio_of_path.value();
     // Contrasts know nothing of what lies between the pixels' centres: a glint shows in the steps alone.
     const auto at_least = [](const PixelMean& mean, double expected) {
         if (mean.count() < 2) return expected;
@@ -289,8 +291,8 @@ void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileC
     };
     t.each_pixel([&](int x, int y, std::size_t at) {
         const auto& [d, p] = means[at];
-        const double sampled = at_least(d, direct.value() * of_mean(d, of_direct(at))) +
-                               at_least(p, path.value() * of_mean(p, of_path(at)));
+        const double sampled =
+            at_least(d, direct * of_mean(d, of_direct(at))) + at_least(p, path * of_mean(p, of_path(at)));
         variance[index_of(x, y, image_width)] =
             means[at].count() > 0 ? static_cast<float>(sampled) : contrast.centre[at];
     });

@@ -43,9 +43,9 @@ void choose_bounce(const Tracer& tracer, const BodyPoses& at, const Hit& hit, co
     out.weight[i] = weight;
 }
 
-/// Without a look at what the pulse lights.
-void look_from_lidar(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const BounceRays& bounces,
-                     const Hit& hit, std::size_t i, SecondSurfaces& out) {
+/// Its light as if the pulse lit it and nothing stood between: the caller tests both.
+void put_second_surface(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const BounceRays& bounces,
+                        const Hit& hit, std::size_t i, SecondSurfaces& out) {
     const Vec3 home = ray.origin - hit.position;
     const double distance_m = norm(home);
     const Vec3 to_lidar = home / distance_m;
@@ -115,7 +115,7 @@ void DiffuseMultipath::trace(const BodyPoses& at, const RayBatch& rays, const Su
         tracer_.intersect(at, hits, bounces.direction, bounces.wanted, seconds);
         SecondSurfaces lit;
         for_each_lane(bounces.wanted & seconds.met, [&](std::size_t i) {
-            look_from_lidar(tracer_, at, rays[i], bounces, seconds[i], i, lit);
+            put_second_surface(tracer_, at, rays[i], bounces, seconds[i], i, lit);
             if (!is_lit(at, rays.time[i], sub_rays.axis[i], -lit.to_lidar[i])) lit.lanes &= ~(1u << i);
         });
         if (lit.lanes == 0) continue;

@@ -20,7 +20,7 @@ constexpr double kLongPulse_m = 1e3;  ///< all light is one echo
 /// The LiDAR's y axis along the world's z.
 const Quat kAlongZ = exp_rotation({kPi / 2, 0, 0});
 
-/// A LiDAR at the origin that looks along z; a pulse lights `lit`.
+/// A LiDAR at the origin with its boresight along z; a pulse lights `lit`.
 class LitScene {
 public:
     explicit LitScene(const LidarField& lit, double albedo = 0.5) {

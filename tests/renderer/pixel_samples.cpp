@@ -135,14 +135,20 @@ double mean_of(const Rgb& p) {
     return mean_band(vec_cast<double>(p));
 }
 
-TEST(Interval, OfASmoothPictureHoldsTheTruth) {
-    // A Lambert plate under the Sun and a ball's limb before it: gradients and edges. The truth is 1024 samples,
-    // whose own error is an eighth of that of 16 or less.
+/// Gradients within, edges at the limb, and the empty sky.
+Scene sunlit(Mesh body) {
     Scene s;
     s.materials.push_back(lambert(0.5f));
-    add_mesh(s, icosphere(4, 1, true));
+    add_mesh(s, std::move(body));
     add_sun(s, {0.4, 0.5, 1});
     s.ambient = {20, 20, 20};
+    return s;
+}
+
+TEST(Interval, OfASmoothPictureHoldsTheTruth) {
+    // The truth is 1024 samples,
+    // whose own error is an eighth of that of 16 or less.
+    const Scene s = sunlit(icosphere(4, 1, true));
     const auto render_scene = RenderScene::create(s, 1);
     ASSERT_TRUE(render_scene);
     const Camera c = camera(32, 32, 40);
@@ -170,11 +176,7 @@ TEST(Interval, OfASmoothPictureHoldsTheTruth) {
 
 // Independent samples would have 3 to 30 times the variance.
 TEST(Interval, OfStratifiedSamplesIsAsLargeAsTheScatterOfFrames) {
-    Scene s;
-    s.materials.push_back(lambert(0.5f));
-    add_mesh(s, icosphere(2, 1, false));
-    add_sun(s, {0.4, 0.5, 1});
-    s.ambient = {20, 20, 20};
+    const Scene s = sunlit(icosphere(2, 1, false));
     const auto render_scene = RenderScene::create(s, 1);
     ASSERT_TRUE(render_scene);
     const Camera c = camera(48, 48, 60);

@@ -43,6 +43,14 @@ public:
         if (on_turn) on_turn();
         bus_.wait(10 * kMs);
     }
+    /// What was sent before the dynamics ended may still be on its way.
+    void listen_until_quiet() {
+        for (int quiet_turns = 0; quiet_turns < 5; ++quiet_turns) {
+            const std::size_t before = frames.size();
+            listen();
+            if (frames.size() > before) quiet_turns = 0;
+        }
+    }
     void beat(std::int64_t t_ns, RunState state) { bus_.send(encode(Heartbeat{t_ns, state})); }
     /// A clock in real time, which shows this at first.
     void run_clock(std::int64_t from_ns) {
@@ -109,8 +117,8 @@ Result<nlohmann::json> fly(const Scenario& scenario, const DynamicsOptions& opti
         done = true;
     });
     while (!done) partner.listen();
-    partner.listen();
     dynamics.join();
+    partner.listen_until_quiet();
     return flown;
 }
 

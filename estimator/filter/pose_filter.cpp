@@ -255,11 +255,47 @@ void PoseFilter::predict(std::int64_t t_ns) {
     t_ns_ = t_ns;
 }
 
-bool PoseFilter::accelerate(const Vec3& acceleration_m_s2, double psd) {
-    if (!is_finite(acceleration_m_s2) || !(psd >= 0 && std::isfinite(psd))) return false;
+/// Index of the first event later than t_ns.
+std::size_t PoseFilter::first_after(std::int64_t t_ns) const {
+    const auto later = std::upper_bound(history_.begin(), history_.end(), t_ns,
+                                        [](std::int64_t t, const Event& e) { return t < e.t_ns; });
+    return static_cast<std::size_t>(later - history_.begin());
+}
+
+/// Events from `place` on once more, after a change before them.
+void PoseFilter::repeat_from(std::size_t place) {
+    for (std::size_t i = place; i < history_.size(); ++i) {
+        Event& e = history_[i];
+        e.after = after(history_[i - 1], e.t_ns);
+        const auto repeat = [&](const auto& measured) {
+            if constexpr (!std::is_same_v<std::decay_t<decltype(measured)>, std::monostate>) {
+                e.thrust = history_[i - 1].thrust;
+                correct(innovation_of(settings_.motion, e.after.state, e.after.covariance, measured), e.after.state,
+                        e.after.covariance);
+            }
+        };
+        std::visit(repeat, e.measurement);
+    }
+    now_ = after(history_.back(), t_ns_);
+}
+
+bool PoseFilter::accelerate(std::int64_t t_ns, const Vec3& acceleration_m_s2, double psd) {
+    if (!is_finite(acceleration_m_s2) || !(psd >= 0 && std::isfinite(psd)) || t_ns < history_.front().t_ns)
+        return false;
     const Thrust thrust{acceleration_m_s2, psd};
-    if (history_.back().thrust == thrust) return true;
-    insert(history_.size(), {t_ns_, now_, thrust, {}});
+    predict(t_ns);
+    if (t_ns == t_ns_) {
+        if (history_.back().thrust != thrust) insert(history_.size(), {t_ns_, now_, thrust, {}});
+        return true;
+    }
+    const auto of_thrust = [&](const Event& e) {
+        return e.t_ns > t_ns && std::holds_alternative<std::monostate>(e.measurement);
+    };
+    std::erase_if(history_, of_thrust);
+    const std::size_t place = first_after(t_ns);
+    const std::size_t dropped = history_.size() == settings_.history ? 1 : 0;
+    insert(place, {t_ns, after(history_[place - 1], t_ns), thrust, {}});
+    repeat_from(place - dropped + 1);
     return true;
 }
 
@@ -274,9 +310,8 @@ UpdateResult PoseFilter::take(const Measurement& m, double gate) {
         ++counts_.too_late;
         return {UpdateOutcome::too_late, 0, "it is older than what the filter remembers"};
     }
-    const auto later = std::upper_bound(history_.begin(), history_.end(), m.t_ns,
-                                        [](std::int64_t t, const Event& e) { return t < e.t_ns; });
-    const Event& before = *std::prev(later);
+    const std::size_t place = first_after(m.t_ns);
+    const Event& before = history_[place - 1];
     Event event{m.t_ns, after(before, m.t_ns), before.thrust, m};
     const auto innovation = innovation_of(settings_.motion, event.after.state, event.after.covariance, m);
     if (!(innovation.nis <= gate)) {
@@ -287,24 +322,13 @@ UpdateResult PoseFilter::take(const Measurement& m, double gate) {
     }
     correct(innovation, event.after.state, event.after.covariance);
 
-    std::size_t place = static_cast<std::size_t>(later - history_.begin());
     counts_.late += m.t_ns < t_ns_;
     ++counts_.taken;
     if (kPose) counts_.gated_in_a_row = 0;
-    if (history_.size() == settings_.history) --place;  // the first one goes
-    insert(static_cast<std::size_t>(later - history_.begin()), event);
-    for (std::size_t i = place + 1; i < history_.size(); ++i) {
-        Event& e = history_[i];
-        e.after = after(history_[i - 1], e.t_ns);
-        const auto repeat = [&](const auto& measured) {
-            if constexpr (!std::is_same_v<std::decay_t<decltype(measured)>, std::monostate>)
-                correct(innovation_of(settings_.motion, e.after.state, e.after.covariance, measured), e.after.state,
-                        e.after.covariance);
-        };
-        std::visit(repeat, e.measurement);
-    }
+    const std::size_t dropped = history_.size() == settings_.history ? 1 : 0;
+    insert(place, event);
     t_ns_ = std::max(t_ns_, m.t_ns);
-    now_ = after(history_.back(), t_ns_);
+    repeat_from(place - dropped + 1);
     return {UpdateOutcome::taken, innovation.nis, ""};
 }
 

@@ -97,11 +97,12 @@ public:
 
     /// Propagates to t_ns; an earlier time changes nothing.
     void predict(std::int64_t t_ns);
-    /// Known acceleration of the target relative to the chaser, frame axes, from the filter's time on until the
-    /// next call: minus that of the chaser's thrusters. `psd`: white noise on each axis in addition to the motion
-    /// model's, for the uncertainty of the thrust (m^2 s^-3). Returns false, without effect, unless finite and psd
-    /// >= 0.
-    bool accelerate(const Vec3& acceleration_m_s2, double psd = 0);
+    /// Known acceleration of the target relative to the chaser, frame axes, from t_ns on in place of what was known
+    /// before: minus that of the chaser's thrusters. Propagates to t_ns; where that is earlier than the filter's
+    /// time, what came since is repeated. `psd`: white noise on each axis in addition to the motion model's, for
+    /// the uncertainty of the thrust (m^2 s^-3). Returns false, without effect, unless finite and psd >= 0, and
+    /// t_ns not older than what the filter remembers.
+    bool accelerate(std::int64_t t_ns, const Vec3& acceleration_m_s2, double psd = 0);
     /// Updates with a measurement; propagates to its time where that is later.
     UpdateResult update(const PoseMeasurement& measurement);
     UpdateResult update(const BeamVelocity& measurement);
@@ -144,6 +145,8 @@ private:
         return propagated(event.after, event.thrust, t_ns - event.t_ns);
     }
     void insert(std::size_t place, const Event& event);
+    void repeat_from(std::size_t place);
+    [[nodiscard]] std::size_t first_after(std::int64_t t_ns) const;
     template <class Measurement>
     UpdateResult take(const Measurement& measurement, double gate);
 

@@ -214,8 +214,7 @@ void StateEstimator::advance(std::int64_t t_ns) {
         const Pulse pulse = pulses_.front();
         pulses_.pop_front();
         if (!pulses_.empty() && pulses_.front().from_ns == pulse.from_ns) continue;
-        tracker_.filter().predict(pulse.from_ns);
-        tracker_.filter().accelerate(pulse.acceleration_m_s2, pulse.psd);
+        tracker_.filter().accelerate(pulse.from_ns, pulse.acceleration_m_s2, pulse.psd);
     }
     tracker_.filter().predict(t_ns);
 }
@@ -251,7 +250,7 @@ void StateEstimator::on_touchdown(std::int64_t t_ns) {
     const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
     (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
     // The ground carries it.
-    tracker_.filter().accelerate(ground_field(scenario_.orbit).gravity_m_s2);
+    tracker_.filter().accelerate(this->t_ns(), ground_field(scenario_.orbit).gravity_m_s2);
     resting_ = true;
 }
 

@@ -21,8 +21,8 @@ Ended in_order(const Case& c, const std::vector<PoseMeasurement>& measurements, 
     std::size_t next = 0;
     for (int t = 0; t <= 21; ++t) {
         filter.predict(t * kSecond);
-        if (t == 3) filter.accelerate({0.001, 0, -0.002});
-        if (t == 9) filter.accelerate({});
+        if (t == 3) filter.accelerate(t * kSecond, {0.001, 0, -0.002});
+        if (t == 9) filter.accelerate(t * kSecond, {});
         for (; next < order.size() && order[next] <= t; ++next)
             EXPECT_EQ(filter.update(measurements[static_cast<std::size_t>(order[next])]).outcome,
                       UpdateOutcome::taken);
@@ -53,6 +53,32 @@ TEST(FilterHistory, LateMeasurementsAreWorthAsMuch) {
         const Vector12 apart = error_between(a.state, b.state);
         EXPECT_LT(normalised_error_squared(apart, a.covariance), 1e-8) << apart.transpose();
     }
+}
+
+/// Thrust that becomes known after measurements of a later time, and once after a thrust that it replaces.
+TEST(FilterHistory, LateThrustIsWorthAsMuch) {
+    const Case c = cases()[3];
+    Flight r(c, 22);
+    const RelativeState guess = r.first_guess();
+    auto punctual = *PoseFilter::create({c.motion}, 0, guess, r.first_covariance()), late = punctual;
+    const Vec3 thrust{0.001, 0, -0.002};
+    for (int k = 0; k < 20; ++k) {
+        if (k == 4) punctual.accelerate(7 * kSecond / 2, thrust, 1e-6);
+        if (k == 10) punctual.accelerate(37 * kSecond / 4, {});
+        const PoseMeasurement m = r.measure(k * kSecond);
+        EXPECT_EQ(punctual.update(m).outcome, UpdateOutcome::taken);
+        EXPECT_EQ(late.update(m).outcome, UpdateOutcome::taken);
+        if (k == 4) late.accelerate(4 * kSecond, {1, 2, 3});
+        if (k == 4) late.accelerate(7 * kSecond / 2, thrust, 1e-6);
+        if (k == 11) late.accelerate(37 * kSecond / 4, {});
+        r.live_on(1);
+        if (k >= 3 && k < 9) r.truth.velocity_m_s += (k == 3 ? 0.5 : 1) * thrust;
+        if (k == 9) r.truth.velocity_m_s += 0.25 * thrust;
+    }
+    EXPECT_EQ(punctual.t_ns(), late.t_ns());
+    EXPECT_LT((punctual.covariance() - late.covariance()).norm(), 1e-9 * punctual.covariance().norm());
+    const Vector12 apart = error_between(punctual.state(), late.state());
+    EXPECT_LT(normalised_error_squared(apart, punctual.covariance()), 1e-12) << apart.transpose();
 }
 
 TEST(FilterHistory, WhatIsOlderThanItIsCounted) {
@@ -147,8 +173,9 @@ TEST(FilterUpdate, RefusesWhatIsNoMeasurement) {
         EXPECT_EQ(filter.counts().bad, ++bad);
         EXPECT_FALSE(PoseFilter::create({c.motion}, m, 1, 1));
     }
-    EXPECT_FALSE(filter.accelerate({kNan, 0, 0}));
-    EXPECT_FALSE(filter.accelerate({}, -1));
+    EXPECT_FALSE(filter.accelerate(0, {kNan, 0, 0}));
+    EXPECT_FALSE(filter.accelerate(0, {}, -1));
+    EXPECT_FALSE(filter.accelerate(-1, {}));
     EXPECT_EQ(before, filter.state());
     EXPECT_EQ(filter.update(good).outcome, UpdateOutcome::taken);
 
@@ -167,9 +194,9 @@ TEST(FilterUpdate, ThrustIsAsUnsureAsItIsSaidToBe) {
     Flight r(c, 10);
     const Matrix12 P = r.first_covariance();
     auto filter = *PoseFilter::create({c.motion}, 0, r.truth, P);
-    ASSERT_TRUE(filter.accelerate({0.01, 0, 0}, 3e-4));
+    ASSERT_TRUE(filter.accelerate(0, {0.01, 0, 0}, 3e-4));
     filter.predict(2 * kSecond);
-    ASSERT_TRUE(filter.accelerate({}));
+    ASSERT_TRUE(filter.accelerate(2 * kSecond, {}));
     filter.predict(5 * kSecond);
     EXPECT_NEAR(filter.state().velocity_m_s.x, r.truth.velocity_m_s.x + 0.02, 1e-12);
     EXPECT_NEAR(filter.covariance()(3, 3), P(3, 3) + 2 * 3e-4 + 5 * c.motion.acceleration_psd, 1e-12);
@@ -201,7 +228,7 @@ TEST(FilterUpdate, NeedsNoHeap) {
         const test::AllocationCounter heap;
         for (int k = 0; k < 40; ++k) {
             filter.predict((k + 2) * kSecond / 10);
-            filter.accelerate({1e-4 * k, 0, 0});
+            filter.accelerate((k + 2) * kSecond / 10, {1e-4 * k, 0, 0});
             filter.update(r.measure(k * kSecond / 10));
             r.live_on(0.1);
         }

@@ -280,9 +280,11 @@ private:
                               world.focal * believed.fy * p.y / p.z + believed.cy + noise * d.normal()});
             if (condition == "bright" && i % 5 == 4) pixels.back() = {d.uniform(0, 500), d.uniform(0, 500)};
         }
-        const PnpSolution& s = solver_.solve({believed, body, pixels, sigma_px}, condition == "bright");
+        const PnpInput input{believed, body, pixels, sigma_px};
+        const PnpSolution& s = solver_.solve(input, condition == "bright");
         if (!s.ok()) return {s.answer()};
-        const PoseShifts by_model = image_shifts(o_.told, s.fit.T_camera_body, moving);
+        const PoseShifts by_model =
+            image_shifts(o_.told, s.fit.T_camera_body, moving, shift_by_focal(input, s.fit.T_camera_body));
         return {s.answer(), s.fit.T_camera_body, s.fit.covariance + by_model * by_model.transpose()};
     }
 

@@ -144,9 +144,9 @@ void CloudIcp::weigh(const Pass& pass, const Matrix6& information, CloudEstimate
     const double factor = variance_factor(pass, out.used);
     const Observability& o = out.observability;
     const PoseShifts by_model = shifts(out.T_lidar_target, pass, o);
-    const Matrix6 of_model = by_model * by_model.transpose();
-    out.bound = o.covariance(pass.information, 1) + of_model;
-    out.covariance = o.covariance(information, factor) + of_model;
+    out.covariance_of_model = by_model * by_model.transpose();
+    out.bound = o.covariance(pass.information, 1) + out.covariance_of_model;
+    out.covariance = o.covariance(information, factor) + out.covariance_of_model;
     out.root_information = root_information_with(o.root_information(information, factor), by_model);
 }
 

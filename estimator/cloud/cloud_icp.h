@@ -34,6 +34,7 @@ struct CloudEstimate {
     /// Of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
     /// section 7.6), for the residuals' own scatter, at least that of the noise, and of the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< the last part, which is the same in all sweeps
     /// Of the covariance, for filters: rows of zeros for motions that are not observed (root_information.h).
     Matrix6 root_information = Matrix6::Zero();
     /// Cramer-Rao bound for the points used and the noise of the settings, and the model's uncertainty.

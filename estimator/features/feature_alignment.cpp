@@ -236,9 +236,9 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
                                  settings_.floor_most_px);
     else
         compare_with_mirrored(frame, at, guess, motion, e, fit);
-    const PoseShifts by_model = image_shifts(settings_.model, e.T_camera_target, motion);
-    const Matrix6 of_model = by_model * by_model.transpose();
-    e.covariance += of_model, e.bound += of_model;
+    const PoseShifts by_model = image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal);
+    e.covariance_of_model = by_model * by_model.transpose();
+    e.covariance += e.covariance_of_model, e.bound += e.covariance_of_model;
     if (e.has_pose())
         observe(e.T_camera_target, e.covariance, fit), compare_with_guess(e.T_camera_target, guess, fit);
     e.answer = judge(std::move(fit));
@@ -331,7 +331,9 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     if (estimate.agreeing < kMany)
         estimate.covariance =
             widened(estimate.covariance, response(points, scale, render_settings, T_of_view, floor_px));
-    const std::vector<PixelCovariance> of_noise = points.covariances(0);
+    const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);
+    estimate.by_focal =
+        shift_by_focal({model, points.body_m, points.pixels, 1, as_weighed}, estimate.T_camera_target);
     estimate.bound =
         refiner.refine({model, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;
     return estimate;

@@ -50,11 +50,13 @@ struct FeatureEstimate {
     /// overlap, in proportion to the overlap, and larger where matches show less of a motion than points of the
     /// body would; from the distance to the answer of a second start; and from the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< the last part, which is the same in all frames
     /// Cramer-Rao for these points with the sensor's noise and the model's uncertainty alone.
     Matrix6 bound = Matrix6::Zero();
     int agreeing = 0;
-    double floor_px = 0;               ///< of the matches: their scatter beyond the sensor's noise
-    std::vector<FeatureRound> rounds;  ///< from the guess
+    double floor_px = 0;                 ///< of the matches: their scatter beyond the sensor's noise
+    std::vector<FeatureRound> rounds;    ///< from the guess
+    Vector6 by_focal = Vector6::Zero();  ///< shift of the pose (pnp_refine.h)
     Answer answer;
 
     [[nodiscard]] bool has_pose() const noexcept {

@@ -11,14 +11,18 @@ PoseShifts pose_shifts(const ModelUncertainty& u, const Rigid3& T, const Apparen
     return shifts;
 }
 
-PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T, const ApparentMotion& motion) {
+PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T, const ApparentMotion& motion,
+                        const std::optional<Vector6>& by_focal) {
     // The image of a larger body further away is the same. A longer focal length makes it appear nearer: the range
     // grows along the axis, the point stays beside it, and the line of sight, which attitudes are seen against,
     // turns.
     const Eigen::Vector3d t = to_eigen(T.t), along(0, 0, T.t.z);
     PoseShifts of_camera = PoseShifts::Zero(6, 2);
     of_camera.col(0).tail<3>() = u.scale * t;
-    of_camera.col(1) << u.focal * t.cross(along) / t.squaredNorm(), u.focal * along;
+    if (by_focal)
+        of_camera.col(1) = u.focal * *by_focal;
+    else
+        of_camera.col(1) << u.focal * t.cross(along) / t.squaredNorm(), u.focal * along;
     return joined(pose_shifts(u, T, motion), of_camera);
 }
 

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string_view>
 
 #include "estimator/pose/apparent_motion.h"
@@ -54,9 +55,10 @@ using PoseShifts = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 
 /// sensor axes.
 [[nodiscard]] PoseShifts pose_shifts(const ModelUncertainty& u, const Rigid3& T_sensor_target,
                                      const ApparentMotion& motion);
-/// The same, and by scale and focal length as a camera sees them.
+/// The same, and by scale and focal length as a camera sees them. `by_focal`: as the points weigh it
+/// (pnp_refine.h), for estimators that have points; none: as a target that is small beside its range moves.
 [[nodiscard]] PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T_camera_target,
-                                      const ApparentMotion& motion);
+                                      const ApparentMotion& motion, const std::optional<Vector6>& by_focal = {});
 /// Side by side.
 [[nodiscard]] PoseShifts joined(const PoseShifts& a, const PoseShifts& b);
 

@@ -63,23 +63,48 @@ const PnpFit& PnpRefiner::refine(const PnpInput& input, const Rigid3& start, con
     return fit_;
 }
 
-Result<Matrix6> pnp_bound(const PnpInput& input, const Rigid3& T_camera_body) {
+namespace {
+
+struct PoseInformation {
+    Matrix6 information = Matrix6::Zero();
+    Vector6 by_focal = Vector6::Zero();  ///< J' C^-1 of what the pixels move by with the focal length
+};
+
+Result<PoseInformation> pose_information(const PnpInput& input, const Rigid3& T_camera_body) {
     if (const PnpStatus status = check(input); status != PnpStatus::converged) return Error{in_words(status)};
-    Matrix6 F = Matrix6::Zero();
+    const auto axis = input.camera->project({0, 0, 1});
+    PoseInformation sum;
     for (std::size_t i = 0; i < input.body_m.size(); ++i) {
-        if (!input.camera->project(T_camera_body * input.body_m[i]))
-            return Error{in_words(PnpStatus::behind_camera)};
+        const auto pixel = input.camera->project(T_camera_body * input.body_m[i]);
+        if (!pixel) return Error{in_words(PnpStatus::behind_camera)};
         Eigen::Matrix2d C = Eigen::Matrix2d::Identity() * (input.sigma_px * input.sigma_px);
         if (!input.covariance_px2.empty()) {
             const PixelCovariance& s = input.covariance_px2[i];
             C << s.uu, s.uv, s.uv, s.vv;
         }
         const Matrix26 J = reprojection_jacobian(*input.camera, T_camera_body, input.body_m[i]);
-        F += J.transpose() * C.inverse() * J;
+        const Eigen::Matrix<double, 6, 2> weighted = J.transpose() * C.inverse();
+        sum.information += weighted * J;
+        if (axis) sum.by_focal += weighted * Eigen::Vector2d(pixel->x - axis->x, pixel->y - axis->y);
     }
+    return sum;
+}
+
+}  // namespace
+
+Result<Matrix6> pnp_bound(const PnpInput& input, const Rigid3& T_camera_body) {
+    const auto sum = pose_information(input, T_camera_body);
+    if (!sum) return sum.error();
     Matrix6 bound;
-    if (!invert_information(F, bound)) return Error{in_words(PnpStatus::degenerate)};
+    if (!invert_information(sum->information, bound)) return Error{in_words(PnpStatus::degenerate)};
     return bound;
+}
+
+Vector6 shift_by_focal(const PnpInput& input, const Rigid3& T_camera_body) {
+    const auto sum = pose_information(input, T_camera_body);
+    Matrix6 bound;
+    if (!sum || !invert_information(sum->information, bound)) return Vector6::Zero();
+    return bound * sum->by_focal;
 }
 
 }  // namespace narpa

@@ -58,4 +58,8 @@ private:
 /// check() finds, a point behind the camera, or a direction that the points leave undetermined.
 [[nodiscard]] Result<Matrix6> pnp_bound(const PnpInput& input, const Rigid3& T_camera_body);
 
+/// How far a least-squares pose moves, as an error (pose_estimate.h), with the focal length, by as much as that
+/// grows as a part of itself. Points at different depths turn it. Zero where pnp_bound fails.
+[[nodiscard]] Vector6 shift_by_focal(const PnpInput& input, const Rigid3& T_camera_body);
+
 }  // namespace narpa

@@ -57,7 +57,11 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     out.answer = e.answer.kind;
     out.why = e.answer.why;
     if (!e.answer.usable()) return out;
-    out.pose = {t_ns, e.T_camera_target, kMatchVariance * e.covariance, camera_.T_mount_camera};
+    out.pose = {.t_ns = t_ns,
+                .T_sensor_target = e.T_camera_target,
+                .covariance = kMatchVariance * (e.covariance - e.covariance_of_model) + e.covariance_of_model,
+                .T_chaser_sensor = camera_.T_mount_camera,
+                .covariance_of_model = e.covariance_of_model};
     if (e.answer.kind == AnswerKind::unobservable)
         out.pose->root_information = e.answer.root_information / std::sqrt(kMatchVariance);
     return out;
@@ -111,7 +115,12 @@ MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points
     out.answer = e->answer.kind;
     out.why = e->answer.why;
     if (!e->answer.usable()) return out;
-    out.pose = {t_ns, e->T_lidar_target, e->covariance, lidar_.T_mount_lidar, e->answer.root_information};
+    out.pose = {.t_ns = t_ns,
+                .T_sensor_target = e->T_lidar_target,
+                .covariance = e->covariance,
+                .T_chaser_sensor = lidar_.T_mount_lidar,
+                .root_information = e->answer.root_information,
+                .covariance_of_model = e->covariance_of_model};
     return out;
 }
 

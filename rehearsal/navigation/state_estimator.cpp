@@ -264,6 +264,9 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     const UpdateResult result = tracker_.update(m);
     if (result.outcome != UpdateOutcome::taken) return result;
     taken_ns_ = std::max(taken_ns_, measurement.t_ns);
+    Matrix6 turn = Matrix6::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = rotation_matrix(measurement.T_chaser_sensor.q);
+    by_model_ = turn * measurement.covariance_of_model * turn.transpose();
     if (tracker_.restarts() != restarts)
         by_star_tracker_.setZero();
     else
@@ -361,8 +364,9 @@ TargetEstimate StateEstimator::estimate() const {
 }
 
 /// Errors of the model are the same in all measurements: they stay, however many there are, and the filter's own
-/// covariance does not know them.
+/// covariance does not know them. Where no pose was measured, only beams: about what they do to one.
 Matrix6 StateEstimator::covariance_of_model(const Rigid3& T_chaser_target) const {
+    if (by_model_) return *by_model_;
     ModelUncertainty u = scenario_.model_error.uncertainty();
     if (u == ModelUncertainty{}) return Matrix6::Zero();
     // A camera's focal length acts as the size does, and a bias of ranges as a shift at most.

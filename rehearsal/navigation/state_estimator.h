@@ -49,6 +49,7 @@ struct TargetMeasurement {
     Rigid3 T_chaser_sensor{};  ///< body axes
     /// In place of `covariance` where motions are not observed (root_information.h).
     std::optional<Matrix6> root_information{};
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< the part that is the same in all measurements
 };
 
 /// Velocity of the target's surface along a beam of the chaser (estimator/filter/pose_filter.h).
@@ -156,6 +157,7 @@ private:
     std::int64_t taken_ns_;
     double mass_kg_;
     bool resting_ = false;
+    std::optional<Matrix6> by_model_;  ///< covariance_of_model of the newest measurement, chaser axes
 };
 
 }  // namespace narpa::rehearsal

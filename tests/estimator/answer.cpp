@@ -101,6 +101,26 @@ TEST(ModelUncertainty, ShiftsAreThoseOfTheFit) {
     EXPECT_LT((clock.col(6) - error_between(T, moved(T, moving, 0.02))).norm(), 1e-9);
 }
 
+/// A body as deep as it is near also turns with the focal length.
+TEST(ModelUncertainty, OfTheFocalLengthAsPointsWeighIt) {
+    constexpr double kPart = 1e-4;
+    std::mt19937_64 random(5);
+    const Rigid3 T{test::random_attitude(random), {0.2, -0.3, 3}};
+    const std::vector<Vec3> body = test::random_points(random, 8, 1);
+    Pinhole camera = test::kPaperCamera;
+    camera.fx *= 1 + kPart, camera.fy *= 1 + kPart;
+    std::vector<Pixel> pixels;
+    for (const Vec3& p : body) pixels.push_back(test::project(camera, T * p));
+    PnpRefiner refiner(8);
+    const PnpInput input{test::kPaperCamera, body, pixels, 1e-3};
+    const PnpFit& fit = refiner.refine(input, T);
+    ASSERT_TRUE(fit.ok());
+    const Vector6 moved = error_between(T, fit.T_camera_body), told = kPart * shift_by_focal(input, T);
+    EXPECT_LT((moved - told).norm(), 1e-3 * moved.norm()) << moved.transpose() << " for " << told.transpose();
+    const Vector6 of_a_point = image_shifts({.focal = kPart}, T, {}).col(8);
+    EXPECT_GT((moved - of_a_point).head<3>().norm(), 0.5 * of_a_point.head<3>().norm());
+}
+
 TEST(ModelUncertainty, RootsTakeItAsCovariancesDo) {
     std::mt19937_64 random(4);
     const Rigid3 T{test::random_attitude(random), {1, 2, 30}};

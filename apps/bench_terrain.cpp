@@ -72,13 +72,14 @@ Command add_bench_terrain(Parser bench_command) {
         .range(65, 20000)
         .shows_default();
     c.option("--heights", o->settings.heights_m, "Heights of the views above the ground, metres")
+        .range(1.0, 1e6)
         .comma_separated()
         .shows_default();
     c.option("--visible-rays", o->settings.visible_rays, "Rays in a pixel, each way, that decide what is visible")
         .range(1, 64)
         .shows_default();
     c.option("--turns", o->settings.turns, "Frames that give a median").range(1, 1000).shows_default();
-    c.flag("--gates", o->gates, "Exit status 1 where a ratio is above 1.3");
+    c.flag("--gates", o->gates, "Exit status 1 where a ratio is above 1.3, or a ray passes a crack");
     return [o] { return bench_terrain(*o); };
 }
 

@@ -248,11 +248,15 @@ Result<TerrainCost> measure_terrain_cost(const TerrainCostSettings& s,
 
 std::vector<std::string> terrain_cost_faults(const TerrainCost& cost) {
     std::vector<std::string> faults;
-    for (const TerrainCostRow& row : cost.rows)
+    for (const TerrainCostRow& row : cost.rows) {
         if (!(row.ratio() <= kTerrainRatioMost))
             faults.push_back(
                 fmt::format("from {:g} m: {:.2f} times a mesh of the visible triangles, expected at most {:g}",
                             row.height_m, row.ratio(), kTerrainRatioMost));
+        if (row.from_below > 0)
+            faults.push_back(fmt::format("from {:g} m: {} of {} rays meet the terrain from below, expected none",
+                                         row.height_m, row.from_below, row.rays));
+    }
     return faults;
 }
 

@@ -56,7 +56,7 @@ struct TerrainCost {
 
 /// Most that a ray may cost, over one in the mesh of the visible triangles.
 inline constexpr double kTerrainRatioMost = 1.3;
-/// Rows that miss it, one sentence each.
+/// Rows that miss it, or that have cracks, one sentence each.
 [[nodiscard]] std::vector<std::string> terrain_cost_faults(const TerrainCost& cost);
 
 }  // namespace narpa

@@ -25,6 +25,8 @@ public:
     /// there and not null, is the shape of body i in place of Body::shape: for kinds that scene files do not name.
     static Result<Tracer> create(const Scene& scene, int threads = 0,
                                  const std::vector<std::shared_ptr<const Shape>>& shapes = {});
+    template <class... Rest>
+    static Result<Tracer> create(const Scene&& temporary, Rest&&...) = delete;
     Tracer(Tracer&&) noexcept;
     Tracer& operator=(Tracer&&) noexcept;
     ~Tracer();

@@ -23,6 +23,8 @@ public:
                                       const std::vector<std::shared_ptr<const Shape>>& shapes = {},
                                       std::unique_ptr<const Background> background = nullptr,
                                       std::unique_ptr<const Medium> medium = nullptr);
+    template <class... Rest>
+    static Result<RenderScene> create(const Scene&& temporary, Rest&&...) = delete;
 
     [[nodiscard]] const Scene& scene() const noexcept { return tracer_.scene(); }
     [[nodiscard]] const Tracer& tracer() const noexcept { return tracer_; }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "renderer/terrain/crater_profile.h"
+
 namespace narpa {
 namespace {
 
@@ -33,16 +35,6 @@ private:
     }
     std::uint64_t state_;
 };
-
-constexpr double kCraterReach = 2;  ///< of the rim, in radii: there it has fallen to zero
-
-/// Height over the ground at r radii from the middle of a crater of 1 m diameter: a bowl, and a rim that falls off.
-double crater_profile(double r) {
-    constexpr double kRim = 0.036, kDepth = 0.196;  // from the rim's crest
-    if (r < 1) return kRim - kDepth * (1 - r * r);
-    const double end = 1 / (kCraterReach * kCraterReach * kCraterReach);
-    return kRim * (1 / (r * r * r) - end) / (1 - end);
-}
 
 double rock_profile(double r) {
     return r < 1 ? 0.5 * std::sqrt(1 - r * r) : 0;

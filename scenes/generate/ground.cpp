@@ -64,7 +64,7 @@ void add_features(int count, double smallest_m, double largest_m, bool boulder, 
 
 /// A boulder is half of a flattened ball.
 double height_m(const Feature& f, double distance_m) {
-    if (!f.boulder) return f.radius_m * crater_profile(distance_m / f.radius_m, 0.22, 0.05);
+    if (!f.boulder) return f.radius_m * bowl_profile(distance_m / f.radius_m, 0.22, 0.05);
     const double r = distance_m / f.radius_m;
     return r < 1 ? 0.7 * f.radius_m * std::sqrt(1 - r * r) : 0;
 }
@@ -93,7 +93,7 @@ Mesh build_terrain() {
         double z = hills(x, y);
         for (const Crater& c : holes)
             if (const double d = std::hypot(x - c.x, y - c.y); d < 2.5 * c.radius)
-                z += c.radius * crater_profile(d / c.radius, 0.3, 0.06);
+                z += c.radius * bowl_profile(d / c.radius, 0.3, 0.06);
         return z;
     };
     Mesh mesh;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "renderer/terrain/crater_profile.h"
 #include "scenes/generate/noise.h"
 #include "scenes/generate/scenes.h"
 #include "scenes/generate/shapes.h"
@@ -14,9 +15,8 @@ namespace narpa::scenes {
 namespace {
 
 /// Craters above the diameter D, per square metre: k D^-2, a quarter of the equilibrium of small lunar ones (N.
-/// Trask, JPL TR 32-800, 1966). Depth and rim of a fresh one, parts of D (R. Pike, in Impact and Explosion
-/// Cratering, 1977).
-constexpr double kHighlandCraters = 0.02, kFreshDepth = 0.196, kFreshRim = 0.036;
+/// Trask, JPL TR 32-800, 1966).
+constexpr double kHighlandCraters = 0.02;
 constexpr double kSmallestCrater_m = 2 * kHighlandSpacing_m, kLargestCrater_m = 500;
 
 class HighlandPosts {
@@ -26,9 +26,8 @@ public:
             for (int column = 0; column < kHighlandPosts; ++column) at(column, row) = hills_m(column, row);
     }
 
-    /// A bowl, and a rim that has fallen to nothing at twice its radius.
     void add_crater(double column, double row, double diameter_m, double freshness) {
-        const double radius = 0.5 * diameter_m / kHighlandSpacing_m, reach = 2 * radius;
+        const double radius = 0.5 * diameter_m / kHighlandSpacing_m, reach = kCraterReach * radius;
         const auto from = [&](double middle) { return std::max(0, static_cast<int>(std::ceil(middle - reach))); };
         const auto to = [&](double middle) {
             return std::min(kHighlandPosts - 1, static_cast<int>(middle + reach));
@@ -36,7 +35,7 @@ public:
         for (int j = from(row); j <= to(row); ++j)
             for (int i = from(column); i <= to(column); ++i) {
                 const double r = std::hypot(i - column, j - row) / radius;
-                if (r < 2) at(i, j) += freshness * diameter_m * profile(r);
+                if (r < kCraterReach) at(i, j) += freshness * diameter_m * crater_profile(r);
             }
     }
     /// 16 bits from 0 at -kHighlandZero_m on, in steps of kHighlandStep_m.
@@ -64,10 +63,6 @@ private:
             sum += height * value_noise(column * kHighlandSpacing_m / wavelength,
                                         row * kHighlandSpacing_m / wavelength, 1500 + octave);
         return sum;
-    }
-    static double profile(double r) {
-        if (r < 1) return kFreshRim - kFreshDepth * (1 - r * r);
-        return kFreshRim * (1 / (r * r * r) - 0.125) / 0.875;
     }
 
     std::vector<double> metres_;

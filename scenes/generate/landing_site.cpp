@@ -81,7 +81,7 @@ std::vector<Bump> all_bumps() {
 double bump_height_m(const Bump& f, double distance_m) {
     const double t = distance_m / f.radius_m;
     if (f.rock) return t < 1 ? 0.9 * f.part * f.radius_m * std::sqrt(1 - t * t) : 0;
-    return f.radius_m * crater_profile(t, 0.4 * f.part, 0.08 * f.part);
+    return f.radius_m * bowl_profile(t, 0.4 * f.part, 0.08 * f.part);
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ inline double fractal_noise(double x, double y, std::uint64_t seed, std::int64_t
 }
 
 /// Height at `r` radii from the middle of a crater: a bowl with a raised rim that falls off outside. All in radii.
-inline double crater_profile(double r, double depth, double rim) {
+inline double bowl_profile(double r, double depth, double rim) {
     return r < 1 ? (depth + rim) * r * r - depth : rim * std::exp(-4 * (r - 1));
 }
 

@@ -43,9 +43,18 @@ TEST(BenchTerrain, FaultsNameTheHeightAndTheBound) {
         row.terrain.ns = ns, row.visible.ns = 100;
         cost.rows.push_back(row);
     }
+    cost.rows[0].rays = 1000, cost.rows[0].from_below = 2;
     EXPECT_EQ(
         terrain_cost_faults(cost),
-        std::vector<std::string>{"from 131 m: 1.31 times a mesh of the visible triangles, expected at most 1.3"});
+        (std::vector<std::string>{"from 130 m: 2 of 1000 rays meet the terrain from below, expected none",
+                                  "from 131 m: 1.31 times a mesh of the visible triangles, expected at most 1.3"}));
+}
+
+TEST(BenchTerrain, HeightsAreAboveTheGround) {
+    const test::Done done =
+        test::run_command(std::string("timeout 120 ") + NARPA_BIN + " bench terrain --heights 100,-5 2>&1");
+    EXPECT_EQ(done.status, 2);
+    EXPECT_NE(done.out.find("--heights: Value -5 not in range"), std::string::npos) << done.out;
 }
 
 }  // namespace

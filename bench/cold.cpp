@@ -113,7 +113,7 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
     // What is off the truth by this part of it has the truth off by more.
     search.range_m = guess_m;
     search.range_part = o.range_part / (1 - o.range_part);
-    search.dense.rays_per_pixel = 24, search.dense.fineness = 4;
+    search.dense.samples_per_pixel = 12, search.dense.fineness = 4;
     BodyPoses unknown = at;
     unknown.set(target.body, {});
     const double before_s = cpu_s(CLOCK_PROCESS_CPUTIME_ID);

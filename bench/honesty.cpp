@@ -211,7 +211,7 @@ private:
         std::vector<float> variance;
         for (const float v : view.aovs().variance) variance.push_back(v * dn_per_mean * dn_per_mean);
         DenseOptions dense;
-        dense.rays_per_pixel = 24, dense.fineness = 4;
+        dense.samples_per_pixel = 32, dense.fineness = 4;
         dense.model = o_.told;
         dense.motion = moving;
         target.dense->set_detector(*camera.detector);

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -19,19 +20,22 @@ namespace {
 
 using Row = Eigen::Matrix<double, 6, 1>;
 
+std::size_t index_in(int width, int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
 /// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
 constexpr double kSurfaceSteps = 2.5;
 /// Lower limit of the cosine between ray and normal in that prediction.
 constexpr double kLeastCosine = 0.02;
 /// Bisections between two rays in the search for a contour.
-constexpr int kHalvings = 10;
+constexpr int kHalvings = 8;
 /// Step of the finite difference of the BSDF, as a part of the range.
 constexpr double kViewStep = 1e-3;
-/// Points of a pixel, each way, at which that difference is taken.
-constexpr int kShadingPoints = 2;
-/// Rays each way in any pixel; more where the radiance varies by more than this part of the sensor's noise.
-constexpr int kAnywhere = 3;
-constexpr double kVarying = 1;
+/// Points of a pixel, each way, at which that difference is taken; and with fewer lines than kFewLines across it.
+constexpr int kShadingPoints = 2, kFewShadingPoints = 1, kFewLines = 4;
+/// Pixels, each way, whose borders are traced together.
+constexpr int kSquare = 8;
 /// Parts of an exposure for each pixel of motion during it, and at the most.
 constexpr double kPartsPerPixel = 1, kMostParts = 8;
 
@@ -102,62 +106,97 @@ struct RaySample {
     Vec3 position{}, normal{}, ray_direction{};  ///< world
 };
 
-class PixelPatch {
+/// Traces rays through any points of a grid, to the centre of the Sun from there.
+class PointTracer {
 public:
-    /// Traces a pixel and the ring of grid points around it, without the ring's corners.
-    void trace(const FineGrid& grid, const SensorModel& sensor, int x, int y) {
-        const int s = grid.fineness;
-        const Frame& f = grid.frame;
-        side_ = s + 2;
-        points_.resize(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
-        sees_anything_ = false;
-        CameraBatch p;
-        CameraSamples samples;
-        samples.centre = true;
-        samples.sample.fill(0);
-        Lanes<std::size_t> place;
-        const auto trace = [&] {
-            RgbLanes radiance;
-            trace_rays(f, samples, f.tracer.all_bodies(), p);
-            f.integrator.radiance(f, p, radiance);
-            for (std::size_t i = 0; i < samples.n; ++i) {
-                RaySample& seen = points_[place[i]];
-                seen = {signal_of(sensor, radiance[i]), -1, kInfinity, {}, {}, p.rays.direction[i]};
-                if (p.hits.body[i] < 0) continue;
-                sees_anything_ = true;
-                seen.body = p.hits.body[i];
-                seen.range_m = p.hits.range_m[i];
-                seen.position = p.hits.position[i];
-                seen.normal = p.hits.geometric_normal[i];
-            }
-            samples.n = 0;
-        };
-        for (int j = -1; j <= s; ++j)
-            for (int i = -1; i <= s; ++i) {
-                if ((i == -1 || i == s) && (j == -1 || j == s)) continue;
-                const int fine_x = x * s + i, fine_y = y * s + j;
-                samples.x[samples.n] = fine_x, samples.y[samples.n] = fine_y;
-                samples.number[samples.n] =
-                    static_cast<std::uint32_t>(fine_y) * static_cast<std::uint32_t>(grid.camera.width) +
-                    static_cast<std::uint32_t>(fine_x);
-                place[samples.n++] = static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
-                                     static_cast<std::size_t>(i + 1);
-                if (samples.n == kLanes) trace();
-            }
-        if (samples.n > 0) trace();
+    PointTracer(const FineGrid& grid, const SensorModel& sensor) : grid_(grid), f_(grid.frame), sensor_(sensor) {
+        p_.sample.fill(0);
+        if (f_.sun) p_.to_sun.fill(f_.sun->centre());
     }
-
-    /// Point (i, j) of the pixel's own, 0 .. fineness - 1, or of the ring, -1 and fineness.
-    [[nodiscard]] const RaySample& at(int i, int j) const {
-        return points_[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(side_) +
-                       static_cast<std::size_t>(i + 1)];
+    /// `seen` is written by the next `trace`, if not before.
+    void put(double x, double y, RaySample& seen) {
+        x_[n_] = x, y_[n_] = y;
+        p_.number[n_] = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(grid_.camera.width) +
+                        static_cast<std::uint32_t>(x);
+        seen_[n_++] = &seen;
+        if (n_ == kLanes) trace();
     }
-    [[nodiscard]] bool sees_anything() const noexcept { return sees_anything_; }
+    void trace() {
+        if (n_ == 0) return;
+        p_.rays.n = n_;
+        if (f_.over_time)
+            for (std::size_t i = 0; i < n_; ++i) p_.rays.put(i, ray_through(f_, x_[i], y_[i]));
+        else
+            f_.model->directions(f_.T_world_camera.q, x_, y_, p_.rays.direction),
+                p_.rays.origin.fill(f_.T_world_camera.t);
+        f_.tracer.intersect(f_.at, p_.rays, f_.tracer.all_bodies(), p_.hits);
+        if (f_.subpixel_bodies.any())
+            for (std::size_t i = 0; i < n_; ++i) p_.hits.put(i, f_.subpixel_bodies.beyond(p_.rays[i], p_.hits[i]));
+        RgbLanes radiance;
+        f_.integrator.radiance(f_, p_, radiance);
+        for (std::size_t i = 0; i < n_; ++i) {
+            RaySample& seen = *seen_[i];
+            seen = {signal_of(sensor_, radiance[i]), -1, kInfinity, {}, {}, p_.rays.direction[i]};
+            if (p_.hits.body[i] < 0) continue;
+            seen.body = p_.hits.body[i];
+            seen.range_m = p_.hits.range_m[i];
+            seen.position = p_.hits.position[i];
+            seen.normal = p_.hits.geometric_normal[i];
+        }
+        n_ = 0;
+    }
 
 private:
-    int side_ = 0;
-    bool sees_anything_ = false;
-    std::vector<RaySample> points_;
+    const FineGrid& grid_;
+    const Frame& f_;
+    const SensorModel& sensor_;
+    CameraBatch p_;
+    std::size_t n_ = 0;
+    Lanes<double> x_{}, y_{};
+    Lanes<RaySample*> seen_{};
+};
+
+/// Pixels of the image that are traced together.
+struct Square {
+    int x, y, columns, rows;
+};
+
+/// Points on the borders of a square's chosen pixels, as many on each as the grid has in a pixel's side.
+class Borders {
+public:
+    Borders(int fineness, const Square& square)
+        : n_(fineness), square_(square), left_(index(0, square.rows, 0)), upper_(index(0, square.rows + 1, 0)) {}
+
+    [[nodiscard]] const Square& square() const noexcept { return square_; }
+
+    void trace(PointTracer& tracer, int width, std::span<const std::uint8_t> chosen) {
+        const auto is_chosen = [&](int c, int r) {
+            return c >= 0 && r >= 0 && c < square_.columns && r < square_.rows &&
+                   chosen[index_in(width, square_.x + c, square_.y + r)] != 0;
+        };
+        for (int r = 0; r <= square_.rows; ++r)
+            for (int c = 0; c <= square_.columns; ++c) {
+                const int x = (square_.x + c) * n_, y = (square_.y + r) * n_;
+                if (is_chosen(c, r - 1) || is_chosen(c, r))
+                    for (int i = 0; i < n_; ++i) tracer.put(x + i, y - 0.5, upper_[index(c, r, i)]);
+                if (is_chosen(c - 1, r) || is_chosen(c, r))
+                    for (int i = 0; i < n_; ++i) tracer.put(x - 0.5, y + i, left_[index(c, r, i)]);
+            }
+        tracer.trace();
+    }
+    /// Point i on the left border of the square's pixel (c, r), from above.
+    [[nodiscard]] const RaySample& left(int c, int r, int i) const { return left_[index(c, r, i)]; }
+    /// Point i on its upper border, from the left.
+    [[nodiscard]] const RaySample& upper(int c, int r, int i) const { return upper_[index(c, r, i)]; }
+
+private:
+    [[nodiscard]] std::size_t index(int c, int r, int i) const {
+        return index_in(square_.columns + 1, c, r) * static_cast<std::size_t>(n_) + static_cast<std::size_t>(i);
+    }
+
+    const int n_;
+    const Square square_;
+    std::vector<RaySample> left_, upper_;
 };
 
 /// While a row is exposed.
@@ -167,29 +206,37 @@ struct RowView {
     double row_s = 0;  ///< to the next row
 };
 
-/// The first two terms of one pixel, on one grid.
+/// The first two terms of one pixel.
 class PixelSides {
 public:
-    PixelSides(const FineGrid& grid, const PixelPatch& patch, int x, int y, const RowView& view)
-        : grid_(grid), patch_(patch), x_(x), y_(y), view_(view), fine_row_s_(view.row_s / grid.fineness) {}
+    /// Of the square's pixel (column, row).
+    PixelSides(const FineGrid& grid, PointTracer& tracer, const Borders& borders, int column, int row,
+               const RowView& view)
+        : grid_(grid),
+          tracer_(tracer),
+          borders_(borders),
+          column_(column),
+          row_(row),
+          x_(borders.square().x + column),
+          y_(borders.square().y + row),
+          view_(view),
+          fine_row_s_(view.row_s / grid.fineness) {}
 
-    /// Sum over the sides within the pixel and its share of those on its border.
+    /// Sum over the lines from border to border.
     Row sum() {
-        const int s = grid_.fineness;
-        for (int j = 0; j < s; ++j)
-            for (int i = -1; i < s; ++i) {
-                add(i, j, i + 1, j);
-                add(j, i, j, i + 1);
-            }
+        const int n = grid_.fineness;
+        const double left = x_ * n - 0.5, top = y_ * n - 0.5;
+        for (int i = 0; i < n; ++i) {
+            add(borders_.left(column_, row_, i), borders_.left(column_ + 1, row_, i), left, y_ * n + i, n, 0);
+            add(borders_.upper(column_, row_, i), borders_.upper(column_, row_ + 1, i), x_ * n + i, top, 0, n);
+        }
         add_contours();
         if (fine_row_s_ == 0) add_by_direction();
-        return sum_ / (static_cast<double>(s) * s);
+        return sum_ / (static_cast<double>(n) * n);
     }
-    /// Total variation of the signal across the pixel, DN; after `sum`.
-    [[nodiscard]] double change() const { return jumps_ / grid_.fineness; }
 
 private:
-    /// From the sample on the nearer surface to its neighbour, grid points.
+    /// From the sample on the nearer surface to that on the opposite border, grid points.
     struct Side {
         double x, y, dx, dy;
         double jump;  ///< DN, left or upper minus right or lower sample
@@ -200,10 +247,10 @@ private:
     };
     struct Contour {
         Side side;
-        const RaySample* far;
-        double range_m;  ///< of the nearer surface
-        bool near_within, far_within;
+        const RaySample *near, *far;
+        double range_m = near->range_m;  ///< of the nearer surface
         double on_near = 0, on_far = 1;
+        RaySample last{};  ///< of the nearer surface before its end
 
         [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
         void halve(int body, double here_m) {
@@ -214,39 +261,28 @@ private:
         }
     };
 
-    [[nodiscard]] bool within(int i, int j) const {
-        return i >= 0 && j >= 0 && i < grid_.fineness && j < grid_.fineness;
-    }
-
-    /// The side between a and b, its neighbour to the right or below.
-    void add(int ia, int ja, int ib, int jb) {
-        const RaySample &a = patch_.at(ia, ja), &b = patch_.at(ib, jb);
+    /// The line from a at (x, y) to b.
+    void add(const RaySample& a, const RaySample& b, double x, double y, double dx, double dy) {
         const double jump = a.signal - b.signal;
         if (jump == 0) return;
-        jumps_ += std::abs(jump);
         const bool near_is_a = a.range_m <= b.range_m;
         const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
         if (near.body < 0 || near.body == grid_.camera.mount) return;
-        const double s = grid_.fineness, to_far = near_is_a ? 1 : -1;
-        const Side side{x_ * s + (near_is_a ? ia : ib), y_ * s + (near_is_a ? ja : jb), to_far * (ib - ia),
-                        to_far * (jb - ja), jump};
-        // A side on the border counts half for this pixel, except a contour, whose position is known.
+        const Side side = near_is_a ? Side{x, y, dx, dy, jump} : Side{x + dx, y + dy, -dx, -dy, jump};
         if (is_contour(a, b))
-            contours_.push_back({side, &far, near.range_m, within(near_is_a ? ia : ib, near_is_a ? ja : jb),
-                                 within(near_is_a ? ib : ia, near_is_a ? jb : ja)});
+            contours_.push_back({side, &near, &far});
         else
-            add(side, 0.5, near.range_m, 0.5 * within(ia, ja) + 0.5 * within(ib, jb));
+            add(side, 0.5, 2 / (1 / a.range_m + 1 / b.range_m));
     }
 
     /// `along`: where between the nearer sample, 0, and the other, 1, the edge lies.
-    void add(const Side& side, double along, double range_m, double share) {
-        const double jump = share * side.jump;
+    void add(const Side& side, double along, double range_m) {
         if (fine_row_s_ == 0) {
             Jumps& jumps = side.dy == 0 ? across_x_ : across_y_;
-            jumps.sum += jump;
-            jumps.over_range += jump / range_m;
+            jumps.sum += side.jump;
+            jumps.over_range += side.jump / range_m;
         } else {
-            sum_ += jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
+            sum_ += side.jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
         }
     }
 
@@ -284,13 +320,25 @@ private:
                 f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
                 for (std::size_t i = 0; i < batch.size(); ++i) batch[i].halve(hits.body[i], hits.range_m[i]);
             }
-            for (const Contour& c : batch)
-                add(c.side, c.middle(), c.range_m, (c.middle() < 0.5 ? c.near_within : c.far_within) ? 1 : 0);
+            for (Contour& c : batch) {
+                const double x = c.side.x + c.on_near * c.side.dx, y = c.side.y + c.on_near * c.side.dy;
+                tracer_.put(x, y, c.last);
+            }
+            tracer_.trace();
+            for (const Contour& c : batch) {
+                // What changes on the surface before its end moves with the surface.
+                Side on_surface = c.side;
+                on_surface.jump = (c.side.dx + c.side.dy > 0 ? 1 : -1) * (c.near->signal - c.last.signal);
+                Side end = c.side;
+                end.jump -= on_surface.jump;
+                add(on_surface, 0.5 * c.on_near, 2 / (1 / c.near->range_m + 1 / c.range_m));
+                add(end, c.middle(), c.range_m);
+            }
         }
         contours_.clear();
     }
 
-    /// True where the two are not neighbouring points of one surface, by the slopes from their normals.
+    /// True where the two are not points of one surface, by the slopes from their normals.
     static bool is_contour(const RaySample& a, const RaySample& b) {
         if (a.body != b.body) return true;
         const double cosine =
@@ -319,44 +367,50 @@ private:
     }
 
     const FineGrid& grid_;
-    const PixelPatch& patch_;
-    const int x_, y_;
+    PointTracer& tracer_;
+    const Borders& borders_;
+    const int column_, row_, x_, y_;
     const RowView& view_;
     const double fine_row_s_;
     Row sum_ = Row::Zero();
     Jumps across_x_, across_y_;
     std::vector<Contour> contours_;
-    double jumps_ = 0;
 };
 
-/// The third term: change of reflected sunlight with the direction to the camera, by central differences of the
-/// BSDF.
-Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, const Vec3& t_camera_target) {
-    Vec3 per_metre{};  // DN per metre of the surface against the camera, world axes
-    for (int j = 0; j < kShadingPoints; ++j)
-        for (int i = 0; i < kShadingPoints; ++i) {
-            constexpr double kStep = 1.0 / kShadingPoints, kFirst = 0.5 * kStep - 0.5;
-            const Ray ray = ray_through(f, x + kFirst + kStep * i, y + kFirst + kStep * j);
-            const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-            if (hit.body < 0 || hit.body == f.camera.mount) continue;
-            if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) continue;
-            const Surface surface =
-                surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m * kStep / f.model->pixels_per_radian());
-            const Vec3& to_sun = f.sun->centre();
-            const double cosine = dot(surface.normal, to_sun);
-            if (cosine <= 0 || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) continue;
-            const Vec3 seen = hit.range_m * ray.direction;
-            const auto shine = [&](const Vec3& displaced) {
-                return signal_of(sensor, bsdf(surface, surface.normal, to_sun, -normalized(displaced)));
-            };
-            const double d = kViewStep * hit.range_m;
-            const Vec3 change{shine(seen + Vec3{d, 0, 0}) - shine(seen - Vec3{d, 0, 0}),
-                              shine(seen + Vec3{0, d, 0}) - shine(seen - Vec3{0, d, 0}),
-                              shine(seen + Vec3{0, 0, d}) - shine(seen - Vec3{0, 0, d})};
-            per_metre += (cosine * static_cast<double>(f.sun->irradiance()) / (2 * d)) * change;
-        }
+/// The third term at a point of the image: change of reflected sunlight with the direction to the camera, by
+/// central differences of the BSDF. DN per metre of the surface against the camera, world axes. `beam_px`: width
+/// that textures are averaged over.
+Vec3 shading_change(const Frame& f, const SensorModel& sensor, double x, double y, double beam_px) {
+    const Ray ray = ray_through(f, x, y);
+    const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
+    if (hit.body < 0 || hit.body == f.camera.mount) return {};
+    if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) return {};
+    const Surface surface =
+        surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m * beam_px / f.model->pixels_per_radian());
+    const Vec3& to_sun = f.sun->centre();
+    const double cosine = dot(surface.normal, to_sun);
+    if (cosine <= 0 || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) return {};
+    const Vec3 seen = hit.range_m * ray.direction;
+    const auto shine = [&](const Vec3& displaced) {
+        return signal_of(sensor, bsdf(surface, surface.normal, to_sun, -normalized(displaced)));
+    };
+    const double d = kViewStep * hit.range_m;
+    const Vec3 change{shine(seen + Vec3{d, 0, 0}) - shine(seen - Vec3{d, 0, 0}),
+                      shine(seen + Vec3{0, d, 0}) - shine(seen - Vec3{0, d, 0}),
+                      shine(seen + Vec3{0, 0, d}) - shine(seen - Vec3{0, 0, d})};
+    return (cosine * static_cast<double>(f.sun->irradiance()) / (2 * d)) * change;
+}
+
+/// Its mean over so many points of a pixel, each way.
+Row shading_change(const Frame& f, const SensorModel& sensor, int x, int y, int points,
+                   const Vec3& t_camera_target) {
+    const double step = 1.0 / points, first = 0.5 * step - 0.5;
+    Vec3 per_metre{};
+    for (int j = 0; j < points; ++j)
+        for (int i = 0; i < points; ++i)
+            per_metre += shading_change(f, sensor, x + first + step * i, y + first + step * j, step);
     // Against the target's axes the camera moves by what the target's origin moves, less what turns it about there.
-    const Vec3 g = conjugate(f.T_world_camera.q) * per_metre / (kShadingPoints * kShadingPoints);
+    const Vec3 g = conjugate(f.T_world_camera.q) * per_metre / (points * points);
     Row row;
     row << to_eigen(-cross(t_camera_target, g)), to_eigen(g);
     return row;
@@ -384,8 +438,8 @@ void ImageDerivative::begin_frame(const BodyPoses& at, const ApparentMotion& mot
 }
 
 std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                                     const FrameSettings& settings, int fineness) {
-    std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
+                                                     const FrameSettings& settings, int fineness,
+                                                     std::span<const std::uint8_t> chosen) {
     const double range_m = std::max(norm(T_camera_target.t), 1e-9);
     const double blur_rad = times_.exposure_s *
                             (norm(motion_.velocity_m_s) +
@@ -393,45 +447,70 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
                             range_m;
     const double blur_px = blur_rad * CameraModelHandle(camera_)->pixels_per_radian();
     const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMostParts));
+    (void)place_camera(T_camera_target, camera_, target_, at_);
+    std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
+    chosen_.assign(derivative_.size(), 1);
+    std::ranges::copy(chosen, chosen_.begin());
     for (int k = 0; k < parts; ++k)
         add(T_camera_target, sensor, settings, fineness, times_.part(k, parts), 1.0F / static_cast<float>(parts));
+    if (view_dependent_)
+        for (int k = 0; k < parts; ++k)
+            add_shading(T_camera_target, sensor, settings, fineness, times_.part(k, parts),
+                        1.0F / static_cast<float>(parts));
     if (optics_.any()) apply_optics();
     return derivative_;
 }
 
+template <class Do>
+void ImageDerivative::each_square(const Rigid3& T_camera_target, const RowTimes& times, float weight, Do&& act) {
+    const int across = (camera_.width - 3) / kSquare + 1, down = (camera_.height - 3) / kSquare + 1;
+    if (camera_.width < 3 || camera_.height < 3) return;
+    tbb::parallel_for(0, across * down, [&](int number) {
+        const FlushDenormals flush;
+        const int x = 1 + kSquare * (number % across), y = 1 + kSquare * (number / across);
+        const Square square{x, y, std::min(kSquare, camera_.width - 1 - x),
+                            std::min(kSquare, camera_.height - 1 - y)};
+        act(square, [&](auto&& derivative) {
+            for (int r = 0; r < square.rows; ++r) {
+                const double t_s = times.at(y + r);
+                const RowView view{moved(T_camera_target, motion_, t_s).t, motion_, times.row_s};
+                const Quat back =
+                    exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to mid-exposure's
+                for (int c = 0; c < square.columns; ++c) {
+                    const std::size_t p = index_in(camera_.width, x + c, y + r);
+                    if (chosen_[p] == 0) continue;
+                    Row row = derivative(c, r, view);
+                    if (t_s != 0) row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
+                    derivative_[p] += weight * row.cast<float>();
+                }
+            }
+        });
+    });
+}
+
 void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
                           int fineness, const RowTimes& times, float weight) {
-    (void)place_camera(T_camera_target, camera_, target_, at_);
     const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
-    const FineGrid coarse(render_scene_, at_, camera_, seen, settings, std::min(fineness, kAnywhere));
-    const FrameSettings plain = settings;
-    const Frame frame = make_frame(render_scene_, at_, camera_, seen.path(1, camera_.height), plain);
-    const FineGrid fine(render_scene_, at_, camera_, seen, settings, fineness);
-    const double varying_dn = kVarying * std::sqrt(sensor.variance_dn2(sensor.black_dn));
-    const auto pixel = [&](PixelPatch& patch, int x, int y, const RowView& view) -> Row {
-        patch.trace(coarse, sensor, x, y);
-        if (!patch.sees_anything()) return Row::Zero();
-        PixelSides sides(coarse, patch, x, y, view);
-        Row sum = sides.sum();
-        if (fineness > kAnywhere && sides.change() > varying_dn) {
-            patch.trace(fine, sensor, x, y);
-            sum = PixelSides(fine, patch, x, y, view).sum();
-        }
-        if (!view_dependent_) return sum;
-        return sum + shading_change(frame, sensor, x, y, view.t_camera_target);
-    };
-    tbb::parallel_for(1, std::max(camera_.height - 1, 1), [&](int y) {
-        const FlushDenormals flush;
-        PixelPatch patch;
-        const double t_s = times.at(y);
-        const RowView view{moved(T_camera_target, motion_, t_s).t, motion_, times.row_s};
-        const Quat back = exp_rotation(-t_s * motion_.rate_rad_s);  // from the row's error to that of mid-exposure
-        for (int x = 1; x < camera_.width - 1; ++x) {
-            Row row = pixel(patch, x, y, view);
-            if (t_s != 0) row.head<3>() = to_eigen(back * to_vec3(row.head<3>()));
-            derivative_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) +
-                        static_cast<std::size_t>(x)] += weight * row.cast<float>();
-        }
+    const FineGrid grid(render_scene_, at_, camera_, seen, settings, fineness);
+    each_square(T_camera_target, times, weight, [&](const Square& square, auto&& each) {
+        Borders borders(grid.fineness, square);
+        PointTracer tracer(grid, sensor);
+        borders.trace(tracer, camera_.width, chosen_);
+        each(
+            [&](int c, int r, const RowView& view) { return PixelSides(grid, tracer, borders, c, r, view).sum(); });
+    });
+}
+
+void ImageDerivative::add_shading(const Rigid3& T_camera_target, const SensorModel& sensor,
+                                  const FrameSettings& settings, int fineness, const RowTimes& times,
+                                  float weight) {
+    const int points = fineness < kFewLines ? kFewShadingPoints : kShadingPoints;
+    const Seen seen{at_.T_world_body[target_], T_camera_target, motion_, times};
+    const Frame frame = make_frame(render_scene_, at_, camera_, seen.path(1, camera_.height), settings);
+    each_square(T_camera_target, times, weight, [&](const Square& square, auto&& each) {
+        each([&](int c, int r, const RowView& view) {
+            return shading_change(frame, sensor, square.x + c, square.y + r, points, view.t_camera_target);
+        });
     });
 }
 

@@ -6,13 +6,14 @@
 ///
 ///   dT/dpose = - mean(v . grad L) + sum over edges of (L_near - L_far) (v_near . n) length / area + mean(dL/dview)
 ///
-/// The first two terms are computed together: L is sampled on a grid of rays in each pixel, finer where it varies,
-/// and each side between two neighbours is an edge across which L jumps and which moves with the nearer of the two
-/// surfaces. Textures, creases, shadow edges and silhouettes are all included, none twice; a staircase of sides
-/// sums to the edge itself, as the sum of n length is the same. Where two neighbours are not on one surface the
-/// edge is an occluding contour: bisection by rays finds its position, hence its pixel, and the range of the nearer
-/// surface there. (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans.
-/// Graph. 37(6), 2018, sample edges at random; here the points are on a grid.)
+/// The first two terms are computed together, by the divergence theorem: what flows over a pixel's border. On lines
+/// across the pixel, from border to border, L differs at their ends by the edges between them, which move with the
+/// nearer of the two surfaces. Textures, creases, shadow edges and silhouettes are all included, none twice; what
+/// lies whole within a pixel does not change it. Pixels share the points on their borders, so that twice as many
+/// rays as a pixel has lines each way suffice. Where the ends are not on one surface an occluding contour is
+/// between them, and bisection by rays finds its range; what changes on the nearer surface before its end moves
+/// with that surface. (T.-M. Li et al., "Differentiable Monte Carlo Ray Tracing through Edge Sampling", ACM Trans.
+/// Graph. 37(6), 2018, sample edges at random; here the points are evenly spaced.)
 ///
 /// The target's illumination does not change with the pose (ModelView): shadows move with the surface, the radiance
 /// of a Lambert surface is constant, and for other materials direct sunlight changes as the BSDF does with the
@@ -46,15 +47,23 @@ public:
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times);
 
     /// Jacobian of the predicted DN at this pose, without clipping. Row-major; zero in the outermost pixels, which
-    /// lack neighbours. `fineness` >= 1: rays each way in a pixel where the radiance varies. Runs on the calling
-    /// thread's TBB arena; the same on any number of threads.
+    /// lack neighbours. `fineness` >= 1: lines each way across a pixel. `chosen`: pixels to look at, those that are
+    /// not 0; empty: all. Runs on the calling thread's TBB arena; the same on any number of threads.
     std::span<const PixelDerivative> at(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                        const FrameSettings& settings, int fineness);
+                                        const FrameSettings& settings, int fineness,
+                                        std::span<const std::uint8_t> chosen = {});
 
 private:
-    /// Adds it, times `weight`, for a moment of each row.
+    /// Calls act(square, each) for squares of the image; each(derivative) adds derivative(column, row, view of the
+    /// row), times `weight`, for the square's chosen pixels.
+    template <class Do>
+    void each_square(const Rigid3& T_camera_target, const RowTimes& times, float weight, Do&& act);
+    /// Adds the first two terms for a moment of each row.
     void add(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings, int fineness,
              const RowTimes& times, float weight);
+    /// Adds the third.
+    void add_shading(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
+                     int fineness, const RowTimes& times, float weight);
     void apply_optics();
 
     const RenderScene& render_scene_;
@@ -67,6 +76,7 @@ private:
     ImageOptics optics_;
     RadianceImage before_optics_, after_optics_;
     std::vector<PixelDerivative> derivative_;
+    std::vector<std::uint8_t> chosen_;  ///< pixels that have a derivative: not 0
 };
 
 }  // namespace narpa

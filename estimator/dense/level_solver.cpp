@@ -11,10 +11,9 @@
 namespace narpa {
 namespace {
 
-/// The finest level converges when a step is less than so many standard deviations of the pose.
-constexpr double kConverged_sigmas = 0.2;
-/// Coarse levels converge when a step moves the target by less than this, px of the level.
-constexpr double kCoarseStep_px = 0.1;
+/// A level converges when a step moves the target by less than this, px of the level; the finest also when it is
+/// less than so many standard deviations of the pose.
+constexpr double kConverged_px = 0.1, kConverged_sigmas = 0.2;
 constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-7, kDampingStep = 10;
 constexpr int kMostRefused = 4;
 /// Steps that move the target by less are accepted without testing the cost, whose change is below its sampling
@@ -42,19 +41,18 @@ constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
 /// Least eigenvalue of the pose's information, scaled to a unit diagonal.
 constexpr double kLeastInformation = 1e-10;
-/// Coarse levels use this part of the rays and a grid coarser by this factor.
-constexpr double kCoarseRays = 0.125;
+/// Coarse levels use so many times the samples: their pixels have more details and less noise, and are few. All
+/// steps but the finest level's last take a derivative by so many times fewer lines.
+constexpr int kCoarseSamples = 2;
 constexpr int kCoarseFineness = 3;
-/// The last step uses this many times the rays.
-constexpr double kPolishRays = 8;
+/// The last step uses this many times the samples.
+constexpr int kPolishSamples = 6;
 /// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
 constexpr int kMostPolishes = 5;
 constexpr double kPolished_sigmas = 1;
 /// Poses within this motion, px, are in one minimum where a step leads from one to the other: no more than this
 /// part of the way is left, or so many variances.
 constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
-/// Part of the window that the target is assumed to fill at first.
-constexpr double kFirstPart = 0.25;
 constexpr int kMostShift_px = 12;
 /// Model error on coarse levels: this part of the signal power.
 constexpr double kCoarseModel = 0.1;
@@ -96,11 +94,10 @@ LevelSolver::LevelSolver(const Camera& camera, const RenderScene& render_scene, 
       o_(options),
       e_(estimate),
       coarse_(factor > options.finest),
-      rays_(options.rays_per_pixel * (coarse_ ? kCoarseRays : 1)),
-      fineness_(coarse_ ? std::max(1, options.fineness / kCoarseFineness) : options.fineness),
-      settings_{.seed = options.seed, .method = options.method, .max_depth = options.max_depth} {
-    settings_.budget.kind = FrameBudget::Kind::rays;
-}
+      settings_{.spp = std::max(2, options.samples_per_pixel * (coarse_ ? kCoarseSamples : 1)),
+                .seed = options.seed,
+                .method = options.method,
+                .max_depth = options.max_depth} {}
 
 DenseStatus LevelSolver::run(bool first) {
     render(e_.T_camera_body);
@@ -110,18 +107,21 @@ DenseStatus LevelSolver::run(bool first) {
     double least = std::numeric_limits<double>::infinity();
     int stalled = 0;
     for (int k = 0; k < o_.iterations; ++k) {
-        differentiate(kDerivativeServes_px);
+        differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
         if (!linearise()) return DenseStatus::too_few_pixels;
         if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
         Step step = next_step(damping);
+        if (step.size < 1) {
+            take(step);
+            return DenseStatus::converged;
+        }
         for (int refused = 0; !try_step(step); ++refused) {
             if (refused == kMostRefused) return DenseStatus::diverged;
             if (stride_ == 1) damping *= kDampingStep;
             stride_ = 1;
             step = next_step(damping);
         }
-        if (step.size < 1) return DenseStatus::converged;
         // Sampling noise keeps the pose moving.
         const bool shrinks = step.size < kShrinking * least;
         const bool gains = coarse_ ? cost_.robust < (1 - kCoarseGain) * cost_before : step.size > kStillSmall;
@@ -135,14 +135,20 @@ DenseStatus LevelSolver::run(bool first) {
 }
 
 void LevelSolver::polish() {
-    rays_ *= kPolishRays;
+    settings_.spp *= kPolishSamples;
     stride_ = 1;
     render(e_.T_camera_body);
+    ++e_.renders;
     for (int k = 0; k < kMostPolishes; ++k) {
-        differentiate(kLastServes_px);
+        differentiate(kLastServes_px, o_.fineness);
         if (!linearise()) return;
         const Step step = next_step(kLeastDamping);
-        if (!try_step(step) || step.size * kConverged_sigmas < kPolished_sigmas) return;
+        if (step.sigmas < kPolished_sigmas || step.motion_px < kLastServes_px) {
+            take(step);
+            view_.predict(step.pose);
+            return;
+        }
+        if (!try_step(step)) return;
     }
 }
 
@@ -183,9 +189,9 @@ void LevelSolver::finish() {
 }
 
 void LevelSolver::examine() {
-    rays_ *= kPolishRays;
+    settings_.spp *= kPolishSamples;
     render(e_.T_camera_body);
-    differentiate(kDerivativeServes_px);
+    differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
     linearise();
 }
 
@@ -205,7 +211,7 @@ double LevelSolver::rise(double sigmas) {
 
 Result<Matrix6> LevelSolver::bound() {
     render(e_.T_camera_body);
-    differentiate(0);
+    view_.differentiate(e_.T_camera_body, settings_, o_.fineness);
     PhotometricImages images = view_.images();
     images.signal_variance = {};
     images.measured = {};
@@ -218,6 +224,7 @@ Result<Matrix6> LevelSolver::bound() {
 Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) {
     PoseShifts shifts = image_shifts(o_.model, e_.T_camera_body, o_.motion);
     if (o_.model.light_rad > 0) {
+        render(e_.T_camera_body);  // with the noise of those that it is compared with
         PoseShifts by_light(6, 3);
         const PhotometricImages images = view_.images();
         for (int axis = 0; axis < 3; ++axis) {
@@ -243,17 +250,14 @@ void LevelSolver::shift() {
 }
 
 void LevelSolver::render(const Rigid3& T) {
-    const double window = static_cast<double>(view_.window().width) * view_.window().height;
-    if (target_px_ == 0) target_px_ = kFirstPart * window;
-    // A coarse pixel's noise is to be less, as the sensor's is. All pixels get one ray first.
-    settings_.budget.rays = static_cast<std::uint64_t>(2 * window + rays_ * factor_ * factor_ * target_px_);
     view_.render(T, settings_);
 }
 
-void LevelSolver::differentiate(double reach_px) {
+void LevelSolver::differentiate(double reach_px, int fineness) {
     const std::optional<Rigid3>& there = view_.differentiated_at();
-    if (there && distance_px(error_between(*there, e_.T_camera_body)) < reach_px) return;
-    view_.differentiate(e_.T_camera_body, settings_, fineness_);
+    const bool fine_enough = view_.fineness() >= fineness;
+    if (there && fine_enough && distance_px(error_between(*there, e_.T_camera_body)) < reach_px) return;
+    view_.differentiate(e_.T_camera_body, settings_, fineness);
 }
 
 /// False where the pose is not observable.
@@ -262,7 +266,6 @@ bool LevelSolver::linearise() {
     robust_.scale = residual_scale(images, e_.exposure, robust_.model_dn2);
     cost_ = cost(images, e_.exposure, robust_);
     equations_ = equations(images, e_.exposure, robust_);
-    target_px_ = static_cast<double>(cost_.pixels);
     return cost_.pixels >= kFewestPixels && is_observable(equations_.pose_information());
 }
 
@@ -272,9 +275,10 @@ LevelSolver::Step LevelSolver::next_step(double damping) const {
     damped.diagonal() *= 1 + damping;
     Step s;
     s.pose = stride_ * damped.ldlt().solve(equations_.pose_gradient());
-    const double sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
+    s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
     s.motion_px = distance_px(s.pose);
-    s.size = coarse_ ? s.motion_px / kCoarseStep_px : sigmas / kConverged_sigmas;
+    s.size = s.motion_px / kConverged_px;
+    if (!coarse_) s.size = std::min(s.size, s.sigmas / kConverged_sigmas);
     s.trusted = stride_ == 1 && s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
     return s;
 }
@@ -298,18 +302,25 @@ void LevelSolver::adapt_stride(const Step& step) {
 bool LevelSolver::try_step(const Step& step) {
     const Rigid3 there = displaced(e_.T_camera_body, step.pose);
     if (!is_pose(there) || !window_about(render_scene_.tracer(), camera_, target_, there)) return false;
-    const Eigen::Vector2d e = equations_.exposure_step(step.pose);
-    const Exposure exposure{std::max(e_.exposure.gain + e[0], kLeastGain), e_.exposure.offset_dn + e[1]};
     render(there);
     ++e_.renders;
-    const PhotometricCost now = cost(view_.images(), exposure, robust_);
+    const PhotometricCost now = cost(view_.images(), after(step), robust_);
     const bool better = step.trusted || now.robust <= cost_.robust * (1 + kSlack);
     if (better) {
-        e_.T_camera_body = there;
-        e_.exposure = exposure;
+        take(step);
         cost_ = now;
     }
     return better;
+}
+
+Exposure LevelSolver::after(const Step& step) const {
+    const Eigen::Vector2d e = equations_.exposure_step(step.pose);
+    return {std::max(e_.exposure.gain + e[0], kLeastGain), e_.exposure.offset_dn + e[1]};
+}
+
+void LevelSolver::take(const Step& step) {
+    e_.exposure = after(step);
+    e_.T_camera_body = displaced(e_.T_camera_body, step.pose);
 }
 
 }  // namespace narpa

@@ -37,18 +37,22 @@ private:
     struct Step {
         Vector6 pose = Vector6::Zero();
         double motion_px = 0;
+        double sigmas = 0;     ///< standard deviations of the pose
         double size = 0;       ///< below 1: small enough to end with
         bool trusted = false;  ///< so small that noise decides whether the cost decreases
     };
 
     void shift();
     void render(const Rigid3& T);
-    void differentiate(double reach_px);
+    void differentiate(double reach_px, int fineness);
     bool linearise();
     [[nodiscard]] Step next_step(double damping) const;
     /// Largest motion of a point of the target in the image, about.
     [[nodiscard]] double distance_px(const Vector6& step) const;
     bool try_step(const Step& step);
+    [[nodiscard]] Exposure after(const Step& step) const;
+    /// Without an image.
+    void take(const Step& step);
     void adapt_stride(const Step& step);
     /// By what is not known of the model, at the last rendered pose.
     [[nodiscard]] Matrix6 covariance_of_model(const PhotometricEquations& equations);
@@ -62,10 +66,7 @@ private:
     const DenseOptions& o_;
     DenseEstimate& e_;
     const bool coarse_;
-    double rays_;  ///< for each pixel of the target
-    const int fineness_;
     FrameSettings settings_{};
-    double target_px_ = 0;  ///< pixels that show the target; 0: not known yet
 
     Robustness robust_{};
     PhotometricCost cost_{};

@@ -126,13 +126,17 @@ void LevelView::place(const Rigid3& T_camera_target) {
 
 void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& settings) {
     place(T_camera_target);
-    view_.render(T_camera_target, settings, true);
+    view_.render_with_variance(T_camera_target, settings);
     const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
         signal_[i] = signal_of(view_.radiance().pixels[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
+}
+
+void LevelView::predict(const Vector6& step) {
+    for (std::size_t i = 0; i < signal_.size(); ++i) signal_[i] += columns_[i].dot(step.cast<float>());
 }
 
 float LevelView::signal_of(const Rgb& radiance) const {
@@ -146,7 +150,7 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     BodyPoses turned = at_;
     turned.T_world_body[target_].q = normalized(at_.T_world_body[target_].q * exp_rotation(turn_rad));
     view_.begin_frame(turned, motion_, times_);
-    view_.render(T_camera_target, settings, true);
+    view_.render_with_variance(T_camera_target, settings);
     std::vector<float> change;
     for (std::size_t i = 0; i < signal_.size(); ++i)
         change.push_back(signal_of(view_.radiance().pixels[i]) - signal_[i]);
@@ -156,38 +160,61 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
 
 void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {
     place(T_camera_target);
-    columns_ = derivative_.at(T_camera_target, sensor_, settings, fineness);
-    differentiated_at_ = T_camera_target;
+    const auto all = derivative_.at(T_camera_target, sensor_, settings, fineness, lit());
+    columns_.assign(all.begin(), all.end());
+    differentiated_at_ = T_camera_target, fineness_ = fineness;
     if (T_world_camera_) add_shading(T_camera_target, settings);
+}
+
+/// Not 0 where a pixel or its neighbours are lit.
+std::vector<std::uint8_t> LevelView::lit() const {
+    std::vector<std::uint8_t> out(signal_.size());
+    const auto width = static_cast<std::size_t>(window_.width);
+    const auto is_lit = [&](std::size_t p) {
+        return signal_[p - 1] != 0 || signal_[p] != 0 || signal_[p + 1] != 0;
+    };
+    for (int y = 1; y < window_.height - 1; ++y)
+        for (int x = 1; x < window_.width - 1; ++x) {
+            const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            out[p] = is_lit(p - width) || is_lit(p) || is_lit(p + width) ? 1 : 0;
+        }
+    return out;
 }
 
 /// Adds what the shading changes by while the target turns under its light, by differences.
 void LevelView::add_shading(const Rigid3& T_camera_target, const FrameSettings& settings) {
     constexpr double kTurn_rad = 0.01;
-    with_shading_.assign(columns_.begin(), columns_.end());
     for (int axis = 0; axis < 3; ++axis) {
         Vec3 turn{};
         turn[axis] = kTurn_rad;
         const auto change = change_with_light(T_camera_target, settings, conjugate(T_camera_target.q) * turn);
         for (std::size_t i = 0; i < change.size(); ++i)
-            with_shading_[i][axis] += change[i] / static_cast<float>(kTurn_rad);
+            columns_[i][axis] += change[i] / static_cast<float>(kTurn_rad);
     }
-    columns_ = with_shading_;
 }
 
 std::optional<Vec3> LevelView::flat_face() const {
+    constexpr int kRaysAcross = 32;
     constexpr double kSteps = 100;  // of a normal's components
-    std::map<std::array<long, 3>, std::size_t> faces;
-    std::size_t pixels = 0;
-    const Aovs& aovs = view_.aovs();
-    for (std::size_t i = 0; i < aovs.body.size(); ++i) {
-        if (aovs.body[i] != static_cast<int>(target_)) continue;
-        const Vec3& n = aovs.normal[i];
-        ++faces[{std::lround(kSteps * n.x), std::lround(kSteps * n.y), std::lround(kSteps * n.z)}];
-        ++pixels;
-    }
+    const int step = std::max(1, std::max(window_.width, window_.height) / kRaysAcross);
+    std::map<std::array<long, 3>, int> faces;
+    int all = 0;
+    HitBatch hits;
+    for (int y = 0; y < window_.height; y += step)
+        for (int x = 0; x < window_.width;) {
+            std::array<ImagePoint, kLanes> points;
+            std::size_t n = 0;
+            for (; n < kLanes && x < window_.width; x += step) points[n++] = {1.0 * x, 1.0 * y};
+            view_.trace_pixels(std::span(points).first(n), hits);
+            for (std::size_t lane = 0; lane < n; ++lane) {
+                if (hits.body[lane] != static_cast<int>(target_)) continue;
+                const Vec3 face = kSteps * hits.geometric_normal[lane];
+                ++faces[{std::lround(face.x), std::lround(face.y), std::lround(face.z)}];
+                ++all;
+            }
+        }
     const auto largest = std::ranges::max_element(faces, {}, [](const auto& face) { return face.second; });
-    if (largest == faces.end() || 3 * largest->second < pixels) return {};
+    if (largest == faces.end() || 3 * largest->second < all) return {};
     const auto& [x, y, z] = largest->first;
     return conjugate(view_.T_world_camera().q) *
            normalized(Vec3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});

@@ -40,15 +40,19 @@ public:
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);
+    /// Moves the latest render's signal by so small a step of the pose that the Jacobian tells its change.
+    void predict(const Vector6& step);
     /// Changes of the latest render's signal, DN, were the target turned under its light by `turn_rad`, target
     /// axes, and seen at the same pose.
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                        const Vec3& turn_rad);
-    /// At the pose of the latest render.
+    /// At the pose of the latest render, where that has light.
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
-    /// The pose of this frame's latest Jacobian.
+    /// The pose of this frame's latest Jacobian, and its fineness.
     [[nodiscard]] const std::optional<Rigid3>& differentiated_at() const noexcept { return differentiated_at_; }
-    /// Of the latest render's target pixels at least a third have this normal, camera axes: a flat face.
+    [[nodiscard]] int fineness() const noexcept { return fineness_; }
+    /// Of the target's surface at the latest render's pose at least a third has this normal, camera axes: a flat
+    /// face.
     [[nodiscard]] std::optional<Vec3> flat_face() const;
     /// The latest of each.
     [[nodiscard]] PhotometricImages images() const;
@@ -56,6 +60,7 @@ public:
 private:
     [[nodiscard]] float signal_of(const Rgb& radiance) const;
     void place(const Rigid3& T_camera_target);
+    [[nodiscard]] std::vector<std::uint8_t> lit() const;
     void add_shading(const Rigid3& T_camera_target, const FrameSettings& settings);
 
     const SensorModel& sensor_;
@@ -71,9 +76,9 @@ private:
     ImageDerivative derivative_;
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
     std::vector<std::uint8_t> measured_clipped_;
-    std::span<const PixelDerivative> columns_;
-    std::vector<PixelDerivative> with_shading_;  ///< columns_, where the light is known in the camera's axes
+    std::vector<PixelDerivative> columns_;
     std::optional<Rigid3> differentiated_at_;
+    int fineness_ = 0;
 };
 
 }  // namespace narpa

@@ -17,9 +17,8 @@ constexpr double kCoarseExtent_px = 20;
 /// And its extent that the finest image does not exceed: to know where the target is takes no more.
 constexpr double kFineExtent_px = 128;
 constexpr int kCoarsest = 32;
-/// Rays of the fits to the coarse image, for each of its pixels, and each way for its derivatives.
-constexpr double kCoarseFitRays = 16;
-constexpr int kCoarseFitFineness = 3;
+/// Samples of the fits to the coarse image, for each of its pixels, and lines each way for its derivatives.
+constexpr int kCoarseFitSamples = 8, kCoarseFitFineness = 3;
 /// Hypotheses whose loss on the coarse image exceeds the least by more are excluded by it: the frame has more
 /// information, and most of them are at their minimum.
 constexpr double kExcluded = 100;
@@ -28,8 +27,8 @@ constexpr std::size_t kMostContenders = 4;
 constexpr double kRangeSigmas = 3;
 /// Fits with other samples, where the frame's sampling noise is not known.
 constexpr int kOtherSamples = 3;
-/// Rays per pixel where whole images are compared.
-constexpr double kWholeRays = 32;
+/// Samples per pixel where whole images are compared.
+constexpr int kWholeSamples = 16;
 
 Status check_search(const SearchOptions& o, const Rigid3& T_world_camera) {
     if (!(o.range_m > 0 && std::isfinite(o.range_m)))
@@ -55,10 +54,7 @@ public:
                           known.T_world_camera);
         view_.measure(coarser_image(frame, factor), coarser_variance(variance, known.camera, factor));
         settings_.seed = options.seed, settings_.method = options.method, settings_.max_depth = options.max_depth;
-        settings_.budget.kind = FrameBudget::Kind::rays;
-        const double extent = std::min(known.extent_px() / factor, static_cast<double>(camera_.width));
-        settings_.budget.rays =
-            static_cast<std::uint64_t>(2.0 * camera_.width * camera_.height + kWholeRays * extent * extent);
+        settings_.spp = kWholeSamples;
     }
     [[nodiscard]] double loss(const DenseEstimate& e) {
         view_.render(e.T_camera_body, settings_);
@@ -149,7 +145,7 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
     const double extent_px = sought.known.extent_px();
     while (extent_px / (2 * sought.factor) >= kCoarseExtent_px && sought.factor < kCoarsest) sought.factor *= 2;
     while (extent_px / sought.dense.finest >= kFineExtent_px && sought.dense.finest < sought.factor)
-        sought.dense.finest *= 2, sought.dense.rays_per_pixel /= 2;
+        sought.dense.finest *= 2;
     std::vector<Contender> contenders = coarse_fits(sought, out);
     if (contenders.empty()) {
         out.answer.why = fmt::format("none of {} hypotheses leads to a pose", sought.hypotheses.size());
@@ -163,7 +159,7 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
 std::vector<PoseSearch::Contender> PoseSearch::coarse_fits(const Sought& sought, SearchEstimate& out) {
     DenseOptions options = sought.dense;
     options.coarsest = options.finest = sought.factor;
-    options.rays_per_pixel = kCoarseFitRays / (sought.factor * sought.factor);
+    options.samples_per_pixel = kCoarseFitSamples;
     options.fineness = kCoarseFitFineness;
     options.rivals = 0;
     const SensorModel sensor = sensor_model(camera_);

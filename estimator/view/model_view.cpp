@@ -21,11 +21,20 @@ ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std:
       renderer_(render_scene_, camera_, false),
       radiance_(camera.width, camera.height) {}
 
-void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {
+CameraPose ModelView::place(const Rigid3& T_camera_target) {
     T_camera_target_ = T_camera_target;
     T_world_camera_ = place_camera(T_camera_target, camera_, target_, at_);
-    const CameraPose path = camera_path(T_world_target(), T_camera_target, motion_, times_, camera_.height);
+    return camera_path(T_world_target(), T_camera_target, motion_, times_, camera_.height);
+}
+
+void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs) {
+    const CameraPose path = place(T_camera_target);
     renderer_.render(at_, path, settings, radiance_, aovs ? &aovs_ : nullptr);
+}
+
+void ModelView::render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings) {
+    const CameraPose path = place(T_camera_target);
+    renderer_.render(at_, path, settings, radiance_, aovs_.variance);
 }
 
 Rigid3 ModelView::T_world_camera(double row) const noexcept {

@@ -37,6 +37,8 @@ public:
     /// Renders the image at this pose, with `aovs` also depth, position, normal and body. Allocates nothing after
     /// the first call of a kind.
     void render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs);
+    /// The image and `Aovs::variance`, but no other of them.
+    void render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings);
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_.tracer(); }
@@ -54,6 +56,8 @@ public:
     void trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept;
 
 private:
+    /// Moves the camera there; its path during the exposure.
+    CameraPose place(const Rigid3& T_camera_target);
     /// In the middle of the row's exposure.
     [[nodiscard]] Rigid3 T_world_camera(double row) const noexcept;
 

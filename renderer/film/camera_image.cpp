@@ -120,6 +120,9 @@ struct CameraRenderer::Impl {
     bool after_light = optics.any() || stars || ghost;
     RadianceImage before_optics{after_light ? camera.width : 0, after_light ? camera.height : 0};
 
+    FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
+                        RadianceImage& final_image, Aovs* aovs, std::vector<float>* variance);
+
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
         optics.apply(before_optics, out);
         if (stars) stars->add(render_scene.tracer(), at, pose, optics, out);
@@ -133,11 +136,20 @@ CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& ca
 CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
-                                    RadianceImage& final_image, Aovs* aovs) {
-    RadianceImage& out = impl_->after_light ? impl_->before_optics : final_image;
-    const RenderScene& render_scene = impl_->render_scene;
-    const Camera& camera = impl_->camera;
-    std::vector<float>* const variance = aovs != nullptr ? &aovs->variance : nullptr;
+                                    RadianceImage& out, Aovs* aovs) {
+    return impl_->render(at, pose, settings, out, aovs, aovs != nullptr ? &aovs->variance : nullptr);
+}
+
+FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
+                                    RadianceImage& out, std::vector<float>& variance) {
+    variance.assign(out.pixels.size(), 0);
+    return impl_->render(at, pose, settings, out, nullptr, &variance);
+}
+
+FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose,
+                                          const FrameSettings& settings, RadianceImage& final_image, Aovs* aovs,
+                                          std::vector<float>* variance) {
+    RadianceImage& out = after_light ? before_optics : final_image;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     FrameAccount account;
     if (uniform || aovs != nullptr) {
@@ -146,13 +158,12 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose,
             resize(*aovs, out.pixels.size());
             store_first_hits(frame, out.width, out.height, *aovs);
         }
-        if (uniform) account = render_uniform(impl_->passes, frame, out, variance);
+        if (uniform) account = render_uniform(passes, frame, out, variance);
     }
     if (!uniform)
-        account = render_within_budget(impl_->passes, impl_->costs, render_scene, camera, at, pose, settings, out,
-                                       variance);
-    for (const std::uint32_t pixel : impl_->unseen) out.pixels[pixel] = {};
-    if (impl_->after_light) impl_->apply_optics(at, pose, final_image);
+        account = render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, variance);
+    for (const std::uint32_t pixel : unseen) out.pixels[pixel] = {};
+    if (after_light) apply_optics(at, pose, final_image);
     return account;
 }
 

@@ -53,6 +53,9 @@ public:
 
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& out, Aovs* aovs = nullptr);
+    /// With the variance of Aovs alone, which takes no rays of its own.
+    FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
+                        RadianceImage& out, std::vector<float>& variance);
 
 private:
     struct Impl;

@@ -67,7 +67,7 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
     o.fineness = 4;
-    o.rays_per_pixel = 24;
+    o.samples_per_pixel = 12;
     const auto e = dense.align(frame, at, displaced(truth, off_by(5, 0.05, norm(truth.t))), o);
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_EQ(e->status, DenseStatus::converged) << name(e->status);
@@ -81,7 +81,7 @@ TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
     DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
     o.fineness = 3;
-    o.rays_per_pixel = 6;
+    o.samples_per_pixel = 3;
     o.finest = 2;
     o.iterations = 8;
     const auto e = dense.align(frame, at, displaced(truth, off_by(60, 0.1, norm(truth.t))), o);
@@ -94,7 +94,7 @@ TEST_F(DockingFrame, IsTheSameOnAnyNumberOfThreads) {
     const MeasuredImage frame = frame_at(truth, true);
     DenseOptions o;
     o.fineness = 4;
-    o.rays_per_pixel = 6;
+    o.samples_per_pixel = 3;
     o.finest = 2;
     const auto pose_on = [&](int threads) {
         tbb::task_arena arena(threads);

@@ -152,7 +152,7 @@ TEST(DenseBound, ErrorsAreThoseThatNoiseMakes) {
 
     DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
-    o.rays_per_pixel = 100;
+    o.samples_per_pixel = 50;
     const auto bound = dense.bound(at, truth, o);
     ASSERT_TRUE(bound) << bound.error().text();
     constexpr int kFrames = 12;

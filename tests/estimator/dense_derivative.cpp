@@ -4,8 +4,10 @@
 // however far apart these are: so the poses can be so far apart that the noise of the renders does not matter.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "estimator/dense/image_derivative.h"
 #include "estimator/view/model_view.h"
@@ -165,6 +167,33 @@ TEST(ImageDerivative, OfTheDockingScene) {
     camera.cx = 10, camera.cy = 5;
     const auto errors = relative_errors(*render_scene, camera, 0, inverse(T_world_camera), r);
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.17) << "column " << k;
+}
+
+/// Pixels that are not chosen are left out; the others do not depend on it.
+TEST(ImageDerivative, LooksAtTheChosenPixels) {
+    const auto scene = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+    ASSERT_TRUE(scene) << scene.error().text();
+    const auto render_scene = RenderScene::create(*scene);
+    ASSERT_TRUE(render_scene);
+    const Rigid3 pose = inverse(
+        Rigid3{scene->bodies[1].initial.T_world_body.q * scene->cameras[0].T_mount_camera.q, {10, 0.4, -0.3}});
+    Camera camera = pinhole(40, 400);
+    camera.cx = 10, camera.cy = 5;
+    const BodyPoses at = placement_of(*scene);
+    ImageDerivative derivative(*render_scene, camera, 0, at);
+    const auto by = [&](std::span<const std::uint8_t> chosen) {
+        const auto J = derivative.at(pose, unit_sensor(), {}, 4, chosen);
+        return std::vector<PixelDerivative>(J.begin(), J.end());
+    };
+    std::vector<std::uint8_t> chosen(40 * 40);
+    for (std::size_t p = 0; p < chosen.size(); ++p) chosen[p] = p % 3 == 0 ? 1 : 0;
+    const auto all = by({}), some = by(chosen);
+    int looked_at = 0;
+    for (std::size_t p = 0; p < all.size(); ++p) {
+        EXPECT_EQ(some[p], chosen[p] != 0 ? all[p] : PixelDerivative(PixelDerivative::Zero())) << p;
+        looked_at += some[p].isZero(0) ? 0 : 1;
+    }
+    EXPECT_GT(looked_at, 300);
 }
 
 }  // namespace

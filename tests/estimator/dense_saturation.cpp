@@ -30,7 +30,7 @@ Claims claims(const Scene& scene, Camera camera, double times, double range_m, i
     ModelView view(*render_scene, camera, 0, at);
     DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
-    o.rays_per_pixel = 24, o.fineness = 4;
+    o.samples_per_pixel = 12, o.fineness = 4;
     std::mt19937_64 random(5);
     std::vector<std::uint8_t> bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
     Claims out;

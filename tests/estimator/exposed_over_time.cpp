@@ -167,7 +167,7 @@ TEST_P(ExposedOverTime, DenseAlignmentReachesItsBound) {
     DenseAlignment dense(*render_scene, camera, 0), ignoring(*render_scene, still, 0);
     DenseOptions options;
     options.motion = motion;
-    options.rays_per_pixel = 256;  // four times the frame's samples: few enough errors of its own
+    options.samples_per_pixel = 128;  // four times the frame's samples: few enough errors of its own
     constexpr int kFrames = 3;
     double over_bound = 0, ignored = 0;
     for (std::uint32_t k = 0; k < kFrames; ++k) {

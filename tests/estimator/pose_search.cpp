@@ -124,7 +124,7 @@ public:
     static SearchOptions options(double range_m) {
         SearchOptions o;
         o.range_m = range_m;
-        o.dense.rays_per_pixel = 24, o.dense.fineness = 4;
+        o.dense.samples_per_pixel = 12, o.dense.fineness = 4;
         return o;
     }
     Result<SearchEstimate> find(const MeasuredImage& image, const SearchOptions& o) {

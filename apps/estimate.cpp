@@ -18,6 +18,7 @@
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
+#include "estimator/search/cloud_search.h"
 #include "estimator/view/measured_image.h"
 #include "protocols/lidar/lidar_model.h"
 
@@ -155,13 +156,13 @@ Result<std::vector<std::uint8_t>> bytes_of(const std::string& path) {
     return bytes;
 }
 
-/// The returns of one turn from the capture's first packet on; times count from its first shot.
-Result<std::vector<RangePoint>> points_of(const std::string& path, const Lidar& lidar) {
+/// One turn from the capture's first packet on; times count from its first shot.
+Result<LidarSweep> sweep_in(const std::string& path, const Lidar& lidar) {
     const LidarSpec& spec = lidar.model->spec();
     auto datagrams = read_datagrams(path, spec.data_packet_bytes);
     if (!datagrams) return datagrams.error();
-    std::vector<RangePoint> points;
-    std::vector<LidarPoint> decoded(spec.points_per_packet);
+    LidarSweep sweep;
+    SweepReader reader(*lidar.model);
     std::optional<std::int64_t> first_ns;
     for (const auto& bytes : *datagrams) {
         const auto time_ns = lidar.model->packet_time(bytes, first_ns.value_or(0));
@@ -169,21 +170,29 @@ Result<std::vector<RangePoint>> points_of(const std::string& path, const Lidar& 
         if (!first_ns) first_ns = time_ns;
         const std::int64_t after_ns = *time_ns - *first_ns;
         if (after_ns < 0 || static_cast<double>(after_ns) >= 1e9 / lidar.model->spec().rate_hz) break;
-        append_points(std::span(decoded).first(lidar.model->points(bytes, decoded)), after_ns, points);
+        reader.append(bytes, after_ns, sweep);
     }
     if (!first_ns)
         return Error{fmt::format("holds no data packet of a {}, expected at least one", spec.name), path};
-    return points;
+    return sweep;
 }
 
-/// Removes the points on the body that carries the LiDAR, whose place is known.
-void remove_own_body(std::vector<RangePoint>& points, const World& world, const Lidar& lidar, const BodyPoses& at) {
+/// Removes the points on the body that carries the LiDAR, whose place is known, and the beams without return that
+/// meet it.
+void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, const BodyPoses& at) {
     const Rigid3 T_world_lidar = world.sensor_pose(lidar.mount, lidar.T_mount_lidar, at);
     constexpr double kAlike_m = 0.1;
-    std::erase_if(points, [&](const RangePoint& p) {
-        const Ray beam{T_world_lidar * p.origin_m, T_world_lidar.q * p.direction};
-        const Hit hit = world.tracer().intersect(at, beam, p.range_m + kAlike_m);
+    const auto first_hit = [&](const auto& beam, double most_m) {
+        return world.tracer().intersect(at, {T_world_lidar * beam.origin_m, T_world_lidar.q * beam.direction},
+                                        most_m);
+    };
+    std::erase_if(sweep.points, [&](const RangePoint& p) {
+        const Hit hit = first_hit(p, p.range_m + kAlike_m);
         return hit.body >= 0 && hit.body == lidar.mount && hit.range_m > p.range_m - kAlike_m;
+    });
+    std::erase_if(sweep.empty, [&](const EmptyBeam& b) {
+        const Hit hit = first_hit(b, lidar.range_max_m);
+        return hit.body >= 0 && hit.body == lidar.mount;
     });
 }
 
@@ -238,11 +247,11 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     const Lidar& lidar = scene.lidars[*index];
     auto target = target_of(**world, lidar.mount, lidar.name, tracker.target);
     if (!target) return target.error();
-    auto points = points_of(o.sweep, lidar);
-    if (!points) return points.error();
+    auto sweep = sweep_in(o.sweep, lidar);
+    if (!sweep) return sweep.error();
     BodyPoses then(scene.bodies.size());
     (*world)->place(t_ns, lidar.mount, then);
-    remove_own_body(*points, **world, lidar, then);
+    remove_own_body(*sweep, **world, lidar, then);
     const auto T_lidar_target_at = [&](std::int64_t t) {
         BodyPoses at(scene.bodies.size());
         (*world)->place(t, lidar.mount, at);
@@ -256,13 +265,19 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
                             tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;
     settings.noise = range_noise_of(lidar);
+    settings.certain = certain_return_of(lidar, scene);
     if (o.range_noise_m > 0) settings.noise.range_m = o.range_noise_m;
-    CloudIcp icp((*world)->tracer(), *target, settings);
     TracingThreads threads(o.threads);
     std::optional<Result<CloudEstimate>> found;
     {
         const Progress progress("estimating the pose in " + o.sweep);
-        threads.arena.execute([&] { found.emplace(icp.align(*points, motion, guess, search_m)); });
+        const auto estimate = [&] {
+            const Tracer& tracer = (*world)->tracer();
+            return tracker.search ? CloudSearch(tracer, *target, settings).find(sweep->points, motion, sweep->empty)
+                                  : CloudIcp(tracer, *target, settings)
+                                        .align(sweep->points, motion, guess, search_m, sweep->empty);
+        };
+        threads.arena.execute([&] { found.emplace(estimate()); });
     }
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
@@ -273,6 +288,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
         fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
                     "cannot be seen; {} iterations",
                     e.points, e.used, e.explained, unobserved, e.iterations));
+    document["empty"] = e.empty_beams.empty;
     document["points"] = e.points;
     document["used"] = e.used;
     document["explained"] = e.explained;
@@ -295,7 +311,6 @@ Outcome estimate(EstimateOptions o) {
     for (const std::string& file : {o.csv, o.picture})
         if (auto made = make_folder_of(file); !made) return made.error();
     if (of_log) return estimate_log(o, *tracker);
-    if (tracker->search && !o.sweep.empty()) return Error{"start \"search\" goes with frames, not with a sweep"};
     if (o.frame.empty() && o.sweep.empty() && !find_file(FileKind::scene, o.input))
         return Error{
             "no such folder, expected that of a logged run or rehearsal, or a scene with --frame FILE.raw or "

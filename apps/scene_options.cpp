@@ -102,9 +102,9 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
         .one_of({"features", "dense"})
         .shows_default();
-    app.option(
-           dashes + "start", start,
-           "Error of the first guess, in attitude and as a part of the range; search: no guess but of the range")
+    app.option(dashes + "start", start,
+               "Error of the first guess, in attitude and as a part of the range; search: no guess, for frames but "
+               "of the range")
         .type_name("DEG,PERCENT|search")
         .shows_default();
     app.option(dashes + "range-guess", tracker.range_guess_m,

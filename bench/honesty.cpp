@@ -12,7 +12,9 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pose/pnp.h"
+#include "estimator/search/cloud_search.h"
 #include "estimator/search/template_matcher.h"
+#include "protocols/lidar/velodyne.h"
 #include "renderer/camera/detector.h"
 #include "renderer/projection/distortion.h"
 
@@ -22,6 +24,13 @@ namespace {
 constexpr double kRadius_m = 2;  ///< of the targets made in code, about
 constexpr RangeNoise kRangeNoise{0.02, 5.1e-5};
 constexpr std::string_view kWrong = "wrong";  ///< the condition that needs another target
+
+/// Of a VLP-16, 100 m, as the estimator believes it: with a detection limit that is not stated.
+CertainReturn vlp16_returns() {
+    Lidar lidar;
+    lidar.range_max_m = vlp16().range_m_default;
+    return certain_return_of(lidar, {});
+}
 
 /// An answer beside the truth.
 struct TrialResult {
@@ -85,6 +94,7 @@ struct KnownTarget {
     std::unique_ptr<DenseAlignment> dense;
     std::unique_ptr<FeatureAlignment> features;
     std::unique_ptr<CloudIcp> icp;
+    std::unique_ptr<CloudSearch> icp_search;
     double radius_m;
 
     KnownTarget(Scene s, const ModelUncertainty& told)
@@ -95,8 +105,9 @@ struct KnownTarget {
         f.model = told;
         dense = std::make_unique<DenseAlignment>(render_scene, camera(), 0);
         features = std::make_unique<FeatureAlignment>(render_scene, camera(), 0, BodyPoses(1), f);
-        icp =
-            std::make_unique<CloudIcp>(render_scene.tracer(), 0, IcpSettings{.noise = kRangeNoise, .model = told});
+        const IcpSettings lidar{.noise = kRangeNoise, .certain = vlp16_returns(), .model = told};
+        icp = std::make_unique<CloudIcp>(render_scene.tracer(), 0, lidar);
+        icp_search = std::make_unique<CloudSearch>(render_scene.tracer(), 0, lidar);
     }
     [[nodiscard]] const Camera& camera() const { return scene.cameras.front(); }
 };
@@ -133,9 +144,10 @@ public:
         KnownTarget& target = *targets_[d.index(targets_.size())];
         row.condition = conditions_[d.index(conditions_.size())];
         row.target = method == "points" ? "random points" : target.scene.name;
-        const Rigid3 truth = pose(target.radius_m, row.condition, method == "icp", d);
+        const bool lidar = method == "icp" || method == "icp-search";
+        const Rigid3 truth = pose(target.radius_m, row.condition, lidar, d);
         const TrialResult out = method == "points" ? points(row.condition, d)
-                                : method == "icp"  ? sweep(target, row.condition, truth, d)
+                                : lidar            ? sweep(target, method, row.condition, truth, d)
                                                    : frame(target, method, row.condition, truth, d);
         ++row.answers[static_cast<std::size_t>(out.answer.kind)];
         if (out.answer.kind != AnswerKind::good) return row;
@@ -222,7 +234,8 @@ private:
     /// A VLP-16 at 10 turns a second. `bright`: a tenth of the points are of something else in front; `dark`: most
     /// are not returned; `blurred`: twice the noise that the estimator is told; `beside`: half of the target is cut
     /// off.
-    TrialResult sweep(KnownTarget& target, std::string_view condition, const Rigid3& truth, Draw& d) {
+    TrialResult sweep(KnownTarget& target, const std::string& method, std::string_view condition,
+                      const Rigid3& truth, Draw& d) {
         const WorldErrors world = WorldErrors::draw(o_.world, 0, d);
         const ApparentMotion moving = motion(d);
         const KnownTarget& shown = condition == kWrong ? another(target, d) : target;
@@ -235,7 +248,7 @@ private:
         const double distance_m = norm(truth.t), reach_m = tracer.bounding_radius_m(0);
         const int columns = static_cast<int>((std::asin(std::min(0.9, reach_m / distance_m)) + 0.1) / kStep);
         const double sigma_m = condition == "blurred" ? 2 * kRangeNoise.range_m : kRangeNoise.range_m;
-        std::vector<RangePoint> points;
+        LidarSweep seen;
         BodyPoses at(1);
         for (int column = -columns; column <= (condition == "beside" ? 0 : columns); ++column)
             for (int line = 0; line < 16; ++line) {
@@ -244,13 +257,18 @@ private:
                 const Vec3 beam{std::cos(w) * std::sin(a), std::cos(w) * std::cos(a), std::sin(w)};
                 at.set(0, moved(middle, moving, t_s));
                 const Hit hit = tracer.intersect(at, {{}, beam}, 200);
-                if (hit.body < 0 || (condition == "dark" && d.uniform(0, 1) < 0.8)) continue;
+                if (hit.body < 0 || (condition == "dark" && d.uniform(0, 1) < 0.8)) {
+                    seen.empty.push_back({{}, beam, t_s});
+                    continue;
+                }
                 double range_m = hit.range_m + world.range_bias_m + sigma_m * d.normal();
                 if (condition == "bright" && d.uniform(0, 1) < 0.1) range_m *= d.uniform(0.5, 0.95);
-                points.push_back({{}, beam, range_m, t_s});
+                seen.points.push_back({{}, beam, range_m, t_s});
             }
         const double search_m = 0.01 * o_.start_percent * distance_m + o_.start_deg * kDegree * reach_m;
-        const auto e = target.icp->align(points, moving, start(truth, d), search_m);
+        const auto e = method == "icp-search"
+                           ? target.icp_search->find(seen.points, moving, seen.empty)
+                           : target.icp->align(seen.points, moving, start(truth, d), search_m, seen.empty);
         if (!e) return {};
         return {e->answer, e->T_lidar_target, e->covariance};
     }

@@ -18,7 +18,9 @@
 
 namespace narpa {
 
-inline constexpr std::array<std::string_view, 4> kHonestyMethods{"points", "features", "dense", "icp"};
+/// `icp-search`: LiDAR without a guess.
+inline constexpr std::array<std::string_view, 5> kHonestyMethods{"points", "features", "dense", "icp",
+                                                                 "icp-search"};
 /// What is done to a measurement. `wrong`: it shows another target.
 inline constexpr std::array<std::string_view, 7> kHonestyConditions{"plain",  "bright", "dark", "blurred",
                                                                     "beside", "wrong",  "far"};

@@ -30,7 +30,6 @@ public:
           placement_(world.scene().bodies.size()),
           shots_(model_.spec().shots_per_packet),
           echoes_(shots_.size()),
-          points_(shots_.size()),
           bytes_(model_.spec().data_packet_bytes) {}
 
     [[nodiscard]] double uniform(double low, double high) {
@@ -63,7 +62,7 @@ public:
 
     /// One turn, from behind to behind. The pose is valid at its middle, when the rotor points forward. Points pass
     /// through the model's packets.
-    void scan(const Rigid3& T_lidar_target, const ApparentMotion& motion, std::vector<RangePoint>& out) {
+    void scan(const Rigid3& T_lidar_target, const ApparentMotion& motion, LidarSweep& out) {
         const auto turn_ns = static_cast<std::int64_t>(1e9 / kRotation_hz);
         out.clear();
         const std::int64_t period_ns = model_.spec().packet_period_ns;
@@ -79,7 +78,7 @@ public:
                 echoes_[i].strongest.range_m = range_of({shots_[i].origin_m, shots_[i].direction});
             }
             model_.encode(packet, 0, echoes_, bytes_);
-            append_points(std::span(points_).first(model_.points(bytes_, points_)), after_ns, out);
+            reader_.append(bytes_, after_ns, out);
         }
     }
 
@@ -104,8 +103,8 @@ private:
     BodyPoses placement_;
     std::vector<LidarShot> shots_;
     std::vector<LidarEchoes> echoes_;
-    std::vector<LidarPoint> points_;
     std::vector<std::uint8_t> bytes_;
+    SweepReader reader_{model_};
 };
 
 /// Over the starts of one run.
@@ -142,12 +141,15 @@ std::vector<IcpRun> run_icp(const World& world, std::size_t target, const std::v
     IcpSettings settings;
     settings.noise.range_m =
         std::hypot(kRangeNoise_m, vlp16().configure_default()->spec().range_resolution_m / std::sqrt(12.0));
+    Lidar lidar;
+    lidar.range_max_m = kRangeMax_m;
+    settings.certain = certain_return_of(lidar, world.scene());
     CloudIcp icp(world.tracer(), target, settings);
 
     int done = 0, all = 0;
     for (const IcpStarts& at : starts) all += at.starts;
     std::vector<IcpRun> runs;
-    std::vector<RangePoint> points;
+    LidarSweep sweep;
     for (const IcpStarts& at : starts) {
         Sweeps sweeps(world, target, runs.size());
         IcpRun run{at};
@@ -155,17 +157,17 @@ std::vector<IcpRun> run_icp(const World& world, std::size_t target, const std::v
         for (int i = 0; i < at.starts; ++i) {
             const Rigid3 truth = sweeps.pose();
             const ApparentMotion motion = sweeps.motion();
-            sweeps.scan(truth, motion, points);
+            sweeps.scan(truth, motion, sweep);
             const Rigid3 start = sweeps.start_near(truth, at);
             const double reach_m = world.tracer().bounding_radius_m(target);
             const double search_m =
                 at.start_distance_fraction * norm(truth.t) + at.start_angle_deg * kDegree * reach_m;
             const double from_s = cpu_s(CLOCK_THREAD_CPUTIME_ID);
-            const auto e = icp.align(points, motion, start, search_m);
+            const auto e = icp.align(sweep.points, motion, start, search_m, sweep.empty);
             const double took_s = cpu_s(CLOCK_THREAD_CPUTIME_ID) - from_s;
-            const auto known = icp.align(points, motion, truth);
+            const auto known = icp.align(sweep.points, motion, truth);
             progress(++done, all);
-            sums.points.add(static_cast<double>(points.size()));
+            sums.points.add(static_cast<double>(sweep.points.size()));
             if (!e || !known) {
                 ++run.told;
                 continue;

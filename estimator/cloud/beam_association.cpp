@@ -22,14 +22,6 @@ constexpr double kOtherSurface = 0.87, kOnOther = 3;
 /// The rim that is searched for edges, in parts of the footprint's radius.
 constexpr double kWider = 1.1;
 
-/// Rays of like elevation and azimuth lie together: a spinning LiDAR's lasers fire by turns at elevations that are
-/// far apart, and rays are traced in packets that are the faster the closer they run.
-float place_of(const Vec3& direction) {
-    constexpr double kBands_1_rad = 200;
-    return static_cast<float>(8 * std::floor(kBands_1_rad * std::asin(std::clamp(direction.z, -1.0, 1.0))) +
-                              std::atan2(direction.x, direction.y));
-}
-
 /// Sixteen places of even density on a disc of radius 1, the first in its middle.
 const std::array<std::array<double, 2>, kLanes>& disc() {
     static const auto places = [] {
@@ -45,6 +37,21 @@ const std::array<std::array<double, 2>, kLanes>& disc() {
 }
 
 }  // namespace
+
+float place_of(const Vec3& direction) noexcept {
+    constexpr double kBands_1_rad = 200;
+    return static_cast<float>(8 * std::floor(kBands_1_rad * std::asin(std::clamp(direction.z, -1.0, 1.0))) +
+                              std::atan2(direction.x, direction.y));
+}
+
+Ray ray_in_cone(const Ray& beam, double tangent, int k) noexcept {
+    constexpr int kRim = kConeRays / 2;
+    const Vec3& d = beam.direction;
+    const Vec3 x = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
+    // Hexagons about the rim and inside of it.
+    const double turn = kPi * k / kRim, radius = (k % 2 == 0 ? 1 : 0.5) * tangent / std::cos(kPi / kRim);
+    return {beam.origin, normalized(d + radius * (std::cos(turn) * x + std::sin(turn) * cross(d, x)))};
+}
 
 BeamAssociation::BeamAssociation(const Tracer& tracer, std::size_t target)
     : tracer_(tracer), at_rest_(tracer.scene().bodies.size()), target_(static_cast<std::uint32_t>(target)) {}
@@ -146,21 +153,13 @@ void BeamAssociation::find_edges(const Rigid3& T, const RangeNoise& noise) {
 /// what the axis misses, shows an edge.
 std::uint32_t BeamAssociation::meeting_edges(const RayBatch& axes, const HitBatch& met,
                                              const RangeNoise& noise) const {
-    constexpr int kRim = 6;
-    // Hexagons about the footprint and inside of it.
-    const double tangent = kWider * std::tan(0.5 * noise.footprint_rad) / std::cos(kPi / kRim);
+    const double tangent = kWider * std::tan(0.5 * noise.footprint_rad);
     RayBatch rays;
     HitBatch hits;
     rays.n = axes.n;
     std::uint32_t edges = 0;
-    for (int k = 0; k < 2 * kRim; ++k) {
-        const double turn = kPi * k / kRim, radius = k % 2 == 0 ? tangent : 0.5 * tangent;
-        for (std::size_t lane = 0; lane < axes.n; ++lane) {
-            const Vec3 d = axes.direction[lane];
-            const Vec3 x = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
-            const Vec3 off = std::cos(turn) * x + std::sin(turn) * cross(d, x);
-            rays.put(lane, {axes.origin[lane], normalized(d + radius * off)});
-        }
+    for (int k = 0; k < kConeRays; ++k) {
+        for (std::size_t lane = 0; lane < axes.n; ++lane) rays.put(lane, ray_in_cone(axes[lane], tangent, k));
         tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
         for (std::size_t lane = 0; lane < axes.n; ++lane) {
             const bool here = is_set(hits.met, lane), there = is_set(met.met, lane);

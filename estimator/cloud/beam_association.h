@@ -28,6 +28,15 @@ struct PointToPlane {
     double sigma_m = 1;          ///< its standard deviation
 };
 
+/// Number `k` of twelve rays about a beam: six around the rim of a cone of this tangent, or just outside it, and
+/// six halfway to it.
+inline constexpr int kConeRays = 12;
+[[nodiscard]] Ray ray_in_cone(const Ray& beam, double tangent, int k) noexcept;
+
+/// Sorts beams so that those of like elevation and azimuth lie together: a spinning LiDAR's lasers fire by turns at
+/// elevations that are far apart.
+[[nodiscard]] float place_of(const Vec3& direction) noexcept;
+
 class BeamAssociation {
 public:
     /// `tracer` outlives it. Only the body `target` is traced.

@@ -78,27 +78,32 @@ bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& 
     return !(eigen.eigenvalues()[0] > 1 - kMost);
 }
 
-Status check(std::span<const RangePoint> points) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        const RangePoint& p = points[i];
-        const auto error = [&](const std::string& what) {
-            return Error{"point " + std::to_string(i) + " of the sweep: " + what};
-        };
-        if (!is_finite(p.origin_m) || !is_finite(p.direction) || !std::isfinite(p.t_s))
-            return error("origin, direction or time is not finite");
-        if (std::abs(dot(p.direction, p.direction) - 1) > 1e-6)
-            return error("expected a direction of length 1, not " + std::to_string(norm(p.direction)));
-        if (!(p.range_m > 0 && std::isfinite(p.range_m)))
-            return error("expected a range > 0, not " + std::to_string(p.range_m) + " m");
+template <class Beam>
+Status check_beams(std::span<const Beam> beams, const char* what) {
+    for (std::size_t i = 0; i < beams.size(); ++i) {
+        const Beam& b = beams[i];
+        if (!is_finite(b.origin_m) || !is_finite(b.direction) || !std::isfinite(b.t_s))
+            return Error{fmt::format("{} {} of the sweep: origin, direction or time is not finite", what, i)};
+        if (std::abs(dot(b.direction, b.direction) - 1) > 1e-6)
+            return Error{fmt::format("{} {} of the sweep: expected a direction of length 1, not {:f}", what, i,
+                                     norm(b.direction))};
     }
     return Ok{};
 }
 
-Status check(const Rigid3& T, const ApparentMotion& motion) {
+Status check(std::span<const RangePoint> points, std::span<const EmptyBeam> empty) {
+    if (auto good = check_beams(empty, "beam without return"); !good) return good;
+    if (auto good = check_beams(points, "point"); !good) return good;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (!(points[i].range_m > 0 && std::isfinite(points[i].range_m)))
+            return Error{
+                fmt::format("point {} of the sweep: expected a range > 0, not {:f} m", i, points[i].range_m)};
+    return Ok{};
+}
+
+Status check_start(const Rigid3& T) {
     if (!is_finite(T.t) || !(std::abs(norm(T.q) - 1) < 1e-6))
         return Error{"the pose to start from: expected a finite position and a unit quaternion"};
-    if (!is_finite(motion.velocity_m_s) || !is_finite(motion.rate_rad_s))
-        return Error{"the motion during the sweep is not finite"};
     return Ok{};
 }
 
@@ -316,6 +321,8 @@ void CloudIcp::compete(CloudEstimate& found, double search_m) {
             const Vector6 apart = error_between(found.T_lidar_target, rival.T_lidar_target);
             const bool elsewhere = (root * apart).squaredNorm() > kElsewhere;
             const double worse_chi2 = 2 * std::abs(rival.cost - found.cost);
+            if (!better && !(elsewhere && worse_chi2 < kAsLikely)) continue;
+            if (empty_beams_.count(rival.T_lidar_target, rival.covariance).refutes()) continue;
             if (better) {
                 rival.iterations = found.iterations;
                 std::swap(rival, found);
@@ -333,6 +340,10 @@ Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double s
         fit.failed = fmt::format("still moving after {} iterations", e.iterations);
     else if (!e.on_model)
         fit.failed = fmt::format("{} of {} points lie on the model", e.explained, e.points - e.edges);
+    else if (const EmptyBeamCount& b = e.empty_beams; b.refutes())
+        fit.failed =
+            fmt::format("{} beams without return pass through the model, in {} stretches; {} beams meet it",
+                        b.empty, b.stretches, b.returned);
     else if (search_m > 0 && e.observability.unobserved == 0 && moved_m > kSearched * search_m)
         fit.failed =
             fmt::format("surfaces are {:.3g} m from the guess, expected at most {:.3g} m, {:g} times the search",
@@ -343,18 +354,50 @@ Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double s
     return judge(std::move(fit));
 }
 
-Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const ApparentMotion& motion,
-                                      const Rigid3& start, double search_m) {
-    if (auto good = check(points); !good) return good.error();
-    if (auto good = check(start, motion); !good) return good.error();
-    if (!(search_m >= 0 && std::isfinite(search_m)))
-        return Error{"search_m = " + std::to_string(search_m) + ": expected a distance >= 0 m"};
+Status CloudIcp::begin(std::span<const RangePoint> points, const ApparentMotion& motion,
+                       std::span<const EmptyBeam> empty) {
+    if (auto good = check(points, empty); !good) return good;
+    if (!is_finite(motion.velocity_m_s) || !is_finite(motion.rate_rad_s))
+        return Error{"the motion during the sweep is not finite"};
     association_.take(points, motion);
+    empty_beams_.take(points, empty, motion);
+    points_ = points;
     motion_ = motion;
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
     rows_.reserve(points.size());
+    return Ok{};
+}
 
+CloudIcp::Approach CloudIcp::approach(const Rigid3& start, double search_m) {
+    constexpr int kMoves = 2;
+    const std::size_t stride = std::max<std::size_t>(1, association_.size() / kSearchPoints);
+    Rigid3 T = start;
+    for (int i = 0; i < kMoves; ++i) {
+        association_.associate(T, settings_.noise, 0, stride, planes_);
+        Vec3 seen_m, met_m;
+        double met = 0;
+        for (std::size_t k = 0; k < planes_.size(); ++k) {
+            seen_m = seen_m + points_[k * stride].position_m();
+            if (planes_[k].fate == BeamFate::missed) continue;
+            met_m = met_m + T * planes_[k].surface_m;
+            ++met;
+        }
+        if (met == 0) break;
+        T.t = T.t + seen_m / static_cast<double>(planes_.size()) - met_m / met;
+    }
+    CloudEstimate out;
+    T = search(T, search_m, kSearchPoints, kSearchIterations, out);
+    static_cast<void>(linearise(T, 0, stride, out));
+    return {T, out.used > 0 ? out.cost : kOutlierCost * static_cast<double>(planes_.size())};
+}
+
+Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const ApparentMotion& motion,
+                                      const Rigid3& start, double search_m, std::span<const EmptyBeam> empty) {
+    if (auto good = begin(points, motion, empty); !good) return good.error();
+    if (auto good = check_start(start); !good) return good.error();
+    if (!(search_m >= 0 && std::isfinite(search_m)))
+        return Error{"search_m = " + std::to_string(search_m) + ": expected a distance >= 0 m"};
     CloudEstimate out = attempt(start, search_m, kSearchPoints, kSearchIterations);
     if (search_m > 0 && !(out.settled && out.on_model)) {
         CloudEstimate again = attempt(start, search_m, 4 * kSearchPoints, 3 * kSearchIterations / 2);
@@ -369,6 +412,7 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
                              std::to_string(kFewestBeams),
                      .kind = ErrorKind::failed};
     verify(out);
+    out.empty_beams = empty_beams_.count(out.T_lidar_target, out.covariance);
     out.answer = answer_of(out, start, search_m);
     return out;
 }

@@ -12,6 +12,7 @@
 
 #include "base/result.h"
 #include "estimator/cloud/beam_association.h"
+#include "estimator/cloud/empty_beams.h"
 #include "estimator/pose/answer.h"
 #include "estimator/pose/leverage.h"
 #include "estimator/pose/model_uncertainty.h"
@@ -20,8 +21,9 @@ namespace narpa {
 
 struct IcpSettings {
     RangeNoise noise{};
-    int iterations = 50;    ///< at most, after the search
-    double settled = 0.05;  ///< converged: a step of fewer standard deviations; 0: all iterations
+    CertainReturn certain{};  ///< for beams without return; nowhere: they are not looked at
+    int iterations = 50;      ///< at most, after the search
+    double settled = 0.05;    ///< converged: a step of fewer standard deviations; 0: all iterations
     /// Least part of the points on the model at a right pose, with a confidence of 95 %: fewer mean a false
     /// minimum, or too few points to tell (29, all on the model, are enough for 0.9). The search is then repeated
     /// with four times the points.
@@ -54,6 +56,7 @@ struct CloudEstimate {
     int unchecked = 0;
     /// Points within four standard deviations of the noise from the model.
     std::size_t explained = 0;
+    EmptyBeamCount empty_beams;
     /// Minus the logarithm of the likelihood, of normal noise and outliers beyond four standard deviations: half
     /// the sum of the points' squared distances in standard deviations, at most 8 each.
     double cost = 0;
@@ -64,15 +67,30 @@ class CloudIcp {
 public:
     /// `tracer` outlives it. `target`: index of the body whose pose is estimated.
     CloudIcp(const Tracer& tracer, std::size_t target, const IcpSettings& settings = {})
-        : settings_(settings), association_(tracer, target) {}
+        : settings_(settings),
+          association_(tracer, target),
+          empty_beams_(tracer, target, settings.noise, settings.certain) {}
 
     /// `search_m`: bound of the error of surfaces at the start, about distance * angle + shift; 0: no search around
     /// the beams. An answer that is observed in all motions and further from the start than 2.5 times that is
-    /// refused. Errors: a point that is not finite or not a range along a unit direction, a motion, a start or a
-    /// search that is not finite, or fewer than six beams that meet the model. Allocates only for more points than
-    /// ever before, or an Error.
+    /// refused, and one that `empty`, the sweep's beams without return, refute. Errors: a point that is not finite
+    /// or not a range along a unit direction, a motion, a start or a search that is not finite, or fewer than six
+    /// beams that meet the model. Allocates only for more points than ever before, or an Error.
     [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const ApparentMotion& motion,
-                                              const Rigid3& start, double search_m = 0);
+                                              const Rigid3& start, double search_m = 0,
+                                              std::span<const EmptyBeam> empty = {});
+
+    /// For searches: where few points lead from an attitude, within circles that begin with `search_m`, and what
+    /// they cost there (CloudEstimate::cost). The target is first moved to where its surface is as the points'.
+    struct Approach {
+        Rigid3 T_lidar_target{};
+        double cost = 0;
+    };
+    /// Of the sweep that align() or begin() had last.
+    [[nodiscard]] Approach approach(const Rigid3& start, double search_m);
+    /// Checks and sets the sweep; the spans outlive its use.
+    [[nodiscard]] Status begin(std::span<const RangePoint> points, const ApparentMotion& motion,
+                               std::span<const EmptyBeam> empty = {});
 
 private:
     struct Pass;  ///< sums over the points at one pose
@@ -92,7 +110,9 @@ private:
 
     IcpSettings settings_;
     BeamAssociation association_;
+    EmptyBeams empty_beams_;
     ApparentMotion motion_{};  ///< of the sweep
+    std::span<const RangePoint> points_;
     std::vector<PointToPlane> planes_;
     std::vector<WeightedRow> rows_;  ///< of the points used
     std::vector<double> magnitudes_;

@@ -11,6 +11,7 @@
 namespace narpa {
 
 struct Lidar;
+struct Scene;
 
 /// One return, in the LiDAR's frame: the beam as it was fired and the range that was read.
 struct RangePoint {
@@ -20,6 +21,19 @@ struct RangePoint {
     double t_s = 0;      ///< when it was fired, relative to the time of the pose
 
     [[nodiscard]] Vec3 position_m() const { return origin_m + range_m * direction; }
+};
+
+/// A beam as it was fired, which brought no return.
+struct EmptyBeam {
+    Vec3 origin_m{}, direction{};  ///< as RangePoint
+    double t_s = 0;
+};
+
+struct LidarSweep {
+    std::vector<RangePoint> points;
+    std::vector<EmptyBeam> empty;  ///< where the packets state them
+
+    void clear() { points.clear(), empty.clear(); }
 };
 
 /// Standard deviations of a return. Seen along the normal of a surface that the beam meets at the angle i from it,
@@ -36,13 +50,30 @@ struct RangeNoise {
 /// Of a LiDAR's returns as its scene models them; where it models no noise, the values above.
 [[nodiscard]] RangeNoise range_noise_of(const Lidar& lidar);
 
-/// Appends a packet's decoded returns to `out`. `packet_after_ns`: time of the packet's first shot after the time
-/// of the pose.
-inline void append_points(std::span<const LidarPoint> packet, std::int64_t packet_after_ns,
-                          std::vector<RangePoint>& out) {
-    for (const LidarPoint& p : packet)
-        out.push_back(
-            {p.origin_m, p.direction, p.range_m, 1e-9 * static_cast<double>(packet_after_ns + p.t_offset_ns)});
-}
+/// Where a surface of the model certainly has a return, unless the LiDAR loses it by chance.
+struct CertainReturn {
+    double nearest_m = 0, farthest_m = 0;  ///< nowhere where they are equal
+    double least_light_1_m2 = 0;           ///< reflectivity / range^2 along the beam (renderer/lidar/lidar_shot.h)
+};
+
+/// For surfaces that reflect a third of what the scene's materials do. Where the scene states no detection limit: a
+/// surface of 10 % at half of the largest range. Nowhere in air, which takes an unknown part.
+[[nodiscard]] CertainReturn certain_return_of(const Lidar& lidar, const Scene& scene);
+
+/// Decodes packets of one unit into sweeps.
+class SweepReader {
+public:
+    explicit SweepReader(const LidarModel& unit)
+        : unit_(unit), points_(unit.spec().points_per_packet), empty_(unit.spec().shots_per_packet) {}
+
+    /// Appends what a data packet states. `packet_after_ns`: time of the packet's first shot after the time of the
+    /// pose.
+    void append(std::span<const std::uint8_t> packet, std::int64_t packet_after_ns, LidarSweep& out);
+
+private:
+    const LidarModel& unit_;
+    std::vector<LidarPoint> points_;
+    std::vector<LidarAxis> empty_;
+};
 
 }  // namespace narpa

@@ -79,6 +79,12 @@ struct LidarPoint {
     [[nodiscard]] Vec3 position_m() const noexcept { return origin_m + range_m * direction; }
 };
 
+/// Where and when a shot was fired, as a reader of the packet computes it.
+struct LidarAxis {
+    Vec3 origin_m{}, direction{};  ///< direction is unit
+    std::int64_t t_offset_ns = 0;  ///< after the packet's start
+};
+
 /// What each pulse lights, evenly by solid angle, where that is more than the beam of one shot: a flash LiDAR's
 /// whole field, about its y axis, in its own frame.
 struct LidarField {
@@ -189,6 +195,12 @@ public:
     /// Decodes a data packet's returns in firing order and returns their number; 0 where it is no data packet of
     /// this unit. `out` has spec().points_per_packet elements.
     virtual std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept = 0;
+    /// Decodes the shots that the packet states to have no return, in firing order, and returns their number; 0
+    /// also where the format does not state them. `out` has spec().shots_per_packet elements.
+    virtual std::size_t empty_shots(std::span<const std::uint8_t> /*bytes*/,
+                                    std::span<LidarAxis> /*out*/) const noexcept {
+        return 0;
+    }
 
     /// What the unit states of itself beside its packets, as a file of the maker's: JSON. Empty: nothing. May
     /// allocate.

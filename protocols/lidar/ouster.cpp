@@ -178,6 +178,23 @@ public:
         return count;
     }
 
+    std::size_t empty_shots(std::span<const std::uint8_t> bytes, std::span<LidarAxis> out) const noexcept override {
+        if (!is_ours(bytes)) return 0;
+        const std::uint64_t start_ns = format_.column(bytes, 0).t_ns;
+        std::size_t count = 0;
+        for (int c = 0; c < kPacketColumns; ++c) {
+            const OusterColumn column = format_.column(bytes, c);
+            if (!format_.is_valid(column)) continue;
+            for (std::size_t beam = 0; beam < beams_.size(); ++beam) {
+                const OusterPixel pixel = format_.pixel(bytes, c, static_cast<int>(beam));
+                if (pixel.returns[0].range_mm != 0 || pixel.returns[1].range_mm != 0) continue;
+                const LidarShot shot = along(beam, column.measurement_id);
+                out[count++] = {shot.origin_m, shot.direction, static_cast<std::int64_t>(column.t_ns - start_ns)};
+            }
+        }
+        return count;
+    }
+
     std::string metadata() const override { return write_ouster_metadata(unit_); }
 
 private:

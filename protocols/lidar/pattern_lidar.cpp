@@ -107,16 +107,28 @@ public:
             if (r.range == 0) continue;
             LidarPoint& point = out[count++];
             point = {};
-            point.direction = direction(r.azimuth / PointRecord::kAngleSteps_per_rad,
-                                        r.elevation / PointRecord::kAngleSteps_per_rad);
+            point.direction = direction_of(r);
             point.range_m = 1e-6 * p->range_step_um * r.range;
-            point.t_offset_ns = r.t_offset_ns - into_frame_ns(place_of(*p), packets_, frame_ns_);
+            point.t_offset_ns = into_packet_ns(r, *p);
             point.intensity = r.reflectivity;
             point.beam = r.beam;
             point.shot = static_cast<int>(i / each);
             point.echo = static_cast<int>(i % each);
             if (r.velocity != PointRecord::kNoVelocity)
                 point.velocity_m_s = 1e-6 * p->velocity_step_um_s * r.velocity;
+        }
+        return count;
+    }
+
+    std::size_t empty_shots(std::span<const std::uint8_t> bytes, std::span<LidarAxis> out) const noexcept override {
+        const auto p = read(bytes);
+        if (!p) return 0;
+        std::size_t count = 0;
+        const std::size_t each = dual_ ? 2 : 1;
+        for (std::size_t i = 0; i < p->records; i += each) {
+            const PointRecord r = PointPacket::record(bytes, i);
+            if (r.range != 0 || PointPacket::record(bytes, i + each - 1).range != 0) continue;
+            out[count++] = {.direction = direction_of(r), .t_offset_ns = into_packet_ns(r, *p)};
         }
         return count;
     }
@@ -163,6 +175,14 @@ private:
     }
     [[nodiscard]] std::int64_t into_frame_ns(const PatternShot& s) const noexcept {
         return std::llround(s.phase * static_cast<double>(frame_ns_));
+    }
+
+    [[nodiscard]] std::int64_t into_packet_ns(const PointRecord& r, const PointPacket& p) const noexcept {
+        return r.t_offset_ns - into_frame_ns(place_of(p), packets_, frame_ns_);
+    }
+    [[nodiscard]] static Vec3 direction_of(const PointRecord& r) noexcept {
+        return direction(r.azimuth / PointRecord::kAngleSteps_per_rad,
+                         r.elevation / PointRecord::kAngleSteps_per_rad);
     }
 
     [[nodiscard]] PointRecord record(const PatternShot& s, const LidarEcho& echo) const noexcept {

@@ -215,25 +215,33 @@ public:
                 const VelodynePacket::Return& r = packet->blocks[block].returns[in_block];
                 if (r.range_2mm == 0) continue;
                 if (echo == 1 && r == packet->blocks[block - 1].returns[in_block]) continue;  // the same echo
+                const LidarAxis axis = axis_of(*packet, block, in_block);
                 const int laser = in_block % product_.lasers();
-                const std::int64_t into_block_ns = product_.shot_offset_ns(in_block);
-                const double gap_cdeg = azimuth_gap_cdeg(*packet, block, echoes);
-                const double azimuth_cdeg =
-                    packet->blocks[block].azimuth_cdeg +
-                    gap_cdeg * static_cast<double>(into_block_ns) / static_cast<double>(product_.block_period_ns());
-                const LidarBeam& beam = settings_.beams[laser];
                 LidarPoint& point = out[count];
                 point = {};
-                point.origin_m = {0, 0, beam.height_m};
-                point.direction = direction(azimuth_cdeg * 0.01 * kRadPerDeg + beam.azimuth_rad, laser);
-                point.range_m = r.range_2mm * kRangeQuantumM + beam.range_offset_m;
-                point.t_offset_ns = i / kShotsPerBlock * product_.block_period_ns() + into_block_ns;
+                point.origin_m = axis.origin_m;
+                point.direction = axis.direction;
+                point.range_m = r.range_2mm * kRangeQuantumM + settings_.beams[laser].range_offset_m;
+                point.t_offset_ns = axis.t_offset_ns;
                 point.intensity = r.reflectivity;
                 point.beam = laser;
                 point.shot = i;
                 point.echo = echo;
                 count += point.range_m > 0 ? 1 : 0;
             }
+        return count;
+    }
+
+    std::size_t empty_shots(std::span<const std::uint8_t> bytes, std::span<LidarAxis> out) const noexcept override {
+        const auto packet = read(bytes);
+        if (!packet) return 0;
+        std::size_t count = 0;
+        const int echoes = dual_ ? 2 : 1;
+        for (int block = 0; block < kBlocks; block += echoes)
+            for (int k = 0; k < kShotsPerBlock; ++k)
+                if (packet->blocks[block].returns[k].range_2mm == 0 &&
+                    packet->blocks[block + echoes - 1].returns[k].range_2mm == 0)
+                    out[count++] = axis_of(*packet, block, k);
         return count;
     }
 
@@ -290,6 +298,17 @@ private:
         const int from = block + step < kBlocks ? block : block - step;
         const int gap = p.blocks[from + step].azimuth_cdeg - p.blocks[from].azimuth_cdeg;
         return gap < 0 ? gap + VelodynePacket::kAzimuthTurn : gap;
+    }
+
+    [[nodiscard]] LidarAxis axis_of(const VelodynePacket& p, int block, int in_block) const noexcept {
+        const int echoes = dual_ ? 2 : 1, laser = in_block % product_.lasers();
+        const std::int64_t into_block_ns = product_.shot_offset_ns(in_block);
+        const double turned = static_cast<double>(into_block_ns) / static_cast<double>(product_.block_period_ns());
+        const double azimuth_cdeg = p.blocks[block].azimuth_cdeg + azimuth_gap_cdeg(p, block, echoes) * turned;
+        const LidarBeam& beam = settings_.beams[laser];
+        return {.origin_m = {0, 0, beam.height_m},
+                .direction = direction(azimuth_cdeg * 0.01 * kRadPerDeg + beam.azimuth_rad, laser),
+                .t_offset_ns = block / echoes * product_.block_period_ns() + into_block_ns};
     }
 
     /// (cos w sin a, cos w cos a, sin w)

@@ -63,13 +63,13 @@ void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<cons
          estimator.measure(bytes, t_ns, p.t_s, p.q_world_chaser, p.T_chaser_target, p.motion), frames_);
 }
 
-void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points) {
+void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, LidarSweep sweep) {
     const Prediction p = predict(t_ns);
     LidarPoseEstimator& estimator = lidars_[lidar];
-    std::vector<RangePoint> believed(points.begin(), points.end());
-    for (RangePoint& point : believed) point.range_m += scenario_.model_error.error.range_bias_m;
+    for (RangePoint& point : sweep.points) point.range_m += scenario_.model_error.error.range_bias_m;
     take(estimator.lidar().name, t_ns,
-         estimator.measure(believed, t_ns, p.motion, p.T_chaser_target, p.position_sigma_m, p.rotation_sigma_rad),
+         estimator.measure(std::move(sweep), t_ns, p.motion, p.T_chaser_target, p.position_sigma_m,
+                           p.rotation_sigma_rad),
          sweeps_);
 }
 

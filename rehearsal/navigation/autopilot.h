@@ -62,7 +62,7 @@ public:
     /// `camera`, `lidar`: indices in the scenario's lists. A frame: its bytes and mid-exposure. Returns of a turn:
     /// their times count from t_ns, its end.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
-    void take_sweep(std::size_t lidar, std::int64_t t_ns, std::span<const RangePoint> points);
+    void take_sweep(std::size_t lidar, std::int64_t t_ns, LidarSweep sweep);
     /// A shot that a LiDAR reports on CAN; nothing where the scenario does not navigate by it, or it met nothing
     /// near the target.
     void take_beam(const LidarBeamReport& report);

@@ -104,15 +104,15 @@ private:
             take_packet(input, n);
         }
         if (!input.buffer.complete_to(t_ns)) ++loop_.counts.turns_incomplete;
-        input.buffer.turn(t_ns, points_);
-        if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
+        input.buffer.turn(t_ns, sweep_);
+        if (!sweep_.points.empty()) loop_.autopilot.take_sweep(i, t_ns, sweep_);
     }
 
     const Loop& loop_;
     std::vector<std::optional<Frame>> newest_;
     std::vector<std::uint8_t> buffer_;
     std::vector<std::uint8_t> packet_ = std::vector<std::uint8_t>(kDatagramBytesMax);
-    std::vector<RangePoint> points_;
+    LidarSweep sweep_;
 };
 
 }  // namespace

@@ -67,45 +67,56 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     return out;
 }
 
-/// Drops returns from the chaser itself.
-void LidarPoseEstimator::remove_own_body(std::span<const RangePoint> points) {
+/// Drops the beams that meet the chaser itself.
+void LidarPoseEstimator::remove_own_body(LidarSweep& sweep) const {
     BodyPoses at(model_->scene().bodies.size());
     const auto own = static_cast<std::uint32_t>(model_->chaser());
     constexpr int kRim = 6;
     const double tangent = std::tan(0.55 * lidar_.receiver.beam_divergence_rad);  // a tenth more than the beam
-    points_.clear();
-    RayBatch rays;
-    HitBatch hits;
-    for (std::size_t i = 0; i < points.size(); i += kLanes) {
-        rays.n = std::min<std::size_t>(kLanes, points.size() - i);
-        std::uint32_t met = 0;
-        for (int rim = 0; rim <= (tangent > 0 ? kRim : 0); ++rim) {  // the axis, then the rim of the beam
-            for (std::size_t k = 0; k < rays.n; ++k) {
-                const Vec3 d = points[i + k].direction, x = normalized(cross(d, Vec3{0, 0, 1})), y = cross(d, x);
-                const double turn = 2 * kDegree * 180 * rim / kRim, r = rim == 0 ? 0 : tangent;
-                const Vec3 ray = normalized(d + r * (std::cos(turn) * x + std::sin(turn) * y));
-                rays.put(k, {lidar_.T_mount_lidar * points[i + k].origin_m, lidar_.T_mount_lidar.q * ray});
+    const auto remove = [&](auto& beams) {
+        RayBatch rays;
+        HitBatch hits;
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < beams.size(); i += kLanes) {
+            rays.n = std::min<std::size_t>(kLanes, beams.size() - i);
+            std::uint32_t met = 0;
+            for (int rim = 0; rim <= (tangent > 0 ? kRim : 0); ++rim) {  // the axis, then the rim of the beam
+                for (std::size_t k = 0; k < rays.n; ++k) {
+                    const Vec3 d = beams[i + k].direction, x = normalized(cross(d, Vec3{0, 0, 1})), y = cross(d, x);
+                    const double turn = 2 * kDegree * 180 * rim / kRim, r = rim == 0 ? 0 : tangent;
+                    const Vec3 ray = normalized(d + r * (std::cos(turn) * x + std::sin(turn) * y));
+                    rays.put(k, {lidar_.T_mount_lidar * beams[i + k].origin_m, lidar_.T_mount_lidar.q * ray});
+                }
+                model_->tracer().intersect(at, rays, {&own, 1}, hits);
+                met |= hits.met;
             }
-            model_->tracer().intersect(at, rays, {&own, 1}, hits);
-            met |= hits.met;
+            for (std::size_t k = 0; k < rays.n; ++k)
+                if (!is_set(met, k)) beams[kept++] = beams[i + k];
         }
-        for (std::size_t k = 0; k < rays.n; ++k)
-            if (!(met >> k & 1)) points_.push_back(points[i + k]);
-    }
+        beams.resize(kept);
+    };
+    remove(sweep.points);
+    remove(sweep.empty);
 }
 
-MeasurementResult LidarPoseEstimator::measure(std::span<const RangePoint> points, std::int64_t t_ns,
-                                              const ApparentMotion& motion, const Rigid3& T_chaser_target,
-                                              double position_sigma_m, double rotation_sigma_rad) {
+MeasurementResult LidarPoseEstimator::measure(LidarSweep sweep, std::int64_t t_ns, const ApparentMotion& motion,
+                                              const Rigid3& T_chaser_target, double position_sigma_m,
+                                              double rotation_sigma_rad) {
     const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
-    remove_own_body(points);
     const Quat q_lidar_chaser = conjugate(lidar_.T_mount_lidar.q);
     const ApparentMotion in_lidar = rotated(q_lidar_chaser, motion);
+    const Rigid3 guess = inverse(lidar_.T_mount_lidar) * T_chaser_target;
     const double reach_m = model_->tracer().bounding_radius_m(model_->target());
     const double off_m = kSearchSigmas * (position_sigma_m + rotation_sigma_rad * reach_m);
-    const auto e =
-        icp_.align(points_, in_lidar, inverse(lidar_.T_mount_lidar) * T_chaser_target, off_m > kNear_m ? off_m : 0);
+    // Of the beams without return most pass the target far off.
+    std::erase_if(sweep.empty, [&](const EmptyBeam& b) {
+        const Vec3 to_target = guess.t + b.t_s * in_lidar.velocity_m_s - b.origin_m;
+        const double along = dot(to_target, b.direction);
+        return along < 0 || dot(to_target, to_target) - along * along > std::pow(reach_m + off_m, 2);
+    });
+    remove_own_body(sweep);
+    const auto e = icp_.align(sweep.points, in_lidar, guess, off_m > kNear_m ? off_m : 0, sweep.empty);
     out.ms = seconds_since(start_ns) * 1e3;
     if (!e) {
         out.why = e.error().what;

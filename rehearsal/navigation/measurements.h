@@ -49,22 +49,24 @@ public:
     LidarPoseEstimator(SceneModel& model, std::size_t lidar)
         : model_(&model),
           lidar_(model.scene().lidars[lidar]),
-          icp_(model.tracer(), model.target(), {.noise = range_noise_of(lidar_), .model = model.uncertainty()}) {}
+          icp_(model.tracer(), model.target(),
+               {.noise = range_noise_of(lidar_),
+                .certain = certain_return_of(lidar_, model.scene()),
+                .model = model.uncertainty()}) {}
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
-    /// Returns of a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
+    /// `sweep`: a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
     /// `position_sigma_m`, `rotation_sigma_rad`: standard deviations of `T_chaser_target`.
-    [[nodiscard]] MeasurementResult measure(std::span<const RangePoint> points, std::int64_t t_ns,
-                                            const ApparentMotion& motion, const Rigid3& T_chaser_target,
-                                            double position_sigma_m, double rotation_sigma_rad);
+    [[nodiscard]] MeasurementResult measure(LidarSweep sweep, std::int64_t t_ns, const ApparentMotion& motion,
+                                            const Rigid3& T_chaser_target, double position_sigma_m,
+                                            double rotation_sigma_rad);
 
 private:
-    void remove_own_body(std::span<const RangePoint> points);
+    void remove_own_body(LidarSweep& sweep) const;
 
     SceneModel* model_;
     Lidar lidar_;
     CloudIcp icp_;
-    std::vector<RangePoint> points_;
 };
 
 }  // namespace narpa::rehearsal

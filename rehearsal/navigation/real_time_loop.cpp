@@ -84,8 +84,8 @@ public:
         }
         return std::nullopt;
     }
-    /// Points of the turn that ends at t_ns; false: its last packet has not come.
-    [[nodiscard]] bool turn(std::size_t i, std::int64_t t_ns, std::vector<RangePoint>& out) {
+    /// The turn that ends at t_ns; false: its last packet has not come.
+    [[nodiscard]] bool turn(std::size_t i, std::int64_t t_ns, LidarSweep& out) {
         const std::lock_guard lock(mutex_);
         const SweepBuffer& buffer = inputs_.lidars[i].buffer;
         buffer.turn(t_ns, out);
@@ -273,8 +273,8 @@ private:
 
     void measure_at(std::int64_t t_ns) {
         for (std::size_t i = 0; i < loop_.inputs.lidars.size(); ++i) {
-            if (!receiver_.turn(i, t_ns, points_)) ++loop_.counts.turns_incomplete;
-            if (!points_.empty()) loop_.autopilot.take_sweep(i, t_ns, points_);
+            if (!receiver_.turn(i, t_ns, sweep_)) ++loop_.counts.turns_incomplete;
+            if (!sweep_.points.empty()) loop_.autopilot.take_sweep(i, t_ns, sweep_);
         }
         for (std::size_t i = 0; i < loop_.inputs.cameras.size(); ++i) {
             const auto frame = receiver_.newest_frame(i, t_ns);
@@ -293,7 +293,7 @@ private:
     std::condition_variable changed_;
     std::int64_t t_attitude_ns_ = std::numeric_limits<std::int64_t>::min();
     bool over_ = false;
-    std::vector<RangePoint> points_;
+    LidarSweep sweep_;
 };
 
 }  // namespace

@@ -41,12 +41,11 @@ bool SweepBuffer::complete_to(std::int64_t t_ns) const noexcept {
     return !packets_.empty() && packets_.back().t_ns + 2 * period_ns_ > t_ns;
 }
 
-void SweepBuffer::turn(std::int64_t t_ns, std::vector<RangePoint>& out) const {
+void SweepBuffer::turn(std::int64_t t_ns, LidarSweep& out) const {
     out.clear();
-    std::vector<LidarPoint> decoded(model_->spec().points_per_packet);
+    SweepReader reader(*model_);
     for (const Packet& p : packets_)
-        if (p.t_ns >= t_ns - turn_ns_ && p.t_ns + period_ns_ <= t_ns)
-            append_points(std::span(decoded).first(model_->points(p.bytes, decoded)), p.t_ns - t_ns, out);
+        if (p.t_ns >= t_ns - turn_ns_ && p.t_ns + period_ns_ <= t_ns) reader.append(p.bytes, p.t_ns - t_ns, out);
 }
 
 namespace {

@@ -28,8 +28,8 @@ public:
     bool take(std::span<const std::uint8_t> bytes, std::int64_t reference_ns);
     /// No packet that is complete by t_ns is missing at the end.
     [[nodiscard]] bool complete_to(std::int64_t t_ns) const noexcept;
-    /// Returns of the turn that ends at t_ns, of complete packets in the order of arrival; times count from t_ns.
-    void turn(std::int64_t t_ns, std::vector<RangePoint>& out) const;
+    /// The turn that ends at t_ns, of complete packets in the order of arrival; times count from t_ns.
+    void turn(std::int64_t t_ns, LidarSweep& out) const;
 
     [[nodiscard]] std::uint64_t received() const noexcept { return received_; }
     [[nodiscard]] std::uint64_t bad() const noexcept { return bad_; }

@@ -54,10 +54,23 @@ TEST(Honesty, LidarTrialsThatLied) {
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
+/// A craft is taken for the same one with details, whose pose it has: beams without return pass through the
+/// details.
+TEST(Honesty, LidarTellsACraftFromOneWithDetails) {
+    HonestyOptions o;
+    o.methods = {"icp"};
+    o.trials = 1;
+    const auto rows = run(o, 28449);
+    ASSERT_EQ(rows.size(), 1u);
+    EXPECT_EQ(rows.front().target + " " + rows.front().condition, "detailed wrong");
+    EXPECT_EQ(rows.front().answers[static_cast<std::size_t>(AnswerKind::refused)], 1);
+}
+
 TEST(Honesty, FewTrialsOfEach) {
     HonestyOptions o;
     o.conditions = {"plain", "dark", "beside", "far", "wrong"};
-    for (const auto& [method, trials] : {std::pair{"points", 500}, {"icp", 200}, {"features", 8}, {"dense", 8}}) {
+    for (const auto& [method, trials] :
+         {std::pair{"points", 500}, {"icp", 200}, {"icp-search", 12}, {"features", 8}, {"dense", 8}}) {
         o.methods = {method};
         o.trials = trials;
         int good = 0;

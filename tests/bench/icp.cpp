@@ -43,15 +43,16 @@ TEST(SweepPoints, OfEmulatedPacketsLieOnTheStation) {
                                 1e3 * Vec3{per_ms[0], per_ms[1], per_ms[2]}};
 
     const LidarModel& model = *unit.lidar().model;
-    std::vector<RangePoint> points;
-    std::vector<LidarPoint> decoded(model.spec().points_per_packet);
+    LidarSweep sweep;
+    SweepReader reader(model);
     const std::int64_t period_ns = unit.packet_period_ns();
     for (std::int64_t packet = turn_ns / 2 / period_ns; packet < 3 * turn_ns / 2 / period_ns; ++packet) {
         unit.fire(packet);
         ASSERT_TRUE(model.packet_time(unit.bytes(), 0));
-        append_points(std::span(decoded).first(model.points(unit.bytes(), decoded)),
-                      unit.packet_start_ns(packet) - turn_ns, points);
+        reader.append(unit.bytes(), unit.packet_start_ns(packet) - turn_ns, sweep);
     }
+    std::vector<RangePoint>& points = sweep.points;
+    EXPECT_GT(sweep.empty.size(), points.size());
     std::erase_if(points, [](const RangePoint& p) { return p.range_m < 10; });  // the chaser's own nose
     ASSERT_GT(points.size(), 500u);
 

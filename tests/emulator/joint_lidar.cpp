@@ -153,8 +153,10 @@ TEST_F(JointLidar, PacketsOfALockstepRunDecodeToTheGeometry) {
     for (const auto& bytes : *datagrams) EXPECT_TRUE(buffer.take(bytes, 0));
     EXPECT_FALSE(buffer.take(std::vector<std::uint8_t>(1206), 0));
     EXPECT_TRUE(buffer.complete_to(1'500'000'000));
-    std::vector<RangePoint> points;
-    buffer.turn(1'500'000'000, points);
+    LidarSweep sweep;
+    buffer.turn(1'500'000'000, sweep);
+    const std::vector<RangePoint>& points = sweep.points;
+    EXPECT_TRUE(sweep.empty.empty()) << "this format does not state them";
     ASSERT_EQ(points.size(), static_cast<std::size_t>(Fan8::kShots));
     EXPECT_EQ(points.front().t_s, -0.5);
     EXPECT_EQ(points.back().t_s, -0.02);

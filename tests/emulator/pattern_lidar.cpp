@@ -189,6 +189,15 @@ TEST_F(PatternLidars, StatesTwoEchoesOfAShot) {
     EXPECT_EQ(points[0].shot, 1);
     EXPECT_EQ(points[1].echo, 1);
     EXPECT_EQ(points[2].shot, 3);
+    std::vector<LidarShot> shots(echoes.size());
+    model.shots(7, shots);
+    std::vector<LidarAxis> empty(echoes.size());
+    ASSERT_EQ(model.empty_shots(bytes, empty), echoes.size() - 2);
+    EXPECT_NEAR(dot(empty[0].direction, shots[0].direction), 1, 1e-12);
+    EXPECT_NEAR(dot(empty[1].direction, shots[2].direction), 1, 1e-12);
+    EXPECT_EQ(empty[1].t_offset_ns, shots[2].t_offset_ns);
+    bytes.pop_back();
+    EXPECT_EQ(model.empty_shots(bytes, empty), 0U);
 }
 
 TEST_F(PatternLidars, RefusesPacketsThatAreNotItsOwnOrChanged) {

@@ -155,6 +155,17 @@ TEST_P(Os1Profiles, RangesBeyondTheFieldAreNone) {
     ASSERT_EQ(unit->points(bytes, points), 1u);
     EXPECT_NEAR(points[0].range_m, most_m, 1e-9);
     EXPECT_EQ(points[0].intensity, 255);
+
+    std::vector<LidarShot> shots(echoes.size());
+    unit->shots(0, shots);
+    std::vector<LidarAxis> empty(echoes.size());
+    ASSERT_EQ(unit->empty_shots(bytes, empty), echoes.size() - 1);
+    for (std::size_t i = 1; i < shots.size(); ++i) {
+        EXPECT_EQ(empty[i - 1].origin_m, shots[i].origin_m);
+        EXPECT_EQ(empty[i - 1].direction, shots[i].direction);
+        EXPECT_NEAR(static_cast<double>(empty[i - 1].t_offset_ns), static_cast<double>(shots[i].t_offset_ns), 1);
+    }
+    EXPECT_EQ(unit->empty_shots({}, empty), 0u);
 }
 
 /// Single bytes and whole stretches are changed: what is no packet of the unit is refused, and what is taken is

@@ -78,9 +78,10 @@ TEST(LidarPoseEstimator, MeasuresThePoseWhileTheChaserMoves) {
     SweepBuffer buffer(estimator.lidar(), epoch);
     for (const auto& bytes : turn(*stage().model, plant, epoch)) ASSERT_TRUE(buffer.take(bytes, 10'000'000'000));
     const auto t_ns = std::llround(1e9 * plant.t_s);
-    std::vector<RangePoint> points;
-    buffer.turn(t_ns, points);
-    ASSERT_GT(points.size(), 500u);
+    LidarSweep sweep;
+    buffer.turn(t_ns, sweep);
+    ASSERT_GT(sweep.points.size(), 500u);
+    ASSERT_GT(sweep.empty.size(), 10'000u);
 
     // As the chaser sees the target move.
     const Rigid3 truth = chaser_target(plant);
@@ -88,14 +89,14 @@ TEST(LidarPoseEstimator, MeasuresThePoseWhileTheChaserMoves) {
     later.step({}, {}, 1e-3);
     const Vector6 rate = error_between(truth, chaser_target(later)) / 1e-3;
     const ApparentMotion motion{to_vec3(rate.tail<3>()), to_vec3(rate.head<3>())};
-    const MeasurementResult s = estimator.measure(points, t_ns, motion, beside(truth), 0.1, 0.2 * kRadPerDeg);
+    const MeasurementResult s = estimator.measure(sweep, t_ns, motion, beside(truth), 0.1, 0.2 * kRadPerDeg);
     ASSERT_TRUE(s.pose) << s.why;
     const Vector6 error = error_between(s.pose->T_sensor_target, inverse(s.pose->T_chaser_sensor) * truth);
     EXPECT_LT(error.head<3>().norm(), 0.02 * kRadPerDeg);
     EXPECT_LT(error.tail<3>().norm(), 3e-3);
     EXPECT_LT(normalised_error_squared(error, s.pose->covariance), 22.5);
     // Without motion correction the turn does not fit the model, and the reason is given.
-    const MeasurementResult still = estimator.measure(points, t_ns, {}, beside(truth), 0.1, 0.2 * kRadPerDeg);
+    const MeasurementResult still = estimator.measure(sweep, t_ns, {}, beside(truth), 0.1, 0.2 * kRadPerDeg);
     EXPECT_FALSE(still.pose);
     EXPECT_NE(still.why.find("points lie on the model"), std::string::npos) << still.why;
 }

@@ -201,8 +201,9 @@ TEST(SweepBuffer, HasTheLastTurnEvenAcrossTheHour) {
     ASSERT_TRUE(buffer.take(packet(last, epoch), t_ns));
     EXPECT_TRUE(buffer.complete_to(t_ns));
     ASSERT_TRUE(buffer.take(packet(last + 1, epoch), t_ns));  // not over at t
-    std::vector<RangePoint> points;
-    buffer.turn(t_ns, points);
+    LidarSweep sweep;
+    buffer.turn(t_ns, sweep);
+    const std::vector<RangePoint>& points = sweep.points;
     ASSERT_FALSE(points.empty());
     EXPECT_EQ(points.size() % shots, 0u);
     EXPECT_NEAR(static_cast<double>(points.size()) / static_cast<double>(shots),

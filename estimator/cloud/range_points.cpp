@@ -1,0 +1,46 @@
+#include "estimator/cloud/range_points.h"
+
+#include <cmath>
+
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// Of the mean of a few rays over a beam: the distance of their centre from the axis, on each of two axes, in parts
+/// of the beam's angle. Eight rays; 32 have 0.006.
+constexpr double kFootprintCentre = 0.02;
+
+RangeNoise range_noise_of(const Lidar& lidar) {
+    RangeNoise noise;
+    const LidarReceiverModel& r = lidar.receiver;
+    const double modelled_m = std::hypot(r.range_noise_m, r.range_noise_at_limit_m);
+    if (modelled_m > 0)
+        noise.range_m = std::hypot(modelled_m, lidar.model->spec().range_resolution_m / std::sqrt(12.0));
+    noise.footprint_rad = r.beam_divergence_rad;
+    noise.pointing_rad = std::hypot(noise.pointing_rad, kFootprintCentre * r.beam_divergence_rad);
+    return noise;
+}
+
+CertainReturn certain_return_of(const Lidar& lidar, const Scene& scene) {
+    if (scene.atmosphere) return {};
+    /// The materials are right to this factor; echoes are above the limit by so many standard deviations.
+    constexpr double kMaterials = 3, kSigmas = 4;
+    const LidarReceiverModel& r = lidar.receiver;
+    const bool stated = r.range_at_10_percent_m > 0;
+    const double detected = 0.1 / std::pow(stated ? r.range_at_10_percent_m : 0.5 * lidar.range_max_m, 2);
+    const double noise = std::sqrt(1 + r.sunlight_noise);  // of a white surface that faces the Sun
+    const double margin = r.detection_snr > 0 ? 1 + kSigmas / r.detection_snr : 1;
+    return {r.range_min_m, lidar.range_max_m, kMaterials * noise * margin * detected};
+}
+
+void SweepReader::append(std::span<const std::uint8_t> packet, std::int64_t packet_after_ns, LidarSweep& out) {
+    const auto after_s = [&](std::int64_t t_offset_ns) {
+        return 1e-9 * static_cast<double>(packet_after_ns + t_offset_ns);
+    };
+    for (const LidarPoint& p : std::span(points_).first(unit_.points(packet, points_)))
+        out.points.push_back({p.origin_m, p.direction, p.range_m, after_s(p.t_offset_ns)});
+    for (const LidarAxis& a : std::span(empty_).first(unit_.empty_shots(packet, empty_)))
+        out.empty.push_back({a.origin_m, a.direction, after_s(a.t_offset_ns)});
+}
+
+}  // namespace narpa

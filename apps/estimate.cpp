@@ -311,6 +311,8 @@ Outcome estimate(EstimateOptions o) {
     for (const std::string& file : {o.csv, o.picture})
         if (auto made = make_folder_of(file); !made) return made.error();
     if (of_log) return estimate_log(o, *tracker);
+    if (tracker->range_guess_m > 0 && !o.sweep.empty())
+        return Error{"a range is guessed for frames, not for a sweep, which measures it"};
     if (o.frame.empty() && o.sweep.empty() && !find_file(FileKind::scene, o.input))
         return Error{
             "no such folder, expected that of a logged run or rehearsal, or a scene with --frame FILE.raw or "

@@ -108,7 +108,8 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
         .type_name("DEG,PERCENT|search")
         .shows_default();
     app.option(dashes + "range-guess", tracker.range_guess_m,
-               "For a start by search: range, known to 30 % (default: the truth, off by up to 30 % at random)")
+               "For a start by search in frames: range, known to 30 % (default: the truth, off by up to 30 % at "
+               "random)")
         .type_name("METRES")
         .range(1e-3, 1e9)
         .finite();

@@ -14,6 +14,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <string_view>
 
 #include "drivers/descriptor.h"
 #include "drivers/write_queue.h"
@@ -210,7 +211,11 @@ Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string&
     std::array<char, PCAP_ERRBUF_SIZE> why{};
     const std::unique_ptr<pcap_t, void (*)(pcap_t*)> file(::pcap_open_offline(path.c_str(), why.data()),
                                                           ::pcap_close);
-    if (!file) return Error{std::string(why.data()) + "; expected a capture (pcap)", path};
+    if (!file) {
+        std::string_view reason = why.data();
+        if (reason.starts_with(path + ": ")) reason.remove_prefix(path.size() + 2);
+        return Error{std::string(reason) + "; expected a capture (pcap)", path};
+    }
     if (::pcap_datalink(file.get()) != DLT_EN10MB) return Error{"not captured from Ethernet, expected that", path};
     std::vector<std::vector<std::uint8_t>> payloads;
     pcap_pkthdr* header = nullptr;

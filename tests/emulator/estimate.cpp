@@ -261,7 +261,8 @@ TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     refuses(scene + " --frame x --target moon", "expected one of: station, chaser");
     refuses(scene + " --frame x --start 5", "expected DEG,PERCENT");
     refuses(scene + " --frame x --range-guess 20", "start by search");
-    refuses(scene + " --sweep x --start search", "not with a sweep");
+    refuses(scene + " --sweep none.pcap --start search", "none.pcap: No such file");
+    refuses(scene + " --sweep x --start search --range-guess 20", "not for a sweep");
     refuses(folder_ / "nowhere", "nowhere");
 }
 

@@ -151,53 +151,53 @@ public:
     }
 
     std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept override {
-        if (!is_ours(bytes)) return 0;
-        const std::uint64_t start_ns = format_.column(bytes, 0).t_ns;
         std::size_t count = 0;
-        for (int c = 0; c < kPacketColumns; ++c) {
-            const OusterColumn column = format_.column(bytes, c);
-            if (!format_.is_valid(column)) continue;
-            for (std::size_t beam = 0; beam < beams_.size(); ++beam) {
-                const OusterPixel pixel = format_.pixel(bytes, c, static_cast<int>(beam));
-                const LidarShot shot = along(beam, column.measurement_id);
-                for (int echo = 0; echo < 2; ++echo) {
-                    const OusterReturn& r = pixel.returns[static_cast<std::size_t>(echo)];
-                    const double range_m = 1e-3 * r.range_mm - origin_to_beam_m();
-                    if (r.range_mm == 0 || !(range_m > 0)) continue;
-                    out[count++] = {.origin_m = shot.origin_m,
-                                    .direction = shot.direction,
-                                    .range_m = range_m,
-                                    .t_offset_ns = static_cast<std::int64_t>(column.t_ns - start_ns),
-                                    .intensity = r.reflectivity,
-                                    .beam = static_cast<int>(beam),
-                                    .shot = c * static_cast<int>(beams_.size()) + static_cast<int>(beam),
-                                    .echo = echo};
-                }
+        each_pixel(bytes, [&](int shot_number, std::size_t beam, const OusterPixel& pixel, const LidarAxis& axis) {
+            for (int echo = 0; echo < 2; ++echo) {
+                const OusterReturn& r = pixel.returns[static_cast<std::size_t>(echo)];
+                const double range_m = 1e-3 * r.range_mm - origin_to_beam_m();
+                if (r.range_mm == 0 || !(range_m > 0)) continue;
+                out[count++] = {.origin_m = axis.origin_m,
+                                .direction = axis.direction,
+                                .range_m = range_m,
+                                .t_offset_ns = axis.t_offset_ns,
+                                .intensity = r.reflectivity,
+                                .beam = static_cast<int>(beam),
+                                .shot = shot_number,
+                                .echo = echo};
             }
-        }
+        });
         return count;
     }
 
     std::size_t empty_shots(std::span<const std::uint8_t> bytes, std::span<LidarAxis> out) const noexcept override {
-        if (!is_ours(bytes)) return 0;
-        const std::uint64_t start_ns = format_.column(bytes, 0).t_ns;
         std::size_t count = 0;
-        for (int c = 0; c < kPacketColumns; ++c) {
-            const OusterColumn column = format_.column(bytes, c);
-            if (!format_.is_valid(column)) continue;
-            for (std::size_t beam = 0; beam < beams_.size(); ++beam) {
-                const OusterPixel pixel = format_.pixel(bytes, c, static_cast<int>(beam));
-                if (pixel.returns[0].range_mm != 0 || pixel.returns[1].range_mm != 0) continue;
-                const LidarShot shot = along(beam, column.measurement_id);
-                out[count++] = {shot.origin_m, shot.direction, static_cast<std::int64_t>(column.t_ns - start_ns)};
-            }
-        }
+        each_pixel(bytes, [&](int, std::size_t, const OusterPixel& pixel, const LidarAxis& axis) {
+            if (pixel.returns[0].range_mm == 0 && pixel.returns[1].range_mm == 0) out[count++] = axis;
+        });
         return count;
     }
 
     std::string metadata() const override { return write_ouster_metadata(unit_); }
 
 private:
+    /// Calls use(shot's number, beam, pixel, axis) for the shots of the packet's valid columns, in firing order.
+    template <class Use>
+    void each_pixel(std::span<const std::uint8_t> bytes, const Use& use) const noexcept {
+        if (!is_ours(bytes)) return;
+        const std::uint64_t start_ns = format_.column(bytes, 0).t_ns;
+        for (int c = 0; c < kPacketColumns; ++c) {
+            const OusterColumn column = format_.column(bytes, c);
+            if (!format_.is_valid(column)) continue;
+            for (std::size_t beam = 0; beam < beams_.size(); ++beam) {
+                const LidarShot shot = along(beam, column.measurement_id);
+                use(c * static_cast<int>(beams_.size()) + static_cast<int>(beam), beam,
+                    format_.pixel(bytes, c, static_cast<int>(beam)),
+                    LidarAxis{shot.origin_m, shot.direction, static_cast<std::int64_t>(column.t_ns - start_ns)});
+            }
+        }
+    }
+
     struct Beam {
         double azimuth_rad, elevation_rad;  ///< counter-clockwise
         double horizontal, vertical;        ///< cosine and sine of the elevation

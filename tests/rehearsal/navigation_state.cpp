@@ -121,6 +121,23 @@ TEST(StateEstimator, ComputesTheMotionDuringASweep) {
     EXPECT_GT(norm(state.velocity_m_s), 0.3);
 }
 
+/// However many measurements there are, what they have in common stays.
+TEST(StateEstimator, ReportsTheErrorsOfTheModelThatTheNewestMeasurementHas) {
+    Estimated e;
+    TargetMeasurement seen;
+    seen.T_chaser_sensor = {exp_rotation({0, 0, 0.5 * kPi}), {0.5, 0, 0}};
+    seen.T_sensor_target = inverse(seen.T_chaser_sensor) * chaser_target(e.plant);
+    seen.covariance = 1e-6 * Matrix6::Identity();
+    EXPECT_EQ(e.estimator->take(seen).outcome, UpdateOutcome::taken);
+    const Matrix6 without = e.estimator->estimate().covariance;
+    seen.covariance_of_model.diagonal() << 1e-4, 0, 0, 0, 4e-2, 0;  // sensor axes: x is the chaser's y, y its -x
+    EXPECT_EQ(e.estimator->take(seen).outcome, UpdateOutcome::taken);
+    const Vector6 more = (e.estimator->estimate().covariance - without).diagonal();
+    EXPECT_NEAR(more[1], 1e-4, 2e-6);
+    EXPECT_NEAR(more[3], 4e-2, 1e-4);
+    EXPECT_LT(std::abs(more[0]) + std::abs(more[4]), 1e-4);
+}
+
 TEST(StateEstimator, RestartsAfterRepeatedContradictions) {
     Estimated e;
     TargetMeasurement seen;

@@ -54,6 +54,8 @@ public:
                                         std::span<const std::uint8_t> chosen = {});
 
 private:
+    /// The camera's, with `fineness` rows for each of its own.
+    [[nodiscard]] CameraPose path(const Rigid3& T_camera_target, const RowTimes& times, int fineness) const;
     /// Calls act(square, each) for squares of the image; each(derivative) adds derivative(column, row, view of the
     /// row), times `weight`, for the square's chosen pixels.
     template <class Do>

@@ -60,9 +60,14 @@ void without_mosaic(MeasuredImage& image) {
 
 }  // namespace
 
-double SensorModel::dn(const Rgb& L) const {
-    return std::min(top_dn,
-                    black_dn + dn_per_radiance[0] * L.x + dn_per_radiance[1] * L.y + dn_per_radiance[2] * L.z);
+double SensorModel::signal(const Rgb& radiance) const {
+    const auto& k = dn_per_radiance;
+    const Vec3 L = vec_cast<double>(radiance);
+    return k[0] * L.x + k[1] * L.y + k[2] * L.z;
+}
+
+double SensorModel::dn(const Rgb& radiance) const {
+    return std::min(top_dn, black_dn + signal(radiance));
 }
 
 double SensorModel::variance_dn2(double expected_dn) const {

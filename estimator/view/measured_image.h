@@ -39,7 +39,8 @@ struct SensorModel {
     double prnu2 = 0;                         ///< variance per square of the DN above black
     double rounding_dn2 = 0;                  ///< variance of rounding to the format's step: step^2 / 12
 
-    [[nodiscard]] double dn(const Rgb& radiance) const;  ///< expected, at most top_dn
+    [[nodiscard]] double signal(const Rgb& radiance) const;  ///< expected DN above black, not clipped
+    [[nodiscard]] double dn(const Rgb& radiance) const;      ///< expected, at most top_dn
     [[nodiscard]] double variance_dn2(double expected_dn) const;
 };
 

@@ -1,5 +1,7 @@
 #include "estimator/dense/border_points.h"
 
+#include <cmath>
+
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
 
@@ -19,10 +21,6 @@ FrameSettings one_ray(FrameSettings settings) {
 }
 
 }  // namespace
-
-Ray ray_through(const Frame& f, double x, double y) {
-    return camera_ray(f.model, f.pose.at(f.pose.time(y, f.camera.height, 0.5)), x, y);
-}
 
 FineGrid::FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& pixels,
                    const CameraPose& path, const FrameSettings& for_all, int factor)
@@ -70,20 +68,64 @@ void PointTracer::trace() {
     n_ = 0;
 }
 
-void BorderPoints::trace(PointTracer& tracer, int width, std::span<const std::uint8_t> chosen) {
+void BorderPoints::trace(const FineGrid& grid, PointTracer& tracer, int width,
+                         std::span<const std::uint8_t> chosen) {
     const auto is_chosen = [&](int c, int r) {
         return c >= 0 && r >= 0 && c < square_.columns && r < square_.rows &&
                chosen[index_in(width, square_.x + c, square_.y + r)] != 0;
     };
+    // A point is one of those pixels' whose borders it or its neighbours are on.
+    const auto serves = [&](int k, auto&& on_border_of) {
+        return on_border_of((k + n_) / n_ - 1) || on_border_of((k - 1 + n_) / n_ - 1) ||
+               on_border_of((k + 1 + n_) / n_ - 1);
+    };
+    const int x = square_.x * n_, y = square_.y * n_;
+    for (int c = 0; c <= square_.columns; ++c)
+        for (int k = -1; k <= left_.n; ++k)
+            if (serves(k, [&](int r) { return is_chosen(c - 1, r) || is_chosen(c, r); }))
+                tracer.put(x + c * n_ - 0.5, y + k, left_.at(c, k));
     for (int r = 0; r <= square_.rows; ++r)
-        for (int c = 0; c <= square_.columns; ++c) {
-            const int x = (square_.x + c) * n_, y = (square_.y + r) * n_;
-            if (is_chosen(c, r - 1) || is_chosen(c, r))
-                for (int i = 0; i < n_; ++i) tracer.put(x + i, y - 0.5, upper_[index(c, r, i)]);
-            if (is_chosen(c - 1, r) || is_chosen(c, r))
-                for (int i = 0; i < n_; ++i) tracer.put(x - 0.5, y + i, left_[index(c, r, i)]);
-        }
+        for (int k = -1; k <= upper_.n; ++k)
+            if (serves(k, [&](int c) { return is_chosen(c, r - 1) || is_chosen(c, r); }))
+                tracer.put(x + k, y + r * n_ - 0.5, upper_.at(r, k));
     tracer.trace();
+    find_shifts(grid);
+}
+
+void BorderPoints::find_shifts(const FineGrid& grid) {
+    std::vector<Contour> contours;
+    std::vector<Step> steps;
+    const auto look = [&](Lines& lines, int line, int k, double x, double y, double dx, double dy) {
+        const RaySample &a = lines.at(line, k), &b = lines.at(line, k + 1);
+        if (a.range_m == 0 || b.range_m == 0 || a.signal == b.signal) return;  // 0: not traced
+        const bool near_is_a = a.range_m <= b.range_m;
+        const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
+        if (near.body < 0 || near.body == grid.camera.mount) return;
+        const Step step{&lines, lines.index(line, k)};
+        if (!is_contour(a, b)) return add_shift(step, edge_between(a, b));
+        steps.push_back(step);
+        contours.push_back(near_is_a ? Contour{x, y, dx, dy, &near, &far}
+                                     : Contour{x + dx, y + dy, -dx, -dy, &near, &far});
+    };
+    const int x = square_.x * n_, y = square_.y * n_;
+    for (int c = 0; c <= square_.columns; ++c)
+        for (int k = -1; k < left_.n; ++k) look(left_, c, k, x + c * n_ - 0.5, y + k, 0, 1);
+    for (int r = 0; r <= square_.rows; ++r)
+        for (int k = -1; k < upper_.n; ++k) look(upper_, r, k, x + k, y + r * n_ - 0.5, 1, 0);
+    bisect(grid.frame, contours);
+    for (std::size_t i = 0; i < contours.size(); ++i) {
+        const Contour& c = contours[i];
+        add_shift(steps[i], {c.dx + c.dy > 0 ? c.middle() : 1 - c.middle(), c.range_m});
+    }
+}
+
+/// Each point stands for the way to the middle between it and the next.
+void BorderPoints::add_shift(const Step& step, const EdgePlace& edge) {
+    const RaySample *a = &step.lines->points[step.first], *b = a + 1;
+    const double change = (edge.along - 0.5) * (a->signal - b->signal);
+    BorderShift& shift = step.lines->shifts[step.first + (edge.along < 0.5 ? 0 : 1)];
+    if (std::abs(change) > std::abs(shift.signal)) shift.range_m = edge.range_m;
+    shift.signal += change;
 }
 
 }  // namespace narpa

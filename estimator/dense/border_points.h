@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "estimator/dense/surface_edges.h"
 #include "estimator/view/measured_image.h"
 #include "renderer/film/camera_batch.h"
 #include "renderer/film/camera_image.h"
@@ -15,9 +16,6 @@ namespace narpa {
 inline std::size_t index_in(int width, int x, int y) {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
-
-/// Through a point of the image, in the middle of its row's exposure.
-[[nodiscard]] Ray ray_through(const Frame& f, double x, double y);
 
 /// A camera with fineness x fineness pixels for each pixel of another.
 struct FineGrid {
@@ -31,14 +29,6 @@ struct FineGrid {
     const Camera camera;
     const FrameSettings settings;
     const Frame frame;
-};
-
-/// The first hit of one ray. None: body -1, infinite range.
-struct RaySample {
-    double signal = 0;  ///< DN above black
-    int body = -1;
-    double range_m = 0;                          ///< along the ray
-    Vec3 position{}, normal{}, ray_direction{};  ///< world
 };
 
 /// Traces rays through any points of a grid, to the centre of the Sun from there.
@@ -64,29 +54,58 @@ struct Square {
     int x, y, columns, rows;
 };
 
+/// What a point on a border stands for is as long as the way between points. A surface that ends within that, or a
+/// crease in it, changes the mean over it by so much: DN.
+struct BorderShift {
+    double signal = 0;
+    double range_m = 0;  ///< of the edge; of two that of the larger change
+};
+
 /// Points on the borders of a square's chosen pixels, as many on each as the grid has in a pixel's side.
 class BorderPoints {
 public:
     BorderPoints(int fineness, const Square& square)
-        : n_(fineness), square_(square), left_(index(0, square.rows, 0)), upper_(index(0, square.rows + 1, 0)) {}
+        : n_(fineness),
+          square_(square),
+          left_(square.columns + 1, square.rows * fineness),
+          upper_(square.rows + 1, square.columns * fineness) {}
 
     [[nodiscard]] const Square& square() const noexcept { return square_; }
 
     /// `chosen`: not 0 for those pixels of the image, which is `width` pixels wide.
-    void trace(PointTracer& tracer, int width, std::span<const std::uint8_t> chosen);
+    void trace(const FineGrid& grid, PointTracer& tracer, int width, std::span<const std::uint8_t> chosen);
     /// Point i on the left border of the square's pixel (c, r), from above.
-    [[nodiscard]] const RaySample& left(int c, int r, int i) const { return left_[index(c, r, i)]; }
+    [[nodiscard]] const RaySample& left(int c, int r, int i) const { return left_.at(c, r * n_ + i); }
+    [[nodiscard]] const BorderShift& left_shift(int c, int r, int i) const { return left_.shift(c, r * n_ + i); }
     /// Point i on its upper border, from the left.
-    [[nodiscard]] const RaySample& upper(int c, int r, int i) const { return upper_[index(c, r, i)]; }
+    [[nodiscard]] const RaySample& upper(int c, int r, int i) const { return upper_.at(r, c * n_ + i); }
+    [[nodiscard]] const BorderShift& upper_shift(int c, int r, int i) const { return upper_.shift(r, c * n_ + i); }
 
 private:
-    [[nodiscard]] std::size_t index(int c, int r, int i) const {
-        return index_in(square_.columns + 1, c, r) * static_cast<std::size_t>(n_) + static_cast<std::size_t>(i);
-    }
+    /// Lines of points all along the square, and one more at either end: point -1 to `n`.
+    struct Lines {
+        Lines(int lines, int count)
+            : n(count), points(static_cast<std::size_t>(lines * (count + 2))), shifts(points.size()) {}
+        [[nodiscard]] std::size_t index(int line, int k) const { return index_in(n + 2, k + 1, line); }
+        [[nodiscard]] RaySample& at(int line, int k) { return points[index(line, k)]; }
+        [[nodiscard]] const RaySample& at(int line, int k) const { return points[index(line, k)]; }
+        [[nodiscard]] const BorderShift& shift(int line, int k) const { return shifts[index(line, k)]; }
+
+        const int n;
+        std::vector<RaySample> points;
+        std::vector<BorderShift> shifts;
+    };
+    /// Where two points of a line differ, the first of them.
+    struct Step {
+        Lines* lines;
+        std::size_t first;
+    };
+    void find_shifts(const FineGrid& grid);
+    void add_shift(const Step& step, const EdgePlace& edge);
 
     const int n_;
     const Square square_;
-    std::vector<RaySample> left_, upper_;
+    Lines left_, upper_;
 };
 
 }  // namespace narpa

@@ -152,7 +152,7 @@ void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sens
     each_square(T_camera_target, times, weight, [&](const Square& square, auto&& each) {
         BorderPoints points(grid.fineness, square);
         PointTracer tracer(grid, sensor);
-        points.trace(tracer, camera_.width, chosen_);
+        points.trace(grid, tracer, camera_.width, chosen_);
         each(
             [&](int c, int r, const RowView& view) { return flow_over_borders(grid, tracer, points, c, r, view); });
     });

@@ -7,13 +7,6 @@
 namespace narpa {
 namespace {
 
-/// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
-constexpr double kSurfaceSteps = 2.5;
-/// Lower limit of the cosine between ray and normal in that prediction.
-constexpr double kLeastCosine = 0.02;
-/// Bisections between two rays in the search for a contour.
-constexpr int kHalvings = 8;
-
 class PixelSides {
 public:
     /// Of the square's pixel (column, row).
@@ -36,6 +29,10 @@ public:
         for (int i = 0; i < n; ++i) {
             add(points_.left(column_, row_, i), points_.left(column_ + 1, row_, i), left, y_ * n + i, n, 0);
             add(points_.upper(column_, row_, i), points_.upper(column_, row_ + 1, i), x_ * n + i, top, 0, n);
+            add(points_.left_shift(column_, row_, i), 1, left, y_ * n + i, true);
+            add(points_.left_shift(column_ + 1, row_, i), -1, left + n, y_ * n + i, true);
+            add(points_.upper_shift(column_, row_, i), 1, x_ * n + i, top, false);
+            add(points_.upper_shift(column_, row_ + 1, i), -1, x_ * n + i, top + n, false);
         }
         add_contours();
         if (fine_row_s_ == 0) add_by_direction();
@@ -52,20 +49,10 @@ private:
     struct Jumps {
         double sum = 0, over_range = 0;  ///< DN, DN / m
     };
-    struct Contour {
+    /// A contour on a line across the pixel.
+    struct Crossed {
         Side side;
-        const RaySample *near, *far;
-        double range_m = near->range_m;  ///< of the nearer surface
-        double on_near = 0, on_far = 1;
         RaySample last{};  ///< of the nearer surface before its end
-
-        [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
-        void halve(int body, double here_m) {
-            if (body >= 0 && (body != far->body || std::abs(here_m - range_m) < std::abs(here_m - far->range_m)))
-                on_near = middle(), range_m = here_m;
-            else
-                on_far = middle();
-        }
     };
 
     /// The line from a at (x, y) to b.
@@ -77,19 +64,27 @@ private:
         if (near.body < 0 || near.body == grid_.camera.mount) return;
         const Side side = near_is_a ? Side{x, y, dx, dy, jump} : Side{x + dx, y + dy, -dx, -dy, jump};
         if (is_contour(a, b))
-            contours_.push_back({side, &near, &far});
+            contours_.push_back({side.x, side.y, side.dx, side.dy, &near, &far}), crossed_.push_back({side, {}});
         else
-            add(side, 0.5, 2 / (1 / a.range_m + 1 / b.range_m));
+            add(side, edge_between(near, far));
     }
 
-    /// `along`: where between the nearer sample, 0, and the other, 1, the edge lies.
-    void add(const Side& side, double along, double range_m) {
+    /// What a point on a border, left or upper if `sign` is 1, does not stand for.
+    void add(const BorderShift& shift, double sign, double x, double y, bool horizontal) {
+        if (shift.signal == 0) return;
+        const Side side{x, y, horizontal ? 1.0 : 0.0, horizontal ? 0.0 : 1.0, sign * shift.signal};
+        add(side, {0, shift.range_m});
+    }
+
+    /// From the nearer sample to the other.
+    void add(const Side& side, const EdgePlace& edge) {
         if (fine_row_s_ == 0) {
             Jumps& jumps = side.dy == 0 ? across_x_ : across_y_;
             jumps.sum += side.jump;
-            jumps.over_range += side.jump / range_m;
+            jumps.over_range += side.jump / edge.range_m;
         } else {
-            sum_ += side.jump * velocity(side.x + along * side.dx, side.y + along * side.dy, range_m, side.dy == 0);
+            sum_ += side.jump * velocity(side.x + edge.along * side.dx, side.y + edge.along * side.dy, edge.range_m,
+                                         side.dy == 0);
         }
     }
 
@@ -110,50 +105,24 @@ private:
         add_sides(across_y_, J.y);
     }
 
-    /// Bisects contours side by side: where between two samples the nearer surface ends, and its range there.
     void add_contours() {
-        const Frame& f = grid_.frame;
-        RayBatch rays;
-        HitBatch hits;
-        for (std::size_t first = 0; first < contours_.size(); first += kLanes) {
-            rays.n = std::min(kLanes, contours_.size() - first);
-            const std::span<Contour> batch(&contours_[first], rays.n);
-            for (int k = 0; k < kHalvings; ++k) {
-                for (std::size_t i = 0; i < batch.size(); ++i) {
-                    const Contour& c = batch[i];
-                    rays.put(i,
-                             ray_through(f, c.side.x + c.middle() * c.side.dx, c.side.y + c.middle() * c.side.dy));
-                }
-                f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
-                for (std::size_t i = 0; i < batch.size(); ++i) batch[i].halve(hits.body[i], hits.range_m[i]);
-            }
-            for (Contour& c : batch) {
-                const double x = c.side.x + c.on_near * c.side.dx, y = c.side.y + c.on_near * c.side.dy;
-                tracer_.put(x, y, c.last);
-            }
-            tracer_.trace();
-            for (const Contour& c : batch) {
-                // What changes on the surface before its end moves with the surface.
-                Side on_surface = c.side;
-                on_surface.jump = (c.side.dx + c.side.dy > 0 ? 1 : -1) * (c.near->signal - c.last.signal);
-                Side end = c.side;
-                end.jump -= on_surface.jump;
-                add(on_surface, 0.5 * c.on_near, 2 / (1 / c.near->range_m + 1 / c.range_m));
-                add(end, c.middle(), c.range_m);
-            }
+        bisect(grid_.frame, contours_);
+        for (std::size_t i = 0; i < contours_.size(); ++i) {
+            const Contour& c = contours_[i];
+            tracer_.put(c.x + c.on_near * c.dx, c.y + c.on_near * c.dy, crossed_[i].last);
         }
-        contours_.clear();
-    }
-
-    /// True where the two are not points of one surface, by the slopes from their normals.
-    static bool is_contour(const RaySample& a, const RaySample& b) {
-        if (a.body != b.body) return true;
-        const double cosine =
-            std::max(std::min(std::abs(dot(a.normal, a.ray_direction)), std::abs(dot(b.normal, b.ray_direction))),
-                     kLeastCosine);
-        const double range_m = kSurfaceSteps * std::max(a.range_m, b.range_m);
-        const Vec3 apart = a.position - b.position, turn = a.ray_direction - b.ray_direction;
-        return dot(apart, apart) * cosine * cosine > range_m * range_m * dot(turn, turn);
+        tracer_.trace();
+        for (std::size_t i = 0; i < contours_.size(); ++i) {
+            const Contour& c = contours_[i];
+            const RaySample& last = crossed_[i].last;
+            // What changes on the surface before its end moves with the surface.
+            Side on_surface = crossed_[i].side, end = on_surface;
+            on_surface.jump = (c.dx + c.dy > 0 ? 1 : -1) * (c.near->signal - last.signal);
+            end.jump -= on_surface.jump;
+            const EdgePlace edge = edge_between(*c.near, last);
+            add(on_surface, {edge.along * c.on_near, edge.range_m});
+            add(end, {c.middle(), c.range_m});
+        }
     }
 
     /// Image velocity across a side at this point of the grid: grid points per unit of the pose's error.
@@ -182,6 +151,7 @@ private:
     Vector6 sum_ = Vector6::Zero();
     Jumps across_x_, across_y_;
     std::vector<Contour> contours_;
+    std::vector<Crossed> crossed_;
 };
 
 }  // namespace

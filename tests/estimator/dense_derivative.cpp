@@ -4,11 +4,13 @@
 // however far apart these are: so the poses can be so far apart that the noise of the renders does not matter.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "../support/shapes.h"
 #include "estimator/dense/image_derivative.h"
 #include "estimator/view/model_view.h"
 #include "renderer/scene/scene_file.h"
@@ -47,10 +49,10 @@ struct Renders {
     RowTimes times{};
 };
 
-/// Of each column: RMS over the pixels of (integral of the derivative - difference of the images), over the RMS of
-/// the difference.
-std::array<double, 6> relative_errors(const RenderScene& render_scene, const Camera& camera, std::size_t target,
-                                      const Rigid3& pose, const Renders& r) {
+/// Along the way from one to the other side of the pose: RMS over the pixels of (integral of the derivative -
+/// difference of the images), over the RMS of the difference.
+double relative_error(const RenderScene& render_scene, const Camera& camera, std::size_t target, const Rigid3& pose,
+                      const Vector6& half, const Renders& r) {
     const BodyPoses at = placement_of(render_scene.scene());
     const SensorModel sensor = unit_sensor();
     ImageDerivative derivative(render_scene, camera, target, at);
@@ -60,30 +62,37 @@ std::array<double, 6> relative_errors(const RenderScene& render_scene, const Cam
     FrameSettings many;
     many.budget.kind = FrameBudget::Kind::rays;
     many.budget.rays = static_cast<std::uint64_t>(r.rays_per_pixel * camera.width * camera.height);
+    view.render(displaced(pose, half), many, false);
+    const auto ahead = view.radiance().pixels;
+    view.render(displaced(pose, -half), many, false);
+    const auto& behind = view.radiance().pixels;
+    std::vector<double> integral(ahead.size());
+    for (int i = 0; i < kNodes; ++i) {
+        const double place = (2 * i + 1.0) / kNodes - 1;
+        const auto J = derivative.at(displaced(pose, place * half), sensor, {}, r.fineness);
+        for (std::size_t p = 0; p < integral.size(); ++p)
+            integral[p] += 2.0 / kNodes * J[p].cast<double>().dot(half);
+    }
+    double error2 = 0, size2 = 0;
+    for (int y = 1; y < camera.height - 1; ++y)
+        for (int x = 1; x < camera.width - 1; ++x) {
+            const auto p = static_cast<std::size_t>(y * camera.width + x);
+            const Rgb d = ahead[p] - behind[p];
+            const double difference = static_cast<double>(d.x + d.y + d.z);
+            error2 += std::pow(integral[p] - difference, 2);
+            size2 += difference * difference;
+        }
+    return std::sqrt(error2 / size2);
+}
+
+/// Of each column.
+std::array<double, 6> relative_errors(const RenderScene& render_scene, const Camera& camera, std::size_t target,
+                                      const Rigid3& pose, const Renders& r) {
     std::array<double, 6> out{};
     for (int k = 0; k < 6; ++k) {
         const double half = k < 3 ? r.half_rad : k < 5 ? r.half_m : r.half_ahead_m;
-        view.render(displaced(pose, half * Vector6::Unit(k)), many, false);
-        const auto ahead = view.radiance().pixels;
-        view.render(displaced(pose, -half * Vector6::Unit(k)), many, false);
-        const auto& behind = view.radiance().pixels;
-        std::vector<double> integral(ahead.size());
-        for (int i = 0; i < kNodes; ++i) {
-            const double place = (2 * i + 1.0) / kNodes - 1;
-            const auto J = derivative.at(displaced(pose, place * half * Vector6::Unit(k)), sensor, {}, r.fineness);
-            for (std::size_t p = 0; p < integral.size(); ++p)
-                integral[p] += 2 * half / kNodes * static_cast<double>(J[p][k]);
-        }
-        double error2 = 0, size2 = 0;
-        for (int y = 1; y < camera.height - 1; ++y)
-            for (int x = 1; x < camera.width - 1; ++x) {
-                const auto p = static_cast<std::size_t>(y * camera.width + x);
-                const Rgb d = ahead[p] - behind[p];
-                const double difference = static_cast<double>(d.x + d.y + d.z);
-                error2 += std::pow(integral[p] - difference, 2);
-                size2 += difference * difference;
-            }
-        out[static_cast<std::size_t>(k)] = std::sqrt(error2 / size2);
+        out[static_cast<std::size_t>(k)] =
+            relative_error(render_scene, camera, target, pose, half * Vector6::Unit(k), r);
     }
     return out;
 }
@@ -149,6 +158,69 @@ TEST(ImageDerivative, OfARollingShutterAndABlurringLens) {
     r.times = {-23.5 * 6e-3, 6e-3, 0.1};
     const auto errors = relative_errors(*render_scene, camera, 0, kTenMetresAhead, r);
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.08) << "column " << k;
+}
+
+/// Of the image by a unit of this motion: RMS over the pixels.
+double rms_change(std::span<const PixelDerivative> J, const Vector6& motion) {
+    double sum = 0;
+    for (const PixelDerivative& pixel : J) sum += std::pow(pixel.cast<double>().dot(motion), 2);
+    return std::sqrt(sum / static_cast<double>(J.size()));
+}
+
+/// Of a cube whose side is seen nearly edge-on, both its edges in one pixel, the motion that the image holds least:
+/// edges' ranges and places must be right for all other motions to cancel in it.
+TEST(ImageDerivative, OfAFaceSeenNearlyEdgeOn) {
+    Scene scene;
+    scene.sun = Sun{normalized(Vec3{0.3, -0.4, -0.85}), 1361, 0};
+    scene.ambient = {20, 20, 20};
+    scene.materials.push_back(test::lambert(0.5f));
+    test::add_mesh(scene, test::box(2, 2, 2));
+    const auto render_scene = RenderScene::create(scene);
+    ASSERT_TRUE(render_scene);
+    const Camera camera = pinhole(64, 150);
+    const BodyPoses at = placement_of(scene);
+    ImageDerivative derivative(*render_scene, camera, 0, at);
+    const auto J_at = [&](const Rigid3& pose, int fineness) {
+        const auto J = derivative.at(pose, unit_sensor(), {}, fineness);
+        return std::vector<PixelDerivative>(J.begin(), J.end());
+    };
+    for (const double turn : {0.12, 0.15}) {  // hidden up to 0.11
+        const Rigid3 pose{exp_rotation({0.2 * turn, turn, 0.1}), {0, 0, 10}};
+        Matrix6 information = Matrix6::Zero();
+        const auto fine = J_at(pose, 32);
+        for (const PixelDerivative& pixel : fine)
+            information += pixel.cast<double>() * pixel.cast<double>().transpose();
+        Vector6 unit;
+        unit << 1, 1, 1, 10, 10, 10;
+        const Matrix6 scaled = unit.asDiagonal() * information * unit.asDiagonal();
+        const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(scaled);
+        const Vector6 held_least = unit.asDiagonal() * eigen.eigenvectors().col(0);
+        EXPECT_NEAR(rms_change(J_at(pose, 4), held_least) / rms_change(fine, held_least), 1, 0.15) << turn;
+        Renders r;
+        r.fineness = 4;
+        EXPECT_LT(relative_error(*render_scene, camera, 0, pose, 0.005 * held_least, r), 0.3) << turn;
+    }
+}
+
+/// An edge that moves along itself changes nothing, wherever in its pixels it lies.
+TEST(ImageDerivative, OfAnEdgeAlongItself) {
+    Scene scene;
+    scene.sun = Sun{normalized(Vec3{0.3, -0.4, -0.85}), 1361, 0};
+    scene.materials.push_back(test::lambert(0.5f));
+    test::add_mesh(scene, test::box(2, 60, 2));
+    const auto render_scene = RenderScene::create(scene);
+    ASSERT_TRUE(render_scene);
+    const Camera camera = pinhole(64, 150);
+    const BodyPoses at = placement_of(scene);
+    ImageDerivative derivative(*render_scene, camera, 0, at);
+    for (const double slope : {0.1, 0.5, 0.7, 2.0}) {
+        const Quat q = exp_rotation({0, 0, -std::atan(slope)});
+        const Vec3 along = q * Vec3{0, 1, 0}, across = q * Vec3{1, 0, 0};
+        Vector6 slides = Vector6::Zero(), moves = slides;
+        slides.tail<3>() = to_eigen(along), moves.tail<3>() = to_eigen(across);
+        const auto J = derivative.at({q, {0, 0, 10}}, unit_sensor(), {}, 4);
+        EXPECT_LT(rms_change(J, slides), 0.01 * rms_change(J, moves)) << "slope " << slope;
+    }
 }
 
 /// Textures, creases, shadows, parts before parts: ten metres before the port.

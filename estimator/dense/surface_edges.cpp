@@ -1,0 +1,71 @@
+#include "estimator/dense/surface_edges.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/camera/scene_camera.h"
+
+namespace narpa {
+namespace {
+
+/// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
+constexpr double kSurfaceSteps = 2.5;
+/// Lower limit of the cosine between ray and normal in that prediction.
+constexpr double kLeastCosine = 0.02;
+/// Bisections between two rays in the search for a contour.
+constexpr int kHalvings = 8;
+
+/// Of a point's tangent plane in the direction of another ray.
+double inverse_range_towards(const RaySample& point, const Vec3& direction) {
+    return dot(point.normal, direction) / (point.range_m * dot(point.normal, point.ray_direction));
+}
+
+void halve(Contour& c, int body, double here_m) {
+    if (body >= 0 && (body != c.far->body || std::abs(here_m - c.range_m) < std::abs(here_m - c.far->range_m)))
+        c.on_near = c.middle(), c.range_m = here_m;
+    else
+        c.on_far = c.middle();
+}
+
+}  // namespace
+
+Ray ray_through(const Frame& f, double x, double y) {
+    return camera_ray(f.model, f.pose.at(f.pose.time(y, f.camera.height, 0.5)), x, y);
+}
+
+bool is_contour(const RaySample& a, const RaySample& b) {
+    if (a.body != b.body) return true;
+    const double cosine = std::max(
+        std::min(std::abs(dot(a.normal, a.ray_direction)), std::abs(dot(b.normal, b.ray_direction))), kLeastCosine);
+    const double range_m = kSurfaceSteps * std::max(a.range_m, b.range_m);
+    const Vec3 apart = a.position - b.position, turn = a.ray_direction - b.ray_direction;
+    return dot(apart, apart) * cosine * cosine > range_m * range_m * dot(turn, turn);
+}
+
+EdgePlace edge_between(const RaySample& a, const RaySample& b) {
+    const double at_a = 1 / a.range_m, at_b = 1 / b.range_m;
+    const double of_a = at_a - inverse_range_towards(b, a.ray_direction);
+    const double of_b = at_b - inverse_range_towards(a, b.ray_direction);
+    const double along = of_a / (of_a + of_b);
+    if (!(along > 0 && along < 1)) return {0.5, 2 / (at_a + at_b)};
+    return {along, 1 / (at_a + along * (at_b - of_b - at_a))};
+}
+
+void bisect(const Frame& f, std::span<Contour> contours) {
+    RayBatch rays;
+    HitBatch hits;
+    for (std::size_t first = 0; first < contours.size(); first += kLanes) {
+        const auto batch = contours.subspan(first, std::min(kLanes, contours.size() - first));
+        rays.n = batch.size();
+        for (int k = 0; k < kHalvings; ++k) {
+            for (std::size_t i = 0; i < batch.size(); ++i) {
+                const Contour& c = batch[i];
+                rays.put(i, ray_through(f, c.x + c.middle() * c.dx, c.y + c.middle() * c.dy));
+            }
+            f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
+            for (std::size_t i = 0; i < batch.size(); ++i) halve(batch[i], hits.body[i], hits.range_m[i]);
+        }
+    }
+}
+
+}  // namespace narpa

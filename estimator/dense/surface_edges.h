@@ -1,0 +1,45 @@
+/// estimator/dense/surface_edges.h - where on a line across the image what is seen changes.
+#pragma once
+
+#include <span>
+
+#include "renderer/film/camera_batch.h"
+
+namespace narpa {
+
+/// The first hit of one ray. None: body -1, infinite range.
+struct RaySample {
+    double signal = 0;  ///< DN above black
+    int body = -1;
+    double range_m = 0;                          ///< along the ray
+    Vec3 position{}, normal{}, ray_direction{};  ///< world
+};
+
+/// Through a point of the image, in the middle of its row's exposure.
+[[nodiscard]] Ray ray_through(const Frame& f, double x, double y);
+
+/// True where the two are not points of one surface, by the slopes from their normals.
+[[nodiscard]] bool is_contour(const RaySample& a, const RaySample& b);
+
+/// Of a line between two points: where on it, from 0 to 1, and at what range.
+struct EdgePlace {
+    double along, range_m;
+};
+
+/// Where what changes between two points of one surface lies: at the crease in which their tangent planes meet, if
+/// that is between them; else in the middle, on average. Along a line of sight the creases of a face seen edge-on
+/// may be as far apart as it is long.
+[[nodiscard]] EdgePlace edge_between(const RaySample& a, const RaySample& b);
+
+/// The end of a surface in front of another, or of nothing, on a line between two points of the image.
+struct Contour {
+    double x, y, dx, dy;  ///< from the nearer sample to the other
+    const RaySample *near, *far;
+    double range_m = near->range_m;  ///< of the nearer surface before its end
+    double on_near = 0, on_far = 1;  ///< the end is between them
+    [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
+};
+/// Finds their ends by bisection, side by side.
+void bisect(const Frame& f, std::span<Contour> contours);
+
+}  // namespace narpa

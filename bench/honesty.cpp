@@ -315,9 +315,9 @@ private:
         const PnpInput input{believed, body, pixels, sigma_px};
         const PnpSolution& s = solver_.solve(input, condition == "bright");
         if (!s.ok()) return {s.answer()};
-        const PoseShifts by_model =
-            image_shifts(o_.told, s.fit.T_camera_body, moving, shift_by_focal(input, s.fit.T_camera_body));
-        return {s.answer(), s.fit.T_camera_body, s.fit.covariance + by_model * by_model.transpose()};
+        const Matrix6 by_model = covariance_by(
+            image_shifts(o_.told, s.fit.T_camera_body, moving, shift_by_focal(input, s.fit.T_camera_body)));
+        return {s.answer(), s.fit.T_camera_body, s.fit.covariance + by_model};
     }
 
     const HonestyOptions& o_;

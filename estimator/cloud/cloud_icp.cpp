@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -10,6 +9,7 @@
 #include "base/constants.h"
 #include "estimator/pose/median.h"
 #include "estimator/pose/root_information.h"
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 namespace {
@@ -68,14 +68,12 @@ double surface_motion_m(const Vector6& pose_step, double reach_m) {
 /// Along some observed motion more than so much of the information of `all` is not that of `some`.
 bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& some) {
     constexpr double kMost = 0.75;
-    const int from = all.observability.unobserved;
-    if (from == 6 || some.observability.unobserved > from) return from < 6;
-    const auto motions = all.observability.motions.rightCols(6 - from);
-    using Restricted = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
-    const Restricted left = motions.transpose() * some.information * motions,
-                     whole = motions.transpose() * all.information * motions;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Restricted> eigen(left, whole, Eigen::EigenvaluesOnly);
-    return !(eigen.eigenvalues()[0] > 1 - kMost);
+    const Observability& o = all.observability;
+    if (o.unobserved == 6 || some.observability.unobserved > o.unobserved) return o.unobserved < 6;
+    const Matrix6 L = cholesky(o.along_motions(all.information)).L;
+    const Matrix6 half = lower_solve(L, o.along_motions(some.information));
+    const Matrix6 parts = lower_solve(L, Matrix6(half.transpose()));  // L^-1 some L'^-1; 1 of unobserved motions
+    return !(symmetric_eigen(parts).values[0] > 1 - kMost);
 }
 
 template <class Beam>
@@ -149,7 +147,7 @@ void CloudIcp::weigh(const Pass& pass, const Matrix6& information, CloudEstimate
     const double factor = variance_factor(pass, out.used);
     const Observability& o = out.observability;
     const PoseShifts by_model = shifts(out.T_lidar_target, pass, o);
-    out.covariance_of_model = by_model * by_model.transpose();
+    out.covariance_of_model = covariance_by(by_model);
     out.bound = o.covariance(pass.information, 1) + out.covariance_of_model;
     out.covariance = o.covariance(information, factor) + out.covariance_of_model;
     out.root_information = root_information_with(o.root_information(information, factor), by_model);

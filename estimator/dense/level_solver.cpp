@@ -1,11 +1,9 @@
 #include "estimator/dense/level_solver.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/pose/symmetric.h"
 #include "renderer/camera/scene_camera.h"
 
 namespace narpa {
@@ -72,8 +70,7 @@ bool is_observable(const Matrix6& information) {
     if (!(sizes.minCoeff() > 0) || !sizes.allFinite()) return false;
     const Vector6 unit = sizes.cwiseSqrt().cwiseInverse();
     const Matrix6 scaled = unit.asDiagonal() * information * unit.asDiagonal();
-    return Eigen::SelfAdjointEigenSolver<Matrix6>(scaled, Eigen::EigenvaluesOnly).eigenvalues()[0] >
-           kLeastInformation;
+    return symmetric_eigen(scaled).values[0] > kLeastInformation;
 }
 
 }  // namespace
@@ -169,7 +166,7 @@ void LevelSolver::finish() {
     const PhotometricImages images = view_.images();
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
     // What the equations say is still to go belongs to the error too.
-    const Vector6 to_go = last.pose_information().ldlt().solve(last.pose_gradient());
+    const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
     e_.covariance = last.pose_covariance() + covariance_of_model(last) + to_go * to_go.transpose();
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
@@ -218,7 +215,7 @@ Result<Matrix6> LevelSolver::bound() {
     const auto all = equations(images, {}, {1, std::numeric_limits<double>::infinity(), 0});
     const Matrix6 information = all.pose_information();
     if (!is_observable(information)) return Error{"too few pixels show the target to determine its pose"};
-    return Matrix6(information.inverse() + covariance_of_model(all));
+    return Matrix6(inverse(information) + covariance_of_model(all));
 }
 
 Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) {
@@ -235,7 +232,7 @@ Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) 
         }
         shifts = joined(shifts, by_light);
     }
-    return shifts * shifts.transpose();
+    return covariance_by(shifts);
 }
 
 void LevelSolver::shift() {
@@ -274,7 +271,7 @@ LevelSolver::Step LevelSolver::next_step(double damping) const {
     Matrix6 damped = information;
     damped.diagonal() *= 1 + damping;
     Step s;
-    s.pose = stride_ * damped.ldlt().solve(equations_.pose_gradient());
+    s.pose = stride_ * ldlt_solve(damped, equations_.pose_gradient());
     s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
     s.motion_px = distance_px(s.pose);
     s.size = s.motion_px / kConverged_px;

@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 namespace {
@@ -72,7 +73,7 @@ Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& ja
             H += weighted * jacobians[m.point];
             gradient += weighted * flow(m);
         }
-        motion = H.ldlt().solve(gradient);
+        motion = ldlt_solve(H, gradient);
         std::vector<double> lengths;
         for (const FeatureMatch& m : flows) lengths.push_back((jacobians[m.point] * motion - flow(m)).norm());
         const double most_px = kOutlier * scale_of(lengths);
@@ -85,11 +86,11 @@ Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& ja
 /// The covariance of a pose whose matches respond to motions like this: C^(1/2) (A' A)^-1 C^(T/2), A = C^(-1/2) R
 /// C^(1/2). Motions of which they show more than there is count as shown as they are.
 Matrix6 widened(const Matrix6& covariance, const Matrix6& response) {
-    const Matrix6 root = covariance.llt().matrixL();
-    const Matrix6 shown = root.triangularView<Eigen::Lower>().solve(response * root);
-    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(shown.transpose() * shown);
-    const Vector6 squares = eigen.eigenvalues().cwiseMin(1).cwiseMax(kLeastShown * kLeastShown);
-    const Matrix6 out = root * eigen.eigenvectors();
+    const Matrix6 root = cholesky(covariance).L;
+    const Matrix6 shown = lower_solve(root, Matrix6(response * root));
+    const SymmetricEigen eigen = symmetric_eigen(shown.transpose() * shown);
+    const Vector6 squares = eigen.values.cwiseMin(1).cwiseMax(kLeastShown * kLeastShown);
+    const Matrix6 out = root * eigen.vectors;
     return out * squares.cwiseInverse().asDiagonal() * out.transpose();
 }
 
@@ -236,8 +237,7 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
                                  settings_.floor_most_px);
     else
         compare_with_mirrored(frame, at, guess, motion, e, fit);
-    const PoseShifts by_model = image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal);
-    e.covariance_of_model = by_model * by_model.transpose();
+    e.covariance_of_model = covariance_by(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal));
     e.covariance += e.covariance_of_model, e.bound += e.covariance_of_model;
     if (e.has_pose())
         observe(e.T_camera_target, e.covariance, fit), compare_with_guess(e.T_camera_target, guess, fit);

@@ -9,6 +9,7 @@
 #include "base/constants.h"
 #include "estimator/features/feature_matcher.h"
 #include "estimator/pose/median.h"
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 namespace {
@@ -103,7 +104,7 @@ ModelMatches::Sums ModelMatches::sums(const CameraModel& camera, const Rigid3& T
 
 double ModelMatches::freedom(const CameraModel& camera, const Rigid3& T, double floor_px) const {
     const Sums s = sums(camera, T, floor_px);
-    return 2 * static_cast<double>(size()) - 6 - s.information.ldlt().solve(s.shared).trace();
+    return 2 * static_cast<double>(size()) - 6 - ldlt_solve(s.information, s.shared).trace();
 }
 
 double ModelMatches::inflation(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
@@ -131,7 +132,7 @@ double ModelMatches::inflation(const CameraModel& camera, const Rigid3& T, const
     const auto parts = static_cast<double>(std::ranges::count_if(members, [](int n) { return n > 0; }));
     constexpr double kUnknowns = 6;
     const double few = parts / std::max(1.0, parts - kUnknowns);
-    return std::max(1.0, few * (covariance.inverse() * C * scatter * C).trace() / kUnknowns);
+    return std::max(1.0, few * (inverse(covariance) * C * scatter * C).trace() / kUnknowns);
 }
 
 double ModelMatches::floor_px(const CameraModel& camera, const Rigid3& T, double freedom) const {

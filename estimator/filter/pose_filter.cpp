@@ -1,12 +1,12 @@
 #include "estimator/filter/pose_filter.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <type_traits>
 #include <utility>
+
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 namespace {
@@ -21,7 +21,7 @@ template <int N>
 bool is_covariance(const Eigen::Matrix<double, N, N>& C) {
     if (!C.allFinite()) return false;
     if ((C - C.transpose()).cwiseAbs().maxCoeff() > 1e-9 * C.cwiseAbs().maxCoeff()) return false;
-    return Eigen::LLT<Eigen::Matrix<double, N, N>>(C).info() == Eigen::Success;
+    return normalised_error_squared(Eigen::Matrix<double, N, 1>::Zero(), C) == 0;
 }
 
 /// What is wrong with it; null: nothing.
@@ -31,7 +31,7 @@ const char* fault(const PoseMeasurement& m) {
         return "expected quaternions of length 1";
     if (m.root_information)
         return m.root_information->allFinite() ? nullptr : "expected a finite root of the information";
-    if (!is_covariance<6>(m.covariance))
+    if (!is_covariance(m.covariance))
         return "expected a covariance that is finite, symmetric and positive definite";
     return nullptr;
 }
@@ -59,10 +59,8 @@ const char* fault(const BeamRange& m) {
 /// Of a measurement that observes all six motions; else 0.
 Matrix6 covariance_of(const PoseMeasurement& m) {
     if (!m.root_information) return m.covariance;
-    const Eigen::FullPivLU<Matrix6> factors(*m.root_information);
-    if (!factors.isInvertible()) return Matrix6::Zero();
-    const Matrix6 inverse = factors.inverse();
-    return inverse * inverse.transpose();
+    const Matrix6 root = inverse(*m.root_information);
+    return root.allFinite() ? Matrix6(root * root.transpose()) : Matrix6(Matrix6::Zero());
 }
 
 /// Where the sensor's axes are in the frame.
@@ -120,18 +118,31 @@ std::pair<double, Eigen::Matrix<double, 1, 12>> expected_range(const RelativeSta
     return {range_m, H};
 }
 
-/// The innovation of a measurement of N numbers, and the factor of its covariance.
+using Matrix1 = Eigen::Matrix<double, 1, 1>;
+
+/// A root W of the inverse: A^-1 = W' W.
+Matrix6 root_of_inverse(const Matrix6& A) {
+    return lower_solve(cholesky(A).L, Matrix6(Matrix6::Identity()));
+}
+Matrix1 root_of_inverse(const Matrix1& A) {
+    return Matrix1(1 / std::sqrt(A.value()));
+}
+
+/// The innovation of a measurement of N numbers.
 template <int N>
 struct Innovation {
     Eigen::Matrix<double, N, 12> H;
     Eigen::Matrix<double, N, 1> z;
-    Eigen::Matrix<double, N, N> R;  ///< of the measurement
-    Eigen::LLT<Eigen::Matrix<double, N, N>> S{};
+    Eigen::Matrix<double, N, N> R;                   ///< of the measurement
+    Eigen::Matrix<double, 12, N> PH{};               ///< P H'
+    Eigen::Matrix<double, N, N> root_information{};  ///< of the innovation
     double nis = 0;
 
     void form(const Matrix12& P) {
-        S.compute(H * P * H.transpose() + R);
-        nis = S.matrixL().solve(z).squaredNorm();
+        PH = P * H.transpose();
+        const Eigen::Matrix<double, N, N> covariance = H * PH + R;
+        root_information = root_of_inverse(covariance);
+        nis = (root_information * z).squaredNorm();
     }
 };
 
@@ -168,20 +179,28 @@ Innovation<1> innovation_of(const MotionModel&, const RelativeState& state, cons
     return i;
 }
 
-template <int N>
-void correct(const Innovation<N>& innovation, RelativeState& state, Matrix12& P) {
-    const auto& H = innovation.H;
-    const Eigen::Matrix<double, 12, N> K = innovation.S.solve(H * P).transpose();
-    const Vector12 step = K * innovation.z;
+/// The covariance of A e, given that of e.
+Matrix12 carried(const Matrix12& A, const Matrix12& covariance) {
+    return A * covariance * A.transpose();
+}
+
+/// `taken`: K H, the part of the state that the measurement replaces; `noise`: K R K', what it adds.
+void correct(const Vector12& step, const Matrix12& taken, const Matrix12& noise, RelativeState& state,
+             Matrix12& P) {
     state = displaced(state, step);
-    const Matrix12 rest = Matrix12::Identity() - K * H;
-    P = (rest * P * rest.transpose() + K * innovation.R * K.transpose()).eval();
+    P = carried(Matrix12::Identity() - taken, P) + noise;
     // Reset: errors now refer to the corrected attitude, to first order a rotation by half the step.
     Matrix12 reset = Matrix12::Identity();
-    const Eigen::Vector3d a = 0.5 * step.template segment<3>(6);
+    const Eigen::Vector3d a = 0.5 * step.segment<3>(6);
     reset.block<3, 3>(6, 6) << 1, a.z(), -a.y(), -a.z(), 1, a.x(), a.y(), -a.x(), 1;
-    P = (reset * P * reset.transpose()).eval();
+    P = carried(reset, P);
     P = (0.5 * (P + P.transpose())).eval();
+}
+
+template <int N>
+void correct(const Innovation<N>& i, RelativeState& state, Matrix12& P) {
+    const Eigen::Matrix<double, 12, N> K = i.PH * (i.root_information.transpose() * i.root_information);
+    correct(K * i.z, K * i.H, K * i.R * K.transpose(), state, P);
 }
 
 Status check(const FilterSettings& s) {
@@ -200,7 +219,7 @@ Result<PoseFilter> PoseFilter::create(const FilterSettings& settings, std::int64
     if (!is_finite(state.position_m) || !is_finite(state.velocity_m_s) || !is_finite(state.rate_rad_s) ||
         !is_unit(state.q_frame_target))
         return Error{"the filter's first state: expected finite numbers and a unit quaternion"};
-    if (!is_covariance<12>(covariance))
+    if (!is_covariance(covariance))
         return Error{"the filter's first covariance: expected it finite, symmetric and positive definite"};
     PoseFilter filter(settings);
     filter.t_ns_ = t_ns;

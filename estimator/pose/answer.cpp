@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <utility>
+
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 namespace {
@@ -55,17 +55,17 @@ Observability observability_of(const Matrix6& covariance, double range_m) {
     const Vector6 most = limits(range_m);
     const Matrix6 scaled = most.cwiseInverse().asDiagonal() * covariance * most.cwiseInverse().asDiagonal();
     // Eigenvalues are ascending: the least information first is the largest variance first.
-    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(0.5 * (scaled + scaled.transpose()));
+    const SymmetricEigen eigen = symmetric_eigen(0.5 * (scaled + scaled.transpose()));
     Observability o;
-    o.eigenvalues = eigen.eigenvalues().reverse().cwiseInverse();
-    o.motions = most.asDiagonal() * eigen.eigenvectors().rowwise().reverse();
+    o.eigenvalues = eigen.values.reverse().cwiseInverse();
+    o.motions = most.asDiagonal() * eigen.vectors.rowwise().reverse();
     while (o.unobserved < 6 && !(o.eigenvalues[o.unobserved] >= 1)) ++o.unobserved;
     return o;
 }
 
 void observe(const Rigid3& T, const Matrix6& covariance, Fit& fit) {
     fit.observability = observability_of(covariance, norm(T.t));
-    fit.root_information = fit.observability.root_information(covariance.inverse(), 1);
+    fit.root_information = fit.observability.root_information(inverse(covariance), 1);
 }
 
 void compare_with_guess(const Rigid3& T, const Rigid3& guess, Fit& fit) {

@@ -1,5 +1,7 @@
 #include "estimator/pose/model_uncertainty.h"
 
+#include <Eigen/Geometry>
+
 namespace narpa {
 
 PoseShifts pose_shifts(const ModelUncertainty& u, const Rigid3& T, const ApparentMotion& motion) {
@@ -30,6 +32,10 @@ PoseShifts joined(const PoseShifts& a, const PoseShifts& b) {
     PoseShifts all(6, a.cols() + b.cols());
     all << a, b;
     return all;
+}
+
+Matrix6 covariance_by(const PoseShifts& shifts) {
+    return shifts * shifts.transpose();
 }
 
 }  // namespace narpa

@@ -62,4 +62,7 @@ using PoseShifts = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 
 /// Side by side.
 [[nodiscard]] PoseShifts joined(const PoseShifts& a, const PoseShifts& b);
 
+/// Of the pose's error that these make: shifts shifts'.
+[[nodiscard]] Matrix6 covariance_by(const PoseShifts& shifts);
+
 }  // namespace narpa

@@ -31,6 +31,8 @@ struct Observability {
     /// The motion x that solves H x = gradient within the observable subspace. `hessian`: that passed to
     /// observability().
     [[nodiscard]] Vector6 solve(const Matrix6& hessian, const Vector6& gradient) const;
+    /// This information of the amounts of the motions, of the unobservable ones that of a unit matrix.
+    [[nodiscard]] Matrix6 along_motions(const Matrix6& information) const;
     /// `factor` times the inverse of this information in the observable subspace; along unobservable motions the
     /// standard deviation is kUnobservedSigma.
     [[nodiscard]] Matrix6 covariance(const Matrix6& information, double factor) const;

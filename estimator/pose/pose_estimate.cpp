@@ -1,8 +1,9 @@
 #include "estimator/pose/pose_estimate.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
+
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 Rigid3 displaced(const Rigid3& T, const Vector6& error) {
@@ -37,9 +38,9 @@ double position_sigma(const Matrix6& covariance) {
 }
 
 double normalised_error_squared(const Vector6& error, const Matrix6& covariance) {
-    const Eigen::LLT<Matrix6> factor(covariance);
-    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
-    return factor.matrixL().solve(error).squaredNorm();
+    const Cholesky factor = cholesky(covariance);
+    if (!factor.positive_definite) return std::numeric_limits<double>::infinity();
+    return lower_solve(factor.L, error).squaredNorm();
 }
 
 Matrix6 covariance_of_inverse(const Rigid3& T, const Matrix6& covariance) {

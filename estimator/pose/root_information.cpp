@@ -1,6 +1,6 @@
 #include "estimator/pose/root_information.h"
 
-#include <Eigen/Cholesky>
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 
@@ -13,9 +13,8 @@ Matrix6 root_information_of_product(const Rigid3& T_a_b, const Matrix6& root_of_
 
 Matrix6 root_information_with(const Matrix6& root, const PoseShifts& shifts) {
     // W (e + J n) has the covariance S = 1 + (W J) (W J)', at least 1: its factor whitens again.
-    const PoseShifts spread = root * shifts;
-    const Matrix6 S = Matrix6::Identity() + spread * spread.transpose();
-    return S.llt().matrixL().solve(root);
+    const Matrix6 S = Matrix6::Identity() + covariance_by(root * shifts);
+    return lower_solve(cholesky(S).L, root);
 }
 
 }  // namespace narpa

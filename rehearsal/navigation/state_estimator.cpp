@@ -372,8 +372,7 @@ Matrix6 StateEstimator::covariance_of_model(const Rigid3& T_chaser_target) const
     // A camera's focal length acts as the size does, and a bias of ranges as a shift at most.
     u.scale = std::hypot(u.scale, u.focal), u.focal = 0;
     u.mesh_m = std::hypot(u.mesh_m, u.range_bias_m);
-    const PoseShifts shifts = image_shifts(u, T_chaser_target, motion_in_chaser());
-    return shifts * shifts.transpose();
+    return covariance_by(image_shifts(u, T_chaser_target, motion_in_chaser()));
 }
 
 Rigid3 StateEstimator::predicted(std::int64_t t_ns) const {

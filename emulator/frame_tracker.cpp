@@ -214,7 +214,7 @@ void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPos
 void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
                                      TrackedFrame& out) {
     DenseOptions dense = dense_options(motion);
-    if (out.measured) dense.coarsest = 1;
+    if (out.measured) dense.coarsest = 4;
     const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense);
     out.measured.reset();
     if (!e) {

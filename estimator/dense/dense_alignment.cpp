@@ -245,7 +245,8 @@ DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPose
     }
     int factor = options.coarsest;
     while (factor > options.finest && extent_px(*about) / factor < kLeastExtent_px) factor /= 2;
-    for (bool first = options.coarsest > options.finest; factor >= last; factor /= 2, first = false) {
+    for (bool first = options.coarsest > options.finest; factor >= last;
+         factor = next_level(factor, options.finest, extent_px(*about)), first = false) {
         const Camera camera = coarser_camera(camera_, factor);
         std::optional<Window> window = window_about(tracer, camera, target_, e.T_camera_body);
         if (!window) {

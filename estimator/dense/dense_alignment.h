@@ -3,9 +3,12 @@
 /// Levenberg-Marquardt on the photometric residuals of all pixels about the target (photometric_fit.h) with the
 /// analytic Jacobian of the rendered image (image_derivative.h), Cauchy loss, coarse to fine over an image pyramid.
 /// Each level works in a window about the target. The image is rendered at each step with the same seed, so that
-/// its sampling noise hardly changes between steps. All pixels have equally many samples, so that each pixel's
-/// variance is known from them: with a budget that follows the contrasts between pixels, residuals about details
-/// smaller than a pixel were 1.7 times what it stated.
+/// its sampling noise hardly changes between steps.
+///
+/// The last steps are of the pixels that hold most of the information about the pose (informative_pixels), about a
+/// fifth: a derivative chooses them, and each gets equally many samples, so that each one's variance is known from
+/// its own. With a budget that follows the contrasts between pixels, residuals about details smaller than a pixel
+/// were 1.7 times what it stated.
 #pragma once
 
 #include <array>
@@ -25,10 +28,10 @@ namespace narpa {
 /// variance is given: 1.6 in attitude and 0.8 in position (4 frames). The scene has many details smaller than a
 /// pixel.
 struct DenseOptions {
-    int iterations = 16;           ///< at most, on each level
-    int coarsest = 8, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    int samples_per_pixel = 8;     ///< of the finest level's images; those of the last step take six times as many
-    int fineness = 6;              ///< of the last derivative: lines each way across a pixel
+    int iterations = 16;            ///< at most, on each level
+    int coarsest = 16, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
+    int samples_per_pixel = 8;      ///< of the finest level's images; those of the last step take six times as many
+    int fineness = 4;               ///< of the last derivative: lines each way across a pixel
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;

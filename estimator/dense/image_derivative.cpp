@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/constants.h"
@@ -18,8 +19,6 @@ namespace {
 
 /// Step of the finite difference of the BSDF, as a part of the range.
 constexpr double kViewStep = 1e-3;
-/// Points of a pixel, each way, at which that difference is taken; and with fewer lines than kFewLines across it.
-constexpr int kShadingPoints = 2, kFewShadingPoints = 1, kFewLines = 4;
 /// Pixels, each way, whose borders are traced together.
 constexpr int kSquare = 8;
 /// Parts of an exposure for each pixel of motion during it, and at the most.
@@ -30,16 +29,12 @@ bool depends_on_view(const Material& m) {
     return m.kind != Material::Kind::phong || m.specular != Rgb{};
 }
 
-/// The third term at a point of the image: change of reflected sunlight with the direction to the camera, by
-/// central differences of the BSDF. DN per metre of the surface against the camera, world axes. `beam_px`: width
-/// that textures are averaged over.
-Vec3 shading_change(const Frame& f, const SensorModel& sensor, double x, double y, double beam_px) {
-    const Ray ray = ray_through(f, x, y);
-    const Hit hit = f.tracer.intersect(f.at, ray, kInfinity);
-    if (hit.body < 0 || hit.body == f.camera.mount) return {};
-    if (!depends_on_view(f.tracer.scene().materials[static_cast<std::size_t>(hit.material)])) return {};
+/// The third term where a ray meets a surface: change of reflected sunlight with the direction to the camera, by
+/// central differences of the BSDF. DN per metre of the surface against the camera, world axes. Textures are
+/// averaged over the pixel.
+Vec3 shading_change(const Frame& f, const SensorModel& sensor, const Ray& ray, const Hit& hit) {
     const Surface surface =
-        surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m * beam_px / f.model->pixels_per_radian());
+        surface_at(f.tracer, f.at, hit, ray.direction, hit.range_m / f.model->pixels_per_radian());
     const Vec3& to_sun = f.sun->centre();
     const double cosine = dot(surface.normal, to_sun);
     if (cosine <= 0 || f.tracer.occluded(f.at, hit, to_sun, kInfinity)) return {};
@@ -54,20 +49,56 @@ Vec3 shading_change(const Frame& f, const SensorModel& sensor, double x, double 
     return (cosine * static_cast<double>(f.sun->irradiance()) / (2 * d)) * change;
 }
 
-/// Its mean over so many points of a pixel, each way.
-Vector6 shading_change(const Frame& f, const SensorModel& sensor, int x, int y, int points,
-                       const Vec3& t_camera_target) {
-    const double step = 1.0 / points, first = 0.5 * step - 0.5;
-    Vec3 per_metre{};
-    for (int j = 0; j < points; ++j)
-        for (int i = 0; i < points; ++i)
-            per_metre += shading_change(f, sensor, x + first + step * i, y + first + step * j, step);
-    // Against the target's axes the camera moves by what the target's origin moves, less what turns it about there.
-    const Vec3 g = conjugate(f.T_world_camera.q) * per_metre / (points * points);
-    Vector6 row;
-    row << to_eigen(-cross(t_camera_target, g)), to_eigen(g);
-    return row;
-}
+/// The same at the middle of each chosen pixel of a square.
+class ShadingChanges {
+public:
+    ShadingChanges(const Frame& f, const SensorModel& sensor, const Square& square,
+                   std::span<const std::uint8_t> chosen)
+        : f_(f), sensor_(sensor) {
+        rays_.n = 0;
+        for (int r = 0; r < square.rows; ++r)
+            for (int c = 0; c < square.columns; ++c) {
+                const int x = square.x + c, y = square.y + r;
+                if (chosen[index_in(f.camera.width, x, y)] == 0) continue;
+                put(index_in(kSquare, c, r), ray_through(f, x, y));
+            }
+        trace();
+    }
+    /// Of the square's pixel (c, r).
+    [[nodiscard]] Vector6 at(int c, int r, const Vec3& t_camera_target) const {
+        // Against the target's axes the camera moves by what the target's origin moves, less what turns it about
+        // there.
+        const Vec3 g = conjugate(f_.T_world_camera.q) * changes_[index_in(kSquare, c, r)];
+        Vector6 row;
+        row << to_eigen(-cross(t_camera_target, g)), to_eigen(g);
+        return row;
+    }
+
+private:
+    void put(std::size_t pixel, const Ray& ray) {
+        pixels_[rays_.n] = pixel;
+        rays_.put(rays_.n++, ray);
+        if (rays_.n == kLanes) trace();
+    }
+    void trace() {
+        if (rays_.n == 0) return;
+        f_.tracer.intersect(f_.at, rays_, f_.tracer.all_bodies(), hits_);
+        const auto& materials = f_.tracer.scene().materials;
+        for (std::size_t i = 0; i < rays_.n; ++i) {
+            if (hits_.body[i] < 0 || hits_.body[i] == f_.camera.mount) continue;
+            if (!depends_on_view(materials[static_cast<std::size_t>(hits_.material[i])])) continue;
+            changes_[pixels_[i]] = shading_change(f_, sensor_, rays_[i], hits_[i]);
+        }
+        rays_.n = 0;
+    }
+
+    const Frame& f_;
+    const SensorModel& sensor_;
+    RayBatch rays_;
+    HitBatch hits_;
+    Lanes<std::size_t> pixels_;
+    std::array<Vec3, static_cast<std::size_t>(kSquare) * kSquare> changes_{};
+};
 
 }  // namespace
 
@@ -108,8 +139,7 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
         add(T_camera_target, sensor, settings, fineness, times_.part(k, parts), 1.0F / static_cast<float>(parts));
     if (view_dependent_)
         for (int k = 0; k < parts; ++k)
-            add_shading(T_camera_target, sensor, settings, fineness, times_.part(k, parts),
-                        1.0F / static_cast<float>(parts));
+            add_shading(T_camera_target, sensor, settings, times_.part(k, parts), 1.0F / static_cast<float>(parts));
     if (optics_.any()) apply_optics();
     return derivative_;
 }
@@ -159,14 +189,11 @@ void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sens
 }
 
 void ImageDerivative::add_shading(const Rigid3& T_camera_target, const SensorModel& sensor,
-                                  const FrameSettings& settings, int fineness, const RowTimes& times,
-                                  float weight) {
-    const int points = fineness < kFewLines ? kFewShadingPoints : kShadingPoints;
+                                  const FrameSettings& settings, const RowTimes& times, float weight) {
     const Frame frame = make_frame(render_scene_, at_, camera_, path(T_camera_target, times, 1), settings);
     each_square(T_camera_target, times, weight, [&](const Square& square, auto&& each) {
-        each([&](int c, int r, const RowView& view) {
-            return shading_change(frame, sensor, square.x + c, square.y + r, points, view.t_camera_target);
-        });
+        const ShadingChanges changes(frame, sensor, square, chosen_);
+        each([&](int c, int r, const RowView& view) { return changes.at(c, r, view.t_camera_target); });
     });
 }
 

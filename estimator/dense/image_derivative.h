@@ -65,7 +65,7 @@ private:
              const RowTimes& times, float weight);
     /// Adds the third.
     void add_shading(const Rigid3& T_camera_target, const SensorModel& sensor, const FrameSettings& settings,
-                     int fineness, const RowTimes& times, float weight);
+                     const RowTimes& times, float weight);
     void apply_optics();
 
     const RenderScene& render_scene_;

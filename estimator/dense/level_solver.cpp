@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/pose/symmetric.h"
 #include "renderer/camera/scene_camera.h"
@@ -9,9 +10,9 @@
 namespace narpa {
 namespace {
 
-/// A level converges when a step moves the target by less than this, px of the level; the finest also when it is
-/// less than so many standard deviations of the pose.
-constexpr double kConverged_px = 0.1, kConverged_sigmas = 0.2;
+/// A level converges when a step moves the target by less than this, px of the level; before a step to pixels a
+/// quarter as wide by less than that. The finest also when it is less than so many standard deviations of the pose.
+constexpr double kConverged_px = 0.1, kBeforeFarStep_px = 0.05, kConverged_sigmas = 0.2;
 constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-7, kDampingStep = 10;
 constexpr int kMostRefused = 4;
 /// Steps that move the target by less are accepted without testing the cost, whose change is below its sampling
@@ -42,9 +43,13 @@ constexpr double kLeastInformation = 1e-10;
 /// Coarse levels use so many times the samples: their pixels have more details and less noise, and are few. All
 /// steps but the finest level's last take a derivative by so many times fewer lines.
 constexpr int kCoarseSamples = 2;
-constexpr int kCoarseFineness = 3;
+constexpr int kCoarseFineness = 2;
 /// The last step uses this many times the samples.
 constexpr int kPolishSamples = 6;
+/// And only pixels that together hold this part of the information.
+constexpr double kHeld = 0.85;
+/// Where the target covers so many: fewer take little time.
+constexpr std::size_t kManyPixels = 10'000;
 /// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
 constexpr int kMostPolishes = 5;
 constexpr double kPolished_sigmas = 1;
@@ -75,6 +80,14 @@ bool is_observable(const Matrix6& information) {
 
 }  // namespace
 
+int next_level(int factor, int finest, double extent_px) {
+    constexpr int kLastStep = 4;
+    constexpr double kManyAcross_px = 64;  // of the level before
+    if (factor == finest) return 0;
+    const bool far = factor <= kLastStep * finest && extent_px / factor >= kManyAcross_px;
+    return far ? finest : factor / 2;
+}
+
 bool is_pose(const Rigid3& T) {
     const bool finite = std::isfinite(T.q.w) && is_finite(T.q.vec()) && is_finite(T.t);
     return finite && std::abs(norm(T.q) - 1) < 1e-3;
@@ -91,12 +104,16 @@ LevelSolver::LevelSolver(const Camera& camera, const RenderScene& render_scene, 
       o_(options),
       e_(estimate),
       coarse_(factor > options.finest),
+      converged_px_(coarse_ && next_level(factor, options.finest, factor * extent_px(view.window())) < factor / 2
+                        ? kBeforeFarStep_px
+                        : kConverged_px),
       settings_{.spp = std::max(2, options.samples_per_pixel * (coarse_ ? kCoarseSamples : 1)),
                 .seed = options.seed,
                 .method = options.method,
                 .max_depth = options.max_depth} {}
 
 DenseStatus LevelSolver::run(bool first) {
+    view_.choose_all();
     render(e_.T_camera_body);
     if (first) shift();
     robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images()) : 0;
@@ -109,7 +126,8 @@ DenseStatus LevelSolver::run(bool first) {
         if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
         Step step = next_step(damping);
-        if (step.size < 1) {
+        const bool chosen = !coarse_ && step.motion_px < kDerivativeServes_px && choose(step.pose);
+        if (step.size < 1 && !(chosen && step.motion_px > kLastServes_px)) {
             take(step);
             return DenseStatus::converged;
         }
@@ -149,6 +167,17 @@ void LevelSolver::polish() {
     }
 }
 
+/// True where pixels are left out from now on. They keep the samples that they have, as the image is after this
+/// last step of theirs.
+bool LevelSolver::choose(const Vector6& step) {
+    const bool mixes_pixels = camera_.point_spread || camera_.veiling_glare > 0;
+    if (mixes_pixels || cost_.pixels < kManyPixels || !view_.images().chosen.empty()) return false;
+    std::vector<std::uint8_t> pixels = informative_pixels(view_.images(), e_.exposure, kHeld);
+    view_.predict(step);
+    view_.choose(std::move(pixels));
+    return true;
+}
+
 std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
     const Vector6 way = error_between(e_.T_camera_body, T_camera_body);
     if (!(distance_px(way) < kReach_px)) return {};
@@ -186,6 +215,7 @@ void LevelSolver::finish() {
 }
 
 void LevelSolver::examine() {
+    view_.choose_all();
     settings_.spp *= kPolishSamples;
     render(e_.T_camera_body);
     differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
@@ -207,6 +237,7 @@ double LevelSolver::rise(double sigmas) {
 }
 
 Result<Matrix6> LevelSolver::bound() {
+    view_.choose_all();
     render(e_.T_camera_body);
     view_.differentiate(e_.T_camera_body, settings_, o_.fineness);
     PhotometricImages images = view_.images();
@@ -274,7 +305,7 @@ LevelSolver::Step LevelSolver::next_step(double damping) const {
     s.pose = stride_ * ldlt_solve(damped, equations_.pose_gradient());
     s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
     s.motion_px = distance_px(s.pose);
-    s.size = s.motion_px / kConverged_px;
+    s.size = s.motion_px / converged_px_;
     if (!coarse_) s.size = std::min(s.size, s.sigmas / kConverged_sigmas);
     s.trusted = stride_ == 1 && s.motion_px < (coarse_ ? kCoarseTrust_px : kFineTrust_px);
     return s;

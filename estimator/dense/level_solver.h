@@ -9,6 +9,11 @@ namespace narpa {
 /// Finite, and a rotation.
 [[nodiscard]] bool is_pose(const Rigid3& T);
 
+/// The pyramid level after one whose pixels are `factor` sensor pixels wide; 0 after the finest. Where the target
+/// is large (`extent_px`, sensor pixels), a level finds the pose to so few of its pixels that the last step may be
+/// to pixels a quarter as wide.
+[[nodiscard]] int next_level(int factor, int finest, double extent_px);
+
 class LevelSolver {
 public:
     /// All outlive it. `camera`: of the level, each of whose pixels is `factor` x `factor` of the sensor's.
@@ -43,6 +48,7 @@ private:
     };
 
     void shift();
+    [[nodiscard]] bool choose(const Vector6& step);
     void render(const Rigid3& T);
     void differentiate(double reach_px, int fineness);
     bool linearise();
@@ -66,6 +72,7 @@ private:
     const DenseOptions& o_;
     DenseEstimate& e_;
     const bool coarse_;
+    const double converged_px_;
     FrameSettings settings_{};
 
     Robustness robust_{};

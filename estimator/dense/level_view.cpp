@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <utility>
 
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
@@ -97,6 +98,7 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
 void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
                             const ModelUncertainty& model, const std::optional<Rigid3>& T_world_camera) {
     differentiated_at_.reset();
+    chosen_.clear();
     at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model, T_world_camera_ = T_world_camera;
     view_.begin_frame(at_, motion_, times_);
     derivative_.begin_frame(at_, motion_, times_);
@@ -126,10 +128,11 @@ void LevelView::place(const Rigid3& T_camera_target) {
 
 void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& settings) {
     place(T_camera_target);
-    view_.render_with_variance(T_camera_target, settings);
+    view_.render_with_variance(T_camera_target, settings, chosen_);
     const auto& k = sensor_.dn_per_radiance;
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
+        if (!is_chosen(i)) continue;
         signal_[i] = signal_of(view_.radiance().pixels[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
@@ -137,6 +140,18 @@ void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
 
 void LevelView::predict(const Vector6& step) {
     for (std::size_t i = 0; i < signal_.size(); ++i) signal_[i] += columns_[i].dot(step.cast<float>());
+}
+
+void LevelView::choose(std::vector<std::uint8_t> pixels) {
+    chosen_ = std::move(pixels);
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+        if (chosen_[i] == 0) columns_[i].setZero();
+}
+
+void LevelView::choose_all() {
+    if (chosen_.empty()) return;
+    chosen_.clear();
+    differentiated_at_.reset();
 }
 
 float LevelView::signal_of(const Rgb& radiance) const {
@@ -150,10 +165,10 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     BodyPoses turned = at_;
     turned.T_world_body[target_].q = normalized(at_.T_world_body[target_].q * exp_rotation(turn_rad));
     view_.begin_frame(turned, motion_, times_);
-    view_.render_with_variance(T_camera_target, settings);
+    view_.render_with_variance(T_camera_target, settings, chosen_);
     std::vector<float> change;
     for (std::size_t i = 0; i < signal_.size(); ++i)
-        change.push_back(signal_of(view_.radiance().pixels[i]) - signal_[i]);
+        change.push_back(is_chosen(i) ? signal_of(view_.radiance().pixels[i]) - signal_[i] : 0);
     view_.begin_frame(at_, motion_, times_);
     return change;
 }
@@ -166,7 +181,7 @@ void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings
     if (T_world_camera_) add_shading(T_camera_target, settings);
 }
 
-/// Not 0 where a pixel or its neighbours are lit.
+/// Not 0 where a chosen pixel or its neighbours are lit.
 std::vector<std::uint8_t> LevelView::lit() const {
     std::vector<std::uint8_t> out(signal_.size());
     const auto width = static_cast<std::size_t>(window_.width);
@@ -176,6 +191,7 @@ std::vector<std::uint8_t> LevelView::lit() const {
     for (int y = 1; y < window_.height - 1; ++y)
         for (int x = 1; x < window_.width - 1; ++x) {
             const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            if (!is_chosen(p)) continue;
             out[p] = is_lit(p - width) || is_lit(p) || is_lit(p + width) ? 1 : 0;
         }
     return out;
@@ -232,6 +248,7 @@ PhotometricImages LevelView::images() const {
             .pixels_averaged = pixels_averaged_,
             .prior = {.gain_sigma = std::hypot(ExposurePrior{}.gain_sigma, model_.albedo)},
             .measured_clipped = measured_clipped_,
+            .chosen = chosen_,
             .model_part = model_.light_rad};
 }
 

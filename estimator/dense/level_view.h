@@ -42,6 +42,10 @@ public:
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);
     /// Moves the latest render's signal by so small a step of the pose that the Jacobian tells its change.
     void predict(const Vector6& step);
+    /// From now on `render` and `differentiate` work on these pixels alone, those that are not 0. The others keep
+    /// their signal, and lose their Jacobian.
+    void choose(std::vector<std::uint8_t> pixels);
+    void choose_all();
     /// Changes of the latest render's signal, DN, were the target turned under its light by `turn_rad`, target
     /// axes, and seen at the same pose.
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
@@ -59,6 +63,7 @@ public:
 
 private:
     [[nodiscard]] float signal_of(const Rgb& radiance) const;
+    [[nodiscard]] bool is_chosen(std::size_t pixel) const { return chosen_.empty() || chosen_[pixel] != 0; }
     void place(const Rigid3& T_camera_target);
     [[nodiscard]] std::vector<std::uint8_t> lit() const;
     void add_shading(const Rigid3& T_camera_target, const FrameSettings& settings);
@@ -77,6 +82,7 @@ private:
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
     std::vector<std::uint8_t> measured_clipped_;
     std::vector<PixelDerivative> columns_;
+    std::vector<std::uint8_t> chosen_;  ///< empty: all
     std::optional<Rigid3> differentiated_at_;
     int fineness_ = 0;
 };

@@ -5,6 +5,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
+#include <numeric>
 #include <vector>
 
 #include "estimator/pose/median.h"
@@ -255,6 +258,32 @@ Vector8 response(const PhotometricImages& images, const Exposure& exposure, cons
         .gradient;
 }
 
+std::vector<std::uint8_t> informative_pixels(const PhotometricImages& images, const Exposure& exposure,
+                                             double part) {
+    const Residuals residuals(images, exposure, 0);
+    const PhotometricEquations all = equations(images, exposure, {1, std::numeric_limits<double>::infinity(), 0});
+    const Matrix6 covariance = all.pose_information().inverse();
+    std::vector<float> leverage(images.signal.size());
+    tbb::parallel_for(1, std::max(images.height - 1, 1), [&](int y) {
+        residuals.each(y, [&](const Residual& r, std::size_t p) {
+            if (images.derivative[p].isZero(0)) return;
+            const Vector6 J = r.inverse_s * exposure.gain * images.derivative[p].cast<double>();
+            leverage[p] = static_cast<float>(J.dot(covariance * J));
+        });
+    });
+    std::vector<float> sorted;
+    std::ranges::copy_if(leverage, std::back_inserter(sorted), [](float l) { return l > 0; });
+    std::ranges::sort(sorted, std::greater<>());
+    const double enough = part * std::accumulate(sorted.begin(), sorted.end(), 0.0);
+    double sum = 0;
+    const auto last =
+        std::ranges::find_if(sorted, [&](float l) { return (sum += static_cast<double>(l)) >= enough; });
+    const float least = last == sorted.end() ? 0 : *last;
+    std::vector<std::uint8_t> chosen(leverage.size());
+    std::ranges::transform(leverage, chosen.begin(), [&](float l) { return l > 0 && l >= least ? 1 : 0; });
+    return chosen;
+}
+
 double blur_score(const PhotometricImages& images, const Exposure& exposure, const PhotometricEquations& fit) {
     struct Sum {
         Vector8 shared = Vector8::Zero();
@@ -265,8 +294,10 @@ double blur_score(const PhotometricImages& images, const Exposure& exposure, con
         }
     };
     const Residuals residuals(images, exposure, 0);
-    // How a blur changes a pixel: as its variance times half the Laplacian.
+    // How a blur changes a pixel: as its variance times half the Laplacian. Noise of the pixel's own samples is in
+    // both that and its residual: it must be small.
     const auto by_blur = [&](const Residual& r, std::size_t p) {
+        if (!images.chosen.empty() && images.chosen[p] == 0 && images.signal[p] != 0) return 0.0;
         const auto& S = images.signal;
         const auto width = static_cast<std::size_t>(images.width);
         const auto around = static_cast<double>(S[p - 1] + S[p + 1] + S[p - width] + S[p + width]);

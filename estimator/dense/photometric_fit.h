@@ -14,6 +14,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "estimator/dense/image_derivative.h"
 
@@ -39,6 +40,9 @@ struct PhotometricImages {
     double pixels_averaged = 1;  ///< each pixel is the mean of so many of the sensor's
     ExposurePrior prior{};
     std::span<const std::uint8_t> measured_clipped{};  ///< MeasuredImage::clipped; empty: nowhere
+    /// Not 0: pixels that hold the pose (informative_pixels). The others have no derivative and fewer samples;
+    /// gain, offset and the size of the residuals follow from all. Empty: all.
+    std::span<const std::uint8_t> chosen{};
     double model_part = 0;  ///< standard deviation of the prediction's model error, as a part of the signal
 };
 
@@ -96,6 +100,11 @@ struct PhotometricEquations {
 };
 [[nodiscard]] PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure,
                                              const Robustness& robust);
+/// The fewest pixels that together hold this part of the information about the pose, all motions alike: those of
+/// the largest leverage (D. C. Hoaglin, R. E. Welsch, The American Statistician 32, 1978). Does not depend on the
+/// measured image but by what of it is clipped, and on the samples of the predicted one by their variance alone.
+[[nodiscard]] std::vector<std::uint8_t> informative_pixels(const PhotometricImages& images,
+                                                           const Exposure& exposure, double part);
 /// By how many standard deviations the residuals show a blur that the prediction does not have (negative: one that
 /// it has too much of): the score of the blur's variance at zero (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948),
 /// with pose, gain and offset unknown. Its own variance is the sum of its squared terms, so that noise of another

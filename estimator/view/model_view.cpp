@@ -32,9 +32,10 @@ void ModelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
     renderer_.render(at_, path, settings, radiance_, aovs ? &aovs_ : nullptr);
 }
 
-void ModelView::render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings) {
+void ModelView::render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings,
+                                     std::span<const std::uint8_t> chosen) {
     const CameraPose path = place(T_camera_target);
-    renderer_.render(at_, path, settings, radiance_, aovs_.variance);
+    renderer_.render(at_, path, settings, radiance_, aovs_.variance, chosen);
 }
 
 Rigid3 ModelView::T_world_camera(double row) const noexcept {

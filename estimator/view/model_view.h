@@ -37,8 +37,9 @@ public:
     /// Renders the image at this pose, with `aovs` also depth, position, normal and body. Allocates nothing after
     /// the first call of a kind.
     void render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs);
-    /// The image and `Aovs::variance`, but no other of them.
-    void render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings);
+    /// The image and `Aovs::variance`, but no other of them. `chosen`: CameraRenderer::render.
+    void render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings,
+                              std::span<const std::uint8_t> chosen = {});
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     [[nodiscard]] const Tracer& tracer() const noexcept { return render_scene_.tracer(); }

@@ -91,9 +91,10 @@ std::vector<std::uint32_t> unseen_pixels(const Camera& camera) {
     return unseen;
 }
 
-FrameAccount render_uniform(FramePasses& passes, const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+FrameAccount render_uniform(FramePasses& passes, const Frame& f, std::span<const std::uint8_t> chosen,
+                            RadianceImage& out, std::vector<float>* variance) {
     passes.begin(f, f.lens);
-    const PassCount count = passes.uniform(f, out, variance);
+    const PassCount count = passes.uniform(f, out, variance, chosen);
     FrameAccount account;
     account.samples = count.samples;
     account.rays = count.rays;
@@ -121,7 +122,8 @@ struct CameraRenderer::Impl {
     RadianceImage before_optics{after_light ? camera.width : 0, after_light ? camera.height : 0};
 
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
-                        RadianceImage& final_image, Aovs* aovs, std::vector<float>* variance);
+                        RadianceImage& final_image, Aovs* aovs, std::vector<float>* variance,
+                        std::span<const std::uint8_t> chosen);
 
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
         optics.apply(before_optics, out);
@@ -137,18 +139,19 @@ CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                                     RadianceImage& out, Aovs* aovs) {
-    return impl_->render(at, pose, settings, out, aovs, aovs != nullptr ? &aovs->variance : nullptr);
+    return impl_->render(at, pose, settings, out, aovs, aovs != nullptr ? &aovs->variance : nullptr, {});
 }
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
-                                    RadianceImage& out, std::vector<float>& variance) {
+                                    RadianceImage& out, std::vector<float>& variance,
+                                    std::span<const std::uint8_t> chosen) {
     variance.assign(out.pixels.size(), 0);
-    return impl_->render(at, pose, settings, out, nullptr, &variance);
+    return impl_->render(at, pose, settings, out, nullptr, &variance, chosen);
 }
 
 FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose,
                                           const FrameSettings& settings, RadianceImage& final_image, Aovs* aovs,
-                                          std::vector<float>* variance) {
+                                          std::vector<float>* variance, std::span<const std::uint8_t> chosen) {
     RadianceImage& out = after_light ? before_optics : final_image;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     FrameAccount account;
@@ -158,7 +161,7 @@ FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose&
             resize(*aovs, out.pixels.size());
             store_first_hits(frame, out.width, out.height, *aovs);
         }
-        if (uniform) account = render_uniform(passes, frame, out, variance);
+        if (uniform) account = render_uniform(passes, frame, chosen, out, variance);
     }
     if (!uniform)
         account = render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, variance);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "renderer/camera/camera_pose.h"
@@ -53,9 +54,11 @@ public:
 
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& out, Aovs* aovs = nullptr);
-    /// With the variance of Aovs alone, which takes no rays of its own.
+    /// With the variance of Aovs alone, which takes no rays of its own. Of `chosen` pixels alone, those that are
+    /// not 0: the budget is in samples, two or more, and the others hold anything then. Empty: all.
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
-                        RadianceImage& out, std::vector<float>& variance);
+                        RadianceImage& out, std::vector<float>& variance,
+                        std::span<const std::uint8_t> chosen = {});
 
 private:
     struct Impl;

@@ -175,13 +175,14 @@ void FramePasses::fill_background(RadianceImage& out) {
     });
 }
 
-PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
+                               std::span<const std::uint8_t> chosen) {
     fill_background(out);
     const PassCount count = over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         if (f.one_sample())
             show_one_sample(w, t, out);
         else
-            show_samples(w, t, out, variance);
+            show_samples(w, t, chosen, out, variance);
         add_subpixel_light(f, t, out, variance);
         if (f.settings.pixels_done != nullptr)
             f.settings.pixels_done->fetch_add(static_cast<std::size_t>(t.width * t.height),
@@ -193,11 +194,23 @@ PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<f
     return count;
 }
 
-void FramePasses::show_samples(Worker& w, const Tile& t, RadianceImage& out, std::vector<float>* variance) {
+void FramePasses::show_samples(Worker& w, const Tile& t, std::span<const std::uint8_t> chosen, RadianceImage& out,
+                               std::vector<float>* variance) {
     PerPixel<PixelMeans> means{};
     PerPixel<PixelSamples> spread, spread_by_paths;
+    PerPixel<std::uint32_t> count;
+    count.fill(static_cast<std::uint32_t>(w.f.settings.spp));
+    if (!chosen.empty()) {
+        bool any = false;
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            const bool is_chosen = chosen[index_of(x, y, out.width)] != 0;
+            any = any || is_chosen;
+            if (!is_chosen) count[at] = 0;
+        });
+        if (!any) return;
+    }
     const auto none = [](std::size_t) { return 0u; };
-    const auto all = [&](std::size_t) { return static_cast<std::uint32_t>(w.f.settings.spp); };
+    const auto all = [&](std::size_t at) { return count[at]; };
     w.samples(t, out.width, none, all, [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
         add_samples(b, light, means);
         if (variance == nullptr) return;
@@ -205,6 +218,7 @@ void FramePasses::show_samples(Worker& w, const Tile& t, RadianceImage& out, std
         for_each_lane(b.path_lanes, [&](std::size_t i) { spread_by_paths[b.place[i]].add(light.path[i]); });
     });
     t.each_pixel([&](int x, int y, std::size_t at) {
+        if (count[at] == 0) return;
         out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
         w.error.add(means[at]);
     });

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "renderer/film/frame_error.h"
@@ -42,8 +43,11 @@ public:
     /// Pixels in which something may be seen.
     [[nodiscard]] std::uint64_t pixels() const noexcept { return pixels_; }
 
-    /// Each pixel with `spp` samples, shown at once. Its variance goes to `variance`, if that is not null.
-    PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance);
+    /// Each pixel with `spp` samples, shown at once. Its variance goes to `variance`, if that is not null. Of
+    /// `chosen` pixels alone, those that are not 0: `spp` is at least 2, and the others hold anything then. Empty:
+    /// all.
+    PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
+                      std::span<const std::uint8_t> chosen = {});
 
     /// Which tiles a pass goes over: a sixteenth lie spread evenly.
     enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
@@ -77,7 +81,8 @@ private:
     void find_background(const Frame& f);
     void fill_background(RadianceImage& out);
     void show_one_sample(Worker& w, const Tile& t, RadianceImage& out);
-    void show_samples(Worker& w, const Tile& t, RadianceImage& out, std::vector<float>* variance);
+    void show_samples(Worker& w, const Tile& t, std::span<const std::uint8_t> chosen, RadianceImage& out,
+                      std::vector<float>* variance);
     [[nodiscard]] bool estimates(std::uint32_t tile) const noexcept;
     [[nodiscard]] bool fills_g_buffer(std::uint32_t tile) const noexcept;
     void estimate_centres(const Frame& f);

@@ -240,27 +240,38 @@ void add_subpixel_light(const Frame& f, const Tile& t, RadianceImage& out, std::
 }
 
 /// Of each pixel's mean: that of independent samples, block by block, times the tile's ratio. Adds to `variance`.
+/// Pixels without samples have none; the others have equally many.
 template <class Tile>
 void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const PerPixel<PixelMeans>& means,
                    PixelMean PixelMeans::*part, int image_width, std::vector<float>& variance) {
-    PerPixel<double> independent;
+    PerPixel<double> independent{};
+    std::size_t sampled = 0;
     for (int y = 0; y < t.height; y += kBlock)
         for (int x = 0; x < t.width; x += kBlock) {
             const PixelBlock block = block_of(t, x, y);
             Lanes<std::size_t> place;
             Lanes<PixelSamples> of_block;
             Lanes<double> of_means;
+            std::size_t n = 0;
             for (std::size_t i = 0; i < block.n; ++i) {
-                place[i] = place_in_tile(block.x[i] - t.x, block.y[i] - t.y);
-                of_block[i] = spread[place[i]];
+                place[n] = place_in_tile(block.x[i] - t.x, block.y[i] - t.y);
+                of_block[n] = spread[place[n]];
+                if (of_block[n].count() > 0) ++n;
             }
-            if (of_block[0].count() == 0) return;
-            variances_of_means(std::span(of_block).first(block.n), of_means);
-            for (std::size_t i = 0; i < block.n; ++i) independent[place[i]] = of_means[i];
+            if (n == 0) continue;
+            sampled += n;
+            variances_of_means(std::span(of_block).first(n), of_means);
+            for (std::size_t i = 0; i < n; ++i) independent[place[i]] = of_means[i];
         }
+    if (sampled == 0) return;
     VarianceRatio ratio;
     t.each_pixel([&](int, int, std::size_t at) { ratio.add(means[at].*part, independent[at]); });
-    const double value = ratio.value();
+    // Steps of few pixels may be small by chance.
+    constexpr double kPixelsAsIndependent = 4;
+    const auto n = static_cast<double>(sampled);
+    const bool all = sampled == static_cast<std::size_t>(t.width * t.height);
+    const double value =
+        all ? ratio.value() : (n * ratio.value() + kPixelsAsIndependent) / (n + kPixelsAsIndependent);
     t.each_pixel([&](int x, int y, std::size_t at) {
         variance[index_of(x, y, image_width)] += static_cast<float>(value * independent[at]);
     });

@@ -115,6 +115,16 @@ LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window&
     return *kept;
 }
 
+void DenseAlignment::weigh_alike(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
+                                 std::span<const float> frame_variance, DenseEstimate& a, DenseEstimate& b) {
+    if (a.window == b.window) return;
+    const Camera camera = coarser_camera(camera_, options.finest);
+    const Window both = joined(a.window, b.window);
+    LevelView& view = level(options.finest, camera, both, at, options, frame, frame_variance);
+    for (DenseEstimate* e : {&a, &b})
+        LevelSolver(camera, render_scene_, target_, options.finest, view, options, *e).weigh();
+}
+
 Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const BodyPoses& at,
                                             const Rigid3& T_camera_body_guess, const DenseOptions& options,
                                             std::span<const float> frame_variance) {
@@ -177,6 +187,7 @@ void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, co
         other = descend(frame, at, other.T_camera_body, to_the_end, frame_variance, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
+        weigh_alike(frame, at, options, frame_variance, e, other);
         keep_better(e, other);
         const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
         const double worse = other.excess_loss - e.excess_loss;
@@ -208,23 +219,27 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).examine();
     if (const auto face = view.flat_face())
         starts.push_back({other_tilt(*face, e.T_camera_body.t) * e.T_camera_body.q, e.T_camera_body.t});
-    std::vector<std::pair<Rigid3, double>> minima{{e.T_camera_body, e.excess_loss}};
-    for (const Rival& r : std::exchange(fit.rivals, {}))
-        minima.emplace_back(r.T_sensor_target, e.excess_loss + r.worse_chi2);
+    std::vector<DenseEstimate> minima{e};
+    for (const Rival& r : std::exchange(fit.rivals, {})) {
+        minima.push_back(e);
+        minima.back().T_camera_body = r.T_sensor_target, minima.back().excess_loss += r.worse_chi2;
+    }
     DenseOptions from_near = options;
     from_near.coarsest = std::min(options.coarsest, 2 * options.finest);
     for (const Rigid3& start : starts) {
         DenseEstimate other = descend(frame, at, start, from_near, frame_variance, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
-        minima.emplace_back(other.T_camera_body, other.excess_loss);
+        weigh_alike(frame, at, options, frame_variance, e, other);
+        minima.push_back(other);
         keep_better(e, other);
     }
-    for (const auto& [T_camera_body, loss] : minima) {
-        const Vector6 apart = error_between(e.T_camera_body, T_camera_body);
-        const double worse = loss - e.excess_loss;
-        if (normalised_error_squared(apart, e.covariance) > kElsewhere && worse < kAsLikely)
-            fit.rivals.push_back({T_camera_body, worse});
+    for (DenseEstimate& other : minima) {
+        const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
+        if (!(normalised_error_squared(apart, e.covariance) > kElsewhere)) continue;
+        weigh_alike(frame, at, options, frame_variance, e, other);
+        const double worse = other.excess_loss - e.excess_loss;
+        if (worse < kAsLikely) fit.rivals.push_back({other.T_camera_body, worse});
     }
     LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
     solver.examine();

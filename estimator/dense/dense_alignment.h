@@ -76,7 +76,8 @@ struct DenseEstimate {
     /// RMS over that which noise makes, without a robust loss: of the target's pixels, or of those that hold the
     /// pose (PhotometricEquations::residual), whichever is larger.
     double residual = 0;
-    double excess_loss = 0;  ///< misfit of all pixels together, about a chi-square
+    double excess_loss = 0;  ///< misfit of all pixels of `window` together, about a chi-square
+    Window window{};         ///< of the last level
     double blur = 0;         ///< blur_score, standard deviations
     Answer answer;
 };
@@ -119,6 +120,9 @@ private:
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     void examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
+    /// So that both losses are of the same pixels, those about either pose.
+    void weigh_alike(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
+                     std::span<const float> frame_variance, DenseEstimate& a, DenseEstimate& b);
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
                      const DenseOptions& options, const MeasuredImage& frame,
                      std::span<const float> frame_variance);

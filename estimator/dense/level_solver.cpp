@@ -54,8 +54,9 @@ constexpr std::size_t kManyPixels = 10'000;
 constexpr int kMostPolishes = 5;
 constexpr double kPolished_sigmas = 1;
 /// Poses within this motion, px, are in one minimum where a step leads from one to the other: no more than this
-/// part of the way is left, or so many variances.
+/// part of the way is left, or so many variances. What a second step leaves is the distance between them.
 constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
+constexpr int kMeetingSteps = 2;
 constexpr int kMostShift_px = 12;
 /// Model error on coarse levels: this part of the signal power.
 constexpr double kCoarseModel = 0.1;
@@ -68,6 +69,11 @@ double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_
     const double z = std::max(T_camera_target.t.z, 1e-9);
     return pixels_per_radian * step.segment<2>(3).norm() / z +
            0.5 * extent_px * (step.head<3>().norm() + std::abs(step[5]) / z);
+}
+
+/// Loss beyond that of noise.
+double excess(const PhotometricCost& loss) {
+    return loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels);
 }
 
 bool is_observable(const Matrix6& information) {
@@ -181,14 +187,27 @@ bool LevelSolver::choose(const Vector6& step) {
 std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
     const Vector6 way = error_between(e_.T_camera_body, T_camera_body);
     if (!(distance_px(way) < kReach_px)) return {};
+    Vector6 left = way;
+    for (int k = 0; k < kMeetingSteps; ++k) {
+        render(e_.T_camera_body);
+        ++e_.renders;
+        if (!linearise()) return {};
+        e_.T_camera_body = displaced(e_.T_camera_body, next_step(kLeastDamping).pose);
+        left = error_between(e_.T_camera_body, T_camera_body);
+        const Matrix6 information = equations_.pose_information() / (robust_.scale * robust_.scale);
+        const double most = std::max(kLeftVariances, kLeft * kLeft * way.dot(information * way));
+        if (!(left.dot(information * left) < most)) return {};
+    }
+    return left;
+}
+
+void LevelSolver::weigh() {
+    view_.choose_all();
+    settings_.spp *= kPolishSamples;
     render(e_.T_camera_body);
     ++e_.renders;
-    if (!linearise()) return {};
-    const Matrix6 information = equations_.pose_information() / (robust_.scale * robust_.scale);
-    const Vector6 left = way - next_step(kLeastDamping).pose;
-    const double most = std::max(kLeftVariances, kLeft * kLeft * way.dot(information * way));
-    if (!(left.dot(information * left) < most)) return {};
-    return left;
+    e_.window = view_.window();
+    e_.excess_loss = excess(cost(view_.images(), e_.exposure, {}));
 }
 
 void LevelSolver::finish() {
@@ -200,7 +219,8 @@ void LevelSolver::finish() {
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
     const PhotometricCost loss = cost(images, e_.exposure, {});
-    e_.excess_loss = loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels);
+    e_.window = view_.window();
+    e_.excess_loss = excess(loss);
     e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
     const PhotometricEquations of_noise =
         equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0});

@@ -27,7 +27,9 @@ public:
     void polish();
     /// Covariance, residuals and status at the last rendered pose.
     void finish();
-    /// A step from the estimate's pose ends so far from the other; nothing where it does not lead there or most of
+    /// The loss at the estimate's pose again, of this view's pixels.
+    void weigh();
+    /// Steps from the estimate's pose end so far from the other; nothing where they do not lead there or most of
     /// the way, or where one of them is beyond the Jacobian's reach.
     [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
     /// Renders with the last step's rays and linearises at the estimate's pose.

@@ -53,6 +53,11 @@ Interval rounded(double low_px, double high_px, int size) {
 
 }  // namespace
 
+Window joined(const Window& a, const Window& b) {
+    const int x = std::min(a.x, b.x), y = std::min(a.y, b.y);
+    return {x, y, std::max(a.x + a.width, b.x + b.width) - x, std::max(a.y + a.height, b.y + b.height) - y};
+}
+
 std::optional<Window> window_about(const Tracer& tracer, const Camera& camera, std::size_t target,
                                    const Rigid3& T_camera_target) {
     const Window whole{0, 0, camera.width, camera.height};

@@ -17,6 +17,8 @@ struct Window {
     int x = 0, y = 0, width = 0, height = 0;
     friend bool operator==(const Window&, const Window&) = default;
 };
+/// The smallest that holds both.
+[[nodiscard]] Window joined(const Window& a, const Window& b);
 
 /// The window that holds the target's bounds at this pose, with a margin; nothing where they are outside the image
 /// or behind the camera.

@@ -128,6 +128,59 @@ TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
     says(frame, truth, {}, std::vector<float>(frame.dn.size(), -1), "negative");
 }
 
+/// Whichever others are rendered, and their variance is about the same.
+TEST_F(DockingFrame, ChosenPixelsAreThoseOfTheWholeImage) {
+    ModelView view(*render_scene, camera, 0, at);
+    FrameSettings s;
+    s.spp = 16;
+    view.render_with_variance(truth, s);
+    const std::vector<Rgb> whole = view.radiance().pixels;
+    const std::vector<float> variance = view.aovs().variance;
+    std::vector<std::uint8_t> chosen(whole.size());
+    for (std::size_t p = 0; p < chosen.size(); ++p) chosen[p] = p % 7 == 0 || p % 160 < 20 ? 1 : 0;
+    view.render_with_variance(truth, s, chosen);
+    double sum = 0, sum_of_whole = 0;
+    int lit = 0;
+    for (std::size_t p = 0; p < whole.size(); ++p) {
+        if (chosen[p] == 0) continue;
+        ASSERT_EQ(view.radiance().pixels[p], whole[p]) << p;
+        sum += static_cast<double>(view.aovs().variance[p]), sum_of_whole += static_cast<double>(variance[p]);
+        lit += whole[p] == Rgb{} ? 0 : 1;
+    }
+    EXPECT_GT(lit, 500);
+    EXPECT_GT(sum, 0.7 * sum_of_whole);
+    EXPECT_LT(sum, 2 * sum_of_whole);
+}
+
+/// Where the target covers more than 10,000 pixels, those that hold the pose make the last steps.
+TEST_F(DockingFrame, OfManyPixelsIsFoundByThoseThatHoldThePose) {
+    camera = scene.cameras[0];
+    camera.format = PixelFormat::y16;
+    at.T_world_body[1].t = {15, 0.7, -0.5};
+    truth = inverse(at.T_world_body[1] * camera.T_mount_camera) * at.T_world_body[0];
+    ModelView view(*render_scene, camera, 0, at);
+    FrameSettings s;
+    s.seed = 99;
+    s.spp = 64;
+    view.render_with_variance(truth, s);
+    std::vector<std::uint8_t> bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
+    expose(camera, view.radiance(), 3, 1, bytes);
+    const auto& k = sensor_model(camera).dn_per_radiance;
+    std::vector<float> variance;
+    for (const float v : view.aovs().variance)
+        variance.push_back(v * static_cast<float>(std::pow(k[0] + k[1] + k[2], 2)));
+    DenseAlignment dense(*render_scene, camera, 0);
+    const auto e = dense.align(*measured_image(camera, bytes), at, displaced(truth, off_by(1, 0.01, norm(truth.t))),
+                               {}, variance);
+    ASSERT_TRUE(e) << e.error().text();
+    EXPECT_GT(e->pixels, 10'000U);
+    EXPECT_EQ(e->answer.kind, AnswerKind::good) << e->answer.why;
+    const Vector6 error = error_between(truth, e->T_camera_body);
+    EXPECT_LT(normalised_error_squared(error, e->covariance), 27.9);  // one of 10,000 right ones is larger
+    EXPECT_LT(error.head<3>().norm(), 1e-3 * kRadPerDeg);
+    EXPECT_LT(error.tail<3>().norm(), 5e-5 * norm(truth.t));
+}
+
 TEST_F(DockingFrame, ReportsThatTheTargetIsOutsideTheImage) {
     const MeasuredImage frame = frame_at(truth, false);
     DenseAlignment dense(*render_scene, camera, 0);

@@ -1,8 +1,8 @@
-// The score of a blur: of noise it is a standard normal number; a blur raises it.
+// The score of a blur: of noise it is a standard normal number; a blur raises it. Which pixels hold the pose.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -68,6 +68,39 @@ struct Disc {
         return found;
     }
 };
+
+TEST(InformativePixels, AreTheFewestThatHoldThatPart) {
+    Disc disc;
+    std::mt19937_64 random(5);
+    (void)disc.score(0.4, random);  // a frame
+    const PhotometricImages images = disc.images();
+    const Eigen::Matrix<double, 6, 6> covariance = equations(images, {}, {1, kAll, 0}).pose_information().inverse();
+    const auto held = [&](std::size_t p) {
+        const Eigen::Matrix<double, 6, 1> J = disc.derivative[p].cast<double>();
+        return J.dot(covariance * J) / images.sensor.variance_dn2(static_cast<double>(disc.signal[p]));
+    };
+    const auto inside = [](std::size_t p) {
+        const std::size_t x = p % kSide, y = p / kSide;
+        return x > 0 && y > 0 && x < kSide - 1 && y < kSide - 1;
+    };
+    for (const double part : {0.5, 0.85}) {
+        const auto chosen = informative_pixels(images, {}, part);
+        double all = 0, of_chosen = 0, least = kAll, most_left = 0;
+        std::size_t n = 0;
+        for (std::size_t p = 0; p < chosen.size(); ++p) {
+            if (!inside(p)) continue;
+            all += held(p);
+            if (chosen[p] != 0)
+                of_chosen += held(p), least = std::min(least, held(p)), ++n;
+            else
+                most_left = std::max(most_left, held(p));
+        }
+        EXPECT_GE(of_chosen, 0.999 * part * all);
+        EXPECT_LT(of_chosen - least, part * all);
+        EXPECT_LT(most_left, 1.001 * least);
+        EXPECT_LT(n, chosen.size() / 4);
+    }
+}
 
 TEST(BlurScore, OfNoiseIsAStandardNormalNumber) {
     Disc disc;

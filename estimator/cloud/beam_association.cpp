@@ -75,10 +75,10 @@ void BeamAssociation::take(std::span<const RangePoint> points, const ApparentMot
     }
 }
 
-Ray BeamAssociation::in_target(const Rigid3& T, const Beam& beam) const noexcept {
+Ray BeamAssociation::in_model(const Rigid3& T, const Beam& beam) const noexcept {
     const Vec3 target_m = turning_ ? conjugate(beam.turn) * T.t : T.t;
     const Quat q = conjugate(T.q);
-    return {q * (beam.origin_m - target_m), q * beam.direction};
+    return {q * (beam.origin_m - target_m) / scale_, q * beam.direction};
 }
 
 void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double search_m, std::size_t stride,
@@ -116,7 +116,7 @@ void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vect
         for (rays.n = 0; rays.n < kLanes && next != order_.end(); ++next) {
             if (next->second % stride != 0) continue;
             index[rays.n] = next->second;
-            rays.put(rays.n++, in_target(T, beams_[next->second]));
+            rays.put(rays.n++, in_model(T, beams_[next->second]));
         }
         tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
         for (std::size_t lane = 0; lane < rays.n; ++lane) {
@@ -125,9 +125,9 @@ void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vect
             if (beam.edge) p.fate = BeamFate::edge;
             if (beam.edge || !is_set(hits.met, lane)) continue;
             p.fate = BeamFate::met;
-            p.surface_m = hits.position[lane];
+            p.surface_m = scale_ * hits.position[lane];
             p.normal = hits.geometric_normal[lane];
-            p.distance_m = dot(p.normal, rays.direction[lane]) * (beam.range_m - hits.range_m[lane]);
+            p.distance_m = dot(p.normal, rays.direction[lane]) * (beam.range_m - scale_ * hits.range_m[lane]);
         }
     }
 }
@@ -140,7 +140,7 @@ void BeamAssociation::find_edges(const Rigid3& T, const RangeNoise& noise) {
         axes.n = std::min(kLanes, order_.size() - first);
         if (noise.footprint_rad > 0) {
             for (std::size_t lane = 0; lane < axes.n; ++lane)
-                axes.put(lane, in_target(T, beams_[order_[first + lane].second]));
+                axes.put(lane, in_model(T, beams_[order_[first + lane].second]));
             tracer_.intersect(at_rest_, axes, {&target_, 1}, hits);
             edges = meeting_edges(axes, hits, noise);
         }
@@ -166,7 +166,7 @@ std::uint32_t BeamAssociation::meeting_edges(const RayBatch& axes, const HitBatc
             const bool same =
                 here == there &&
                 (!here || std::abs(dot(met.geometric_normal[lane], hits.position[lane] - met.position[lane])) <
-                              kOnPlane * noise.range_m);
+                              kOnPlane * noise.range_m / scale_);
             edges |= same ? 0u : 1u << lane;
         }
     }
@@ -174,8 +174,8 @@ std::uint32_t BeamAssociation::meeting_edges(const RayBatch& axes, const HitBatc
 }
 
 Vec3 BeamAssociation::trace_around(const Rigid3& T, const Beam& beam, double radius_m, HitBatch& hits) const {
-    const Ray axis = in_target(T, beam);
-    const Vec3 point = axis.origin + beam.range_m * axis.direction;
+    const Ray axis = in_model(T, beam);
+    const Vec3 point = axis.origin + beam.range_m / scale_ * axis.direction;
     const Vec3& d = axis.direction;
     const Vec3 across = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
     const Vec3 other = cross(d, across);
@@ -183,7 +183,7 @@ Vec3 BeamAssociation::trace_around(const Rigid3& T, const Beam& beam, double rad
     rays.n = kLanes;
     for (std::size_t k = 0; k < kLanes; ++k) {
         const auto& [u, v] = disc()[k];
-        rays.put(k, {axis.origin, normalized(point + radius_m * (u * across + v * other) - axis.origin)});
+        rays.put(k, {axis.origin, normalized(point + radius_m / scale_ * (u * across + v * other) - axis.origin)});
     }
     tracer_.intersect(at_rest_, rays, {&target_, 1}, hits);
     return point;
@@ -197,18 +197,18 @@ void BeamAssociation::around_beams(const Rigid3& T, double search_m, std::size_t
         PointToPlane& p = out.emplace_back();
         double nearest = std::numeric_limits<double>::infinity();
         for_each_lane(hits.met, [&](std::size_t lane) {
-            const Vec3 away = point - hits.position[lane];
+            const Vec3 away = scale_ * (point - hits.position[lane]);
             if (!(dot(away, away) < nearest)) return;
             nearest = dot(away, away);
             p.fate = BeamFate::met;
-            p.surface_m = hits.position[lane];
+            p.surface_m = scale_ * hits.position[lane];
             p.normal = hits.geometric_normal[lane];
             p.distance_m = dot(p.normal, away);
         });
         // Beside the model a tangent plane would let the point slide; the nearest place holds it.
         if (nearest > 0 && p.fate == BeamFate::met && !is_set(hits.met, 0)) {
             p.distance_m = std::sqrt(nearest);
-            p.normal = (point - p.surface_m) / p.distance_m;
+            p.normal = (scale_ * point - p.surface_m) / p.distance_m;
         }
     }
 }
@@ -224,7 +224,8 @@ bool BeamAssociation::may_lie_elsewhere(const Rigid3& T, const RangeNoise& noise
         const Vec3 normal = hits.geometric_normal[lane];
         const double cosine = std::abs(dot(normal, direction));
         if (dot(normal, p.normal) > kOtherSurface || cosine < kGrazingCosine) return;
-        elsewhere |= std::abs(dot(normal, point - hits.position[lane])) < kOnOther * noise.range_m * cosine;
+        const double distance_m = scale_ * dot(normal, point - hits.position[lane]);
+        elsewhere |= std::abs(distance_m) < kOnOther * noise.range_m * cosine;
     });
     return elsewhere;
 }

@@ -50,6 +50,9 @@ public:
     /// Of the target about its origin.
     [[nodiscard]] double reach_m() const noexcept { return tracer_.bounding_radius_m(target_); }
 
+    /// The target is so many times as large as its model, from now on.
+    void set_scale(double scale) noexcept { scale_ = scale; }
+
     /// For every `stride`-th point from the first, in order, at this pose at the time of the sweep. With `search_m`
     /// > 0, for poses that are far off, sixteen rays within that distance of the beam are traced and the hit
     /// nearest to the point is used; a point whose beam misses is then attracted by the surface and its edges. Its
@@ -72,7 +75,7 @@ public:
 
     /// The derivative of distance_m with the range, for the same point.
     [[nodiscard]] double along_beam(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const {
-        return dot(p.normal, in_target(T_lidar_target, beams_[i]).direction);
+        return dot(p.normal, in_model(T_lidar_target, beams_[i]).direction);
     }
 
 private:
@@ -83,19 +86,21 @@ private:
         double range_m = 0;
         bool edge = false;  ///< find_edges
     };
-    [[nodiscard]] Ray in_target(const Rigid3& T_lidar_target, const Beam& beam) const noexcept;
+    /// In coordinates of the model, as long as the target's over the scale.
+    [[nodiscard]] Ray in_model(const Rigid3& T_lidar_target, const Beam& beam) const noexcept;
     void along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const;
     [[nodiscard]] std::uint32_t meeting_edges(const RayBatch& axes, const HitBatch& met,
                                               const RangeNoise& noise) const;
     void around_beams(const Rigid3& T, double search_m, std::size_t stride, std::vector<PointToPlane>& out) const;
-    /// Sixteen rays within `radius_m` of the beam at the point, the first through it. Returns the point.
+    /// Sixteen rays within `radius_m` of the beam at the point, the first through it. Returns the point; both in
+    /// coordinates of the model.
     Vec3 trace_around(const Rigid3& T, const Beam& beam, double radius_m, HitBatch& hits) const;
 
     const Tracer& tracer_;
-    BodyPoses at_rest_;  ///< target coordinates are the tracer's world
+    BodyPoses at_rest_;  ///< model coordinates are the tracer's world
     std::uint32_t target_;
     bool turning_ = false;
-    double nearest_m_ = 0;
+    double scale_ = 1, nearest_m_ = 0;
     std::vector<Beam> beams_;
     std::vector<std::pair<float, std::uint32_t>> order_;  ///< points, by neighbourhood
 };

@@ -108,12 +108,13 @@ Status check_start(const Rigid3& T) {
 }  // namespace
 
 struct CloudIcp::Pass {
-    Matrix6 hessian = Matrix6::Zero();            ///< sum of weight * J J' / sigma^2
-    Vector6 gradient = Vector6::Zero();           ///< -sum of weight * J distance / sigma^2
-    Matrix6 information = Matrix6::Zero();        ///< sum of J J' / sigma^2 of the points used
-    Vector6 by_range = Vector6::Zero();           ///< the gradient for a metre more of range,
-    Vector6 by_scale = Vector6::Zero();           ///< and for a model twice as large
-    double scores2 = 0, slopes = 0, slopes2 = 0;  ///< sums of psi^2, psi', psi'^2 of the points used
+    Matrix6 hessian = Matrix6::Zero();             ///< sum of weight * J J' / sigma^2
+    Vector6 gradient = Vector6::Zero();            ///< -sum of weight * J distance / sigma^2
+    Matrix6 information = Matrix6::Zero();         ///< sum of J J' / sigma^2 of the points used
+    Vector6 by_range = Vector6::Zero();            ///< the gradient for a metre more of range,
+    Vector6 by_scale = Vector6::Zero();            ///< and for a model twice as large
+    double scale_hessian = 0, scale_gradient = 0;  ///< of the model's size itself, with its prior
+    double scores2 = 0, slopes = 0, slopes2 = 0;   ///< sums of psi^2, psi', psi'^2 of the points used
     PointSpread spread;
     double scatter = 1;
     bool enough = false;  ///< points to solve for a pose
@@ -132,14 +133,29 @@ double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
     return std::max(1.0, std::pow(correction * pass.scatter / slope, 2) * mean_square);
 }
 
-/// By what is not known of the model: of the ranges' bias and the model's size as the points weigh them.
+/// By what is not known of the model: of the ranges' bias as the points weigh it, and of what they leave unknown of
+/// the model's size.
 PoseShifts CloudIcp::shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const {
     const ModelUncertainty& u = settings_.model;
     if (u == ModelUncertainty{}) return PoseShifts::Zero(6, 0);
     PoseShifts of_ranges = PoseShifts::Zero(6, 2);
     of_ranges.col(0) = u.range_bias_m * observability.solve(pass.hessian, pass.by_range);
-    of_ranges.col(1) = u.scale * observability.solve(pass.hessian, pass.by_scale);
+    if (u.scale > 0) {
+        const Vector6 by_scale = observability.solve(pass.hessian, pass.by_scale);
+        of_ranges.col(1) = by_scale / std::sqrt(pass.scale_hessian - pass.by_scale.dot(by_scale));
+    }
     return joined(pose_shifts(u, T, motion_), of_ranges);
+}
+
+/// Of the pose; of the model's size too where it is uncertain (the Schur complement of the pose).
+Vector6 CloudIcp::take_step(const Pass& pass, CloudEstimate& out) const {
+    const Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+    if (settings_.model.scale == 0) return step;
+    const Vector6 by_scale = out.observability.solve(pass.hessian, pass.by_scale);
+    const double larger =
+        (pass.scale_gradient + pass.by_scale.dot(step)) / (pass.scale_hessian - pass.by_scale.dot(by_scale));
+    out.scale += larger;
+    return step + larger * by_scale;
 }
 
 /// Covariance, bound and root of the information. `information`: what the answer may rest on.
@@ -156,6 +172,7 @@ void CloudIcp::weigh(const Pass& pass, const Matrix6& information, CloudEstimate
 /// The answer may rest only on points that others check; nor may it rest on points that may lie on another surface.
 void CloudIcp::verify(CloudEstimate& out) {
     const Rigid3& T = out.T_lidar_target;
+    association_.set_scale(1 + out.scale);
     association_.find_edges(T, settings_.noise);
     const Pass pass = linearise(T, 0, 1, out);
     if (!pass.enough) return;
@@ -172,6 +189,7 @@ void CloudIcp::verify(CloudEstimate& out) {
 }
 
 CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
+    association_.set_scale(1 + out.scale);
     association_.associate(T, settings_.noise, search_m, stride, planes_);
     Pass pass;
     magnitudes_.clear();
@@ -210,7 +228,10 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
         pass.information += JJ;
         const double along = association_.along_beam(T, k * stride, p);
         pass.by_range -= robust.weight * along / p.sigma_m * J;
-        pass.by_scale -= robust.weight * dot(p.normal, p.surface_m) / p.sigma_m * J;
+        const double grows = -dot(p.normal, p.surface_m) / p.sigma_m;  // for a model twice as large
+        pass.by_scale -= robust.weight * grows * J;
+        pass.scale_hessian += robust.weight * grows * grows;
+        pass.scale_gradient -= robust.weight * e * grows;
         pass.scores2 += std::pow(robust.weight * u, 2);
         pass.slopes += robust.slope;
         pass.slopes2 += robust.slope * robust.slope;
@@ -222,6 +243,11 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
     }
     pass.enough = out.used >= kFewestBeams;
     if (!pass.enough) return pass;
+    if (const double sigma = settings_.model.scale; sigma > 0) {
+        out.cost += 0.5 * std::pow(out.scale / sigma, 2);
+        pass.scale_hessian += 1 / (sigma * sigma);
+        pass.scale_gradient -= out.scale / (sigma * sigma);
+    }
     pass.spread.centre_m = pass.spread.centre_m / pass.spread.weight;
     const Vec3& c = pass.spread.centre_m;
     pass.spread.radius_m = std::sqrt(std::max(1e-18, moment / pass.spread.weight - dot(c, c)));
@@ -251,6 +277,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     double damping = 1, moved_m = 0;  // since edges were found
     for (int i = 0;; ++i) {
         if (i == 0 || (out.settled && moved_m > edges_hold_m() && i < settings_.iterations)) {
+            association_.set_scale(1 + out.scale);
             association_.find_edges(T, settings_.noise);
             moved_m = 0;
             out.settled = false;
@@ -261,7 +288,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
             weigh(pass, pass.information, out);
             break;
         }
-        Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+        Vector6 step = take_step(pass, out);
         // Back and forth between two sets of partners, for ever: it ends between them.
         if (step.dot(pass.hessian * last) < 0) damping *= 0.5;
         step *= damping;
@@ -371,6 +398,7 @@ CloudIcp::Approach CloudIcp::approach(const Rigid3& start, double search_m) {
     constexpr int kMoves = 2;
     const std::size_t stride = std::max<std::size_t>(1, association_.size() / kSearchPoints);
     Rigid3 T = start;
+    association_.set_scale(1);
     for (int i = 0; i < kMoves; ++i) {
         association_.associate(T, settings_.noise, 0, stride, planes_);
         Vec3 seen_m, met_m;

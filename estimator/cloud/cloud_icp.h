@@ -42,8 +42,9 @@ struct CloudEstimate {
     /// Cramer-Rao bound for the points used and the noise of the settings, and the model's uncertainty.
     Matrix6 bound = Matrix6::Zero();
     Observability observability{};
-    int iterations = 0;     ///< with those of the search
-    bool settled = false;   ///< the last step was small
+    double scale = 0;      ///< by this part the target is larger than its model, if ModelUncertainty::scale is told
+    int iterations = 0;    ///< with those of the search
+    bool settled = false;  ///< the last step was small
     bool on_model = false;  ///< enough points are explained
     /// Other poses that explain the points nearly as well: a near symmetry of the model, or few points.
     std::vector<Rival> rivals;
@@ -97,6 +98,7 @@ private:
     [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start, double search_m) const;
     [[nodiscard]] PoseShifts shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const;
     [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
+    [[nodiscard]] Vector6 take_step(const Pass& pass, CloudEstimate& out) const;
     void weigh(const Pass& pass, const Matrix6& information, CloudEstimate& out) const;
     void verify(CloudEstimate& out);
     [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);

@@ -138,7 +138,7 @@ void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
         if (!is_chosen(i)) continue;
-        signal_[i] = signal_of(view_.radiance().pixels[i]);
+        signal_[i] = static_cast<float>(sensor_.signal(view_.radiance().pixels[i]));
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
 }
@@ -159,12 +159,6 @@ void LevelView::choose_all() {
     differentiated_at_.reset();
 }
 
-float LevelView::signal_of(const Rgb& radiance) const {
-    const auto& k = sensor_.dn_per_radiance;
-    const Vec3 L = vec_cast<double>(radiance);
-    return static_cast<float>(k[0] * L.x + k[1] * L.y + k[2] * L.z);
-}
-
 std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                 const Vec3& turn_rad) {
     BodyPoses turned = at_;
@@ -173,7 +167,8 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
     view_.render_with_variance(T_camera_target, settings, chosen_);
     std::vector<float> change;
     for (std::size_t i = 0; i < signal_.size(); ++i)
-        change.push_back(is_chosen(i) ? signal_of(view_.radiance().pixels[i]) - signal_[i] : 0);
+        change.push_back(is_chosen(i) ? static_cast<float>(sensor_.signal(view_.radiance().pixels[i])) - signal_[i]
+                                      : 0);
     view_.begin_frame(at_, motion_, times_);
     return change;
 }

@@ -64,7 +64,6 @@ public:
     [[nodiscard]] PhotometricImages images() const;
 
 private:
-    [[nodiscard]] float signal_of(const Rgb& radiance) const;
     [[nodiscard]] bool is_chosen(std::size_t pixel) const { return chosen_.empty() || chosen_[pixel] != 0; }
     void place(const Rigid3& T_camera_target);
     [[nodiscard]] std::vector<std::uint8_t> lit() const;

@@ -24,7 +24,7 @@ void append(Mesh& to, const Mesh& part, const Rigid3& T) {
 }
 
 /// A bus of 3 x 2 x 2 m with two panels, a tilted dish plate and a mast: nothing of it is symmetric.
-Scene craft_scene() {
+Scene craft_scene(double scale) {
     Mesh m;
     m.name = "craft";
     append(m, test::box(3, 2, 2), {});
@@ -32,6 +32,7 @@ Scene craft_scene() {
     append(m, test::box(1.5, 3, 0.1), {exp_rotation({0, -0.3, 0}), {-0.2, -2.7, 0.2}});
     append(m, test::box(0.1, 1.6, 1.6), {exp_rotation({0, 0.5, 0.4}), {1.9, 0.3, 0.8}});
     append(m, test::box(0.3, 0.3, 2.5), {{}, {-1.0, 0.6, 2.0}});
+    for (Vec3f& p : m.positions) p = static_cast<float>(scale) * p;
     Scene scene;
     scene.materials.push_back(test::lambert(0.5f));
     test::add_mesh(scene, std::move(m));
@@ -41,8 +42,9 @@ Scene craft_scene() {
 const ApparentMotion kTumbling{{0.3, -0.2, 0.1}, {0.05, 0.08, -0.1}};
 
 struct Bench {
-    Scene scene = craft_scene();
-    Tracer tracer = *Tracer::create(scene, 1);
+    Scene scene;
+    Tracer tracer;
+    explicit Bench(double scale = 1) : scene(craft_scene(scale)), tracer(*Tracer::create(scene, 1)) {}
 
     /// Of a sixth of a turn in 1/60 s about the y axis, 32 lines of 0.7 degrees, 0.2 degrees apart, as a
     /// VLP-16 looks: x right, y forward.
@@ -129,6 +131,35 @@ TEST(IcpSweeps, FindsThePoseFromFiveDegreesAndFivePercent) {
     // 95 % of the efficiency is 1.026 of the bound; the rest are four standard errors of this many draws.
     for (int i = 0; i < 6; ++i) EXPECT_NEAR(all.to_bound(i), 1.026, 4 / std::sqrt(2.0 * all.count)) << i;
     EXPECT_NEAR(all.nees / all.count, 6, 4 * std::sqrt(12.0 / all.count));
+}
+
+/// Of a craft that is larger than its model: where the model's size is said to be uncertain, the points tell it.
+TEST(IcpSweeps, AnUncertainSizeIsFound) {
+    constexpr double kLarger = 0.04;
+    constexpr int kStarts = 30;
+    const Bench larger(1 + kLarger);
+    IcpSettings told = noisy();
+    told.model.scale = kLarger;
+    CloudIcp icp(bench().tracer, 0, told), believes(bench().tracer, 0, noisy());
+    std::mt19937_64 random(12);
+    int usable = 0, usable_untold = 0;
+    double nees = 0, squares = 0;
+    for (int k = 0; k < kStarts; ++k) {
+        const Rigid3 T = truth(random), start = start_beside(T, 3 * kRadPerDeg, 0.03, random);
+        const auto points = larger.sweep(T, kTumbling, random);
+        const auto e = icp.align(points, kTumbling, start, kSearch),
+                   untold = believes.align(points, kTumbling, start, kSearch);
+        ASSERT_TRUE(e) << e.error().text();
+        usable_untold += untold && untold->answer.usable() ? 1 : 0;
+        if (!e->answer.usable() || e->observability.unobserved > 0) continue;
+        ++usable;
+        nees += normalised_error_squared(error_between(e->T_lidar_target, T), e->covariance);
+        squares += std::pow(e->scale - kLarger, 2);
+    }
+    EXPECT_GE(usable, 25);
+    EXPECT_LE(usable_untold, 10);
+    EXPECT_LT(nees / usable, 6 + 4 * std::sqrt(12.0 / usable));
+    EXPECT_LT(std::sqrt(squares / usable), 0.1 * kLarger);
 }
 
 /// A quarter of the returns come from something else in front of the target.

@@ -69,7 +69,6 @@ private:
     const double pixels_per_radian_;
     const RenderScene& render_scene_;
     const std::size_t target_;
-    const int factor_;
     LevelView& view_;
     const DenseOptions& o_;
     DenseEstimate& e_;

@@ -46,6 +46,7 @@ def approach(document):
     for run, colour in zip(document["runs"], CYCLE):
         off = [cell["off_deg_and_percent"] for cell in run["basin"]]
         basin.plot(off, [100 * c["found"] / max(1, c["trials"]) for c in run["basin"]], "o-", color=colour, label=run["method"])
+    basin.set_visible(any(run["basin"] for run in document["runs"]))
     basin.set_ylim(-5, 105)
     basin.set_xlabel("error of the start, degrees and % of the range")
     basin.set_ylabel("poses found, %")

@@ -149,13 +149,14 @@ PoseShifts CloudIcp::shifts(const Rigid3& T, const Pass& pass, const Observabili
 
 /// Of the pose; of the model's size too where it is uncertain (the Schur complement of the pose).
 Vector6 CloudIcp::take_step(const Pass& pass, CloudEstimate& out) const {
-    const Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
+    Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
     if (settings_.model.scale == 0) return step;
     const Vector6 by_scale = out.observability.solve(pass.hessian, pass.by_scale);
     const double larger =
         (pass.scale_gradient + pass.by_scale.dot(step)) / (pass.scale_hessian - pass.by_scale.dot(by_scale));
     out.scale += larger;
-    return step + larger * by_scale;
+    step += larger * by_scale;
+    return step;
 }
 
 /// Covariance, bound and root of the information. `information`: what the answer may rest on.

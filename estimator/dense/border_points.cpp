@@ -74,7 +74,7 @@ void BorderPoints::trace(const FineGrid& grid, PointTracer& tracer, int width,
         return c >= 0 && r >= 0 && c < square_.columns && r < square_.rows &&
                chosen[index_in(width, square_.x + c, square_.y + r)] != 0;
     };
-    // A point is one of those pixels' whose borders it or its neighbours are on.
+    // A point is needed where it, or a neighbour on its line, is on the border of a chosen pixel.
     const auto serves = [&](int k, auto&& on_border_of) {
         return on_border_of((k + n_) / n_ - 1) || on_border_of((k - 1 + n_) / n_ - 1) ||
                on_border_of((k + 1 + n_) / n_ - 1);

@@ -54,10 +54,10 @@ struct Square {
     int x, y, columns, rows;
 };
 
-/// What a point on a border stands for is as long as the way between points. A surface that ends within that, or a
-/// crease in it, changes the mean over it by so much: DN.
+/// Each point stands for a stretch of the border as long as the spacing of the points. Where a contour or a crease
+/// crosses that, the mean of the stretch differs from the point.
 struct BorderShift {
-    double signal = 0;
+    double signal = 0;   ///< the mean less the point's, DN
     double range_m = 0;  ///< of the edge; of two that of the larger change
 };
 

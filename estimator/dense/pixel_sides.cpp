@@ -69,7 +69,7 @@ private:
             add(side, edge_between(near, far));
     }
 
-    /// What a point on a border, left or upper if `sign` is 1, does not stand for.
+    /// `sign`: 1 on the left and upper border, -1 on the others.
     void add(const BorderShift& shift, double sign, double x, double y, bool horizontal) {
         if (shift.signal == 0) return;
         const Side side{x, y, horizontal ? 1.0 : 0.0, horizontal ? 0.0 : 1.0, sign * shift.signal};

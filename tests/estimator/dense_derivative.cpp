@@ -160,6 +160,15 @@ TEST(ImageDerivative, OfARollingShutterAndABlurringLens) {
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.08) << "column " << k;
 }
 
+Scene box_of(const Vec3& sides_m) {
+    Scene s;
+    s.sun = Sun{normalized(Vec3{0.3, -0.4, -0.85}), 1361, 0};
+    s.ambient = {20, 20, 20};
+    s.materials.push_back(test::lambert(0.5f));
+    test::add_mesh(s, test::box(sides_m.x, sides_m.y, sides_m.z));
+    return s;
+}
+
 /// Of the image by a unit of this motion: RMS over the pixels.
 double rms_change(std::span<const PixelDerivative> J, const Vector6& motion) {
     double sum = 0;
@@ -170,11 +179,7 @@ double rms_change(std::span<const PixelDerivative> J, const Vector6& motion) {
 /// Of a cube whose side is seen nearly edge-on, both its edges in one pixel, the motion that the image holds least:
 /// edges' ranges and places must be right for all other motions to cancel in it.
 TEST(ImageDerivative, OfAFaceSeenNearlyEdgeOn) {
-    Scene scene;
-    scene.sun = Sun{normalized(Vec3{0.3, -0.4, -0.85}), 1361, 0};
-    scene.ambient = {20, 20, 20};
-    scene.materials.push_back(test::lambert(0.5f));
-    test::add_mesh(scene, test::box(2, 2, 2));
+    const Scene scene = box_of({2, 2, 2});
     const auto render_scene = RenderScene::create(scene);
     ASSERT_TRUE(render_scene);
     const Camera camera = pinhole(64, 150);
@@ -204,10 +209,7 @@ TEST(ImageDerivative, OfAFaceSeenNearlyEdgeOn) {
 
 /// An edge that moves along itself changes nothing, wherever in its pixels it lies.
 TEST(ImageDerivative, OfAnEdgeAlongItself) {
-    Scene scene;
-    scene.sun = Sun{normalized(Vec3{0.3, -0.4, -0.85}), 1361, 0};
-    scene.materials.push_back(test::lambert(0.5f));
-    test::add_mesh(scene, test::box(2, 60, 2));
+    const Scene scene = box_of({2, 60, 2});
     const auto render_scene = RenderScene::create(scene);
     ASSERT_TRUE(render_scene);
     const Camera camera = pinhole(64, 150);

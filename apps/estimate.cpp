@@ -86,7 +86,7 @@ Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_opt
     if (!tracked) return tracked.error();
     const Scene& scene = (*run)->world().scene();
     const std::string target = scene.bodies[(*tracker)->target()].name;
-    const std::string_view method = kEstimateMethods[static_cast<std::size_t>(tracker_options.method)];
+    const std::string_view method = kCameraMethods[static_cast<std::size_t>(tracker_options.method)];
     const EstimateSummary summary = summarise(*tracked);
     say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target, method,
                     in_words(summary)));

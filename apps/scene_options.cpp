@@ -118,7 +118,7 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
 
 Result<TrackerOptions> TrackerFlags::options() const {
     TrackerOptions o = tracker;
-    o.method = method == "dense" ? EstimateMethod::dense : EstimateMethod::features;
+    o.method = method == "dense" ? CameraMethod::dense : CameraMethod::features;
     o.search = start == "search";
     if (o.search) return o;
     if (o.range_guess_m > 0)

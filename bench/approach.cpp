@@ -46,11 +46,11 @@ Camera without(const std::vector<std::string>& ignored, Camera camera) {
 /// One method, initialised for the camera and the target.
 class Method {
 public:
-    Method(EstimateMethod method, const World& world, const Camera& camera, std::size_t target,
+    Method(CameraMethod method, const World& world, const Camera& camera, std::size_t target,
            const ApproachOptions& o)
         : method_(method) {
         const BodyPoses at(world.scene().bodies.size());
-        if (method == EstimateMethod::features) {
+        if (method == CameraMethod::features) {
             FeatureSettings settings;
             settings.seed = o.seed;
             points_.emplace(world.render_scene(), camera, target, at, settings);
@@ -70,7 +70,7 @@ public:
         dense_.motion = view.motion;
         Rigid3 T{};
         Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
-        if (method_ == EstimateMethod::features) {
+        if (method_ == CameraMethod::features) {
             const FeatureEstimate e = points_->align(view.image, view.at, guess, view.motion);
             out.claimed = e.answer.usable(), out.renders = static_cast<int>(e.rounds.size());
             T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
@@ -85,14 +85,14 @@ public:
         out.nees = normalised_error_squared(error, covariance);
         out.found = out.rotation_rad < kFoundPart * off.head<3>().norm() &&
                     out.position_m < kFoundPart * off.tail<3>().norm();
-        if (method_ == EstimateMethod::dense && with_bound && out.found)
+        if (method_ == CameraMethod::dense && with_bound && out.found)
             if (const auto least = pixels_->bound(view.at, view.truth, dense_, view.variance_dn2)) bound = *least;
         out.bound_rotation_rad = rotation_sigma(bound), out.bound_position_m = position_sigma(bound);
         return out;
     }
 
 private:
-    EstimateMethod method_;
+    CameraMethod method_;
     std::optional<FeatureAlignment> points_;
     std::optional<DenseAlignment> pixels_;
     DenseOptions dense_;
@@ -194,7 +194,7 @@ std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_ind
     ApproachFrames frames(world, camera, target, o);
     std::vector<ApproachRun> runs;
     std::deque<Method> methods;  // stable addresses
-    for (const EstimateMethod m : o.methods) {
+    for (const CameraMethod m : o.methods) {
         methods.emplace_back(m, world, without(o.ignored, camera), target, o);
         runs.push_back({m, {}, {}, {}});
     }

@@ -19,7 +19,7 @@
 namespace narpa {
 
 struct ApproachOptions {
-    std::vector<EstimateMethod> methods{EstimateMethod::features, EstimateMethod::dense};
+    std::vector<CameraMethod> methods{CameraMethod::features, CameraMethod::dense};
     int frames = 200;
     double from_m = 100, to_m = 1.2;  ///< range, target's origin to camera; in equal steps of its logarithm
     Vec3 along{1, 0, 0};              ///< from the target towards the camera, target axes
@@ -67,7 +67,7 @@ struct BasinCell {
 };
 
 struct ApproachRun {
-    EstimateMethod method{};
+    CameraMethod method{};
     std::vector<ApproachFrame> frames;
     std::vector<ApproachBand> bands;  ///< the last is of them all
     std::vector<BasinCell> basin;

@@ -24,8 +24,8 @@ using nlohmann::json;
 
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
-std::string name_of(EstimateMethod m) {
-    return std::string(kEstimateMethods[static_cast<std::size_t>(m)]);
+std::string name_of(CameraMethod m) {
+    return std::string(kCameraMethods[static_cast<std::size_t>(m)]);
 }
 
 }  // namespace

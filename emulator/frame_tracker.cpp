@@ -82,7 +82,7 @@ FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t t
     features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
     features_ = std::make_unique<FeatureAlignment>(world.render_scene(), camera_, target,
                                                    BodyPoses(world.scene().bodies.size()), features);
-    if (options.method == EstimateMethod::dense)
+    if (options.method == CameraMethod::dense)
         pixels_ = std::make_unique<DenseAlignment>(world.render_scene(), camera_, target);
     if (options.search) search_ = std::make_unique<PoseSearch>(world.render_scene(), camera_, target);
 }

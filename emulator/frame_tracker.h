@@ -2,7 +2,6 @@
 /// with the truth beside it.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -16,16 +15,11 @@
 #include "estimator/filter/pose_filter.h"
 #include "estimator/pose/answer.h"
 #include "estimator/pose/apparent_motion.h"
+#include "estimator/pose/camera_method.h"
 #include "protocols/estimate.h"
 #include "protocols/ledger.h"
 
 namespace narpa {
-
-enum class EstimateMethod : std::uint8_t {
-    features,  ///< points of the frame and of a render at the guess (estimator/features)
-    dense,     ///< all pixels (estimator/dense), from where the points lead
-};
-inline constexpr std::array<std::string_view, 2> kEstimateMethods{"features", "dense"};
 
 class DenseAlignment;
 struct DenseOptions;
@@ -35,7 +29,7 @@ struct MeasuredImage;
 
 struct TrackerOptions {
     std::string target;  ///< name of the body; empty: the first with a mesh that does not carry the camera
-    EstimateMethod method = EstimateMethod::features;
+    CameraMethod method = CameraMethod::features;  ///< dense starts from where the features lead
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
     bool search = false;                      ///< no guess but of the range, known to 30 % (estimator/search)
     double range_guess_m = 0;                 ///< for the search; 0: the truth, off by up to 30 % at random

@@ -68,6 +68,7 @@ struct DenseEstimate {
     Rigid3 T_camera_body{};
     /// PhotometricEquations::pose_covariance and the model's uncertainty; zero unless converged.
     Matrix6 covariance = Matrix6::Zero();
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< its part by the model's uncertainty
     Exposure exposure{};
     std::size_t pixels = 0;  ///< of the last level that show the target
     int renders = 0;         ///< images that were compared with the frame

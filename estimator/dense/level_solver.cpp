@@ -214,7 +214,8 @@ void LevelSolver::finish() {
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
     // What the equations say is still to go belongs to the error too.
     const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
-    e_.covariance = last.pose_covariance() + covariance_of_model(last) + to_go * to_go.transpose();
+    e_.covariance_of_model = covariance_of_model(last);
+    e_.covariance = last.pose_covariance() + e_.covariance_of_model + to_go * to_go.transpose();
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
     const PhotometricCost loss = cost(images, e_.exposure, {});

@@ -10,7 +10,8 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     auto model = SceneModel::create(scenario);
     if (!model) return model.error();
     a->model_ = *std::move(model);
-    for (const std::size_t camera : a->model_->cameras()) a->cameras_.emplace_back(*a->model_, camera, seed);
+    for (const std::size_t camera : a->model_->cameras())
+        a->cameras_.emplace_back(*a->model_, camera, scenario.navigation.camera_method, seed);
     for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
     for (const std::size_t lidar : a->model_->velocimeters())
         a->velocimeters_.emplace_back(*a->model_, lidar, scenario.navigation);
@@ -44,7 +45,7 @@ void Autopilot::take(DynamicsPhase phase, std::int64_t t_ns) {
     if (on_ground(phase) && !on_ground(before)) estimator_->on_touchdown(t_ns);
 }
 
-Autopilot::Prediction Autopilot::predict(std::int64_t t_ns) {
+Prediction Autopilot::predict(std::int64_t t_ns) {
     const std::lock_guard lock(mutex_);
     if (t_ns > estimator_->t_ns()) estimator_->advance(t_ns);
     const TargetEstimate known = estimator_->estimate();
@@ -57,20 +58,14 @@ Autopilot::Prediction Autopilot::predict(std::int64_t t_ns) {
 }
 
 void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
-    const Prediction p = predict(t_ns);
     CameraPoseEstimator& estimator = cameras_[camera];
-    take(estimator.camera().name, t_ns,
-         estimator.measure(bytes, t_ns, p.t_s, p.q_world_chaser, p.T_chaser_target, p.motion), frames_);
+    take(estimator.camera().name, t_ns, estimator.measure(bytes, t_ns, predict(t_ns)), frames_);
 }
 
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, LidarSweep sweep) {
-    const Prediction p = predict(t_ns);
     LidarPoseEstimator& estimator = lidars_[lidar];
     for (RangePoint& point : sweep.points) point.range_m += scenario_.model_error.error.range_bias_m;
-    take(estimator.lidar().name, t_ns,
-         estimator.measure(std::move(sweep), t_ns, p.motion, p.T_chaser_target, p.position_sigma_m,
-                           p.rotation_sigma_rad),
-         sweeps_);
+    take(estimator.lidar().name, t_ns, estimator.measure(std::move(sweep), t_ns, predict(t_ns)), sweeps_);
 }
 
 void Autopilot::take_beam(const LidarBeamReport& report) {

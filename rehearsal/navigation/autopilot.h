@@ -76,15 +76,8 @@ public:
     [[nodiscard]] std::uint64_t restarts() const noexcept { return estimator_ ? estimator_->restarts() : 0; }
 
 private:
-    /// The filter's state, from which a measurement starts.
-    struct Prediction {
-        double t_s = 0;
-        Quat q_world_chaser{};
-        Rigid3 T_chaser_target{};
-        ApparentMotion motion{};
-        double position_sigma_m = 0, rotation_sigma_rad = 0;
-    };
     Autopilot() = default;
+    /// The filter's state, from which a measurement starts.
     [[nodiscard]] Prediction predict(std::int64_t t_ns);
     void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,
               std::uint8_t& count);

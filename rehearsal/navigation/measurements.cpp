@@ -7,6 +7,7 @@
 
 #include "base/time.h"
 #include "estimator/view/measured_image.h"
+#include "renderer/camera/scene_camera.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 FeatureSettings feature_settings(std::uint64_t seed, const ModelUncertainty& model) {
     FeatureSettings f;
     f.model = model;
-    f.seed = ~seed;  // not the random numbers of the frames, whose seed may be the same
+    f.seed = seed;
     f.renders_max = 4;
     f.settled_px = 0.1;  // the filter's prediction is usually so near that one render is enough
     return f;
@@ -28,18 +29,34 @@ constexpr double kMatchVariance = 2.5;
 constexpr double kSearchSigmas = 4;
 /// No search where the prediction is this good: a search costs much more than an alignment.
 constexpr double kNear_m = 0.3;
+/// Pixels of a level that its steps reach over.
+constexpr double kDenseReach_px = 1;
+
+/// Sensor pixels, each way, in a pixel of the coarsest level that dense steps need from a prediction.
+int coarsest_level(const Prediction& predicted, const Camera& camera, double range_m, double reach_m, int most) {
+    const double off_m = kSearchSigmas * (predicted.position_sigma_m + predicted.rotation_sigma_rad * reach_m);
+    const double off_px = CameraModelHandle(camera)->pixels_per_radian() * off_m / range_m;
+    int factor = 1;
+    while (factor < most && off_px > kDenseReach_px * factor) factor *= 2;
+    return factor;
+}
 
 }  // namespace
 
-CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, std::uint64_t seed)
+CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, CameraMethod method,
+                                         std::uint64_t seed)
     : model_(model),
       camera_(model.scene().cameras[camera]),
-      alignment_(model.render_scene(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
-                 feature_settings(seed, model.uncertainty())) {}
+      seed_(~seed) {  // not the random numbers of the frames, whose seed may be the same
+    if (method == CameraMethod::dense)
+        pixels_.emplace(model.render_scene(), camera_, model.target());
+    else
+        features_.emplace(model.render_scene(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
+                          feature_settings(seed_, model.uncertainty()));
+}
 
-MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
-                                               const Quat& q_world_chaser, const Rigid3& T_chaser_target,
-                                               const ApparentMotion& motion) {
+MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns,
+                                               const Prediction& predicted) {
     const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
     const auto image = measured_image(camera_, bytes);
@@ -47,24 +64,67 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
         out.why = image.error().what;
         return out;
     }
-    const BodyPoses& at =
-        model_.place(t_s, normalized(q_world_chaser * T_chaser_target.q), inverse(T_chaser_target));
-    const Rigid3 guess = inverse(camera_.T_mount_camera) * T_chaser_target;
-    const FeatureEstimate e =
-        alignment_.align(*image, at, guess, rotated(conjugate(camera_.T_mount_camera.q), motion));
-    out.points = e.agreeing;
+    const Rigid3& T = predicted.T_chaser_target;
+    const BodyPoses& at = model_.place(predicted.t_s, normalized(predicted.q_world_chaser * T.q), inverse(T));
+    if (pixels_)
+        by_pixels(*image, at, predicted, out);
+    else
+        by_features(*image, at, predicted, out);
     out.ms = seconds_since(start_ns) * 1e3;
+    if (out.pose) out.pose->t_ns = t_ns;
+    return out;
+}
+
+Rigid3 CameraPoseEstimator::guess(const Prediction& predicted) const {
+    return inverse(camera_.T_mount_camera) * predicted.T_chaser_target;
+}
+ApparentMotion CameraPoseEstimator::motion(const Prediction& predicted) const {
+    return rotated(conjugate(camera_.T_mount_camera.q), predicted.motion);
+}
+
+void CameraPoseEstimator::by_features(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
+                                      MeasurementResult& out) {
+    const FeatureEstimate e = features_->align(image, at, guess(predicted), motion(predicted));
+    out.points = e.agreeing;
     out.answer = e.answer.kind;
     out.why = e.answer.why;
-    if (!e.answer.usable()) return out;
-    out.pose = {.t_ns = t_ns,
-                .T_sensor_target = e.T_camera_target,
+    if (!e.answer.usable()) return;
+    out.pose = {.T_sensor_target = e.T_camera_target,
                 .covariance = kMatchVariance * (e.covariance - e.covariance_of_model) + e.covariance_of_model,
                 .T_chaser_sensor = camera_.T_mount_camera,
                 .covariance_of_model = e.covariance_of_model};
     if (e.answer.kind == AnswerKind::unobservable)
         out.pose->root_information = e.answer.root_information / std::sqrt(kMatchVariance);
-    return out;
+}
+
+/// The light is known in the camera's axes, by the chaser's attitude.
+void CameraPoseEstimator::by_pixels(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
+                                    MeasurementResult& out) {
+    const Scene& scene = model_.scene();
+    const Rigid3 start = guess(predicted);
+    DenseOptions o;
+    o.coarsest = coarsest_level(predicted, camera_, norm(start.t),
+                                model_.tracer().bounding_radius_m(model_.target()), o.coarsest);
+    o.seed = ++seed_;
+    o.method = scene.render.method;
+    o.max_depth = scene.render.max_depth;
+    o.motion = motion(predicted);
+    o.model = model_.uncertainty();
+    o.T_world_camera = at.T_world_body[model_.chaser()] * camera_.T_mount_camera;
+    const auto e = pixels_->align(image, at, start, o);
+    if (!e) {
+        out.why = e.error().what;
+        return;
+    }
+    out.points = static_cast<int>(e->pixels);
+    out.answer = e->answer.kind;
+    out.why = e->answer.why;
+    if (!e->answer.usable()) return;
+    out.pose = {.T_sensor_target = e->T_camera_body,
+                .covariance = e->covariance,
+                .T_chaser_sensor = camera_.T_mount_camera,
+                .root_information = e->answer.root_information,
+                .covariance_of_model = e->covariance_of_model};
 }
 
 /// Drops the beams that meet the chaser itself.
@@ -99,16 +159,14 @@ void LidarPoseEstimator::remove_own_body(LidarSweep& sweep) const {
     remove(sweep.empty);
 }
 
-MeasurementResult LidarPoseEstimator::measure(LidarSweep sweep, std::int64_t t_ns, const ApparentMotion& motion,
-                                              const Rigid3& T_chaser_target, double position_sigma_m,
-                                              double rotation_sigma_rad) {
+MeasurementResult LidarPoseEstimator::measure(LidarSweep sweep, std::int64_t t_ns, const Prediction& predicted) {
     const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
     const Quat q_lidar_chaser = conjugate(lidar_.T_mount_lidar.q);
-    const ApparentMotion in_lidar = rotated(q_lidar_chaser, motion);
-    const Rigid3 guess = inverse(lidar_.T_mount_lidar) * T_chaser_target;
+    const ApparentMotion in_lidar = rotated(q_lidar_chaser, predicted.motion);
+    const Rigid3 guess = inverse(lidar_.T_mount_lidar) * predicted.T_chaser_target;
     const double reach_m = model_->tracer().bounding_radius_m(model_->target());
-    const double off_m = kSearchSigmas * (position_sigma_m + rotation_sigma_rad * reach_m);
+    const double off_m = kSearchSigmas * (predicted.position_sigma_m + predicted.rotation_sigma_rad * reach_m);
     // Of the beams without return most pass the target far off.
     std::erase_if(sweep.empty, [&](const EmptyBeam& b) {
         const Vec3 to_target = guess.t + b.t_s * in_lidar.velocity_m_s - b.origin_m;

@@ -7,39 +7,56 @@
 #include <vector>
 
 #include "estimator/cloud/cloud_icp.h"
+#include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "rehearsal/navigation/scene_model.h"
 #include "rehearsal/navigation/state_estimator.h"
 
 namespace narpa::rehearsal {
 
+/// What is known of the target before a measurement, from the filter; body axes of the chaser.
+struct Prediction {
+    double t_s = 0;  ///< after the scenario's time 0
+    Quat q_world_chaser{};
+    Rigid3 T_chaser_target{};
+    ApparentMotion motion{};
+    double position_sigma_m = 0, rotation_sigma_rad = 0;
+};
+
 /// The pose; or none, and why, where no reliable one was found.
 struct MeasurementResult {
     std::optional<TargetMeasurement> pose;
     AnswerKind answer = AnswerKind::refused;
     std::string why;
-    int points = 0;  ///< feature matches that agree, or returns used
+    int points = 0;  ///< feature matches that agree, pixels, or returns used
     double ms = 0;   ///< wall time
 };
 
-/// Frames of one camera: renders the model at the predicted pose and matches its features with the frame.
+/// Frames of one camera: renders the model at the predicted pose and compares features or all pixels.
 class CameraPoseEstimator {
 public:
     /// `model` outlives it. `camera`: index in the scene.
-    CameraPoseEstimator(SceneModel& model, std::size_t camera, std::uint64_t seed);
+    CameraPoseEstimator(SceneModel& model, std::size_t camera, CameraMethod method, std::uint64_t seed);
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
-    /// `bytes`: in the camera's format. `t_ns`: mid-exposure, t_s after the scenario's time 0. `T_chaser_target`:
-    /// predicted, body axes; `motion`: the target's in the chaser's, during the exposure. Runs on the calling
-    /// thread's TBB arena.
-    [[nodiscard]] MeasurementResult measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns, double t_s,
-                                            const Quat& q_world_chaser, const Rigid3& T_chaser_target,
-                                            const ApparentMotion& motion = {});
+    /// `bytes`: in the camera's format. `t_ns`: mid-exposure, the time of `predicted`. Runs on the calling thread's
+    /// TBB arena.
+    [[nodiscard]] MeasurementResult measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns,
+                                            const Prediction& predicted);
 
 private:
+    void by_features(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
+                     MeasurementResult& out);
+    void by_pixels(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
+                   MeasurementResult& out);
+    [[nodiscard]] Rigid3 guess(const Prediction& predicted) const;
+    [[nodiscard]] ApparentMotion motion(const Prediction& predicted) const;
+
     SceneModel& model_;
     Camera camera_;
-    FeatureAlignment alignment_;
+    std::uint64_t seed_;
+    std::optional<FeatureAlignment> features_;  ///< one of them
+    std::optional<DenseAlignment> pixels_;
 };
 
 /// Sweeps of one LiDAR: ICP of the last turn's returns, corrected for the motion to the time of its end.
@@ -55,11 +72,8 @@ public:
                 .model = model.uncertainty()}) {}
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
-    /// `sweep`: a turn; times count from t_ns. `motion`: of the target in the chaser's body axes.
-    /// `position_sigma_m`, `rotation_sigma_rad`: standard deviations of `T_chaser_target`.
-    [[nodiscard]] MeasurementResult measure(LidarSweep sweep, std::int64_t t_ns, const ApparentMotion& motion,
-                                            const Rigid3& T_chaser_target, double position_sigma_m,
-                                            double rotation_sigma_rad);
+    /// `sweep`: a turn; times count from t_ns, the time of `predicted`.
+    [[nodiscard]] MeasurementResult measure(LidarSweep sweep, std::int64_t t_ns, const Prediction& predicted);
 
 private:
     void remove_own_body(LidarSweep& sweep) const;

@@ -23,6 +23,7 @@
 
 #include "base/pose.h"
 #include "base/result.h"
+#include "estimator/pose/camera_method.h"
 #include "estimator/pose/model_uncertainty.h"
 #include "rehearsal/contact/landing.h"
 #include "rehearsal/contact/port_state.h"
@@ -138,8 +139,9 @@ struct Navigation {
     double map_sigma_m = 0,
            map_correlation_m = 0;              ///< errors of its heights, and over which distance they are alike
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
-    std::vector<std::string> velocimeters;     ///< LiDARs whose velocities come over CAN, beside the others
-    double period_s = 1;                       ///< of measurements and of control
+    CameraMethod camera_method = CameraMethod::features;
+    std::vector<std::string> velocimeters;  ///< LiDARs whose velocities come over CAN, beside the others
+    double period_s = 1;                    ///< of measurements and of control
     /// Process noise beside that of the thrusters, which the filter knows by itself, m^2 s^-3 and rad^2 s^-3.
     double acceleration_psd = 1e-10, angular_acceleration_psd = 1e-14;
     double abort_sigma_m = 2;  ///< aborts at this position uncertainty

@@ -37,7 +37,7 @@ TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
     const auto world = small_world(NARPA_BUILD_DIR "/scenes/docking/docking.toml", 2);
     ASSERT_TRUE(world) << world.error().text();
     ApproachOptions options;
-    options.methods = {EstimateMethod::features};
+    options.methods = {CameraMethod::features};
     options.frames = 6;
     options.from_m = 60, options.to_m = 2;
     options.basin = {3};
@@ -84,7 +84,7 @@ TEST(BenchApproach, FindsTheIssBeforeTheEarthAtTheEdgeOfEclipse) {
     const auto world = small_world(path, 1);
     ASSERT_TRUE(world) << world.error().text();
     ApproachOptions options;
-    options.methods = {EstimateMethod::features};
+    options.methods = {CameraMethod::features};
     options.frames = 3;
     options.from_m = 350, options.to_m = 200;
     options.along = {0, 1, 0}, options.up = {0, 0, 1};

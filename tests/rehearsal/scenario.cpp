@@ -164,6 +164,8 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"inertia_kg_m2 = [22000.0, 31000.0, 31000.0]", "inertia_kg_m2 = [1.0, 1.0, 3.0]", "sum of the two"},
         Bad{"position_sigma_m = [0.5, 0.4, 0.4]", "position_sigma_m = [0.5, -0.4, 0.4]", "position_sigma_m[1]"},
         Bad{"cameras = [\"nav\"]", "cameras = [\"left\"]", "\"left\" is not in"},
+        Bad{"cameras = [\"nav\"]", "cameras = [\"nav\"]\ncamera_method = \"sparse\"",
+            "one of \"features\", \"dense\""},
         Bad{"period_s = 1.0", "period_s = 0.33", "a whole number of them"},
         Bad{"to_m = [12.0, 0.0, 0.0]", "", "`arc_deg`"},
         Bad{"hold_s = 10.0", "contact = true", "only the last leg"},

@@ -18,7 +18,6 @@ constexpr std::size_t kFewestBeams = 6;
 constexpr std::size_t kSearchPoints = 100;  ///< of the sweep, about, that the search uses
 constexpr int kSearchIterations = 10;       ///< of the search, each with a smaller radius
 constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observability.h)
-constexpr double kTukey = 4.685;            ///< of the biweight: 95 % of the efficiency of least squares
 constexpr double kLastCircle = 0.02;        ///< of the search, in parts of the first
 constexpr double kExplained = 4;            ///< standard deviations of a point that lies on the model
 constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
@@ -34,17 +33,6 @@ constexpr double kBesideCircle = 0.15;
 constexpr double kElsewhere_sigmas = 2;
 /// An answer further from the start, in parts of the search, was not looked for: a symmetry led there.
 constexpr double kSearched = 2.5;
-
-/// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
-struct Biweight {
-    double weight = 0, slope = 0;
-    explicit Biweight(double u) {
-        const double r = u / kTukey, s = 1 - r * r;
-        if (s <= 0) return;
-        weight = s * s;
-        slope = s * (1 - 5 * r * r);
-    }
-};
 
 /// So many of n points would be found with a chance below 5 % if their share were `least` (Clopper and Pearson
 /// 1934): of few points nearly all must be.
@@ -107,65 +95,15 @@ Status check_start(const Rigid3& T) {
 
 }  // namespace
 
-struct CloudIcp::Pass {
-    Matrix6 hessian = Matrix6::Zero();             ///< sum of weight * J J' / sigma^2
-    Vector6 gradient = Vector6::Zero();            ///< -sum of weight * J distance / sigma^2
-    Matrix6 information = Matrix6::Zero();         ///< sum of J J' / sigma^2 of the points used
-    Vector6 by_range = Vector6::Zero();            ///< the gradient for a metre more of range,
-    Vector6 by_scale = Vector6::Zero();            ///< and for a model twice as large
-    double scale_hessian = 0, scale_gradient = 0;  ///< of the model's size itself, with its prior
-    double scores2 = 0, slopes = 0, slopes2 = 0;   ///< sums of psi^2, psi', psi'^2 of the points used
-    PointSpread spread;
-    double scatter = 1;
-    bool enough = false;  ///< points to solve for a pose
-};
-
-/// The variance of the robust estimate over that of least squares with the noise as it is set: Huber's, with his
-/// correction for few points. His other form, the sandwich of one term for each point, was tried: where a few
-/// points hold a motion it is too sure, by 1.2 in sigma on a craft of 200,000 triangles.
-double CloudIcp::variance_factor(const Pass& pass, std::size_t used) {
-    constexpr double kUnknowns = 6;
-    const auto n = static_cast<double>(used);
-    const double slope = pass.slopes / n, slope_variance = std::max(0.0, pass.slopes2 / n - slope * slope);
-    if (!(n > kUnknowns && slope > 0)) return kUnobservedSigma * kUnobservedSigma;
-    const double correction = 1 + kUnknowns / n * slope_variance / (slope * slope);
-    const double mean_square = pass.scores2 / (n - kUnknowns);
-    return std::max(1.0, std::pow(correction * pass.scatter / slope, 2) * mean_square);
-}
-
-/// By what is not known of the model: of the ranges' bias as the points weigh it, and of what they leave unknown of
-/// the model's size.
-PoseShifts CloudIcp::shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const {
-    const ModelUncertainty& u = settings_.model;
-    if (u == ModelUncertainty{}) return PoseShifts::Zero(6, 0);
-    PoseShifts of_ranges = PoseShifts::Zero(6, 2);
-    of_ranges.col(0) = u.range_bias_m * observability.solve(pass.hessian, pass.by_range);
-    if (u.scale > 0) {
-        const Vector6 by_scale = observability.solve(pass.hessian, pass.by_scale);
-        of_ranges.col(1) = by_scale / std::sqrt(pass.scale_hessian - pass.by_scale.dot(by_scale));
-    }
-    return joined(pose_shifts(u, T, motion_), of_ranges);
-}
-
-/// Of the pose; of the model's size too where it is uncertain (the Schur complement of the pose).
-Vector6 CloudIcp::take_step(const Pass& pass, CloudEstimate& out) const {
-    Vector6 step = out.observability.solve(pass.hessian, pass.gradient);
-    if (settings_.model.scale == 0) return step;
-    const Vector6 by_scale = out.observability.solve(pass.hessian, pass.by_scale);
-    const double larger =
-        (pass.scale_gradient + pass.by_scale.dot(step)) / (pass.scale_hessian - pass.by_scale.dot(by_scale));
-    out.scale += larger;
-    step += larger * by_scale;
-    return step;
-}
-
 /// Covariance, bound and root of the information. `information`: what the answer may rest on.
-void CloudIcp::weigh(const Pass& pass, const Matrix6& information, CloudEstimate& out) const {
-    const double factor = variance_factor(pass, out.used);
+void CloudIcp::weigh(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const {
+    const double factor = equations.variance_factor();
     const Observability& o = out.observability;
-    const PoseShifts by_model = shifts(out.T_lidar_target, pass, o);
+    PoseShifts by_model = PoseShifts::Zero(6, 0);
+    if (const ModelUncertainty& u = settings_.model; u != ModelUncertainty{})
+        by_model = joined(pose_shifts(u, out.T_lidar_target, motion_), equations.shifts(u, o));
     out.covariance_of_model = covariance_by(by_model);
-    out.bound = o.covariance(pass.information, 1) + out.covariance_of_model;
+    out.bound = o.covariance(equations.information(), 1) + out.covariance_of_model;
     out.covariance = o.covariance(information, factor) + out.covariance_of_model;
     out.root_information = root_information_with(o.root_information(information, factor), by_model);
 }
@@ -175,24 +113,24 @@ void CloudIcp::verify(CloudEstimate& out) {
     const Rigid3& T = out.T_lidar_target;
     association_.set_scale(1 + out.scale);
     association_.find_edges(T, settings_.noise);
-    const Pass pass = linearise(T, 0, 1, out);
-    if (!pass.enough) return;
-    CheckedInformation checked = checked_information(rows_, pass.spread, kUnobservedBelow);
+    const auto equations = linearise(T, 0, 1, out);
+    if (!equations) return;
+    CheckedInformation checked = checked_information(rows_, equations->spread(), kUnobservedBelow);
     const double radius_m = kElsewhere_sigmas * settings_.noise.range_m;
     for (WeightedRow& row : rows_)
         row.checked = !association_.may_lie_elsewhere(T, settings_.noise, radius_m, row.measurement,
                                                       planes_[row.measurement]);
-    const CheckedInformation on_one = checked_information(rows_, pass.spread, kUnobservedBelow);
+    const CheckedInformation on_one = checked_information(rows_, equations->spread(), kUnobservedBelow);
     if (rests_on_the_rest(checked, on_one)) checked = on_one;
     out.unchecked = checked.unchecked;
     out.observability = checked.observability;
-    weigh(pass, checked.information, out);
+    weigh(*equations, checked.information, out);
 }
 
-CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out) {
+std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride,
+                                                  CloudEstimate& out) {
     association_.set_scale(1 + out.scale);
     association_.associate(T, settings_.noise, search_m, stride, planes_);
-    Pass pass;
     magnitudes_.clear();
     rows_.clear();
     for (const PointToPlane& p : planes_)
@@ -200,10 +138,8 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
     out.points = planes_.size();
     out.used = out.missed = out.edges = out.grazing = out.rejected = out.explained = 0;
     out.cost = 0;
-    if (magnitudes_.size() < kFewestBeams) return pass;
-    pass.scatter = std::max(1.0, kMadToSigma * upper_median(std::span(magnitudes_)));
-
-    double moment = 0;
+    if (magnitudes_.size() < kFewestBeams) return {};
+    PlaneEquations equations(std::max(1.0, kMadToSigma * upper_median(std::span(magnitudes_))));
     for (std::size_t k = 0; k < planes_.size(); ++k) {
         const PointToPlane& p = planes_[k];
         out.missed += p.fate == BeamFate::missed;
@@ -212,49 +148,29 @@ CloudIcp::Pass CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t
         if (p.fate == BeamFate::missed) out.cost += kOutlierCost;
         if (p.fate == BeamFate::edge) out.cost += kUsualCost;
         if (p.fate != BeamFate::met) continue;
-        const double e = p.distance_m / p.sigma_m, u = e / pass.scatter;
+        const double e = p.distance_m / p.sigma_m;
         out.explained += std::abs(e) < kExplained;
         out.cost += std::min(0.5 * e * e, kOutlierCost);
-        const Biweight robust(u);
-        if (robust.weight <= 0) {
+        const Vector6 by_pose = association_.derivative(T, k * stride, p) / p.sigma_m;
+        const double weight = equations.add({.distance = e,
+                                             .by_pose = by_pose,
+                                             .by_range = association_.along_beam(T, k * stride, p) / p.sigma_m,
+                                             .by_scale = -dot(p.normal, p.surface_m) / p.sigma_m,
+                                             .sigma_m = p.sigma_m,
+                                             .at_m = T.q * p.surface_m});
+        if (weight > 0)
+            rows_.push_back({by_pose, weight, k});
+        else
             ++out.rejected;
-            continue;
-        }
-        ++out.used;
-        const Vector6 J = association_.derivative(T, k * stride, p) / p.sigma_m;
-        const Matrix6 JJ = J * J.transpose();
-        rows_.push_back({J, robust.weight, k});
-        pass.hessian += robust.weight * JJ;
-        pass.gradient -= robust.weight * e * J;
-        pass.information += JJ;
-        const double along = association_.along_beam(T, k * stride, p);
-        pass.by_range -= robust.weight * along / p.sigma_m * J;
-        const double grows = -dot(p.normal, p.surface_m) / p.sigma_m;  // for a model twice as large
-        pass.by_scale -= robust.weight * grows * J;
-        pass.scale_hessian += robust.weight * grows * grows;
-        pass.scale_gradient -= robust.weight * e * grows;
-        pass.scores2 += std::pow(robust.weight * u, 2);
-        pass.slopes += robust.slope;
-        pass.slopes2 += robust.slope * robust.slope;
-        const double weight = robust.weight / (p.sigma_m * p.sigma_m);
-        const Vec3 at = T.q * p.surface_m;
-        pass.spread.weight += weight;
-        pass.spread.centre_m += weight * at;
-        moment += weight * dot(at, at);
     }
-    pass.enough = out.used >= kFewestBeams;
-    if (!pass.enough) return pass;
-    if (const double sigma = settings_.model.scale; sigma > 0) {
-        out.cost += 0.5 * std::pow(out.scale / sigma, 2);
-        pass.scale_hessian += 1 / (sigma * sigma);
-        pass.scale_gradient -= out.scale / (sigma * sigma);
-    }
-    pass.spread.centre_m = pass.spread.centre_m / pass.spread.weight;
-    const Vec3& c = pass.spread.centre_m;
-    pass.spread.radius_m = std::sqrt(std::max(1e-18, moment / pass.spread.weight - dot(c, c)));
-    out.observability = observability(pass.hessian, pass.spread, kUnobservedBelow);
-    out.radius_m = pass.spread.radius_m;
-    return pass;
+    out.used = equations.used();
+    if (out.used < kFewestBeams) return {};
+    const double sigma = settings_.model.scale;
+    if (sigma > 0) out.cost += 0.5 * std::pow(out.scale / sigma, 2);
+    equations.finish(out.scale, sigma);
+    out.observability = observability(equations.hessian(), equations.spread(), kUnobservedBelow);
+    out.radius_m = equations.spread().radius_m;
+    return equations;
 }
 
 Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points, int circles, CloudEstimate& out) {
@@ -262,9 +178,9 @@ Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points
     const double narrower = std::pow(kLastCircle, 1.0 / (circles - 1));
     Rigid3 T = start;
     for (int i = 0; i < circles; ++i, search_m *= narrower) {
-        const Pass pass = linearise(T, search_m, stride, out);
-        if (!pass.enough) break;
-        T = displaced(T, out.observability.solve(pass.hessian, pass.gradient));
+        const auto equations = linearise(T, search_m, stride, out);
+        if (!equations) break;
+        T = displaced(T, equations->pose_step(out.observability));
         ++out.iterations;
     }
     return T;
@@ -283,20 +199,22 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
             moved_m = 0;
             out.settled = false;
         }
-        const Pass pass = linearise(T, 0, 1, out);
-        if (!pass.enough) break;
+        const auto equations = linearise(T, 0, 1, out);
+        if (!equations) break;
         if (out.settled || i == settings_.iterations) {
-            weigh(pass, pass.information, out);
+            weigh(*equations, equations->information(), out);
             break;
         }
-        Vector6 step = take_step(pass, out);
+        auto [step, larger] = equations->step(out.observability);
+        out.scale += larger;
+        const Matrix6& hessian = equations->hessian();
         // Back and forth between two sets of partners, for ever: it ends between them.
-        if (step.dot(pass.hessian * last) < 0) damping *= 0.5;
+        if (step.dot(hessian * last) < 0) damping *= 0.5;
         step *= damping;
         T = displaced(T, step);
         moved_m += surface_motion_m(step, association_.reach_m());
         ++out.iterations;
-        out.settled = step.dot(pass.hessian * step) < std::pow(settings_.settled * pass.scatter, 2);
+        out.settled = step.dot(hessian * step) < std::pow(settings_.settled * equations->scatter(), 2);
         last = step;
     }
     out.on_model = share_is_more(out.explained, out.points - out.edges, settings_.explained_least);

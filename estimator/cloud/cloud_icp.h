@@ -7,12 +7,14 @@
 /// on all along their beams. Unobservable motions stay as in the start and are reported (observability.h).
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "base/result.h"
 #include "estimator/cloud/beam_association.h"
 #include "estimator/cloud/empty_beams.h"
+#include "estimator/cloud/plane_equations.h"
 #include "estimator/pose/answer.h"
 #include "estimator/pose/leverage.h"
 #include "estimator/pose/model_uncertainty.h"
@@ -94,14 +96,12 @@ public:
                                std::span<const EmptyBeam> empty = {});
 
 private:
-    struct Pass;  ///< sums over the points at one pose
     [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start, double search_m) const;
-    [[nodiscard]] PoseShifts shifts(const Rigid3& T, const Pass& pass, const Observability& observability) const;
-    [[nodiscard]] static double variance_factor(const Pass& pass, std::size_t used);
-    [[nodiscard]] Vector6 take_step(const Pass& pass, CloudEstimate& out) const;
-    void weigh(const Pass& pass, const Matrix6& information, CloudEstimate& out) const;
+    void weigh(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const;
     void verify(CloudEstimate& out);
-    [[nodiscard]] Pass linearise(const Rigid3& T, double search_m, std::size_t stride, CloudEstimate& out);
+    /// At this pose; nothing where too few points meet the model to solve for one.
+    [[nodiscard]] std::optional<PlaneEquations> linearise(const Rigid3& T, double search_m, std::size_t stride,
+                                                          CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
     [[nodiscard]] double edges_hold_m() const;
     void draw_in(CloudEstimate& found);

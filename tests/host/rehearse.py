@@ -135,4 +135,22 @@ complete = false
     expect(n["with_frames"] >= 38 and n["with_sweeps"] >= 38, f"frames and sweeps are taken: {n['with_frames']}, {n['with_sweeps']} of {n['estimates']}")
 
 
-{"docks": docks, "lands": lands, "gale": gale, "fails": fails, "another": another, "flies": flies}[sys.argv[1]]()
+def dense():
+    folder = support.work_folder()
+    (folder / "short.toml").write_text(f"""
+[scenario]
+based_on = "{SCENARIOS}/docking-dense.toml"
+name = "short"
+duration_s = 6.0
+
+[gates]
+complete = false
+""")
+    _, verdict = rehearse(folder / "short.toml", folder / "out")
+    n = verdict["navigation"]
+    expect(n["with_frames"] >= 6, f"frames gave poses: {n['with_frames']} of {n['estimates']}")
+    expect(n["position_m"]["max"] < 0.015, f"largest error at 25 m, by features 20 mm: {n['position_m']['max']}")
+    expect(n["nees"] < 14, f"covariances hold: NEES {n['nees']}")
+
+
+{"docks": docks, "lands": lands, "gale": gale, "fails": fails, "another": another, "flies": flies, "dense": dense}[sys.argv[1]]()

@@ -46,11 +46,7 @@ void PointTracer::put(double x, double y, RaySample& seen) {
 void PointTracer::trace() {
     if (n_ == 0) return;
     p_.rays.n = n_;
-    if (f_.over_time)
-        for (std::size_t i = 0; i < n_; ++i) p_.rays.put(i, ray_through(f_, x_[i], y_[i]));
-    else
-        f_.model->directions(f_.T_world_camera.q, x_, y_, p_.rays.direction),
-            p_.rays.origin.fill(f_.T_world_camera.t);
+    aim_through(f_, x_, y_, p_.rays);
     f_.tracer.intersect(f_.at, p_.rays, f_.tracer.all_bodies(), p_.hits);
     if (f_.subpixel_bodies.any())
         for (std::size_t i = 0; i < n_; ++i) p_.hits.put(i, f_.subpixel_bodies.beyond(p_.rays[i], p_.hits[i]));
@@ -112,7 +108,7 @@ void BorderPoints::find_shifts(const FineGrid& grid) {
         for (int k = -1; k < left_.n; ++k) look(left_, c, k, x + c * n_ - 0.5, y + k, 0, 1);
     for (int r = 0; r <= square_.rows; ++r)
         for (int k = -1; k < upper_.n; ++k) look(upper_, r, k, x + k, y + r * n_ - 0.5, 1, 0);
-    bisect(grid.frame, contours);
+    bisect(grid.frame, contours, grid.halvings);
     for (std::size_t i = 0; i < contours.size(); ++i) {
         const Contour& c = contours[i];
         add_shift(steps[i], {c.dx + c.dy > 0 ? c.middle() : 1 - c.middle(), c.range_m});

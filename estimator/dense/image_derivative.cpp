@@ -183,8 +183,8 @@ void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sens
         BorderPoints points(grid.fineness, square);
         PointTracer tracer(grid, sensor);
         points.trace(grid, tracer, camera_.width, chosen_);
-        each(
-            [&](int c, int r, const RowView& view) { return flow_over_borders(grid, tracer, points, c, r, view); });
+        const SquareSides sides(grid, tracer, points, camera_.width, chosen_);
+        each([&](int c, int r, const RowView& view) { return sides.flow_over_borders(c, r, view); });
     });
 }
 

@@ -2,72 +2,85 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <optional>
 
 namespace narpa {
 namespace {
 
+/// From the sample on the nearer surface to that on the opposite border, grid points.
+struct Side {
+    double x, y, dx, dy;
+    double jump;  ///< DN, left or upper minus right or lower sample
+    const RaySample *near = nullptr, *far = nullptr;
+};
+
+/// The line from a at (x, y) to b; nothing where it adds nothing.
+std::optional<Side> side_between(const FineGrid& grid, const RaySample& a, const RaySample& b, double x, double y,
+                                 double dx, double dy) {
+    const double jump = a.signal - b.signal;
+    if (jump == 0) return {};
+    const bool near_is_a = a.range_m <= b.range_m;
+    const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
+    if (near.body < 0 || near.body == grid.camera.mount) return {};
+    return near_is_a ? Side{x, y, dx, dy, jump, &near, &far} : Side{x + dx, y + dy, -dx, -dy, jump, &near, &far};
+}
+
+/// Calls act(side) for those lines across the square's pixel that add something.
+template <class Do>
+void each_side(const FineGrid& grid, const BorderPoints& points, int column, int row, Do&& act) {
+    const int n = grid.fineness, x = (points.square().x + column) * n, y = (points.square().y + row) * n;
+    for (int i = 0; i < n; ++i) {
+        if (const auto across = side_between(grid, points.left(column, row, i), points.left(column + 1, row, i),
+                                             x - 0.5, y + i, n, 0))
+            act(*across);
+        if (const auto down = side_between(grid, points.upper(column, row, i), points.upper(column, row + 1, i),
+                                           x + i, y - 0.5, 0, n))
+            act(*down);
+    }
+}
+
 class PixelSides {
 public:
-    /// Of the square's pixel (column, row).
-    PixelSides(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int column, int row,
-               const RowView& view)
+    /// Of the square's pixel (column, row). `contours`, `last`: on its sides, in order.
+    PixelSides(const FineGrid& grid, const BorderPoints& points, int column, int row, const RowView& view,
+               std::span<const Contour> contours, std::span<const RaySample> last)
         : grid_(grid),
-          tracer_(tracer),
           points_(points),
           column_(column),
           row_(row),
           x_(points.square().x + column),
           y_(points.square().y + row),
           view_(view),
-          fine_row_s_(view.row_s / grid.fineness) {}
+          fine_row_s_(view.row_s / grid.fineness),
+          contours_(contours),
+          last_(last) {}
 
     /// Sum over the lines from border to border.
     Vector6 sum() {
         const int n = grid_.fineness;
+        std::size_t contour = 0;
+        each_side(grid_, points_, column_, row_, [&](const Side& side) {
+            if (is_contour(*side.near, *side.far))
+                add_contour(side, contours_[contour], last_[contour]), ++contour;
+            else
+                add(side, edge_between(*side.near, *side.far));
+        });
         const double left = x_ * n - 0.5, top = y_ * n - 0.5;
         for (int i = 0; i < n; ++i) {
-            add(points_.left(column_, row_, i), points_.left(column_ + 1, row_, i), left, y_ * n + i, n, 0);
-            add(points_.upper(column_, row_, i), points_.upper(column_, row_ + 1, i), x_ * n + i, top, 0, n);
             add(points_.left_shift(column_, row_, i), 1, left, y_ * n + i, true);
             add(points_.left_shift(column_ + 1, row_, i), -1, left + n, y_ * n + i, true);
             add(points_.upper_shift(column_, row_, i), 1, x_ * n + i, top, false);
             add(points_.upper_shift(column_, row_ + 1, i), -1, x_ * n + i, top + n, false);
         }
-        add_contours();
         if (fine_row_s_ == 0) add_by_direction();
         return sum_ / (static_cast<double>(n) * n);
     }
 
 private:
-    /// From the sample on the nearer surface to that on the opposite border, grid points.
-    struct Side {
-        double x, y, dx, dy;
-        double jump;  ///< DN, left or upper minus right or lower sample
-    };
     /// Of the sides across one direction of the image.
     struct Jumps {
         double sum = 0, over_range = 0;  ///< DN, DN / m
     };
-    /// A contour on a line across the pixel.
-    struct Crossed {
-        Side side;
-        RaySample last{};  ///< of the nearer surface before its end
-    };
-
-    /// The line from a at (x, y) to b.
-    void add(const RaySample& a, const RaySample& b, double x, double y, double dx, double dy) {
-        const double jump = a.signal - b.signal;
-        if (jump == 0) return;
-        const bool near_is_a = a.range_m <= b.range_m;
-        const RaySample &near = near_is_a ? a : b, &far = near_is_a ? b : a;
-        if (near.body < 0 || near.body == grid_.camera.mount) return;
-        const Side side = near_is_a ? Side{x, y, dx, dy, jump} : Side{x + dx, y + dy, -dx, -dy, jump};
-        if (is_contour(a, b))
-            contours_.push_back({side.x, side.y, side.dx, side.dy, &near, &far}), crossed_.push_back({side, {}});
-        else
-            add(side, edge_between(near, far));
-    }
 
     /// `sign`: 1 on the left and upper border, -1 on the others.
     void add(const BorderShift& shift, double sign, double x, double y, bool horizontal) {
@@ -88,6 +101,16 @@ private:
         }
     }
 
+    /// What changes on the surface before its end moves with the surface.
+    void add_contour(const Side& side, const Contour& c, const RaySample& last) {
+        Side on_surface = side, end = side;
+        on_surface.jump = (c.dx + c.dy > 0 ? 1 : -1) * (c.near->signal - last.signal);
+        end.jump -= on_surface.jump;
+        const EdgePlace edge = edge_between(*c.near, last);
+        add(on_surface, {edge.along * c.on_near, edge.range_m});
+        add(end, {c.middle(), c.range_m});
+    }
+
     /// Where rows are exposed together a velocity is linear in the inverse range, and hardly changes in a pixel
     /// otherwise: that of its centre.
     void add_by_direction() {
@@ -103,26 +126,6 @@ private:
         };
         add_sides(across_x_, J.x);
         add_sides(across_y_, J.y);
-    }
-
-    void add_contours() {
-        bisect(grid_.frame, contours_);
-        for (std::size_t i = 0; i < contours_.size(); ++i) {
-            const Contour& c = contours_[i];
-            tracer_.put(c.x + c.on_near * c.dx, c.y + c.on_near * c.dy, crossed_[i].last);
-        }
-        tracer_.trace();
-        for (std::size_t i = 0; i < contours_.size(); ++i) {
-            const Contour& c = contours_[i];
-            const RaySample& last = crossed_[i].last;
-            // What changes on the surface before its end moves with the surface.
-            Side on_surface = crossed_[i].side, end = on_surface;
-            on_surface.jump = (c.dx + c.dy > 0 ? 1 : -1) * (c.near->signal - last.signal);
-            end.jump -= on_surface.jump;
-            const EdgePlace edge = edge_between(*c.near, last);
-            add(on_surface, {edge.along * c.on_near, edge.range_m});
-            add(end, {c.middle(), c.range_m});
-        }
     }
 
     /// Image velocity across a side at this point of the grid: grid points per unit of the pose's error.
@@ -143,22 +146,45 @@ private:
     }
 
     const FineGrid& grid_;
-    PointTracer& tracer_;
     const BorderPoints& points_;
     const int column_, row_, x_, y_;
     const RowView& view_;
     const double fine_row_s_;
     Vector6 sum_ = Vector6::Zero();
+    const std::span<const Contour> contours_;
+    const std::span<const RaySample> last_;
     Jumps across_x_, across_y_;
-    std::vector<Contour> contours_;
-    std::vector<Crossed> crossed_;
 };
 
 }  // namespace
 
-Vector6 flow_over_borders(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int column,
-                          int row, const RowView& view) {
-    return PixelSides(grid, tracer, points, column, row, view).sum();
+SquareSides::SquareSides(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int width,
+                         std::span<const std::uint8_t> chosen)
+    : grid_(grid), points_(points) {
+    const Square& square = points.square();
+    for (int r = 0; r < square.rows; ++r)
+        for (int c = 0; c < square.columns; ++c) {
+            first_.push_back(contours_.size());
+            if (chosen[index_in(width, square.x + c, square.y + r)] == 0) continue;
+            each_side(grid, points, c, r, [&](const Side& s) {
+                if (is_contour(*s.near, *s.far)) contours_.push_back({s.x, s.y, s.dx, s.dy, s.near, s.far});
+            });
+        }
+    first_.push_back(contours_.size());
+    bisect(grid.frame, contours_, grid.halvings);
+    last_.resize(contours_.size());
+    for (std::size_t i = 0; i < contours_.size(); ++i) {
+        const Contour& c = contours_[i];
+        tracer.put(c.x + c.on_near * c.dx, c.y + c.on_near * c.dy, last_[i]);
+    }
+    tracer.trace();
+}
+
+Vector6 SquareSides::flow_over_borders(int column, int row, const RowView& view) const {
+    const std::size_t p = pixel(column, row), first = first_[p], n = first_[p + 1] - first;
+    return PixelSides(grid_, points_, column, row, view, std::span(contours_).subspan(first, n),
+                      std::span(last_).subspan(first, n))
+        .sum();
 }
 
 }  // namespace narpa

@@ -1,6 +1,10 @@
 /// estimator/dense/pixel_sides.h - what moves over the borders of a pixel: the first two terms of its derivative.
 #pragma once
 
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "estimator/dense/border_points.h"
 #include "estimator/pose/apparent_motion.h"
 #include "estimator/pose/pose_estimate.h"
@@ -14,9 +18,27 @@ struct RowView {
     double row_s = 0;  ///< to the next row
 };
 
-/// Of the square's pixel (column, row): DN per unit of the pose's error, summed over the lines from border to
-/// border (image_derivative.h). `tracer`: of the same grid as the points.
-[[nodiscard]] Vector6 flow_over_borders(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points,
-                                        int column, int row, const RowView& view);
+/// Of the chosen pixels of a square.
+class SquareSides {
+public:
+    /// All outlive it. `tracer`: of the same grid as the points. `chosen`: as of BorderPoints::trace. Contours on
+    /// the lines of all these pixels are located side by side.
+    SquareSides(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int width,
+                std::span<const std::uint8_t> chosen);
+    /// Of the square's pixel (column, row): DN per unit of the pose's error, summed over the lines from border to
+    /// border (image_derivative.h).
+    [[nodiscard]] Vector6 flow_over_borders(int column, int row, const RowView& view) const;
+
+private:
+    [[nodiscard]] std::size_t pixel(int column, int row) const {
+        return index_in(points_.square().columns, column, row);
+    }
+
+    const FineGrid& grid_;
+    const BorderPoints& points_;
+    std::vector<Contour> contours_;
+    std::vector<RaySample> last_;     ///< of each contour's nearer surface, before its end
+    std::vector<std::size_t> first_;  ///< contour of each pixel; the next pixel's is behind its last
+};
 
 }  // namespace narpa

@@ -12,8 +12,6 @@ namespace {
 constexpr double kSurfaceSteps = 2.5;
 /// Lower limit of the cosine between ray and normal in that prediction.
 constexpr double kLeastCosine = 0.02;
-/// Bisections between two rays in the search for a contour.
-constexpr int kHalvings = 8;
 
 /// Of a point's tangent plane in the direction of another ray.
 double inverse_range_towards(const RaySample& point, const Vec3& direction) {
@@ -31,6 +29,13 @@ void halve(Contour& c, int body, double here_m) {
 
 Ray ray_through(const Frame& f, double x, double y) {
     return camera_ray(f.model, f.pose.at(f.pose.time(y, f.camera.height, 0.5)), x, y);
+}
+
+void aim_through(const Frame& f, const Lanes<double>& x, const Lanes<double>& y, RayBatch& rays) {
+    if (f.over_time)
+        for (std::size_t i = 0; i < rays.n; ++i) rays.put(i, ray_through(f, x[i], y[i]));
+    else
+        f.model->directions(f.T_world_camera.q, x, y, rays.direction), rays.origin.fill(f.T_world_camera.t);
 }
 
 bool is_contour(const RaySample& a, const RaySample& b) {
@@ -51,17 +56,19 @@ EdgePlace edge_between(const RaySample& a, const RaySample& b) {
     return {along, 1 / (at_a + along * (at_b - of_b - at_a))};
 }
 
-void bisect(const Frame& f, std::span<Contour> contours) {
+void bisect(const Frame& f, std::span<Contour> contours, int halvings) {
     RayBatch rays;
     HitBatch hits;
+    Lanes<double> x{}, y{};
     for (std::size_t first = 0; first < contours.size(); first += kLanes) {
         const auto batch = contours.subspan(first, std::min(kLanes, contours.size() - first));
         rays.n = batch.size();
-        for (int k = 0; k < kHalvings; ++k) {
+        for (int k = 0; k < halvings; ++k) {
             for (std::size_t i = 0; i < batch.size(); ++i) {
                 const Contour& c = batch[i];
-                rays.put(i, ray_through(f, c.x + c.middle() * c.dx, c.y + c.middle() * c.dy));
+                x[i] = c.x + c.middle() * c.dx, y[i] = c.y + c.middle() * c.dy;
             }
+            aim_through(f, x, y, rays);
             f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
             for (std::size_t i = 0; i < batch.size(); ++i) halve(batch[i], hits.body[i], hits.range_m[i]);
         }

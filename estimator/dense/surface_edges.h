@@ -18,6 +18,9 @@ struct RaySample {
 /// Through a point of the image, in the middle of its row's exposure.
 [[nodiscard]] Ray ray_through(const Frame& f, double x, double y);
 
+/// The same through `rays.n` points.
+void aim_through(const Frame& f, const Lanes<double>& x, const Lanes<double>& y, RayBatch& rays);
+
 /// True where the two are not points of one surface, by the slopes from their normals.
 [[nodiscard]] bool is_contour(const RaySample& a, const RaySample& b);
 
@@ -39,7 +42,7 @@ struct Contour {
     double on_near = 0, on_far = 1;  ///< the end is between them
     [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
 };
-/// Finds their ends by bisection, side by side.
-void bisect(const Frame& f, std::span<Contour> contours);
+/// Finds their ends by so many bisections, side by side.
+void bisect(const Frame& f, std::span<Contour> contours, int halvings);
 
 }  // namespace narpa

@@ -66,7 +66,8 @@ enum class DenseStatus : std::uint8_t {
 struct DenseEstimate {
     DenseStatus status = DenseStatus::converged;
     Rigid3 T_camera_body{};
-    /// PhotometricEquations::pose_covariance and the model's uncertainty; zero unless converged.
+    /// PhotometricEquations::pose_covariance, widened where renders show that the Jacobian says too much of the
+    /// motions that are held least (response.h), and the model's uncertainty; zero unless converged.
     Matrix6 covariance = Matrix6::Zero();
     Matrix6 covariance_of_model = Matrix6::Zero();  ///< its part by the model's uncertainty
     Exposure exposure{};

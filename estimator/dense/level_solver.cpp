@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/pose/response.h"
 #include "estimator/pose/symmetric.h"
 #include "renderer/camera/scene_camera.h"
 
@@ -53,6 +54,10 @@ constexpr std::size_t kManyPixels = 10'000;
 /// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
 constexpr int kMostPolishes = 5;
 constexpr double kPolished_sigmas = 1;
+/// So many motions, those that are held least, are rendered so far to both sides: by so many standard deviations,
+/// but not many times the limit of observed motions, and at least by so many pixels.
+constexpr int kRenderedMotions = 3;
+constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
 /// Poses within this motion, px, are in one minimum where a step leads from one to the other: no more than this
 /// part of the way is left, or so many variances. What a second step leaves is the distance between them.
 constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
@@ -214,24 +219,58 @@ void LevelSolver::finish() {
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
     // What the equations say is still to go belongs to the error too.
     const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
+    const Matrix6 of_noise = last.pose_covariance();
     e_.covariance_of_model = covariance_of_model(last);
-    e_.covariance = last.pose_covariance() + e_.covariance_of_model + to_go * to_go.transpose();
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
     const PhotometricCost loss = cost(images, e_.exposure, {});
     e_.window = view_.window();
     e_.excess_loss = excess(loss);
     e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
-    const PhotometricEquations of_noise =
+    const PhotometricEquations plain =
         equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
-    const double of_information = of_noise.residual();
-    e_.blur = blur_score(images, e_.exposure, of_noise);
+    const double of_information = plain.residual();
+    e_.blur = blur_score(images, e_.exposure, plain);
     e_.residual =
         std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
     const double off = std::abs(e_.exposure.gain - 1);
     if (robust_.scale > kNoFit || e_.misfit > kMostMisfit ||
         off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
         e_.status = DenseStatus::does_not_fit;
+    else
+        e_.covariance =
+            widened(of_noise, response_to_motions(last)) + e_.covariance_of_model + to_go * to_go.transpose();
+}
+
+/// The motions that are held least are those in which the changes of the pixels cancel, so that errors of the
+/// Jacobian matter there. They are rendered to both sides, with equal samples; the others count as shown as they
+/// are.
+Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
+    const std::vector<float> signal(view_.images().signal.begin(), view_.images().signal.end()),
+        variance(view_.images().signal_variance.begin(), view_.images().signal_variance.end());
+    PhotometricImages here = view_.images();
+    here.signal = signal, here.signal_variance = variance;
+    const Observability o = observability_of(last.pose_covariance(), norm(e_.T_camera_body.t));
+    const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();  // one sigma of each
+    const Matrix6 in_sigmas = inverse(motions);
+    Matrix6 shown = Matrix6::Identity();
+    settings_.spp /= kPolishSamples;
+    std::vector<float> change(signal.size());
+    for (int i = 0; i < kRenderedMotions; ++i) {
+        const Vector6 motion = motions.col(i);
+        const double within_limits = kRendered_limits * std::sqrt(o.eigenvalues[i]);
+        const double sigmas =
+            std::max(std::min(kRendered_sigmas, within_limits), kRendered_px / distance_px(motion));
+        render(displaced(e_.T_camera_body, sigmas * motion));
+        std::ranges::copy(view_.images().signal, change.begin());
+        render(displaced(e_.T_camera_body, -sigmas * motion));
+        e_.renders += 2;
+        for (std::size_t p = 0; p < change.size(); ++p)
+            change[p] = (change[p] - view_.images().signal[p]) / static_cast<float>(2 * sigmas);
+        const Vector6 step = last.pose_step(response(here, e_.exposure, robust_, change));
+        shown += (step - motion) * in_sigmas.row(i);
+    }
+    return shown;
 }
 
 void LevelSolver::examine() {

@@ -25,7 +25,7 @@ public:
     DenseStatus run(bool first);
     /// One more step with many more rays, against the sampling noise of the rendered image.
     void polish();
-    /// Covariance, residuals and status at the last rendered pose.
+    /// Covariance, residuals and status at the last rendered pose. Leaves another pose rendered.
     void finish();
     /// The loss at the estimate's pose again, of this view's pixels.
     void weigh();
@@ -62,6 +62,9 @@ private:
     /// Without an image.
     void take(const Step& step);
     void adapt_stride(const Step& step);
+    /// What the image shows of motions, as errors of the pose: the identity where the Jacobian is right. `last`:
+    /// the equations at the last rendered pose.
+    [[nodiscard]] Matrix6 response_to_motions(const PhotometricEquations& last);
     /// By what is not known of the model, at the last rendered pose.
     [[nodiscard]] Matrix6 covariance_of_model(const PhotometricEquations& equations);
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/pose/response.h"
 #include "estimator/pose/symmetric.h"
 
 namespace narpa {
@@ -33,8 +34,6 @@ constexpr int kMany = 30;
 constexpr double kNear_px = 2 * kTurn_px;
 /// Fewer flows do not say what motion they show.
 constexpr std::size_t kFewestFlows = 5;
-/// Of a motion of which matches show nothing: so little that its variance is beyond all limits.
-constexpr double kLeastShown = 1e-4;
 /// Answers from two starts whose distance has a larger normalised square are two poses.
 constexpr double kSameSquared = 30;
 /// Side of the blocks in which the target is searched.
@@ -81,17 +80,6 @@ Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& ja
             flows, [&](const FeatureMatch& m) { return (jacobians[m.point] * motion - flow(m)).norm() > most_px; });
     }
     return motion;
-}
-
-/// The covariance of a pose whose matches respond to motions like this: C^(1/2) (A' A)^-1 C^(T/2), A = C^(-1/2) R
-/// C^(1/2). Motions of which they show more than there is count as shown as they are.
-Matrix6 widened(const Matrix6& covariance, const Matrix6& response) {
-    const Matrix6 root = cholesky(covariance).L;
-    const Matrix6 shown = lower_solve(root, Matrix6(response * root));
-    const SymmetricEigen eigen = symmetric_eigen(shown.transpose() * shown);
-    const Vector6 squares = eigen.values.cwiseMin(1).cwiseMax(kLeastShown * kLeastShown);
-    const Matrix6 out = root * eigen.vectors;
-    return out * squares.cwiseInverse().asDiagonal() * out.transpose();
 }
 
 }  // namespace

@@ -24,8 +24,8 @@ TEST(Honesty, DenseTrialsThatLied) {
     HonestyOptions o;
     o.methods = {"dense"};
     o.trials = 1;
-    for (const int trial :
-         {25, 32, 55, 146, 4, 38, 10, 11704, 10799, 11543, 10026, 10139, 10296, 10653, 11764, 11229, 10001})
+    for (const int trial : {25,    32,    55,    146,   4,     38,    10,     11704,  10799,  11543, 10026,
+                            10139, 10296, 10653, 11764, 11229, 10001, 100450, 101152, 105170, 105816})
         for (const HonestyRow& row : run(o, trial))
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }

@@ -1,0 +1,21 @@
+/// estimator/pose/response.h - covariances of poses whose measurements respond to motions otherwise than the
+/// Jacobian says.
+///
+/// A pose where J' W r = 0 answers a motion by the response R = (J' W J)^-1 J' W D, D being what the motion really
+/// changes the measurements by: the identity where J = D. The pose's errors are those that the Jacobian states, C,
+/// times R^-1 (an M-estimator's covariance: P. J. Huber, "The behavior of maximum likelihood estimates under
+/// nonstandard conditions", 5th Berkeley Symposium, 1967).
+#pragma once
+
+#include "estimator/pose/pose_estimate.h"
+
+namespace narpa {
+
+/// Of a motion of which nothing is shown: so little that its variance is beyond all limits.
+inline constexpr double kLeastShown = 1e-4;
+
+/// R^-1 C R^-T. Motions of which more is shown than there is count as shown as they are, so that nothing of C is
+/// taken away; and of all motions at least kLeastShown. `response`: of errors (pose_estimate.h).
+[[nodiscard]] Matrix6 widened(const Matrix6& covariance, const Matrix6& response);
+
+}  // namespace narpa

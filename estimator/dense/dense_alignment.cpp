@@ -25,6 +25,8 @@ constexpr double kLeastExtent_px = 16;
 /// the image may not be linear over it. The loss rises by at least this part of what a linear image's would, at so
 /// many standard deviations.
 constexpr double kSurelyLinear = 0.2, kRise_sigmas = 4, kLeastRise = 0.5;
+/// Answers that are turned by so much against the guess have a third start.
+constexpr double kFarTurn_rad = 0.07;
 /// Other minima are looked for so many standard deviations away.
 constexpr double kAside_sigmas = 8;
 
@@ -52,6 +54,13 @@ Quat other_tilt(const Vec3& normal, const Vec3& position_m) {
     const Vec3 axis = cross(normal, -normalized(position_m));
     const double sine = norm(axis);
     return sine > 1e-9 ? exp_rotation(2 * std::asin(std::min(1.0, sine)) / sine * axis) : Quat{};
+}
+
+/// The factor with which a descent begins: of the coarsest level that shows enough of a target of this extent.
+int first_level(const DenseOptions& options, double target_px) {
+    int factor = options.coarsest;
+    while (factor > options.finest && target_px / factor < kLeastExtent_px) factor /= 2;
+    return factor;
 }
 
 std::size_t level_number(int factor) {
@@ -163,44 +172,83 @@ bool DenseAlignment::has_independent_noise() const {
 }
 
 /// The first of the mirrored starts that converges decides. Its coarse levels suffice where they end close enough
-/// to the answer for one step to lead there. Else the answer with the smaller loss stays; how far they are apart is
-/// part of its error.
+/// to the answer for one step to lead there.
 void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                              const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e,
                              Fit& fit) {
-    for (int k = 0; k < options.rivals; ++k) {
+    bool decided = false;
+    for (int k = 0; k < options.rivals && !decided; ++k) {
         const Vector6 beyond = std::pow(0.5, k) * error_between(guess, e.T_camera_body);
         DenseEstimate other =
             descend(frame, at, displaced(e.T_camera_body, beyond), options, frame_variance, 2 * options.finest);
         e.renders += other.renders;
         if (other.status == DenseStatus::left_the_picture) continue;
-        LevelView& finest = *levels_[level_number(options.finest)];
-        other.exposure = e.exposure;
-        const Camera camera = coarser_camera(camera_, options.finest);
-        LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);
-        if (const auto apart = solver.miss(e.T_camera_body)) {
-            e.covariance += *apart * apart->transpose();
-            return;
-        }
-        DenseOptions to_the_end = options;
-        to_the_end.coarsest = options.finest;
-        other = descend(frame, at, other.T_camera_body, to_the_end, frame_variance, options.finest);
-        e.renders += other.renders;
-        if (other.status != DenseStatus::converged) continue;
-        weigh_alike(frame, at, options, frame_variance, e, other);
-        keep_better(e, other);
-        const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
-        const double worse = other.excess_loss - e.excess_loss;
-        const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
-        if (agree)
-            e.covariance += 0.5 * apart * apart.transpose();
-        else if (worse < kAsLikely)
-            fit.rivals.push_back({other.T_camera_body, worse});
-        else
-            fit.failed = "two starts lead to different poses";
-        return;
+        decided = meets(e, other, options) ||
+                  compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
     }
-    fit.failed = "no second start leads to the same pose";
+    if (!decided) fit.failed = "no second start leads to the same pose";
+    if (fit.failed.empty() && fit.rivals.empty()) start_near(frame, at, guess, options, frame_variance, e, fit);
+}
+
+/// Steps from where the other's coarse levels ended lead to the answer. How far they are apart is part of its
+/// error.
+bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
+    other.exposure = e.exposure, other.renders = 0;
+    const Camera camera = coarser_camera(camera_, options.finest);
+    LevelView& finest = *levels_[level_number(options.finest)];
+    LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);
+    const auto apart = solver.miss(e.T_camera_body);
+    e.renders += other.renders;
+    if (apart) e.covariance += *apart * apart->transpose();
+    return apart.has_value();
+}
+
+/// False where no pose is found from this start. Else the answer with the smaller loss stays.
+bool DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at,
+                                        const DenseOptions& options, std::span<const float> frame_variance,
+                                        const Rigid3& start, DenseEstimate& e, Fit& fit) {
+    DenseOptions to_the_end = options;
+    to_the_end.coarsest = options.finest;
+    DenseEstimate other = descend(frame, at, start, to_the_end, frame_variance, options.finest);
+    e.renders += other.renders;
+    if (other.status != DenseStatus::converged) return false;
+    weigh_alike(frame, at, options, frame_variance, e, other);
+    keep_better(e, other);
+    const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
+    const double worse = other.excess_loss - e.excess_loss;
+    const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
+    if (agree)
+        e.covariance += 0.5 * apart * apart.transpose();
+    else if (worse < kAsLikely)
+        fit.rivals.push_back({other.T_camera_body, worse});
+    else
+        fit.failed = "two starts lead to different poses";
+    return true;
+}
+
+/// The coarsest levels may lead two starts away from a pose that is near the guess, to the same false minimum. So
+/// where they led far, a third start is without them. Only a pose with a smaller loss counts.
+void DenseAlignment::start_near(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                                const DenseOptions& options, std::span<const float> frame_variance,
+                                DenseEstimate& e, Fit& fit) {
+    DenseOptions without = options;
+    without.coarsest = 2 * options.finest;
+    const auto window = window_about(render_scene_.tracer(), camera_, target_, guess);
+    if (!window || first_level(options, extent_px(*window)) <= without.coarsest ||
+        error_between(guess, e.T_camera_body).head<3>().norm() < kFarTurn_rad)
+        return;
+    DenseEstimate other = descend(frame, at, guess, without, frame_variance, without.coarsest);
+    e.renders += other.renders;
+    if (other.status == DenseStatus::left_the_picture || meets(e, other, options)) return;
+    const Camera camera = coarser_camera(camera_, without.coarsest);
+    LevelView& view = *levels_[level_number(without.coarsest)];
+    DenseEstimate here = e, there = other;
+    there.exposure = e.exposure;
+    for (DenseEstimate* x : {&here, &there})
+        LevelSolver(camera, render_scene_, target_, without.coarsest, view, options, *x).weigh();
+    e.renders += 2;
+    if (there.excess_loss < here.excess_loss)
+        compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
 }
 
 /// What the covariance of a weak motion leaves out: other minima along it, or where a flat face is tilted to the
@@ -258,8 +306,7 @@ DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPose
         e.status = DenseStatus::left_the_picture;
         return e;
     }
-    int factor = options.coarsest;
-    while (factor > options.finest && extent_px(*about) / factor < kLeastExtent_px) factor /= 2;
+    int factor = first_level(options, extent_px(*about));
     for (bool first = options.coarsest > options.finest; factor >= last;
          factor = next_level(factor, options.finest, extent_px(*about)), first = false) {
         const Camera camera = coarser_camera(camera_, factor);

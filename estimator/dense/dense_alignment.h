@@ -43,7 +43,8 @@ struct DenseOptions {
     std::optional<Rigid3> T_world_camera{};
     /// An answer counts that two starts lead to, the guess and the guess mirrored in the first answer: false minima
     /// and valleys in which steps end early are met from both sides. At most so many mirrored starts; 0: no such
-    /// test.
+    /// test. Where the answer is far from the guess, the guess without the coarsest levels must not lead to a
+    /// better one.
     int rivals = 2;
     /// Largest residuals of a right pose (DenseEstimate::residual): of frames whose noise is known, that is, where
     /// `frame_variance` is given and the model is exact; and of others.
@@ -120,6 +121,11 @@ private:
     [[nodiscard]] bool has_independent_noise() const;
     void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
+    [[nodiscard]] bool meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options);
+    bool compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
+                            std::span<const float> frame_variance, const Rigid3& start, DenseEstimate& e, Fit& fit);
+    void start_near(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
+                    const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     void examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     /// So that both losses are of the same pixels, those about either pose.

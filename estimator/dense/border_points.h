@@ -1,6 +1,7 @@
 /// estimator/dense/border_points.h - rays through the borders of an image's pixels, for its derivative.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,8 +28,8 @@ struct FineGrid {
 
     const int fineness;
     /// Of the search for a contour (bisect). The range of a smooth body's limb needs eight; where few lines make
-    /// the derivative coarse, four lead to the same steps and the same choice of pixels.
-    const int halvings = fineness > 2 ? 8 : 4;
+    /// the derivative coarse, fewer lead to the same steps and the same choice of pixels.
+    const int halvings = std::min(2 * fineness, 8);
     const Camera camera;
     const FrameSettings settings;
     const Frame frame;

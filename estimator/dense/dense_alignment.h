@@ -5,10 +5,10 @@
 /// Each level works in a window about the target. The image is rendered at each step with the same seed, so that
 /// its sampling noise hardly changes between steps.
 ///
-/// The last steps are of the pixels that hold most of the information about the pose (informative_pixels), about a
-/// fifth: a derivative chooses them, and each gets equally many samples, so that each one's variance is known from
-/// its own. With a budget that follows the contrasts between pixels, residuals about details smaller than a pixel
-/// were 1.7 times what it stated.
+/// The last steps are of the pixels that hold most of the information about the pose (informative_pixels), about an
+/// eighth: a derivative of few lines chooses them, and each gets equally many samples, so that each one's variance
+/// is known from its own. With a budget that follows the contrasts between pixels, residuals about details smaller
+/// than a pixel were 1.7 times what it stated.
 #pragma once
 
 #include <array>
@@ -30,8 +30,8 @@ namespace narpa {
 struct DenseOptions {
     int iterations = 16;            ///< at most, on each level
     int coarsest = 16, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    int samples_per_pixel = 8;      ///< of the finest level's images; those of the last step take six times as many
-    int fineness = 4;               ///< of the last derivative: lines each way across a pixel
+    int samples_per_pixel = 8;  ///< of the finest level's images; those of the last step take eight times as many
+    int fineness = 4;           ///< of the last derivative: lines each way across a pixel
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
@@ -73,6 +73,7 @@ struct DenseEstimate {
     Matrix6 covariance_of_model = Matrix6::Zero();  ///< its part by the model's uncertainty
     Exposure exposure{};
     std::size_t pixels = 0;  ///< of the last level that show the target
+    std::size_t chosen = 0;  ///< of these that the last steps are of
     int renders = 0;         ///< images that were compared with the frame
     double misfit =
         0;  ///< loss of the residuals beyond that of noise, per pixel of the target: Robustness{1, 3, 0}

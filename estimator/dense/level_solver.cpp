@@ -45,15 +45,24 @@ constexpr double kLeastInformation = 1e-10;
 /// steps but the finest level's last take a derivative by so many times fewer lines.
 constexpr int kCoarseSamples = 2;
 constexpr int kCoarseFineness = 2;
-/// The last step uses this many times the samples.
-constexpr int kPolishSamples = 6;
+/// Of the image and the derivative from which pixels of a large target are chosen: one in so many samples, and
+/// lines.
+constexpr int kChoiceSamples = 4, kChoiceFineness = 1;
 /// And only pixels that together hold this part of the information.
-constexpr double kHeld = 0.85;
+constexpr double kHeld = 0.8;
 /// Where the target covers so many: fewer take little time.
 constexpr std::size_t kManyPixels = 10'000;
-/// Repeated until a step is shorter than so many standard deviations: in a curved valley steps end early.
+/// The last steps. In a curved valley steps end early, and the derivative leaves about a tenth of a step.
+struct LastSteps {
+    int first_samples, samples;  ///< so many times; the most once a step is shorter than `before_sigmas`
+    double before_sigmas;
+    double sigmas, px;  ///< the last is shorter than that many standard deviations, or than that
+    double serves_px;   ///< the Jacobian is reused for poses within this motion
+};
+/// Chosen pixels show fine details: samples are what limits them, and low-discrepancy ones are best in powers of
+/// two.
+constexpr LastSteps kOfAll{6, 6, 0, 1, 0.02, 0.02}, kOfChosen{4, 8, 20, 3, 0, 0.1};
 constexpr int kMostPolishes = 5;
-constexpr double kPolished_sigmas = 1;
 /// So many motions, those that are held least, are rendered so far to both sides: by so many standard deviations,
 /// but not many times the limit of observed motions, and at least by so many pixels.
 constexpr int kRenderedMotions = 3;
@@ -66,14 +75,22 @@ constexpr int kMostShift_px = 12;
 /// Model error on coarse levels: this part of the signal power.
 constexpr double kCoarseModel = 0.1;
 constexpr double kLeastGain = 0.05;
-/// The Jacobian is reused for poses within this motion, px; for the last steps within that.
-constexpr double kDerivativeServes_px = 0.2, kLastServes_px = 0.02;
+/// The Jacobian is reused for poses within this motion, px.
+constexpr double kDerivativeServes_px = 0.2;
+/// Pixels are chosen when a step is shorter than this: those that hold the pose show details smaller than a pixel,
+/// from which steps lead nowhere from further off. After so many steps any that the derivative holds for will do.
+constexpr double kChooses_px = 0.1;
+constexpr int kMostBeforeChoice = 2;
 
 /// Largest motion of a point of the target in the image, about.
 double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_camera_target, double extent_px) {
     const double z = std::max(T_camera_target.t.z, 1e-9);
     return pixels_per_radian * step.segment<2>(3).norm() / z +
            0.5 * extent_px * (step.head<3>().norm() + std::abs(step[5]) / z);
+}
+
+std::size_t pixels_of(const Window& window) {
+    return static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
 }
 
 /// Loss beyond that of noise.
@@ -120,24 +137,48 @@ LevelSolver::LevelSolver(const Camera& camera, const RenderScene& render_scene, 
       settings_{.spp = std::max(2, options.samples_per_pixel * (coarse_ ? kCoarseSamples : 1)),
                 .seed = options.seed,
                 .method = options.method,
-                .max_depth = options.max_depth} {}
+                .max_depth = options.max_depth},
+      choosing_(!coarse_ && !camera.point_spread && !(camera.veiling_glare > 0) &&
+                pixels_of(view.window()) >= kManyPixels) {}
 
 DenseStatus LevelSolver::run(bool first) {
     view_.choose_all();
+    const int samples = settings_.spp;
+    if (choosing_) settings_.spp = std::max(2, samples / kChoiceSamples);
     render(e_.T_camera_body);
     if (first) shift();
+    const DenseStatus status = iterate(samples);
+    settings_.spp = samples;
+    return status;
+}
+
+/// `samples`: of a pixel once they are chosen.
+DenseStatus LevelSolver::iterate(int samples) {
     robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images()) : 0;
     double damping = kFirstDamping;
     double least = std::numeric_limits<double>::infinity();
     int stalled = 0;
     for (int k = 0; k < o_.iterations; ++k) {
-        differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
+        differentiate();
         if (!linearise()) return DenseStatus::too_few_pixels;
+        if (choosing_ && cost_.pixels < kManyPixels) {
+            choosing_ = false;
+            settings_.spp = samples;
+            render(e_.T_camera_body);
+            differentiate();
+            if (!linearise()) return DenseStatus::too_few_pixels;
+        }
         if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
         Step step = next_step(damping);
-        const bool chosen = !coarse_ && step.motion_px < kDerivativeServes_px && choose(step.pose);
-        if (step.size < 1 && !(chosen && step.motion_px > kLastServes_px)) {
+        const double most_px = k < kMostBeforeChoice ? kChooses_px : kDerivativeServes_px;
+        const bool chosen = choosing_ && step.motion_px < most_px;
+        if (chosen) {
+            choose(step.pose);
+            settings_.spp = samples;
+            step.trusted = true;
+        }
+        if (step.size < 1 && !chosen) {
             take(step);
             return DenseStatus::converged;
         }
@@ -160,39 +201,48 @@ DenseStatus LevelSolver::run(bool first) {
 }
 
 void LevelSolver::polish() {
-    settings_.spp *= kPolishSamples;
+    const LastSteps& last = view_.images().chosen.empty() ? kOfAll : kOfChosen;
+    const int samples = last.samples * settings_.spp;
+    settings_.spp *= last.first_samples;
     stride_ = 1;
     render(e_.T_camera_body);
     ++e_.renders;
     for (int k = 0; k < kMostPolishes; ++k) {
-        differentiate(kLastServes_px, o_.fineness);
+        differentiate(last.serves_px, o_.fineness);
         if (!linearise()) return;
-        const Step step = next_step(kLeastDamping);
-        if (step.sigmas < kPolished_sigmas || step.motion_px < kLastServes_px) {
+        Step step = next_step(kLeastDamping);
+        if (settings_.spp == samples && (step.sigmas < last.sigmas || step.motion_px < last.px)) {
             take(step);
             view_.predict(step.pose);
             return;
+        }
+        if (settings_.spp < samples && step.sigmas < last.before_sigmas) {
+            settings_.spp = samples;
+            step.trusted = step.trusted || step.motion_px < kDerivativeServes_px;
         }
         if (!try_step(step)) return;
     }
 }
 
-/// True where pixels are left out from now on. They keep the samples that they have, as the image is after this
-/// last step of theirs.
-bool LevelSolver::choose(const Vector6& step) {
-    const bool mixes_pixels = camera_.point_spread || camera_.veiling_glare > 0;
-    if (mixes_pixels || cost_.pixels < kManyPixels || !view_.images().chosen.empty()) return false;
+/// The others keep the samples that they have, as the image is after this last step of theirs.
+void LevelSolver::choose(const Vector6& step) {
     std::vector<std::uint8_t> pixels = informative_pixels(view_.images(), e_.exposure, kHeld);
     view_.predict(step);
     view_.choose(std::move(pixels));
-    return true;
+    choosing_ = false;
+}
+
+void LevelSolver::differentiate() {
+    differentiate(kDerivativeServes_px, choosing_ ? kChoiceFineness : std::max(1, o_.fineness / kCoarseFineness));
 }
 
 std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
     const Vector6 way = error_between(e_.T_camera_body, T_camera_body);
     if (!(distance_px(way) < kReach_px)) return {};
     Vector6 left = way;
+    const bool of_few_pixels = !view_.images().chosen.empty();
     for (int k = 0; k < kMeetingSteps; ++k) {
+        if (k > 0 && of_few_pixels) settings_.spp *= kOfChosen.first_samples;
         render(e_.T_camera_body);
         ++e_.renders;
         if (!linearise()) return {};
@@ -207,7 +257,7 @@ std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
 
 void LevelSolver::weigh() {
     view_.choose_all();
-    settings_.spp *= kPolishSamples;
+    settings_.spp *= kOfAll.samples;
     render(e_.T_camera_body);
     ++e_.renders;
     e_.window = view_.window();
@@ -223,6 +273,9 @@ void LevelSolver::finish() {
     e_.covariance_of_model = covariance_of_model(last);
     const PhotometricCost now = cost(images, e_.exposure, robust_);
     e_.pixels = now.pixels;
+    e_.chosen = images.chosen.empty()
+                    ? e_.pixels
+                    : static_cast<std::size_t>(std::ranges::count_if(images.chosen, [](auto c) { return c != 0; }));
     const PhotometricCost loss = cost(images, e_.exposure, {});
     e_.window = view_.window();
     e_.excess_loss = excess(loss);
@@ -254,7 +307,7 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();  // one sigma of each
     const Matrix6 in_sigmas = inverse(motions);
     Matrix6 shown = Matrix6::Identity();
-    settings_.spp /= kPolishSamples;
+    settings_.spp = std::max(2, o_.samples_per_pixel);
     std::vector<float> change(signal.size());
     for (int i = 0; i < kRenderedMotions; ++i) {
         const Vector6 motion = motions.col(i);
@@ -275,7 +328,7 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
 
 void LevelSolver::examine() {
     view_.choose_all();
-    settings_.spp *= kPolishSamples;
+    settings_.spp *= kOfAll.samples;
     render(e_.T_camera_body);
     differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
     linearise();
@@ -352,7 +405,7 @@ bool LevelSolver::linearise() {
     const PhotometricImages images = view_.images();
     robust_.scale = residual_scale(images, e_.exposure, robust_.model_dn2);
     cost_ = cost(images, e_.exposure, robust_);
-    equations_ = equations(images, e_.exposure, robust_);
+    equations_ = equations(images, e_.exposure, robust_, false);
     return cost_.pixels >= kFewestPixels && is_observable(equations_.pose_information());
 }
 

@@ -50,8 +50,11 @@ private:
     };
 
     void shift();
-    [[nodiscard]] bool choose(const Vector6& step);
+    DenseStatus iterate(int samples);
+    void choose(const Vector6& step);
     void render(const Rigid3& T);
+    /// As the next step needs it.
+    void differentiate();
     void differentiate(double reach_px, int fineness);
     bool linearise();
     [[nodiscard]] Step next_step(double damping) const;
@@ -78,6 +81,7 @@ private:
     const bool coarse_;
     const double converged_px_;
     FrameSettings settings_{};
+    bool choosing_;  ///< the pixels that hold the pose are to be chosen: the target is large, and they are not yet
 
     Robustness robust_{};
     PhotometricCost cost_{};

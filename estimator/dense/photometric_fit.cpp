@@ -90,6 +90,14 @@ Vector8 design(const PhotometricImages& images, const Exposure& exposure, std::s
     return J;
 }
 
+/// Adds weight J J' to the lower triangle; J is 0 before `first`.
+void add_square(Matrix8& sum, const Vector8& J, double weight, int first) {
+    for (int column = first; column < 8; ++column) {
+        const double w = weight * J[column];
+        for (int row = column; row < 8; ++row) sum(row, column) += w * J[row];
+    }
+}
+
 /// Of blocks of kBlock_px x kBlock_px pixels. k: scale of Cauchy's loss.
 Matrix8 scatter_of_blocks(const PhotometricImages& images, const Residuals& residuals, double k) {
     constexpr int kBlock_px = 8;
@@ -186,20 +194,21 @@ PhotometricCost cost(const PhotometricImages& images, const Exposure& exposure, 
     return sum;
 }
 
-PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure,
-                               const Robustness& robust) {
+PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust,
+                               bool scatter) {
     const Residuals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
     auto out = sum_rows<PhotometricEquations>(images, [&](int y, PhotometricEquations& row) {
         residuals.each(y, [&](const Residual& r, std::size_t p) {
             const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
             const Vector8 J = r.inverse_s * design(images, exposure, p);
-            row.information.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
-            row.scatter.selfadjointView<Eigen::Lower>().rankUpdate(J, weight * weight * r.r * r.r);
+            const int first = images.derivative[p].isZero(0) ? 6 : 0;  // not 0 from there on
+            add_square(row.information, J, weight, first);
+            if (scatter) add_square(row.scatter, J, weight * weight * r.r * r.r, first);
             row.gradient += weight * r.r * J;
         });
     });
-    out.block_scatter = scatter_of_blocks(images, residuals, k);
+    if (scatter) out.block_scatter = scatter_of_blocks(images, residuals, k);
     out.information = Matrix8(out.information.selfadjointView<Eigen::Lower>());
     out.scatter = Matrix8(out.scatter.selfadjointView<Eigen::Lower>());
     // The prior in the units of residuals that are `scale` times their noise.
@@ -258,10 +267,13 @@ Vector8 response(const PhotometricImages& images, const Exposure& exposure, cons
         .gradient;
 }
 
-std::vector<std::uint8_t> informative_pixels(const PhotometricImages& images, const Exposure& exposure,
+std::vector<std::uint8_t> informative_pixels(const PhotometricImages& of_samples, const Exposure& exposure,
                                              double part) {
+    PhotometricImages images = of_samples;
+    images.signal_variance = {};
     const Residuals residuals(images, exposure, 0);
-    const PhotometricEquations all = equations(images, exposure, {1, std::numeric_limits<double>::infinity(), 0});
+    const PhotometricEquations all =
+        equations(images, exposure, {1, std::numeric_limits<double>::infinity(), 0}, false);
     const Matrix6 covariance = all.pose_information().inverse();
     std::vector<float> leverage(images.signal.size());
     tbb::parallel_for(1, std::max(images.height - 1, 1), [&](int y) {

@@ -174,6 +174,8 @@ TEST_F(DockingFrame, OfManyPixelsIsFoundByThoseThatHoldThePose) {
                                {}, variance);
     ASSERT_TRUE(e) << e.error().text();
     EXPECT_GT(e->pixels, 10'000U);
+    EXPECT_GT(e->chosen, e->pixels / 50);
+    EXPECT_LT(e->chosen, e->pixels / 4);
     EXPECT_EQ(e->answer.kind, AnswerKind::good) << e->answer.why;
     const Vector6 error = error_between(truth, e->T_camera_body);
     EXPECT_LT(normalised_error_squared(error, e->covariance), 27.9);  // one of 10,000 right ones is larger

@@ -21,10 +21,10 @@ constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observab
 constexpr double kLastCircle = 0.02;        ///< of the search, in parts of the first
 constexpr double kExplained = 4;            ///< standard deviations of a point that lies on the model
 constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
-/// Answers may have rivals below so many points, where a normalised eigenvalue is smaller, or where a larger part
-/// of the points lies elsewhere.
+/// Answers may have rivals below so many points, where a normalised eigenvalue is smaller, where a larger part of
+/// the points lies elsewhere, or where the cost is so many standard deviations above that of noise.
 constexpr std::size_t kManyPoints = 150;
-constexpr double kWeak = 0.01, kFewElsewhere = 0.02;
+constexpr double kWeak = 0.01, kFewElsewhere = 0.02, kMoreThanNoise_sigmas = 4;
 /// A rival is better by this difference of the costs, each half a chi-square.
 constexpr double kBetter = 0.5;
 /// Of a search about a minimum at which points lie beside the model, in parts of the points' spread.
@@ -240,12 +240,16 @@ void CloudIcp::draw_in(CloudEstimate& found) {
     }
 }
 
-/// An answer of few points, with a motion that they hold weakly, or with points that lie elsewhere.
+/// An answer of few points, with a motion that they hold weakly, with points that lie elsewhere, or with larger
+/// residuals than noise makes.
 bool CloudIcp::may_have_rivals(const CloudEstimate& e) {
     const Observability& o = e.observability;
     const auto elsewhere = static_cast<double>(e.points - e.explained - e.grazing - e.edges);
+    // Half of a chi-square, whose standard deviation is the root of its mean.
+    const double of_noise = 0.5 * static_cast<double>(e.points - e.edges);
     return e.used < kManyPoints || o.eigenvalues[o.unobserved] < kWeak ||
-           elsewhere > kFewElsewhere * static_cast<double>(e.points);
+           elsewhere > kFewElsewhere * static_cast<double>(e.points) ||
+           e.cost > of_noise + kMoreThanNoise_sigmas * std::sqrt(of_noise);
 }
 
 /// Looks for other minima that are as good: from poses that lie a search away along the two motions that the points

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/pose/response.h"
 #include "estimator/pose/symmetric.h"
 #include "renderer/camera/scene_camera.h"
 
@@ -28,19 +27,9 @@ constexpr double kStillSmall = 10;
 constexpr double kCoarseGain = 0.01;
 /// Consecutive steps are parallel if the cosine between them is larger.
 constexpr double kSameWay = 0.7, kLongestStride = 8;
-/// Residuals of more than this many times their noise: the model does not fit.
-constexpr double kNoFit = 4;
-/// Or a gain this many standard deviations off its prior.
-constexpr double kPriorHolds = 4, kLeastOff = 1e-3;
-/// Or a loss of so much beyond that of noise: station and cube in clean and in saturated frames have up to 8.
-constexpr double kMostMisfit = 10;
-/// Mean of 9 ln(1 + r^2 / 9), r normal.
-constexpr double kLossOfNoise = 0.8741;
 /// Sampling noise may increase the cost of a good step by this part.
 constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
-/// Least eigenvalue of the pose's information, scaled to a unit diagonal.
-constexpr double kLeastInformation = 1e-10;
 /// Coarse levels use so many times the samples: their pixels have more details and less noise, and are few. All
 /// steps but the finest level's last take a derivative by so many times fewer lines.
 constexpr int kCoarseSamples = 2;
@@ -63,10 +52,6 @@ struct LastSteps {
 /// two.
 constexpr LastSteps kOfAll{6, 6, 0, 1, 0.02, 0.02}, kOfChosen{4, 8, 20, 3, 0, 0.1};
 constexpr int kMostPolishes = 5;
-/// So many motions, those that are held least, are rendered so far to both sides: by so many standard deviations,
-/// but not many times the limit of observed motions, and at least by so many pixels.
-constexpr int kRenderedMotions = 3;
-constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
 /// Poses within this motion, px, are in one minimum where a step leads from one to the other: no more than this
 /// part of the way is left, or so many variances. What a second step leaves is the distance between them.
 constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
@@ -91,19 +76,6 @@ double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_
 
 std::size_t pixels_of(const Window& window) {
     return static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
-}
-
-/// Loss beyond that of noise.
-double excess(const PhotometricCost& loss) {
-    return loss.robust - kLossOfNoise * static_cast<double>(loss.all_pixels);
-}
-
-bool is_observable(const Matrix6& information) {
-    const Vector6 sizes = information.diagonal();
-    if (!(sizes.minCoeff() > 0) || !sizes.allFinite()) return false;
-    const Vector6 unit = sizes.cwiseSqrt().cwiseInverse();
-    const Matrix6 scaled = unit.asDiagonal() * information * unit.asDiagonal();
-    return symmetric_eigen(scaled).values[0] > kLeastInformation;
 }
 
 }  // namespace
@@ -261,69 +233,7 @@ void LevelSolver::weigh() {
     render(e_.T_camera_body);
     ++e_.renders;
     e_.window = view_.window();
-    e_.excess_loss = excess(cost(view_.images(), e_.exposure, {}));
-}
-
-void LevelSolver::finish() {
-    const PhotometricImages images = view_.images();
-    const PhotometricEquations last = equations(images, e_.exposure, robust_);
-    // What the equations say is still to go belongs to the error too.
-    const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
-    const Matrix6 of_noise = last.pose_covariance();
-    e_.covariance_of_model = covariance_of_model(last);
-    const PhotometricCost now = cost(images, e_.exposure, robust_);
-    e_.pixels = now.pixels;
-    e_.chosen = images.chosen.empty()
-                    ? e_.pixels
-                    : static_cast<std::size_t>(std::ranges::count_if(images.chosen, [](auto c) { return c != 0; }));
-    const PhotometricCost loss = cost(images, e_.exposure, {});
-    e_.window = view_.window();
-    e_.excess_loss = excess(loss);
-    e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
-    const PhotometricEquations plain =
-        equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
-    const double of_information = plain.residual();
-    e_.blur = blur_score(images, e_.exposure, plain);
-    e_.residual =
-        std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
-    const double off = std::abs(e_.exposure.gain - 1);
-    if (robust_.scale > kNoFit || e_.misfit > kMostMisfit ||
-        off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
-        e_.status = DenseStatus::does_not_fit;
-    else
-        e_.covariance =
-            widened(of_noise, response_to_motions(last)) + e_.covariance_of_model + to_go * to_go.transpose();
-}
-
-/// The motions that are held least are those in which the changes of the pixels cancel, so that errors of the
-/// Jacobian matter there. They are rendered to both sides, with equal samples; the others count as shown as they
-/// are.
-Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
-    const std::vector<float> signal(view_.images().signal.begin(), view_.images().signal.end()),
-        variance(view_.images().signal_variance.begin(), view_.images().signal_variance.end());
-    PhotometricImages here = view_.images();
-    here.signal = signal, here.signal_variance = variance;
-    const Observability o = observability_of(last.pose_covariance(), norm(e_.T_camera_body.t));
-    const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();  // one sigma of each
-    const Matrix6 in_sigmas = inverse(motions);
-    Matrix6 shown = Matrix6::Identity();
-    settings_.spp = std::max(2, o_.samples_per_pixel);
-    std::vector<float> change(signal.size());
-    for (int i = 0; i < kRenderedMotions; ++i) {
-        const Vector6 motion = motions.col(i);
-        const double within_limits = kRendered_limits * std::sqrt(o.eigenvalues[i]);
-        const double sigmas =
-            std::max(std::min(kRendered_sigmas, within_limits), kRendered_px / distance_px(motion));
-        render(displaced(e_.T_camera_body, sigmas * motion));
-        std::ranges::copy(view_.images().signal, change.begin());
-        render(displaced(e_.T_camera_body, -sigmas * motion));
-        e_.renders += 2;
-        for (std::size_t p = 0; p < change.size(); ++p)
-            change[p] = (change[p] - view_.images().signal[p]) / static_cast<float>(2 * sigmas);
-        const Vector6 step = last.pose_step(response(here, e_.exposure, robust_, change));
-        shown += (step - motion) * in_sigmas.row(i);
-    }
-    return shown;
+    e_.excess_loss = cost(view_.images(), e_.exposure, {}).excess();
 }
 
 void LevelSolver::examine() {
@@ -332,50 +242,6 @@ void LevelSolver::examine() {
     render(e_.T_camera_body);
     differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
     linearise();
-}
-
-double LevelSolver::rise(double sigmas) {
-    const Observability o = observability_of(e_.covariance, norm(e_.T_camera_body.t));
-    const Vector6 motion = sigmas / std::sqrt(o.eigenvalues[0]) * o.motions.col(0);
-    const double here = cost(view_.images(), e_.exposure, {}).robust;
-    double least = std::numeric_limits<double>::infinity();
-    for (const double side : {-1.0, 1.0}) {
-        const Eigen::Vector2d step = equations_.exposure_step(side * motion);
-        const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
-        render(displaced(e_.T_camera_body, side * motion));
-        least = std::min(least, cost(view_.images(), exposure, {}).robust - here);
-    }
-    return least / (sigmas * sigmas);
-}
-
-Result<Matrix6> LevelSolver::bound() {
-    view_.choose_all();
-    render(e_.T_camera_body);
-    view_.differentiate(e_.T_camera_body, settings_, o_.fineness);
-    PhotometricImages images = view_.images();
-    images.signal_variance = {};
-    images.measured = {};
-    const auto all = equations(images, {}, {1, std::numeric_limits<double>::infinity(), 0});
-    const Matrix6 information = all.pose_information();
-    if (!is_observable(information)) return Error{"too few pixels show the target to determine its pose"};
-    return Matrix6(inverse(information) + covariance_of_model(all));
-}
-
-Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) {
-    PoseShifts shifts = image_shifts(o_.model, e_.T_camera_body, o_.motion);
-    if (o_.model.light_rad > 0) {
-        render(e_.T_camera_body);  // with the noise of those that it is compared with
-        PoseShifts by_light(6, 3);
-        const PhotometricImages images = view_.images();
-        for (int axis = 0; axis < 3; ++axis) {
-            Vec3 turn{};
-            turn[axis] = o_.model.light_rad;
-            const auto change = view_.change_with_light(e_.T_camera_body, settings_, turn);
-            by_light.col(axis) = equations.pose_step(response(images, e_.exposure, robust_, change));
-        }
-        shifts = joined(shifts, by_light);
-    }
-    return covariance_by(shifts);
 }
 
 void LevelSolver::shift() {
@@ -406,7 +272,7 @@ bool LevelSolver::linearise() {
     robust_.scale = residual_scale(images, e_.exposure, robust_.model_dn2);
     cost_ = cost(images, e_.exposure, robust_);
     equations_ = equations(images, e_.exposure, robust_, false);
-    return cost_.pixels >= kFewestPixels && is_observable(equations_.pose_information());
+    return cost_.pixels >= kFewestPixels && equations_.observes_pose();
 }
 
 LevelSolver::Step LevelSolver::next_step(double damping) const {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/pose/median.h"
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 namespace {
@@ -339,6 +340,21 @@ Vector6 PhotometricEquations::pose_gradient() const {
 Eigen::Vector2d PhotometricEquations::exposure_step(const Vector6& pose_step) const {
     return information.bottomRightCorner<2, 2>().inverse() *
            (gradient.tail<2>() - information.bottomLeftCorner<2, 6>() * pose_step);
+}
+
+double PhotometricCost::excess() const {
+    constexpr double kOfNoise = 0.8741;  // mean of 9 ln(1 + r^2 / 9), r normal
+    return robust - kOfNoise * static_cast<double>(all_pixels);
+}
+
+bool PhotometricEquations::observes_pose() const {
+    constexpr double kLeast = 1e-10;
+    const Matrix6 of_pose = pose_information();
+    const Vector6 sizes = of_pose.diagonal();
+    if (!(sizes.minCoeff() > 0) || !sizes.allFinite()) return false;
+    const Vector6 unit = sizes.cwiseSqrt().cwiseInverse();
+    const Matrix6 scaled = unit.asDiagonal() * of_pose * unit.asDiagonal();
+    return symmetric_eigen(scaled).values[0] > kLeast;
 }
 
 }  // namespace narpa

@@ -53,6 +53,8 @@ struct PhotometricCost {
     std::size_t all_pixels = 0;  ///< that `robust` is the sum of
 
     PhotometricCost& operator+=(const PhotometricCost& b);
+    /// `robust` beyond that of noise, with the default Robustness.
+    [[nodiscard]] double excess() const;
 };
 
 /// `scale`: size of the residuals in units of their noise (1: the model holds); `cauchy`: scale of the loss in
@@ -85,6 +87,8 @@ struct PhotometricEquations {
     PhotometricEquations& operator+=(const PhotometricEquations& b);
     /// Information of the pose with gain and offset marginalised.
     [[nodiscard]] Matrix6 pose_information() const;
+    /// The least eigenvalue of the pose's information, scaled to a unit diagonal, is not that of rounding.
+    [[nodiscard]] bool observes_pose() const;
     [[nodiscard]] Vector6 pose_gradient() const;
     /// Inverse information where residuals are no larger than their noise; else the sandwich estimator (P. J.
     /// Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 5th Berkeley Symposium,

@@ -55,7 +55,7 @@ TEST_P(CameraMethods, MeasureTheTruePose) {
     for (const double x_m : {25.0, 6.0}) {
         const Plant plant = plant_at({x_m, 0.3, -0.2}, {0.01, -0.02, 0.01});
         const Rigid3 truth = chaser_target(plant);
-        const auto bytes = frame(*stage().model, plant, ++number);
+        const auto bytes = frame(*stage().model, plant, ++number, 16);
         const MeasurementResult s = estimator.measure(bytes, 0, predicted(plant, beside(truth)));
         ASSERT_TRUE(s.pose) << s.why;
         EXPECT_GT(s.points, 30);
@@ -74,7 +74,7 @@ TEST_P(CameraMethods, GiveAReasonWithoutAPose) {
     std::fill(bytes.begin(), bytes.end(), std::uint8_t{4});  // the Earth's shadow
     const MeasurementResult dark = estimator.measure(bytes, 0, predicted(plant, truth));
     EXPECT_FALSE(dark.pose);
-    const auto* why = GetParam() == CameraMethod::features ? "few matches" : "diverged";
+    const auto* why = GetParam() == CameraMethod::features ? "few matches" : "does not fit";
     EXPECT_NE(dark.why.find(why), std::string::npos) << dark.why;
     bytes.pop_back();
     EXPECT_FALSE(estimator.measure(bytes, 0, predicted(plant, truth)).why.empty());

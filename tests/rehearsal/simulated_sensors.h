@@ -22,14 +22,15 @@ inline Rigid3 chaser_target(const Plant& plant) {
     return inverse(T_world_chaser) * T_world_target;
 }
 
-inline std::vector<std::uint8_t> frame(SceneModel& model, const Plant& plant, std::uint32_t number) {
+/// `spp`: samples of a pixel.
+inline std::vector<std::uint8_t> frame(SceneModel& model, const Plant& plant, std::uint32_t number, int spp = 4) {
     const Camera& camera = model.scene().cameras[model.cameras()[0]];
     const Rigid3 T_chaser_target = chaser_target(plant);
     const BodyPoses at = model.place(plant.t_s, plant.motion.q_world_target, inverse(T_chaser_target));
     FrameSettings settings;
     settings.seed = 77;
     settings.frame = number;
-    settings.spp = 4;
+    settings.spp = spp;
     RadianceImage image(camera.width, camera.height);
     render_radiance(model.render_scene(), at, camera, at.T_world_body[model.chaser()] * camera.T_mount_camera,
                     settings, image);

@@ -253,7 +253,7 @@ void DenseAlignment::start_near(const MeasuredImage& frame, const BodyPoses& at,
 
 /// What the covariance of a weak motion leaves out: other minima along it, or where a flat face is tilted to the
 /// other side of the line of sight; and an image that is linear in the pose over less than a few standard
-/// deviations. From beside a motion that counts as observed some start must lead to a pose.
+/// deviations. Of the descents beside a motion that counts as observed one must converge: else nothing was tested.
 void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
                              std::span<const float> frame_variance, DenseEstimate& e, Fit& fit) {
     const Camera camera = coarser_camera(camera_, options.finest);
@@ -274,18 +274,18 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     }
     DenseOptions from_near = options;
     from_near.coarsest = std::min(options.coarsest, 2 * options.finest);
-    bool looked = false;
+    bool tested = false;
     for (const Rigid3& start : starts) {
         DenseEstimate other = descend(frame, at, start, from_near, frame_variance, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
-        looked = true;
+        tested = true;
         weigh_alike(frame, at, options, frame_variance, e, other);
         minima.push_back(other);
         keep_better(e, other);
     }
-    if (!looked && observability_of(e.covariance, norm(e.T_camera_body.t)).unobserved == 0)
-        fit.failed = "no start beside the answer leads to a pose";
+    if (!tested && observability_of(e.covariance, norm(e.T_camera_body.t)).unobserved == 0)
+        fit.failed = "no descent beside the weakest motion converges, so that it is not tested";
     for (DenseEstimate& other : minima) {
         const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
         if (!(normalised_error_squared(apart, e.covariance) > kElsewhere)) continue;

@@ -30,8 +30,8 @@ namespace narpa {
 struct DenseOptions {
     int iterations = 16;            ///< at most, on each level
     int coarsest = 16, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    int samples_per_pixel = 8;  ///< of the finest level's images; those of the last step take eight times as many
-    int fineness = 4;           ///< of the last derivative: lines each way across a pixel
+    int samples_per_pixel = 8;      ///< of the finest level's images; the last take six or eight times as many
+    int fineness = 4;               ///< of the last derivative: lines each way across a pixel
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;

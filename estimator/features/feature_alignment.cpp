@@ -28,9 +28,6 @@ constexpr double kFewestFreedom = 3;
 constexpr double kSettledSquared = 9;
 /// Points move by so much in the turns by which the response is measured, RMS.
 constexpr double kTurn_px = 2;
-/// Of fewer matches that agree the scatter does not show when some of them slid together: 5 of 123 such answers
-/// were beyond 6 sigma, of 261 others none.
-constexpr int kFewestOfAnswer = 15;
 /// Of so many matches most are of points of the body: their response is not measured.
 constexpr int kMany = 30;
 /// Matches that were nearer to a guess than this, RMS, need no second start.
@@ -226,8 +223,8 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     else if (e.floor_px > settings_.floor_most_px)
         fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
                                  settings_.floor_most_px);
-    else if (e.agreeing < kFewestOfAnswer)
-        fit.failed = fmt::format("{} matches agree, expected at least {}", e.agreeing, kFewestOfAnswer);
+    else if (e.agreeing < settings_.fewest_agreeing)
+        fit.failed = fmt::format("{} matches agree, expected at least {}", e.agreeing, settings_.fewest_agreeing);
     else
         compare_with_mirrored(frame, at, guess, motion, e, fit);
     e.covariance_of_model = covariance_by(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal));

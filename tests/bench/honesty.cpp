@@ -20,7 +20,7 @@ std::vector<HonestyRow> run(const HonestyOptions& o, int first) {
 /// Trials whose good answers were beyond 6 sigma: valleys in which steps ended early, frames blurred by what the
 /// model does not know, and another target; from 10000 on other minima along a weak motion, and images that are not
 /// linear over its standard deviation; from 100000 on a false minimum to which coarse levels led both starts, and
-/// Jacobians that said too much of weak motions; from 140000 on a weak motion from whose sides no steps led back.
+/// Jacobians that said too much of weak motions; from 140000 on a weak motion beside which no descent converged.
 TEST(Honesty, DenseTrialsThatLied) {
     HonestyOptions o;
     o.methods = {"dense"};

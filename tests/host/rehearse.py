@@ -7,7 +7,8 @@ Usage: rehearse.py docks       the last ten metres: docks within the docking sta
        rehearse.py lands       from 1200 m to the site within the gates, byte for byte the same on 1 and 2 threads; and a stuck
                                throttle that fails at the vertical velocity
        rehearse.py gale        on the elevation model of Gale crater, where ../shared/assets has it
-       rehearse.py flies       around the shape of Itokawa, where ../shared/assets has it"""
+       rehearse.py flies       around the shape of Itokawa, where ../shared/assets has it
+       rehearse.py dense       the first seconds of a docking by all pixels of the frames"""
 import json
 import os
 import subprocess
@@ -32,6 +33,19 @@ def rehearse(scenario, folder, *options):
 
 def failed_gates(verdict):
     return {g["name"]: g["reason"] for g in verdict["gates"] if g["state"] == "failed"}
+
+
+def part_of(scenario, seconds, folder, keys=""):
+    """A file: the scenario ended after so long. `keys`: more of its [scenario], and tables."""
+    file = folder / "part.toml"
+    file.write_text(f"""
+[scenario]
+based_on = "{SCENARIOS}/{scenario}.toml"
+name = "part"
+duration_s = {seconds:.1f}
+{keys}
+""")
+    return file
 
 
 def docks():
@@ -82,15 +96,9 @@ def another():
     except ImportError as error:
         support.skip(f"{error} (python3-can, python3-opencv, python3-serial)")
     folder = support.work_folder()
-    (folder / "hold.toml").write_text(f"""
-[scenario]
-based_on = "{SCENARIOS}/docking-camera.toml"
-name = "hold"
-duration_s = 10.0
-""")
     example = Path(__file__).resolve().parents[2] / "examples/navigation.py"
     command = f"{sys.executable} {example} $BUS ${{VIDEO#nav=}}"
-    _, verdict = rehearse(folder / "hold.toml", folder / "out", "--navigation", command)
+    _, verdict = rehearse(part_of("docking-camera", 10, folder), folder / "out", "--navigation", command)
     expect(verdict["bus"]["commands"] == 10, f"each period has its thruster command: {verdict['bus']}")
     reasons = failed_gates(verdict)
     expect(reasons.get("navigation") == "no estimate was on the bus" and "complete" in reasons and "corridor" not in reasons,
@@ -118,17 +126,8 @@ can_id = 0x100
 position_m = [62.0, 0.0, 0.0]
 attitude_wxyz = [0.0, 0.0, 0.0, 1.0]
 """)
-    (folder / "itokawa.toml").write_text(f"""
-[scenario]
-based_on = "{SCENARIOS}/flyaround.toml"
-name = "itokawa"
-scene = "scene.toml"
-duration_s = 40.0
-
-[gates]
-complete = false
-""")
-    _, verdict = rehearse(folder / "itokawa.toml", folder / "out")
+    keys = 'scene = "scene.toml"\n[gates]\ncomplete = false'
+    _, verdict = rehearse(part_of("flyaround", 40, folder, keys), folder / "out")
     failed = failed_gates(verdict)
     expect(set(failed) <= {"duration"}, f"around Itokawa nothing fails but that 40 s are over: {failed}")
     n = verdict["navigation"]
@@ -137,16 +136,7 @@ complete = false
 
 def dense():
     folder = support.work_folder()
-    (folder / "short.toml").write_text(f"""
-[scenario]
-based_on = "{SCENARIOS}/docking-dense.toml"
-name = "short"
-duration_s = 6.0
-
-[gates]
-complete = false
-""")
-    _, verdict = rehearse(folder / "short.toml", folder / "out")
+    _, verdict = rehearse(part_of("docking-dense", 6, folder), folder / "out")
     n = verdict["navigation"]
     expect(n["with_frames"] >= 6, f"frames gave poses: {n['with_frames']} of {n['estimates']}")
     expect(n["position_m"]["max"] < 0.015, f"largest error at 25 m, by features 20 mm: {n['position_m']['max']}")

@@ -217,6 +217,7 @@ std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
         if (k > 0 && of_few_pixels) settings_.spp *= kOfChosen.first_samples;
         render(e_.T_camera_body);
         ++e_.renders;
+        differentiate(kReach_px, std::max(1, o_.fineness / kCoarseFineness));
         if (!linearise()) return {};
         e_.T_camera_body = displaced(e_.T_camera_body, next_step(kLeastDamping).pose);
         left = error_between(e_.T_camera_body, T_camera_body);

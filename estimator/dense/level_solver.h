@@ -30,7 +30,8 @@ public:
     /// The loss at the estimate's pose again, of this view's pixels.
     void weigh();
     /// Steps from the estimate's pose end so far from the other; nothing where they do not lead there or most of
-    /// the way, or where one of them is beyond the Jacobian's reach.
+    /// the way, or where one of them is beyond the Jacobian's reach. Takes a Jacobian where the view has none of
+    /// there.
     [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
     /// Renders with the last step's rays and linearises at the estimate's pose.
     void examine();

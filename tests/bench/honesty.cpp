@@ -31,6 +31,18 @@ TEST(Honesty, DenseTrialsThatLied) {
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
+/// The third start is held against the answer where the second has left the view of another window, without a
+/// Jacobian (it crashed).
+TEST(Honesty, DenseThirdStartAfterAWholeSecondDescent) {
+    HonestyOptions o;
+    o.methods = {"dense"};
+    o.trials = 1;
+    const auto rows = run(o, 142147);
+    ASSERT_EQ(rows.size(), 1u);
+    EXPECT_EQ(rows[0].trials(), 1);
+    EXPECT_EQ(rows[0].beyond, 0);
+}
+
 /// Matches of outlines, of shading and along edges, which end where the start left them; from 30000 on too few of
 /// them.
 TEST(Honesty, FeatureTrialsThatLied) {

@@ -25,6 +25,8 @@ constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
 /// the points lies elsewhere, or where the cost is so many standard deviations above that of noise.
 constexpr std::size_t kManyPoints = 150;
 constexpr double kWeak = 0.01, kFewElsewhere = 0.02, kMoreThanNoise_sigmas = 4;
+/// Rivals are looked for about the best of them, and so on, at most so many times.
+constexpr int kCompetitions = 4;
 /// A rival is better by this difference of the costs, each half a chi-square.
 constexpr double kBetter = 0.5;
 /// Of a search about a minimum at which points lie beside the model, in parts of the points' spread.
@@ -253,9 +255,10 @@ bool CloudIcp::may_have_rivals(const CloudEstimate& e) {
 }
 
 /// Looks for other minima that are as good: from poses that lie a search away along the two motions that the points
-/// hold least. The best is the answer; it is ambiguous where another is nearly as likely.
-void CloudIcp::compete(CloudEstimate& found, double search_m) {
-    if (found.used < kFewestBeams || found.observability.unobserved > 4 || !may_have_rivals(found)) return;
+/// hold least. The best is the answer; it is ambiguous where another is nearly as likely. True where one is better:
+/// about that there may be better ones still.
+bool CloudIcp::compete(CloudEstimate& found, double search_m) {
+    if (found.used < kFewestBeams || found.observability.unobserved > 4 || !may_have_rivals(found)) return false;
     const CloudEstimate first = found;
     for (const int motion : {first.observability.unobserved, first.observability.unobserved + 1})
         for (const double side : {-search_m, search_m}) {
@@ -278,6 +281,7 @@ void CloudIcp::compete(CloudEstimate& found, double search_m) {
             }
             if (elsewhere && worse_chi2 < kAsLikely) found.rivals.push_back({rival.T_lidar_target, worse_chi2});
         }
+    return found.cost < first.cost - kBetter;
 }
 
 Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double search_m) const {
@@ -354,7 +358,9 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
         if (again.explained > out.explained) out = again;
     }
     draw_in(out);
-    if (search_m > 0) compete(out, search_m);
+    if (search_m > 0)
+        for (int k = 0; k < kCompetitions && compete(out, search_m); ++k) {
+        }
     if (out.used < kFewestBeams)
         return Error{.what = "only " + std::to_string(out.used) + " of " + std::to_string(points.size()) +
                              " beams meet the target where it is taken to be, expected at least " +

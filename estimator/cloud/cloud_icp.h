@@ -106,7 +106,7 @@ private:
     [[nodiscard]] double edges_hold_m() const;
     void draw_in(CloudEstimate& found);
     [[nodiscard]] static bool may_have_rivals(const CloudEstimate& e);
-    void compete(CloudEstimate& found, double search_m);
+    bool compete(CloudEstimate& found, double search_m);
     [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,
                                 CloudEstimate& out);
 

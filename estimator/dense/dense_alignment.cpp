@@ -171,22 +171,24 @@ bool DenseAlignment::has_independent_noise() const {
            sensor_.read_dn2 >= kDithered * sensor_.rounding_dn2;
 }
 
-/// The first of the mirrored starts that converges decides. Its coarse levels suffice where they end close enough
-/// to the answer for one step to lead there.
+/// One of the mirrored starts must lead to the answer, or to a pose that is as likely. Its coarse levels suffice
+/// where they end close enough to the answer for one step to lead there. Where the first leads elsewhere, two of
+/// three starts, with the guess, lead to the answer, and its loss is the smaller one.
 void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                              const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e,
                              Fit& fit) {
-    bool decided = false;
-    for (int k = 0; k < options.rivals && !decided; ++k) {
+    fit.failed = "no second start leads to the same pose";
+    for (int k = 0; k < options.rivals && !fit.failed.empty(); ++k) {
         const Vector6 beyond = std::pow(0.5, k) * error_between(guess, e.T_camera_body);
         DenseEstimate other =
             descend(frame, at, displaced(e.T_camera_body, beyond), options, frame_variance, 2 * options.finest);
         e.renders += other.renders;
         if (other.status == DenseStatus::left_the_picture) continue;
-        decided = meets(e, other, options) ||
-                  compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
+        if (meets(e, other, options))
+            fit.failed.clear();
+        else
+            compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
     }
-    if (!decided) fit.failed = "no second start leads to the same pose";
     if (fit.failed.empty() && fit.rivals.empty()) start_near(frame, at, guess, options, frame_variance, e, fit);
 }
 
@@ -203,27 +205,25 @@ bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOp
     return apart.has_value();
 }
 
-/// False where no pose is found from this start. Else the answer with the smaller loss stays.
-bool DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at,
+/// The answer with the smaller loss stays. Where no pose is found from this start nothing changes.
+void DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at,
                                         const DenseOptions& options, std::span<const float> frame_variance,
                                         const Rigid3& start, DenseEstimate& e, Fit& fit) {
     DenseOptions to_the_end = options;
     to_the_end.coarsest = options.finest;
     DenseEstimate other = descend(frame, at, start, to_the_end, frame_variance, options.finest);
     e.renders += other.renders;
-    if (other.status != DenseStatus::converged) return false;
+    if (other.status != DenseStatus::converged) return;
     weigh_alike(frame, at, options, frame_variance, e, other);
     keep_better(e, other);
     const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
     const double worse = other.excess_loss - e.excess_loss;
     const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
+    fit.failed = agree || worse < kAsLikely ? "" : "two starts lead to different poses";
     if (agree)
         e.covariance += 0.5 * apart * apart.transpose();
     else if (worse < kAsLikely)
         fit.rivals.push_back({other.T_camera_body, worse});
-    else
-        fit.failed = "two starts lead to different poses";
-    return true;
 }
 
 /// The coarsest levels may lead two starts away from a pose that is near the guess, to the same false minimum. So

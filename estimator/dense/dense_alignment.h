@@ -123,7 +123,7 @@ private:
     void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     [[nodiscard]] bool meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options);
-    bool compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
+    void compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
                             std::span<const float> frame_variance, const Rigid3& start, DenseEstimate& e, Fit& fit);
     void start_near(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                     const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);

@@ -26,12 +26,12 @@ constexpr double kStep_px = 6;
 constexpr double kFewestFreedom = 3;
 /// Steps of a smaller normalised square are noise: each view selects other features.
 constexpr double kSettledSquared = 9;
-/// Points move by so much in the turns by which the response is measured, RMS.
-constexpr double kTurn_px = 2;
+/// Points move by so much in the motions to which the response is measured, RMS.
+constexpr double kMoved_px = 2;
 /// Of so many matches most are of points of the body: their response is not measured.
 constexpr int kMany = 30;
 /// Matches that were nearer to a guess than this, RMS, need no second start.
-constexpr double kNear_px = 2 * kTurn_px;
+constexpr double kNear_px = 2 * kMoved_px;
 /// Fewer flows do not say what motion they show.
 constexpr std::size_t kFewestFlows = 5;
 /// Answers from two starts whose distance has a larger normalised square are two poses.
@@ -172,29 +172,24 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
     }
 }
 
-/// What matches show of the target's motions from the pose of the last view, as errors (pose_estimate.h): the
-/// identity where all are of points of the body. Outlines and shading do not turn with it. Motions that move the
-/// image as a whole are shown as they are; turns across the line of sight are measured, from view to view.
+/// What matches show of the motions that they hold least, from the pose of the last view: these themselves where
+/// all are of points of the body. Outlines and shading do not move with it, and matches slide along edges.
 Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& scale,
-                                   const FrameSettings& settings, const Rigid3& T_camera_target, double floor_px) {
+                                   const FrameSettings& settings, const Rigid3& T_camera_target,
+                                   const Matrix6& covariance, double floor_px) {
     const CameraModelHandle model(view_.camera());
     std::vector<Matrix26> jacobians;
     for (const Vec3& p : points.body_m) jacobians.push_back(reprojection_jacobian(*model, T_camera_target, p));
     const ByteImage here = scale.scaled(view_.radiance());
-    const Eigen::Vector3d sight = to_eigen(normalized(T_camera_target.t)), across = sight.unitOrthogonal();
-    Matrix6 shown = Matrix6::Identity();
-    for (const Eigen::Vector3d& axis : {across, Eigen::Vector3d(sight.cross(across))}) {
+    const auto shown = [&](int, const Vector6& motion) -> Vector6 {
         double squares = 0;
-        for (const Matrix26& J : jacobians) squares += (J.leftCols<3>() * axis).squaredNorm();
-        const double angle_rad = kTurn_px / std::sqrt(squares / static_cast<double>(points.size()));
-        Vector6 turn = Vector6::Zero();
-        turn.head<3>() = axis;
-        view_.render(displaced(T_camera_target, angle_rad * turn), settings, false);
-        const Vector6 motion = motion_shown(points, jacobians, floor_px,
-                                            track_points(here, scale.scaled(view_.radiance()), points.in_view));
-        shown += (motion / angle_rad - (1 - kLeastShown) * turn) * turn.transpose();
-    }
-    return shown;
+        for (const Matrix26& J : jacobians) squares += (J * motion).squaredNorm();
+        const double sigmas = kMoved_px / std::sqrt(squares / static_cast<double>(points.size()));
+        view_.render(displaced(T_camera_target, sigmas * motion), settings, false);
+        const auto flows = track_points(here, scale.scaled(view_.radiance()), points.in_view);
+        return motion_shown(points, jacobians, floor_px, flows) / sigmas;
+    };
+    return response_to_weakest(observability_of(covariance, norm(T_camera_target.t)), shown);
 }
 
 /// Outlines, and edges along which a match can slide, hold answers near where they started. So a start beyond the
@@ -319,8 +314,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     }
     estimate.floor_px = floor_px;
     if (estimate.agreeing < kMany)
-        estimate.covariance =
-            widened(estimate.covariance, response(points, scale, render_settings, T_of_view, floor_px));
+        estimate.covariance = widened(estimate.covariance, response(points, scale, render_settings, T_of_view,
+                                                                    estimate.covariance, floor_px));
     const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);
     estimate.by_focal =
         shift_by_focal({model, points.body_m, points.pixels, 1, as_weighed}, estimate.T_camera_target);

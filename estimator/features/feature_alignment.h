@@ -89,7 +89,8 @@ private:
                 ModelMatches& points);
     void find_target();
     [[nodiscard]] Matrix6 response(const ModelMatches& points, const ByteScale& scale,
-                                   const FrameSettings& settings, const Rigid3& T_camera_target, double floor_px);
+                                   const FrameSettings& settings, const Rigid3& T_camera_target,
+                                   const Matrix6& covariance, double floor_px);
     void compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                const ApparentMotion& motion, FeatureEstimate& e, Fit& fit);
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;

@@ -7,12 +7,32 @@
 /// nonstandard conditions", 5th Berkeley Symposium, 1967).
 #pragma once
 
+#include "estimator/pose/observability.h"
 #include "estimator/pose/pose_estimate.h"
+#include "estimator/pose/symmetric.h"
 
 namespace narpa {
 
 /// Of a motion of which nothing is shown: so little that its variance is beyond all limits.
 inline constexpr double kLeastShown = 1e-4;
+
+/// So many motions are measured, those that are held least: there the changes of the measurements cancel, so that
+/// errors of the Jacobian matter. The others count as shown as they are.
+inline constexpr int kMeasuredMotions = 3;
+
+/// R. `o`: of the covariance C (observability_of). `shown(i, motion)`: what a change of the pose by the i-th of
+/// them, by one standard deviation, looks like, as an error (pose_estimate.h).
+template <class Shown>
+[[nodiscard]] Matrix6 response_to_weakest(const Observability& o, Shown&& shown) {
+    const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();
+    const Matrix6 in_sigmas = inverse(motions);
+    Matrix6 response = Matrix6::Identity();
+    for (int i = 0; i < kMeasuredMotions; ++i) {
+        const Vector6 motion = motions.col(i);
+        response += (shown(i, motion) - motion) * in_sigmas.row(i);
+    }
+    return response;
+}
 
 /// R^-1 C R^-T. Motions of which more is shown than there is count as shown as they are, so that nothing of C is
 /// taken away; and of all motions at least kLeastShown. `response`: of errors (pose_estimate.h).

@@ -10,7 +10,6 @@
 /// Times are CPU times of one thread; the candidates take turns, and medians count.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>

@@ -1,7 +1,5 @@
 #include "drivers/usb/faulty_device.h"
 
-#include <algorithm>
-
 #include "protocols/little_endian.h"
 
 namespace narpa {

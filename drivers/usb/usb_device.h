@@ -2,7 +2,6 @@
 /// implements this interface; the server stays as it is.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>

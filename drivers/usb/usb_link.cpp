@@ -5,7 +5,6 @@
 #include <libusb-1.0/libusb.h>
 
 #include <algorithm>
-#include <array>
 
 #include "base/time.h"
 #include "drivers/descriptor.h"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
 
 #include "emulator/camera_control.h"
 #include "emulator/camera_unit.h"

@@ -1,7 +1,6 @@
 #include "estimator/stereo/stereo_matcher.h"
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
 

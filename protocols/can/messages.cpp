@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <limits>
 #include <optional>
-#include <tuple>
 #include <type_traits>
 
 namespace narpa {

@@ -1,7 +1,5 @@
 #include "protocols/can/slcan.h"
 
-#include <algorithm>
-
 #include "protocols/can/hex.h"
 
 namespace narpa {

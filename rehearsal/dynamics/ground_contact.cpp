@@ -1,7 +1,6 @@
 #include "rehearsal/dynamics/ground_contact.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "rehearsal/contact/landing.h"

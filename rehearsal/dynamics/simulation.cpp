@@ -1,7 +1,6 @@
 #include "rehearsal/dynamics/simulation.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "base/time.h"

@@ -5,7 +5,6 @@
 /// orders make the same record.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>

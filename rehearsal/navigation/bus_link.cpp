@@ -1,6 +1,5 @@
 #include "rehearsal/navigation/bus_link.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace narpa::rehearsal {

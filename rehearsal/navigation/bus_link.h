@@ -2,7 +2,6 @@
 /// them, are not read: they are the truth.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>

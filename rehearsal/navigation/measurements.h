@@ -4,7 +4,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/dense/dense_alignment.h"

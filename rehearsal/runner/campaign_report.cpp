@@ -1,7 +1,6 @@
 // The summary of a campaign as JSON, JUnit and HTML.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
 
 #include "rehearsal/judge/verdict.h"

@@ -1,6 +1,5 @@
 #include "renderer/atmosphere/chapman.h"
 
-#include <array>
 #include <cmath>
 #include <numbers>
 

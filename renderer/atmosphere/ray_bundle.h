@@ -9,7 +9,6 @@
 /// frame integrates each once.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>

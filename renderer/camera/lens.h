@@ -6,7 +6,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include "renderer/camera/scene_camera.h"
 #include "renderer/light/concentric_disc.h"

@@ -5,7 +5,6 @@
 /// error.
 #pragma once
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,5 @@
 // Boxes about the parts of a mesh, from one about all of it down to a few thousand.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <queue>
 #include <span>

@@ -1,7 +1,6 @@
 // Sixteen rays into a mesh at a time.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <limits>
 

@@ -1,7 +1,5 @@
 #include "renderer/geometry/tracer.h"
 
-#include <algorithm>
-#include <limits>
 #include <numeric>
 
 #include "renderer/geometry/tracer_impl.h"

@@ -1,8 +1,6 @@
 #include "renderer/integrator/wavefront.h"
 
 #include <algorithm>
-#include <array>
-#include <optional>
 
 #include "base/constants.h"
 #include "base/each_isa.h"

@@ -11,8 +11,6 @@
 /// Direct lighting is one round of it, path tracing max_depth. Used by path.h alone.
 #pragma once
 
-#include <limits>
-
 #include "base/uninitialized_array.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/path.h"

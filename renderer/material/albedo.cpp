@@ -1,7 +1,6 @@
 #include "renderer/material/albedo.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numbers>
 

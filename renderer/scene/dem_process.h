@@ -4,7 +4,6 @@
 
 #include <limits>
 #include <string>
-#include <vector>
 
 #include "base/result.h"
 #include "renderer/terrain/detail.h"

@@ -4,7 +4,6 @@
 /// motion (0.6 arcsec at most).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "renderer/atmosphere/air.h"
 #include "renderer/scene/scene_parts.h"

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {

@@ -1,6 +1,7 @@
 #include "renderer/terrain/tile_errors.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace narpa {

@@ -1,7 +1,6 @@
 /// renderer/terrain/tile_errors.h - how far a tile that leaves out posts is from the surface through all of them.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 
-#include <array>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>

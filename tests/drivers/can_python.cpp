@@ -4,7 +4,6 @@
 #include <sys/wait.h>
 
 #include <array>
-#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <string_view>
-#include <thread>
 
 #include "drivers/can/usb_adapters.h"
 #include "drivers/can/usb_spec.h"

@@ -9,7 +9,6 @@
 #include <atomic>
 #include <random>
 #include <string>
-#include <thread>
 
 namespace narpa {
 namespace {

@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <numeric>
-
 #include "drivers/lidar/packet_sink.h"
 #include "protocols/lidar/velodyne.h"
 #include "protocols/little_endian.h"

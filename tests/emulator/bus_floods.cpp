@@ -1,7 +1,6 @@
 // What narpa does with a bus that others flood, and with commands for a far future.
 #include <sys/stat.h>
 
-#include <filesystem>
 #include <thread>
 
 #include "drivers/can/remote_clock.h"

@@ -1,8 +1,6 @@
 // What `narpa check` reports of a scene's light and materials: the program itself is run.
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 

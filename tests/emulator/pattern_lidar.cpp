@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <random>
-#include <set>
 
 #include "base/constants.h"
 #include "emulator/lidar_unit.h"

@@ -6,7 +6,6 @@
 
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <random>
 
 #include "../support/allocation_counter.h"

@@ -1,5 +1,4 @@
 // How a run begins, how the ports meet, and how it ends.
-#include <vector>
 
 #include "base/constants.h"
 #include "tests/rehearsal/dynamics_support.h"

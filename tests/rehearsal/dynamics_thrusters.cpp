@@ -1,5 +1,4 @@
 // What thrusters make of commands, and what goes wrong with them.
-#include <vector>
 
 #include "base/constants.h"
 #include "tests/rehearsal/dynamics_support.h"

@@ -1,7 +1,6 @@
 // tests/rehearsal/judge_support.h - rehearsals as a list of messages, to be judged.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 

@@ -3,7 +3,6 @@
 
 #include <regex>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace narpa::rehearsal {

@@ -2,8 +2,6 @@
 /// the detector's noise, packets of a turn.
 #pragma once
 
-#include <algorithm>
-
 #include "estimator/view/model_view.h"
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/navigation/scene_model.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include "base/constants.h"
 #include "renderer/atmosphere/gauss_legendre.h"

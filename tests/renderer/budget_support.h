@@ -5,10 +5,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <cmath>
 #include <cstring>
 #include <memory>
-#include <optional>
 
 #include "renderer/film/camera_image.h"
 #include "tests/support/shapes.h"

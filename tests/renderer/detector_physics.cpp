@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
-#include <numeric>
 
 #include "renderer/camera/detector.h"
 #include "renderer/camera/solar_bands.h"

@@ -1,7 +1,6 @@
 // Bodies that move within an exposure: each ray meets them at its own moment.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <random>
 
 #include "renderer/geometry/tracer.h"

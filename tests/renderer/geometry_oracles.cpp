@@ -1,7 +1,6 @@
 // The tracer against reference numbers from exact and 60-digit arithmetic (a sibling folder of the project).
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 

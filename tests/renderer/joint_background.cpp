@@ -1,7 +1,6 @@
 // The Background joint: a gradient that is not in the product, rendered against its closed forms.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>

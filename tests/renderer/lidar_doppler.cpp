@@ -1,8 +1,6 @@
 // Line-of-sight velocities against closed forms and independent reference numbers.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/light/render_scene.h"
 #include "tests/renderer/camera_support.h"

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "renderer/light/render_scene.h"
 #include "tests/renderer/camera_support.h"

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "renderer/integrator/path.h"
 #include "tests/support/shapes.h"

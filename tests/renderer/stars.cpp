@@ -1,8 +1,6 @@
 // Stars in the image: where they stand, how much light they give, what hides them.
 #include <tbb/global_control.h>
 
-#include <numbers>
-
 #include "renderer/camera/detector.h"
 #include "tests/renderer/star_support.h"
 #include "tests/support/allocation_counter.h"

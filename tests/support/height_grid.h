@@ -3,8 +3,6 @@
 
 #include <cmath>
 #include <functional>
-#include <random>
-#include <utility>
 #include <vector>
 
 #include "renderer/terrain/terrain_mesh.h"

@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "base/program_beside.h"
 #include "renderer/geometry/tracer.h"

@@ -3,10 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <random>
+
+#include "tests/support/oracle.h"
 
 namespace narpa {
 namespace {
@@ -136,10 +135,7 @@ TEST(Slerp, ExtrapolatesAtTheSameRate) {
 }
 
 TEST(Slerp, AgreesWithTheOracle) {
-    const std::string path = NARPA_SOURCE_DIR "/../shared/oracles/quaternion_interp.json";
-    if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there";
-    std::ifstream in(path);
-    const nlohmann::json oracle = nlohmann::json::parse(in);
+    NEED_ORACLE(oracle, "quaternion_interp");
     const auto quat = [](const nlohmann::json& q) { return Quat{q.at(0), q.at(1), q.at(2), q.at(3)}; };
     ASSERT_FALSE(oracle.at("cases").empty());
     for (const nlohmann::json& c : oracle.at("cases")) {

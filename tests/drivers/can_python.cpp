@@ -13,6 +13,7 @@
 #include "drivers/descriptor.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
+#include "tests/support/read_file.h"
 
 namespace narpa {
 namespace {
@@ -71,8 +72,7 @@ TEST(PythonCan, SlcanOverTcp) {
 // The program that protocols/can/README.md offers, as it stands there but for the port.
 TEST(PythonCan, ReadmeProgramCommandsAPose) {
     if (std::system("/usr/bin/python3 -c 'import can, serial' 2>/dev/null") != 0) GTEST_SKIP() << "no python-can";
-    std::ifstream file(NARPA_SOURCE_DIR "/protocols/can/README.md");
-    std::string text((std::istreambuf_iterator<char>(file)), {});
+    std::string text = test::read_text(NARPA_SOURCE_DIR "/protocols/can/README.md");
     const std::string fence = "```python\n", port = "29537";
     const std::size_t begin = text.find(fence) + fence.size();
     text = text.substr(begin, text.find("```", begin) - begin);

@@ -1,4 +1,4 @@
-/// tests/drivers/can_support.h - frames and waiting for the tests of drivers/can.
+/// tests/drivers/can_support.h - waiting for the tests of drivers/can.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,34 +11,9 @@
 
 #include "base/time.h"
 #include "drivers/can/can_bus.h"
+#include "tests/support/can_frames.h"
 
 namespace narpa {
-
-inline CanFrame can_frame(std::uint32_t id, std::vector<std::uint8_t> data, bool extended = false) {
-    CanFrame f;
-    f.id = id;
-    f.extended = extended;
-    f.size = static_cast<std::uint8_t>(data.size());
-    std::copy(data.begin(), data.end(), f.data.begin());
-    return f;
-}
-inline CanFrame remote_frame(std::uint32_t id, std::uint8_t size, bool extended = false) {
-    CanFrame f = can_frame(id, {}, extended);
-    f.remote = true;
-    f.size = size;
-    return f;
-}
-inline CanFrame fd_frame(std::uint32_t id, std::vector<std::uint8_t> data, bool bit_rate_switch) {
-    CanFrame f = can_frame(id, std::move(data));
-    f.fd = true;
-    f.bit_rate_switch = bit_rate_switch;
-    return f;
-}
-
-inline bool same(const CanFrame& a, const CanFrame& b) {
-    return a.id == b.id && a.extended == b.extended && a.remote == b.remote && a.fd == b.fd &&
-           a.bit_rate_switch == b.bit_rate_switch && a.size == b.size && a.data == b.data;
-}
 
 /// Repeats `step` until it returns true. The time is bounded only so that a broken bus fails its test instead of
 /// hanging it.

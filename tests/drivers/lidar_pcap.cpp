@@ -6,6 +6,7 @@
 #include "protocols/little_endian.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
@@ -91,7 +92,7 @@ TEST_F(PcapSink, HoldsThePacketsAsTheInstrumentBroadcastsThem) {
                                    payload(data ? 1206 : 512, static_cast<std::uint64_t>(i)), i * 1'327'104LL));
         }
     }
-    const std::vector<Record> records = records_of(test::read_file(path_));
+    const std::vector<Record> records = records_of(test::read_bytes(path_));
     ASSERT_EQ(records.size(), static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) {
         const auto& [t_ns, f] = records[static_cast<std::size_t>(i)];
@@ -119,7 +120,7 @@ TEST_F(PcapSink, IsReadableWhileItIsWritten) {
     const auto sink = opened(true);
     sink->send(PacketKind::data, payload(1206, 1), 5);
     sink->flush();
-    EXPECT_EQ(records_of(test::read_file(path_)).size(), 1U);
+    EXPECT_EQ(records_of(test::read_bytes(path_)).size(), 1U);
     EXPECT_EQ(sink->counters().sent, 1U);
 }
 
@@ -133,7 +134,7 @@ TEST_F(PcapSink, FileEndsWithAWholeRecordAndGoesOnWhenThereIsRoom) {
     ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
     for (std::uint64_t i = 0; i < 6; ++i) sink->send(PacketKind::data, payload(1206, i), 0);
     sink->flush();
-    const std::size_t at_limit = records_of(test::read_file(path_)).size();
+    const std::size_t at_limit = records_of(test::read_bytes(path_)).size();
     ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
     EXPECT_EQ(at_limit, 3U);
     EXPECT_EQ(sink->counters().sent, 3U);
@@ -144,7 +145,7 @@ TEST_F(PcapSink, FileEndsWithAWholeRecordAndGoesOnWhenThereIsRoom) {
         << sink->failure().error().text();
     sink->send(PacketKind::data, payload(1206, 6), 0);
     sink->flush();
-    EXPECT_EQ(records_of(test::read_file(path_)).size(), 4U);
+    EXPECT_EQ(records_of(test::read_bytes(path_)).size(), 4U);
 }
 
 TEST_F(PcapSink, SendingAllocatesNothing) {

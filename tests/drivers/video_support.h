@@ -4,8 +4,6 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <thread>
@@ -23,11 +21,6 @@ inline Bytes noise_frame(const VideoFormat& format, std::uint64_t seed) {
     Bytes frame(frame_bytes(format));
     for (auto& byte : frame) byte = static_cast<std::uint8_t>(random());
     return frame;
-}
-
-inline Bytes read_file(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
 }
 
 /// What a command writes to standard output; empty when it cannot run.

@@ -7,6 +7,7 @@
 #include "drivers/video/v4l2_device.h"
 #include "drivers/video/video_sink.h"
 #include "tests/drivers/video_support.h"
+#include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
@@ -62,7 +63,7 @@ protected:
             std::this_thread::sleep_for(std::chrono::milliseconds(20));
         }
         reader.join();
-        const Bytes read = test::read_file(file);
+        const Bytes read = test::read_bytes(file);
         const std::size_t size = frame_bytes(format_);
         ASSERT_EQ(read.size(), kReaderFrames * size);
         std::uint64_t candidate = 0;

@@ -8,6 +8,7 @@
 #include "drivers/video/video_sink.h"
 #include "protocols/video/y4m.h"
 #include "tests/drivers/video_support.h"
+#include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
@@ -113,7 +114,7 @@ TEST(Y4mSink, FfmpegReadsTheFileByteForByte) {
         const Bytes read = test::output_of("ffmpeg -v error -nostdin -i " + path +
                                            " -fps_mode passthrough -f rawvideo -pix_fmt " + c.ffmpeg + " -");
         EXPECT_TRUE(read == sent) << name(c.pixel) << ": " << read.size() << " bytes of " << sent.size();
-        EXPECT_EQ(frames_of(test::read_file(path), format).size(), 20U);
+        EXPECT_EQ(frames_of(test::read_bytes(path), format).size(), 20U);
     }
 }
 
@@ -166,14 +167,14 @@ TEST(Y4mSink, FileEndsWithAWholeFrameAndGoesOnWhenThereIsRoom) {
     ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
     for (std::uint64_t i = 0; i < 6; ++i) sink->send(noise_frame(kGrey, i));
     sink->flush();
-    const std::vector<Bytes> at_limit = frames_of(test::read_file(path), kGrey);
+    const std::vector<Bytes> at_limit = frames_of(test::read_bytes(path), kGrey);
     ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
     EXPECT_EQ(at_limit.size(), 3U);
     EXPECT_EQ(sink->counters().written, 3U);
     EXPECT_EQ(sink->counters().failed, 3U);
     sink->send(noise_frame(kGrey, 6));
     sink->flush();
-    const std::vector<Bytes> frames = frames_of(test::read_file(path), kGrey);
+    const std::vector<Bytes> frames = frames_of(test::read_bytes(path), kGrey);
     ASSERT_EQ(frames.size(), 4U);
     EXPECT_EQ(frames[2], noise_frame(kGrey, 2));
     EXPECT_EQ(frames[3], noise_frame(kGrey, 6));

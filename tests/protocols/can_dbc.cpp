@@ -12,6 +12,7 @@
 
 #include "protocols/can/candump.h"
 #include "tests/protocols/can_support.h"
+#include "tests/support/read_file.h"
 
 namespace narpa {
 namespace {
@@ -20,8 +21,7 @@ constexpr std::uint32_t kChaserBase = 0x100;
 const std::string kDbcPath = NARPA_SOURCE_DIR "/protocols/can/narpa.dbc";
 
 std::string shipped_text() {
-    std::ifstream file(kDbcPath);
-    return {std::istreambuf_iterator<char>(file), {}};
+    return test::read_text(kDbcPath);
 }
 
 TEST(CanDbc, ShippedFileIsTheGeneratedOne) {

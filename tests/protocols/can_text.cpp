@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -12,27 +10,11 @@
 #include "protocols/can/candump.h"
 #include "protocols/can/slcan.h"
 #include "protocols/can/udp_multicast.h"
+#include "tests/support/can_frames.h"
+#include "tests/support/read_file.h"
 
 namespace narpa {
 namespace {
-
-CanFrame frame_of(std::uint32_t id, std::vector<std::uint8_t> data, bool extended = false) {
-    CanFrame f;
-    f.id = id;
-    f.extended = extended;
-    f.size = static_cast<std::uint8_t>(data.size());
-    std::copy(data.begin(), data.end(), f.data.begin());
-    return f;
-}
-
-CanFrame remote(std::uint32_t id, std::uint8_t size, bool extended = false) {
-    CanFrame f;
-    f.id = id;
-    f.extended = extended;
-    f.remote = true;
-    f.size = size;
-    return f;
-}
 
 CanFrame random_frame(std::mt19937_64& rng, bool may_be_fd) {
     CanFrame f;
@@ -46,11 +28,6 @@ CanFrame random_frame(std::mt19937_64& rng, bool may_be_fd) {
     return f;
 }
 
-bool same(const CanFrame& a, const CanFrame& b) {
-    return a.id == b.id && a.extended == b.extended && a.remote == b.remote && a.error == b.error && a.fd == b.fd &&
-           a.bit_rate_switch == b.bit_rate_switch && a.size == b.size && a.data == b.data;
-}
-
 std::string slcan(const CanFrame& f) {
     std::array<char, kSlcanMaxLine> out;
     return {out.data(), encode_slcan(f, out)};
@@ -58,19 +35,19 @@ std::string slcan(const CanFrame& f) {
 
 // The lines are those of the LAWICEL CANUSB manual's examples.
 TEST(CanSlcan, KnownLines) {
-    EXPECT_EQ(slcan(frame_of(0x100, {0x11, 0x22, 0x33})), "t1003112233\r");
-    EXPECT_EQ(slcan(frame_of(0x100, {0x11, 0x22, 0x33}, true)), "T000001003112233\r");
-    EXPECT_EQ(slcan(remote(0x100, 3)), "r1003\r");
-    EXPECT_EQ(slcan(remote(0x100, 3, true)), "R000001003\r");
+    EXPECT_EQ(slcan(can_frame(0x100, {0x11, 0x22, 0x33})), "t1003112233\r");
+    EXPECT_EQ(slcan(can_frame(0x100, {0x11, 0x22, 0x33}, true)), "T000001003112233\r");
+    EXPECT_EQ(slcan(remote_frame(0x100, 3)), "r1003\r");
+    EXPECT_EQ(slcan(remote_frame(0x100, 3, true)), "R000001003\r");
 }
 
 TEST(CanSlcan, CarriesNoFdAndNothingOutOfRange) {
-    CanFrame f = frame_of(0x123, {1});
+    CanFrame f = can_frame(0x123, {1});
     f.fd = true;
     EXPECT_EQ(slcan(f), "");
-    EXPECT_EQ(slcan(frame_of(0x800, {1})), "");
-    EXPECT_EQ(slcan(frame_of(0x20000000, {1}, true)), "");
-    f = frame_of(0x123, {1});
+    EXPECT_EQ(slcan(can_frame(0x800, {1})), "");
+    EXPECT_EQ(slcan(can_frame(0x20000000, {1}, true)), "");
+    f = can_frame(0x123, {1});
     f.size = 9;
     EXPECT_EQ(slcan(f), "");
 }
@@ -87,7 +64,7 @@ TEST(CanSlcan, RoundTrip) {
 }
 
 TEST(CanSlcan, RejectsBadLines) {
-    CanFrame out = frame_of(0x7, {9});
+    CanFrame out = can_frame(0x7, {9});
     for (const char* line :
          {"",        "t",      "t1",         "t123",     "t1231",    "t12311",  "t1239112233445566778899",
           "t123F",   "t80000", "T200000000", "T0000000", "tXYZ0",    "t 120",   "t1230 ",
@@ -155,7 +132,7 @@ TEST(CanUdpMulticast, SameBytesAsPythonCan) {
                                  "bitrate_switch\xc2" +
                                  "\xb5"
                                  "error_state_indicator\xc2";
-    EXPECT_EQ(datagram(frame_of(0x123, {0xDE, 0xAD, 0xBE, 0xEF})), datagram_bytes(expected));
+    EXPECT_EQ(datagram(can_frame(0x123, {0xDE, 0xAD, 0xBE, 0xEF})), datagram_bytes(expected));
     EXPECT_EQ(expected.size(), 158u);
 }
 
@@ -182,7 +159,7 @@ TEST(CanUdpMulticast, MissingFlagsHavePythonCansDefaults) {
 }
 
 TEST(CanUdpMulticast, RejectsBadMaps) {
-    const std::vector<std::uint8_t> good = datagram(frame_of(0x123, {1, 2, 3}));
+    const std::vector<std::uint8_t> good = datagram(can_frame(0x123, {1, 2, 3}));
     CanFrame out;
     ASSERT_TRUE(decode_udp_multicast(good, out));
     for (std::size_t n = 0; n < good.size(); ++n)
@@ -235,13 +212,13 @@ std::string candump(const CandumpLine& line) {
 }
 
 TEST(CanCandump, KnownLines) {
-    CandumpLine line{1'700'000'000'250'000'000, frame_of(0x123, {0xDE, 0xAD, 0xBE, 0xEF})};
+    CandumpLine line{1'700'000'000'250'000'000, can_frame(0x123, {0xDE, 0xAD, 0xBE, 0xEF})};
     EXPECT_EQ(candump(line), "(1700000000.250000) vcan0 123#DEADBEEF\n");
     line.frame.extended = true;
     EXPECT_EQ(candump(line), "(1700000000.250000) vcan0 00000123#DEADBEEF\n");
     line.frame.fd = line.frame.bit_rate_switch = true;
     EXPECT_EQ(candump(line), "(1700000000.250000) vcan0 00000123##1DEADBEEF\n");
-    line = {500'000, remote(0x7FF, 4)};
+    line = {500'000, remote_frame(0x7FF, 4)};
     EXPECT_EQ(candump(line), "(0000000000.000500) vcan0 7FF#R4\n");
     line.frame.size = 0;
     EXPECT_EQ(candump(line), "(0000000000.000500) vcan0 7FF#R\n");
@@ -249,7 +226,7 @@ TEST(CanCandump, KnownLines) {
 
 TEST(CanCandump, HasNoStampBeforeZero) {
     std::array<char, kCandumpMaxLine> out;
-    const std::size_t n = format_candump({-49'939'000, frame_of(0x123, {1})}, "narpa", out);
+    const std::size_t n = format_candump({-49'939'000, can_frame(0x123, {1})}, "narpa", out);
     EXPECT_EQ(std::string(out.data(), n), "(0000000000.000000) narpa 123#01\n");
 }
 
@@ -258,8 +235,7 @@ TEST(CanCandump, StatesHowManyFramesAreNotInTheLogAsTheReadmeShows) {
     const std::size_t n = format_candump({12'100'000'000, lost_frames(77'411)}, "not_logged", out);
     const std::string line(out.data(), n);
     EXPECT_EQ(line, "(0000000012.100000) not_logged 20000004#00010000632E0100\n");
-    std::ifstream readme(NARPA_SOURCE_DIR "/protocols/can/README.md");
-    EXPECT_NE(std::string(std::istreambuf_iterator<char>(readme), {}).find(line), std::string::npos);
+    EXPECT_NE(test::read_text(NARPA_SOURCE_DIR "/protocols/can/README.md").find(line), std::string::npos);
 }
 
 TEST(CanCandump, ReadsWhatOthersWrite) {

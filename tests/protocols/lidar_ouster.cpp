@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <numbers>
 #include <random>
 
 #include "protocols/lidar/ouster_metadata.h"
 #include "protocols/lidar/ouster_packet.h"
+#include "tests/support/read_file.h"
 
 namespace narpa {
 namespace {
@@ -34,8 +32,7 @@ std::shared_ptr<const LidarModel> os1_unit(int beams, int columns, double rate_h
 }
 
 std::string recorded_metadata(const char* file) {
-    std::ifstream in(std::filesystem::path(NARPA_SOURCE_DIR "/../shared/assets/lidar/ouster") / file);
-    return {std::istreambuf_iterator<char>(in), {}};
+    return test::read_text(std::string(NARPA_SOURCE_DIR "/../shared/assets/lidar/ouster/") + file);
 }
 
 TEST(Os1, HasItsModesInWholePackets) {

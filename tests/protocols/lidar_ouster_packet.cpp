@@ -3,12 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <vector>
 
-#include "protocols/little_endian.h"
+#include "tests/protocols/capture.h"
 
 namespace narpa {
 namespace {
@@ -85,22 +82,6 @@ TEST(OusterFormat, FieldsAreAtTheBitsThatTheMakerDocuments) {
         EXPECT_TRUE(bits_set_by(profile, second).empty());
 }
 
-/// UDP payloads of this size in a capture of Ethernet frames.
-std::vector<PacketBytes> ouster_payloads(const std::filesystem::path& path, std::size_t payload_bytes) {
-    std::ifstream in(path, std::ios::binary);
-    const PacketBytes file{std::istreambuf_iterator<char>(in), {}};
-    std::vector<PacketBytes> out;
-    constexpr std::size_t kFileHeader = 24, kRecordHeader = 16, kFrameHeader = 42;
-    for (std::size_t at = kFileHeader; at + kRecordHeader <= file.size();) {
-        const auto length = get_le<std::uint32_t>(&file[at + 8]);
-        at += kRecordHeader;
-        if (length == kFrameHeader + payload_bytes && at + length <= file.size())
-            out.emplace_back(&file[at + kFrameHeader], &file[at + kFrameHeader] + payload_bytes);
-        at += length;
-    }
-    return out;
-}
-
 struct Recording {
     const char* file;
     OusterProfile profile;
@@ -120,8 +101,8 @@ class OusterRecording : public ::testing::TestWithParam<Recording> {};
 TEST_P(OusterRecording, IsReadAndWrittenByteForByte) {
     const Recording& r = GetParam();
     const OusterFormat format(r.profile, r.beams);
-    const auto packets = ouster_payloads(
-        std::filesystem::path(NARPA_SOURCE_DIR "/../shared/assets/lidar/ouster") / r.file, format.bytes());
+    const auto packets = test::captured_payloads(
+        std::string(NARPA_SOURCE_DIR "/../shared/assets/lidar/ouster/") + r.file, format.bytes());
     if (packets.empty()) GTEST_SKIP() << "no capture beside the project: ../shared/assets/lidar/ouster";
     ASSERT_EQ(packets.size(), r.packets);
     std::size_t returns = 0;

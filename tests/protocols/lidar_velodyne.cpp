@@ -3,18 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <numbers>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "protocols/lidar/velodyne_packet.h"
 #include "protocols/little_endian.h"
+#include "tests/protocols/capture.h"
 
 namespace narpa {
 namespace {
@@ -22,7 +22,7 @@ namespace {
 constexpr double kRadian = std::numbers::pi / 180;
 using Packet = std::array<std::uint8_t, VelodynePacket::kBytes>;
 
-std::vector<LidarPoint> decoded(const LidarModel& unit, const Packet& bytes) {
+std::vector<LidarPoint> decoded(const LidarModel& unit, std::span<const std::uint8_t> bytes) {
     std::vector<LidarPoint> points(unit.spec().points_per_packet);
     points.resize(unit.points(bytes, points));
     return points;
@@ -137,34 +137,19 @@ TEST(Velodyne, UnitsHaveTheirOwnBeams) {
     }
 }
 
-/// Payloads of a capture of Ethernet frames in microseconds, as a LiDAR's own.
-std::vector<Packet> capture(const std::filesystem::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    const std::vector<std::uint8_t> file{std::istreambuf_iterator<char>(in), {}};
-    std::vector<Packet> out;
-    constexpr std::size_t kFileHeader = 24, kRecordHeader = 16, kFrameHeader = 42;
-    for (std::size_t at = kFileHeader; at + kRecordHeader <= file.size();) {
-        const auto length = get_le<std::uint32_t>(&file[at + 8]);
-        at += kRecordHeader;
-        if (length == kFrameHeader + VelodynePacket::kBytes && at + length <= file.size())
-            std::copy_n(&file[at + kFrameHeader], VelodynePacket::kBytes, out.emplace_back().begin());
-        at += length;
-    }
-    return out;
-}
-
 TEST(Hdl32e, PacketsOfARealUnitAreReadAndWrittenByteForByte) {
-    const auto packets = capture(NARPA_SOURCE_DIR "/../shared/assets/lidar/velodyne/sample_velodyne_hdl32.pcap");
+    const auto packets = test::captured_payloads(
+        NARPA_SOURCE_DIR "/../shared/assets/lidar/velodyne/sample_velodyne_hdl32.pcap", VelodynePacket::kBytes);
     if (packets.empty()) GTEST_SKIP() << "no capture beside the project: ../shared/assets/lidar/velodyne";
     const auto unit = hdl32e().configure_default();
     std::size_t points = 0;
-    for (const Packet& bytes : packets) {
+    for (const std::vector<std::uint8_t>& bytes : packets) {
         const auto packet = VelodynePacket::read(bytes);
         ASSERT_TRUE(packet);
         Packet again;
         again.fill(0xAA);
         packet->write(again);
-        EXPECT_EQ(again, bytes);
+        EXPECT_TRUE(std::ranges::equal(again, bytes));
         points += decoded(*unit, bytes).size();
     }
     EXPECT_EQ(packets.size(), 500u);

@@ -13,14 +13,6 @@ using namespace test;
 using Method = RenderSettings::Method;
 constexpr double kSolar = 1361;
 
-RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, const FrameSettings& settings) {
-    const auto render_scene = RenderScene::create(s, 1);
-    EXPECT_TRUE(render_scene);
-    RadianceImage image(c.width, c.height);
-    render_radiance(*render_scene, placed(s), c, T, settings, image);
-    return image;
-}
-
 FrameSettings by(Method method, int spp, int max_depth = 1) {
     FrameSettings settings;
     settings.spp = spp;
@@ -38,7 +30,7 @@ double sphere_at(double phase, Method method, int pixels, int spp) {
     add_sphere(s, kRadius, {});
     add_sun(s, {std::cos(phase), std::sin(phase), 0});
     const Camera c = camera(pixels + 8, pixels + 8, pixels * kDistance / (2 * kRadius));
-    return irradiance(render(s, c, looking({kDistance, 0, 0}, {}), by(method, spp)), c);
+    return irradiance(rendered(s, c, looking({kDistance, 0, 0}, {}), by(method, spp)), c);
 }
 /// Lambert's law integrated over the lit and visible lune, for a point Sun.
 double lambert_phase(double phase) {
@@ -79,10 +71,10 @@ TEST(ClosedForm, LambertPlaneUnderTheSunByPathsFollowsTheCosine) {
         const Camera c = camera(8, 8, 20);
         const Rigid3 T = looking({0.1, 0.2, 5}, {0, 0, 0}, {0, 1, 0});
         const double expected = 0.25 * kSolar * std::cos(zenith) / kPi;
-        for (const Rgb& p : render(s, c, T, by(Method::path, 1, 4)).pixels)
+        for (const Rgb& p : rendered(s, c, T, by(Method::path, 1, 4)).pixels)
             // One point of the Sun: its height differs from the centre's by up to half of its diameter.
             EXPECT_NEAR(static_cast<double>(p.x) / expected, 1, 0.0047 * std::tan(zenith) + 2e-5) << zenith;
-        for (const Rgb& p : render(s, c, T, by(Method::path, 64, 4)).pixels)
+        for (const Rgb& p : rendered(s, c, T, by(Method::path, 64, 4)).pixels)
             EXPECT_NEAR(static_cast<double>(p.x) / expected, 1, 2e-4 * std::tan(zenith) + 2e-5) << zenith;
     }
 }
@@ -96,7 +88,7 @@ TEST(ClosedForm, LambertPlaneUnderAVeryLargeSunFacingItGetsItsIrradiance) {
     const Camera c = camera(8, 8, 20);
     const Rigid3 T = looking({0.1, 0.2, 5}, {0, 0, 0}, {0, 1, 0});
     for (const Method method : {Method::direct, Method::path})
-        for (const Rgb& p : render(s, c, T, by(method, 64, 4)).pixels)
+        for (const Rgb& p : rendered(s, c, T, by(method, 64, 4)).pixels)
             EXPECT_NEAR(static_cast<double>(p.x) / (0.25 * kSolar / kPi), 1, 1e-5);
 }
 
@@ -106,13 +98,13 @@ TEST(ClosedForm, SkySunAndLampsThatTheCameraLooksAt) {
     s.materials.push_back(lambert(0.5f));
     s.ambient = {2, 3, 5};
     const Camera c = camera(4, 4, 100);
-    for (const Rgb& p : render(s, c, {}, by(Method::path, 2)).pixels) EXPECT_EQ(p, (Rgb{2, 3, 5}));
-    for (const Rgb& p : render(s, c, {}, by(Method::direct, 2)).pixels) EXPECT_EQ(p, Rgb{});
+    for (const Rgb& p : rendered(s, c, {}, by(Method::path, 2)).pixels) EXPECT_EQ(p, (Rgb{2, 3, 5}));
+    for (const Rgb& p : rendered(s, c, {}, by(Method::direct, 2)).pixels) EXPECT_EQ(p, Rgb{});
     // The Sun's disc gives its irradiance to a camera that faces it.
     s.ambient = {};
     add_sun(s, {0, 0, 1});
     const Camera solar = camera(60, 60, 50 / (0.533 * kPi / 180));
-    EXPECT_NEAR(irradiance(render(s, solar, {}, by(Method::path, 64)), solar) / kSolar, 1, 1e-3);
+    EXPECT_NEAR(irradiance(rendered(s, solar, {}, by(Method::path, 64)), solar) / kSolar, 1, 1e-3);
     // A lamp is seen by both methods, with its radiance.
     s.sun.reset();
     Light lamp;
@@ -121,7 +113,7 @@ TEST(ClosedForm, SkySunAndLampsThatTheCameraLooksAt) {
     lamp.emission = {7, 8, 9};
     s.lights.push_back(lamp);
     for (const Method method : {Method::direct, Method::path})
-        for (const Rgb& p : render(s, c, {}, by(method, 4)).pixels) EXPECT_EQ(p, (Rgb{7, 8, 9}));
+        for (const Rgb& p : rendered(s, c, {}, by(method, 4)).pixels) EXPECT_EQ(p, (Rgb{7, 8, 9}));
 }
 
 TEST(ClosedForm, DirectLightOfALampIsThatOfPathsWithOneSurface) {
@@ -137,7 +129,7 @@ TEST(ClosedForm, DirectLightOfALampIsThatOfPathsWithOneSurface) {
     s.lights.push_back(lamp);
     const Camera c = camera(24, 24, 24);
     const Rigid3 T = looking({2, -2, 1.5}, {0, 0, 0.1});
-    const auto direct = render(s, c, T, by(Method::direct, 64)), path = render(s, c, T, by(Method::path, 64));
+    const auto direct = rendered(s, c, T, by(Method::direct, 64)), path = rendered(s, c, T, by(Method::path, 64));
     double difference = 0, sum = 0;
     for (std::size_t i = 0; i < direct.pixels.size(); ++i) {
         difference += static_cast<double>(direct.pixels[i].y - path.pixels[i].y);
@@ -147,7 +139,7 @@ TEST(ClosedForm, DirectLightOfALampIsThatOfPathsWithOneSurface) {
     EXPECT_NEAR(difference / sum, 0, 1e-3);
     s.lights.clear();
     add_sun(s, {0.3, 0.2, 1});
-    const auto quick = render(s, c, T, by(Method::direct, 64)), sunlit = render(s, c, T, by(Method::path, 64));
+    const auto quick = rendered(s, c, T, by(Method::direct, 64)), sunlit = rendered(s, c, T, by(Method::path, 64));
     difference = sum = 0;
     for (std::size_t i = 0; i < quick.pixels.size(); ++i) {
         difference += static_cast<double>(quick.pixels[i].y - sunlit.pixels[i].y);
@@ -165,7 +157,7 @@ TEST(ClosedForm, MirrorsAndGlassAreBlackInDirectLight) {
         s.materials.push_back(m);
         add_sphere(s, 1, {});
         add_sun(s, {1, 0.3, 0.2});
-        for (const Rgb& p : render(s, camera(16, 16, 40), looking({4, 0, 0}, {}), by(Method::direct, 4)).pixels)
+        for (const Rgb& p : rendered(s, camera(16, 16, 40), looking({4, 0, 0}, {}), by(Method::direct, 4)).pixels)
             EXPECT_EQ(p, Rgb{});
     }
 }

@@ -7,9 +7,8 @@
 
 #include "renderer/camera/image_optics.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/film/camera_image.h"
+#include "tests/renderer/camera_support.h"
 #include "tests/renderer/point_spread_support.h"
-#include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
@@ -32,15 +31,9 @@ RadianceImage slanted_edge(const Camera& c) {
     Mesh half = plate(20, 20);
     for (Vec3f& p : half.positions) p.x += 10;
     add_mesh(scene, half);
-    auto render_scene = RenderScene::create(scene, 1);
-    EXPECT_TRUE(render_scene);
-    FrameSettings settings;
-    settings.spp = 256;
-    RadianceImage image(c.width, c.height);
     // From the front: x of the plate is to the right of the image, y up.
     const Rigid3 T_world_camera{exp_rotation({0, 0, kSlant_rad}) * Quat{0, 1, 0, 0}, {0, 0, 5}};
-    render_radiance(*render_scene, placed(scene), c, T_world_camera, settings, image);
-    return image;
+    return rendered(scene, c, T_world_camera, {.spp = 256});
 }
 
 /// The modulation transfer at so many cycles a pixel across the edge, after ISO 12233: the edge profile in bins of

@@ -1,11 +1,33 @@
-/// tests/renderer/camera_support.h - what a camera measures of a whole image.
+/// tests/renderer/camera_support.h - an image of a scene, and what a camera measures of a whole image.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "renderer/film/camera_image.h"
+#include "tests/support/shapes.h"
 
 namespace narpa::test {
+
+inline RadianceImage rendered(const RenderScene& render_scene, const BodyPoses& at, const Camera& c,
+                              const CameraPose& pose = {}, const FrameSettings& settings = {},
+                              Aovs* aovs = nullptr) {
+    RadianceImage image(c.width, c.height);
+    render_radiance(render_scene, at, c, pose, settings, image, aovs);
+    return image;
+}
+inline RadianceImage rendered(const Scene& scene, const BodyPoses& at, const Camera& c, const CameraPose& pose = {},
+                              const FrameSettings& settings = {}, Aovs* aovs = nullptr) {
+    const auto render_scene = RenderScene::create(scene, 1);
+    EXPECT_TRUE(render_scene);
+    return rendered(*render_scene, at, c, pose, settings, aovs);
+}
+/// All bodies are where the scene puts them at time 0.
+inline RadianceImage rendered(const Scene& scene, const Camera& c, const CameraPose& pose = {},
+                              const FrameSettings& settings = {}, Aovs* aovs = nullptr) {
+    return rendered(scene, placed(scene), c, pose, settings, aovs);
+}
 
 /// Irradiance at the camera in the green band, W m^-2: radiance times solid angle over all pixels.
 inline double irradiance(const RadianceImage& image, const Camera& c) {

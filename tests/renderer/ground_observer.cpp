@@ -130,7 +130,7 @@ track = "station"
 )";
 
 TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(folder.write("s.toml", kGroundScene));
     ASSERT_TRUE(scene) << scene.error().text();
     ASSERT_TRUE(scene->atmosphere);
@@ -148,7 +148,7 @@ TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
 
 /// The scene at a later time is the one of a later epoch: the orbit, the Earth, the telescope.
 TEST(GroundScene, AtALaterTimeIsTheOneOfALaterEpoch) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto now = read_scene(folder.write("now.toml", kGroundScene));
     ASSERT_TRUE(now) << now.error().text();
     const double degrees_per_s = std::sqrt(3.986004418e14 / 6791e3) / 6791e3 * kDegPerRad;
@@ -172,7 +172,7 @@ TEST(GroundScene, AtALaterTimeIsTheOneOfALaterEpoch) {
 }
 
 TEST(GroundScene, CoursesHaveTheDerivativesOfTheirPoses) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(folder.write("s.toml", kGroundScene));
     ASSERT_TRUE(scene) << scene.error().text();
     for (const auto& course : {scene->bodies[1].course, scene->cameras[0].course}) {
@@ -189,7 +189,7 @@ TEST(GroundScene, CoursesHaveTheDerivativesOfTheirPoses) {
 TEST(GroundScene, ATelescopeAtAzimuthAndElevationTurnsWithTheEarth) {
     std::string text = kGroundScene;
     text.replace(text.find("track = \"station\""), 17, "azimuth_elevation_deg = [150.0, 40.0]");
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(folder.write("s.toml", text));
     ASSERT_TRUE(scene) << scene.error().text();
     const Rigid3 T = scene->cameras[0].course->at(3600).T_world_body;
@@ -203,7 +203,7 @@ TEST(GroundScene, ATelescopeAtAzimuthAndElevationTurnsWithTheEarth) {
 
 TEST(GroundScene, FollowingAllocatesNothing) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "the sanitizer's heap counts nothing";
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(folder.write("s.toml", kGroundScene));
     ASSERT_TRUE(scene) << scene.error().text();
     const AllocationCounter count;
@@ -229,7 +229,7 @@ TEST(GroundScene, AStationFallsIntoThePixelOfItsApparentPlace) {
     replace("orbit =", fmt::format("position_m = [{:.3f}, {:.3f}, {:.3f}]", station.x, station.y, station.z));
     replace("sphere = {", "sphere = {radius_m = 100}");
     replace("track =", "azimuth_elevation_deg = [150.0, 45.01]");
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(folder.write("s.toml", text));
     ASSERT_TRUE(scene) << scene.error().text();
     const auto render_scene = RenderScene::create(*scene, 2);

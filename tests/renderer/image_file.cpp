@@ -9,11 +9,10 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "renderer/camera/detector.h"
 #include "tests/support/image_files.h"
+#include "tests/support/read_file.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -25,12 +24,6 @@ std::string scratch(const std::string& name) {
     const auto folder = std::filesystem::path(NARPA_BUILD_DIR) / "image_file_test";
     std::filesystem::create_directories(folder);
     return (folder / name).string();
-}
-std::string contents(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream text;
-    text << file.rdbuf();
-    return text.str();
 }
 
 /// A frame of a globe at the distance of the Moon from the world's origin.
@@ -116,7 +109,7 @@ TEST(ImageFile, PfmIsReadByOpenCv) {
     const Shot shot(PixelFormat::grey);
     const std::string path = scratch("radiance.pfm");
     ASSERT_TRUE(write_image(path, {shot.c, shot.image, nullptr, {}}));
-    EXPECT_EQ(contents(path).substr(0, 13), "PF\n12 8\n-1.0\n");
+    EXPECT_EQ(read_text(path).substr(0, 13), "PF\n12 8\n-1.0\n");
     const cv::Mat image = test::read_image_file(path);
     ASSERT_EQ(image.type(), CV_32FC3);
     for (int y = 0; y < 8; ++y)
@@ -177,7 +170,7 @@ TEST(ImageFile, RawIsTheBytesAsTheyAre) {
     const Shot shot(PixelFormat::yuyv);
     const std::string path = scratch("frame.raw");
     ASSERT_TRUE(write_image(path, shot.frame()));
-    const std::string read = contents(path);
+    const std::string read = read_text(path);
     EXPECT_TRUE(std::equal(read.begin(), read.end(), shot.bytes.begin(), shot.bytes.end(),
                            [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }));
 }

@@ -4,11 +4,10 @@
 #include <algorithm>
 
 #include "base/constants.h"
-#include "renderer/film/camera_image.h"
 #include "renderer/film/tile_culling.h"
+#include "tests/renderer/camera_support.h"
 #include "tests/support/equidistant_camera.h"
 #include "tests/support/lens_ray.h"
-#include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
@@ -116,16 +115,6 @@ Scene glowing_sphere(double radius_m, const Vec3& centre) {
     return s;
 }
 
-RadianceImage rendered(const Scene& scene, const Camera& c, const Rigid3& T, int spp, Aovs* aovs = nullptr) {
-    auto render_scene = RenderScene::create(scene, 1);
-    EXPECT_TRUE(render_scene);
-    FrameSettings settings;
-    settings.spp = spp;
-    RadianceImage image(c.width, c.height);
-    render_radiance(*render_scene, placed(scene), c, T, settings, image, aovs);
-    return image;
-}
-
 /// Of the lit part: area in pixels, first moment, and the solid angle by the model.
 struct Blob {
     double area_px2 = 0, x = 0, y = 0, solid_angle_sr = 0;
@@ -147,7 +136,7 @@ Blob blob(const RadianceImage& image, const CameraModel& model) {
 TEST(EquidistantCamera, ImageOfASphereOnTheAxisHasRadiusFTheta) {
     const Camera c = with_equidistant(camera(200, 200, 1), 80);
     const double half = std::asin(2.0 / 3);  // 42 degrees
-    const Blob b = blob(rendered(glowing_sphere(2, {0, 0, 3}), c, {}, 64), *c.model);
+    const Blob b = blob(rendered(glowing_sphere(2, {0, 0, 3}), c, {}, {.spp = 64}), *c.model);
     EXPECT_NEAR(b.area_px2, kPi * (80 * half) * (80 * half), 10);
     EXPECT_NEAR(b.solid_angle_sr, 2 * kPi * (1 - std::cos(half)), 1e-3 * b.solid_angle_sr);
     EXPECT_NEAR(b.x, 99.5, 0.02);
@@ -160,7 +149,7 @@ TEST(EquidistantCamera, SeesASphereBehindItsImagePlane) {
     const double half = std::asin(0.3), off = 110 * kPi / 180;
     const Scene scene = glowing_sphere(0.3, {std::sin(off), 0, std::cos(off)});
     Aovs aovs;
-    const Blob b = blob(rendered(scene, c, {}, 64, &aovs), *c.model);
+    const Blob b = blob(rendered(scene, c, {}, {.spp = 64}, &aovs), *c.model);
     EXPECT_NEAR(b.solid_angle_sr, 2 * kPi * (1 - std::cos(half)), 2e-3 * b.solid_angle_sr);
     // Along the row through its centre it reaches from f (off - half) to f (off + half).
     const auto* row = &aovs.body[static_cast<std::size_t>(99 * c.width)];
@@ -174,7 +163,7 @@ TEST(EquidistantCamera, ASubpixelBodyKeepsItsLight) {
     const Camera c = with_equidistant(camera(200, 200, 1), 80);
     const double radius = 2e-3;  // 0.3 px wide
     const Vec3 direction = c.model->direction({171.3, 28.8});
-    const Blob b = blob(rendered(glowing_sphere(radius, direction), c, {}, 4), *c.model);
+    const Blob b = blob(rendered(glowing_sphere(radius, direction), c, {}, {.spp = 4}), *c.model);
     EXPECT_NEAR(b.solid_angle_sr, 2 * kPi * (1 - std::cos(std::asin(radius))), 0.01 * b.solid_angle_sr);
     EXPECT_NEAR(b.x, 171.3, 0.5);
     EXPECT_NEAR(b.y, 28.8, 0.5);
@@ -201,7 +190,7 @@ TEST(EquidistantCamera, BudgetedFramesMatchUniformOnes) {
 TEST(EquidistantCamera, PixelsBeyondTheImageCircleAreBlack) {
     const Camera c = with_equidistant(camera(100, 100, 1), 80, 0.5);
     Scene inside = glowing_sphere(10, {});
-    const RadianceImage image = rendered(inside, c, {}, 4);
+    const RadianceImage image = rendered(inside, c, {}, {.spp = 4});
     EXPECT_EQ(image.pixels[50 * 100 + 50].y, 1);
     EXPECT_EQ(image.pixels[50 * 100 + 95].y, 0);
     EXPECT_NEAR(blob(image, *c.model).area_px2, kPi * 40 * 40, 40);
@@ -211,7 +200,7 @@ TEST(EquidistantCamera, ItsLensBlursToTheCircleOfConfusion) {
     // A far point on the axis, focused near: a disc of aperture / focus radians.
     Camera c = with_equidistant(camera(120, 120, 1), 400);
     c.lens = Lens{0.1, 1.0};
-    const Blob b = blob(rendered(glowing_sphere(1000, {0, 0, 1e5}), c, {}, 256), *c.model);
+    const Blob b = blob(rendered(glowing_sphere(1000, {0, 0, 1e5}), c, {}, {.spp = 256}), *c.model);
     const double radiance = b.area_px2;  // of all pixels together: the sphere's own image
     EXPECT_NEAR(radiance, kPi * std::pow(400 * 0.01, 2), 0.02 * radiance);
 }

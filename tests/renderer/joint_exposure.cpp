@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "renderer/camera/camera_pose.h"
-#include "renderer/film/camera_image.h"
-#include "tests/support/shapes.h"
+#include "tests/renderer/camera_support.h"
 
 namespace narpa {
 namespace {
@@ -53,20 +52,6 @@ CameraPose passing(double row_time = 0) {
     return {{{}, {-half_m, 0, 0}}, {{}, {half_m, 0, 0}}, row_time};
 }
 
-RadianceImage rendered(const Scene& scene, const BodyPoses& at, const CameraPose& pose,
-                       const FrameSettings& settings, Aovs* aovs = nullptr) {
-    const auto render_scene = RenderScene::create(scene, 1);
-    EXPECT_TRUE(render_scene);
-    RadianceImage image(kWidth, kHeight);
-    render_radiance(*render_scene, at, kCamera, pose, settings, image, aovs);
-    return image;
-}
-RadianceImage rendered(const Scene& scene, const CameraPose& pose, int spp) {
-    FrameSettings settings;
-    settings.spp = spp;
-    return rendered(scene, placed(scene), pose, settings);
-}
-
 double value(const RadianceImage& image, int x, int y) {
     return static_cast<double>(image.pixels[static_cast<std::size_t>(y * image.width + x)].y);
 }
@@ -92,7 +77,7 @@ void expect_blurred_edge(const RadianceImage& image, int spp) {
 
 TEST(MovingCamera, BlursAnEdgeToARamp) {
     const Scene scene = bright_edge();
-    expect_blurred_edge(rendered(scene, passing(), 64), 64);
+    expect_blurred_edge(rendered(scene, kCamera, passing(), {.spp = 64}), 64);
 }
 
 TEST(MovingCamera, BlursAsMuchAsABodyThatMovesTheOtherWay) {
@@ -103,16 +88,16 @@ TEST(MovingCamera, BlursAsMuchAsABodyThatMovesTheOtherWay) {
     at.set(0, {T.q, T.t + half}, {T.q, T.t - half});
     FrameSettings settings;
     settings.spp = 64;
-    expect_blurred_edge(rendered(scene, at, CameraPose({}, {}), settings), 64);
+    expect_blurred_edge(rendered(scene, at, kCamera, CameraPose({}, {}), settings), 64);
     // A picture of one moment shows the body where it is at mid-exposure.
-    EXPECT_EQ(rendered(scene, at, CameraPose(), settings).pixels, rendered(scene, {}, 64).pixels);
+    EXPECT_EQ(rendered(scene, at, kCamera, {}, settings).pixels, rendered(scene, kCamera, {}, {.spp = 64}).pixels);
 }
 
 TEST(MovingCamera, BlursFramesWithinABudget) {
     const Scene scene = bright_edge();
     FrameSettings settings;
     settings.budget = {.kind = FrameBudget::Kind::rays, .rays = 32 * kWidth * kHeight};
-    expect_blurred_edge(rendered(scene, placed(scene), passing(), settings), 16);
+    expect_blurred_edge(rendered(scene, kCamera, passing(), settings), 16);
 }
 
 /// Place of the edge in each row, from the row's light.
@@ -139,19 +124,20 @@ double slope(const std::vector<double>& values) {
 TEST(RollingShutter, SlantsAnUprightEdgeByVelocityTimesRowTime) {
     const Scene scene = bright_edge();
     constexpr double kRowTime = 1.0 / (kHeight - 1);  // each row shows one moment: sharp
-    const std::vector<double> edge = edge_by_row(rendered(scene, passing(kRowTime), 64));
+    const std::vector<double> edge = edge_by_row(rendered(scene, kCamera, passing(kRowTime), {.spp = 64}));
     for (int y = 0; y < kHeight; ++y)
         EXPECT_NEAR(edge[static_cast<std::size_t>(y)], kCamera.cx - kShift_px * (y * kRowTime - 0.5), 1.0 / 32)
             << y;
     EXPECT_NEAR(slope(edge), -kShift_px * kRowTime, 2e-4);
     // One sample a pixel meets the edge in whole pixels.
-    EXPECT_NEAR(slope(edge_by_row(rendered(scene, passing(kRowTime), 1))), -kShift_px * kRowTime, 5e-3);
+    EXPECT_NEAR(slope(edge_by_row(rendered(scene, kCamera, passing(kRowTime), {.spp = 1}))), -kShift_px * kRowTime,
+                5e-3);
 }
 
 TEST(RollingShutter, BlursEachRowOverItsOwnExposure) {
     const Scene scene = bright_edge();
     constexpr double kRowTime = 0.5 / (kHeight - 1);
-    const RadianceImage image = rendered(scene, passing(kRowTime), 256);
+    const RadianceImage image = rendered(scene, kCamera, passing(kRowTime), {.spp = 256});
     EXPECT_NEAR(slope(edge_by_row(image)), -kShift_px * kRowTime, 1e-3);
     const auto row_end = [&](int y) { return kCamera.cx + 0.5 * kShift_px - kShift_px * (y * kRowTime + 0.5); };
     for (int y = 0; y < kHeight; y += 9) {
@@ -182,7 +168,7 @@ TEST(MovingCamera, SeesTheMeanOfManyMoments) {
     settings.max_depth = 3;
     settings.spp = 128;
     Aovs aovs;
-    const RadianceImage blurred = rendered(scene, moving, pose, settings, &aovs);
+    const RadianceImage blurred = rendered(scene, moving, kCamera, pose, settings, &aovs);
     constexpr int kMoments = 32;
     settings.spp = 8;
     std::vector<double> mean(blurred.pixels.size());
@@ -191,7 +177,7 @@ TEST(MovingCamera, SeesTheMeanOfManyMoments) {
         BodyPoses at(3);
         for (std::size_t b = 0; b < 3; ++b) at.set(b, moving.T_world_body_at(b, time));
         settings.frame = static_cast<std::uint32_t>(k);
-        const RadianceImage moment = rendered(scene, at, CameraPose(pose.at(time)), settings);
+        const RadianceImage moment = rendered(scene, at, kCamera, CameraPose(pose.at(time)), settings);
         for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += static_cast<double>(moment.pixels[i].y) / kMoments;
     }
     constexpr int kBlock = 8;
@@ -215,7 +201,7 @@ TEST(MovingCamera, SeesTheMeanOfManyMoments) {
     for (std::size_t b = 0; b < 3; ++b) middle.set(b, moving.T_world_body[b]);
     Aovs of_moment;
     settings.spp = 1;
-    rendered(scene, middle, CameraPose(pose.middle()), settings, &of_moment);
+    rendered(scene, middle, kCamera, CameraPose(pose.middle()), settings, &of_moment);
     EXPECT_EQ(aovs.body, of_moment.body);
     for (std::size_t i = 0; i < aovs.depth_m.size(); ++i)
         if (aovs.body[i] >= 0) {
@@ -235,8 +221,8 @@ TEST(MovingCamera, AtRestAmongBodiesAtRestRendersTheSameBytesAsOneMoment) {
         for (const auto method : {RenderSettings::Method::direct, RenderSettings::Method::path}) {
             settings.spp = spp;
             settings.method = method;
-            EXPECT_EQ(rendered(scene, placed(scene), CameraPose(T, T, 0.01), settings).pixels,
-                      rendered(scene, placed(scene), T, settings).pixels);
+            EXPECT_EQ(rendered(scene, kCamera, CameraPose(T, T, 0.01), settings).pixels,
+                      rendered(scene, kCamera, T, settings).pixels);
         }
 }
 

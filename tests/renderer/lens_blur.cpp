@@ -1,13 +1,10 @@
 // The thin lens: Gauss's equation, the circle of confusion, and the blur of whole pictures against it.
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-
 #include "base/constants.h"
-#include "renderer/film/camera_image.h"
+#include "tests/renderer/camera_support.h"
 #include "tests/support/lens_ray.h"
-#include "tests/support/shapes.h"
+#include "tests/support/oracle.h"
 
 namespace narpa {
 namespace {
@@ -15,9 +12,7 @@ namespace {
 using namespace test;
 
 TEST(ThinLens, OracleOfTheCircleOfConfusion) {
-    std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/thin_lens.json");
-    if (!file) GTEST_SKIP() << "no reference numbers beside the project: ../shared/oracles/thin_lens.json";
-    const nlohmann::json reference = nlohmann::json::parse(file);
+    NEED_ORACLE(reference, "thin_lens");
     int judged = 0;
     for (const auto& c : reference["cases"]) {
         const auto &in = c["in"], &out = c["out"];
@@ -72,16 +67,6 @@ TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
         }
 }
 
-RadianceImage render(const Scene& s, const Camera& c, int spp, const Rigid3& T = {}) {
-    const auto render_scene = RenderScene::create(s, 1);
-    EXPECT_TRUE(render_scene);
-    RadianceImage image(c.width, c.height);
-    FrameSettings settings;
-    settings.spp = spp;
-    render_radiance(*render_scene, placed(s), c, T, settings, image);
-    return image;
-}
-
 Scene emitting_ball() {
     Scene s;
     s.materials.push_back(lambert(0));
@@ -103,7 +88,7 @@ TEST(Lens, AnEdgeOutOfFocusIsSpreadOverTheCircleOfConfusion) {
             Scene s = emitting_ball();
             const double wide = 100 * depth;
             add_mesh(s, plate(wide, wide), {{0, 1, 0, 0}, {wide / 2, 0, depth}});  // its edge on the axis
-            const RadianceImage image = render(s, c, 1024);
+            const RadianceImage image = rendered(s, c, {}, {.spp = 1024});
             const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
             EXPECT_GT(blur, 3);
             for (int x = 0; x < c.width; ++x) {
@@ -123,7 +108,7 @@ TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
     const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
     Scene s = emitting_ball();
     add_sphere(s, radius, {0.3 * depth / 700, -0.2 * depth / 700, depth});
-    const RadianceImage image = render(s, c, 4);
+    const RadianceImage image = rendered(s, c, {}, {.spp = 4});
     double sum = 0, x1 = 0, y1 = 0, r2 = 0, outside = 0;
     for (int y = 0; y < c.height; ++y)
         for (int x = 0; x < c.width; ++x) {
@@ -144,13 +129,15 @@ TEST(Lens, OneSampleAPixelAndWhatIsInFocusAreAsThroughAPinhole) {
     Scene s = emitting_ball();
     add_mesh(s, plate(3, 3), {normalized(Quat{1, 0.1, 0.2, 0.1}), {0.3, 0.1, 8}});
     const Camera pinhole = camera(48, 36, 60), wide_open = with_lens(pinhole, 0.3, 2);
-    EXPECT_EQ(render(s, pinhole, 1).pixels, render(s, wide_open, 1).pixels);
-    EXPECT_NE(render(s, pinhole, 16).pixels, render(s, wide_open, 16).pixels);
-    EXPECT_EQ(render(s, pinhole, 16).pixels, render(s, with_lens(pinhole, 0, 2), 16).pixels);
+    EXPECT_EQ(rendered(s, pinhole, {}, {.spp = 1}).pixels, rendered(s, wide_open, {}, {.spp = 1}).pixels);
+    EXPECT_NE(rendered(s, pinhole, {}, {.spp = 16}).pixels, rendered(s, wide_open, {}, {.spp = 16}).pixels);
+    EXPECT_EQ(rendered(s, pinhole, {}, {.spp = 16}).pixels,
+              rendered(s, with_lens(pinhole, 0, 2), {}, {.spp = 16}).pixels);
 
     Scene facing = emitting_ball();
     add_mesh(facing, plate(3, 3), {{0, 1, 0, 0}, {0.3, 0.1, 8}});
-    const auto sharp = render(facing, pinhole, 64), focused = render(facing, with_lens(pinhole, 0.3, 8), 64);
+    const auto sharp = rendered(facing, pinhole, {}, {.spp = 64}),
+               focused = rendered(facing, with_lens(pinhole, 0.3, 8), {}, {.spp = 64});
     for (std::size_t i = 0; i < sharp.pixels.size(); ++i)
         EXPECT_NEAR(sharp.pixels[i].x, focused.pixels[i].x, 1e-6) << i;
 }

@@ -9,6 +9,7 @@
 #include "renderer/lidar/lidar_receiver.h"
 #include "renderer/light/render_scene.h"
 #include "tests/renderer/camera_support.h"
+#include "tests/renderer/lidar_support.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -117,19 +118,7 @@ std::vector<LidarEchoes> shots_in(const Medium* medium, const LidarReceiverModel
     if (plate_m > 0) add_mesh(scene, plate(10, 10), {exp_rotation({0, kPi, 0}), {0, 0, plate_m}});
     const auto render_scene = RenderScene::create(scene, 1);
     EXPECT_TRUE(render_scene);
-    const BodyPoses at = placed(scene);
-    Lidar lidar;
-    lidar.range_max_m = 1e4;
-    lidar.receiver = model;
-    LidarReceiver receiver(render_scene->tracer(), lidar, seed, 0);
-    receiver.set_medium(medium);
-    std::vector<LidarEchoes> out(n);
-    for (std::size_t first = 0; first < n; first += kLanes) {
-        RayBatch beams;
-        for (; beams.n < std::min(kLanes, n - first); ++beams.n) beams.put(beams.n, {{}, {0, 0, 1}});
-        receiver.receive(at, beams, first, {}, std::span(out).subspan(first));
-    }
-    return out;
+    return shots_along({0, 0, 1}, *render_scene, model, n, {.seed = seed, .medium = medium});
 }
 
 /// 10 % at 1000 m: the least light is 1e-7; fog of pi beta * gate = 1e-5 crosses it up to 10 m.

@@ -7,6 +7,7 @@
 
 #include "renderer/light/render_scene.h"
 #include "tests/renderer/camera_support.h"
+#include "tests/renderer/lidar_support.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -31,18 +32,8 @@ public:
                                                  std::uint64_t seed = 1, double range_max_m = 1e5) const {
         const auto render_scene = RenderScene::create(scene, 1);
         EXPECT_TRUE(render_scene);
-        const BodyPoses at = placed(scene);
-        Lidar lidar;
-        lidar.range_max_m = range_max_m;
-        lidar.receiver = model;
-        LidarReceiver receiver(render_scene->tracer(), lidar, seed, 0);
-        std::vector<LidarEchoes> out(n);
-        for (std::size_t first = 0; first < n; first += kLanes) {
-            RayBatch beams;
-            for (; beams.n < std::min(kLanes, n - first); ++beams.n) beams.put(beams.n, {{}, {0, 0, 1}});
-            receiver.receive(at, beams, first, motions, std::span(out).subspan(first));
-        }
-        return out;
+        return shots_along({0, 0, 1}, *render_scene, model, n,
+                           {.seed = seed, .motions = motions, .range_max_m = range_max_m});
     }
 
     Scene scene;

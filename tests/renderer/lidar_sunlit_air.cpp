@@ -6,6 +6,7 @@
 #include "renderer/atmosphere/ray_bundle.h"
 #include "renderer/lidar/lidar_receiver.h"
 #include "renderer/light/atmosphere.h"
+#include "tests/renderer/lidar_support.h"
 #include "tests/renderer/path_support.h"
 
 namespace narpa {
@@ -37,19 +38,7 @@ public:
 /// From the origin along these directions. Of a receiver that hears all.
 std::vector<LidarEchoes> shots(const RenderScene& render_scene, const LidarReceiverModel& model,
                                const Vec3& direction, std::size_t n) {
-    Lidar lidar;
-    lidar.range_max_m = 1e4;
-    lidar.receiver = model;
-    LidarReceiver receiver(render_scene.tracer(), lidar, 1, 0);
-    receiver.set_medium(render_scene.medium());
-    const BodyPoses at = placed(render_scene.scene());
-    std::vector<LidarEchoes> out(n);
-    for (std::size_t first = 0; first < n; first += kLanes) {
-        RayBatch beams;
-        for (; beams.n < std::min(kLanes, n - first); ++beams.n) beams.put(beams.n, {{}, direction});
-        receiver.receive(at, beams, first, {}, std::span(out).subspan(first));
-    }
-    return out;
+    return shots_along(direction, render_scene, model, n, {.medium = render_scene.medium()});
 }
 
 /// What a camera's pixel sees there, in units of a white surface that faces the Sun.

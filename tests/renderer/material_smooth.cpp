@@ -1,11 +1,9 @@
 // Mirrors and clear dielectrics against 60-digit reference numbers and the laws they keep.
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-
 #include "renderer/material/fresnel.h"
 #include "tests/renderer/material_support.h"
+#include "tests/support/oracle.h"
 
 namespace narpa {
 namespace {
@@ -22,9 +20,7 @@ void expect_near(const Vec3& a, const Vec3& b, double tolerance, const std::stri
 }
 
 TEST(SmoothInterface, MeetsTheReferenceNumbers) {
-    std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/reflection_refraction.json");
-    if (!file) GTEST_SKIP() << "no ../shared/oracles beside the project";
-    const json reference = json::parse(file);
+    NEED_ORACLE(reference, "reflection_refraction");
     int judged = 0;
     for (const json& c : reference["cases"]) {
         const json &in = c["in"], &out = c["out"];

@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 const std::string kAdvice = "; the file is damaged or too large, expected it exported anew, or as OBJ";
 
@@ -37,7 +37,7 @@ TEST(MeshProcess, MemoryIsLimited) {
 }
 
 TEST(MeshProcess, TimeIsLimited) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     ASSERT_EQ(mkfifo((folder / "endless.bin").c_str(), 0600), 0);
     const std::string path =
         folder.write("m.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
@@ -48,7 +48,7 @@ TEST(MeshProcess, TimeIsLimited) {
 }
 
 TEST(MeshProcess, WhatItSendsIsLimited) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     std::string stl = "solid s\n";
     for (int i = 0; i < 1000; ++i)
         stl += "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
@@ -58,7 +58,7 @@ TEST(MeshProcess, WhatItSendsIsLimited) {
 }
 
 TEST(MeshProcess, OtherFormatsAreNotGivenToAssimp) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string blender = "BLENDER-v248" + std::string(200, '\0');
     const auto text_of = [&](const std::string& name) {
         const Result<MeshFile> mesh = read_mesh(folder.write(name, blender), 1);

@@ -23,7 +23,7 @@ constexpr int kFieldSide = 512;
 constexpr double kFieldPixels = kFieldSide * kFieldSide;
 
 Camera camera_of_scene(const std::string& detector) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(folder.write("flat.toml", R"([ambient]
 radiance = 1
 [[body]]

@@ -146,7 +146,7 @@ void write_exr(const std::string& path, const PointSpreadImage& image, const cha
 }
 
 TEST(PointSpreadImage, IsReadFromPngAndExr) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const PointSpreadImage image = *image_of(coma, 24, 1).image;
     write_png(folder / "coma.png", image);
     write_exr(folder / "coma.exr", image);
@@ -162,7 +162,7 @@ TEST(PointSpreadImage, IsReadFromPngAndExr) {
 }
 
 TEST(PointSpreadImage, IsRefusedWhereItIsNoPointSpread) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto expect = [&](const char* name, const std::string& words) {
         const auto read = read_point_spread_image(folder / name);
         ASSERT_FALSE(read) << name;
@@ -189,7 +189,7 @@ constexpr const char* kScene =
     "[[camera]]\nname = \"c\"\nresolution = [64, 48]\nfov_diagonal_deg = 30\n";
 
 TEST(PointSpreadImage, IsNamedRelativeToTheScene) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     write_png(folder / "coma.png", *image_of(coma, 24, 1).image);
     const auto scene =
         read_scene(folder.write("s.toml", kScene + std::string("psf = {image = \"coma.png\", samples_per_px = 2, "
@@ -203,7 +203,7 @@ TEST(PointSpreadImage, IsNamedRelativeToTheScene) {
 }
 
 TEST(PointSpreadImage, ReachesNoFartherThanTheFilter) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     write_png(folder / "wide.png", *image_of(coma, 70, 1).image);
     const auto scene = read_scene(folder.write("s.toml", kScene + std::string("psf = {image = \"wide.png\"}\n")));
     ASSERT_FALSE(scene);

@@ -13,7 +13,7 @@ namespace narpa {
 namespace {
 
 using test::asset_file;
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 struct Asset {
     const char* file;
@@ -71,7 +71,7 @@ INSTANTIATE_TEST_SUITE_P(Assets, RealMesh, testing::ValuesIn(kAssets));
 TEST(RealScene, StationLoadsWithItsMaterialsAndTextures) {
     const std::string mesh = asset_file("spacecraft/iss/iss.obj");
     NARPA_SKIP_WITHOUT(mesh);
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const Result<Scene> s = read_scene(folder.write(
         "s.toml", "[sun]\ndirection = [1, 0, 0]\n[[body]]\nname = \"iss\"\nmesh = \"" + mesh +
                       "\"\n[[camera]]\nname = \"c\"\nresolution = [640, 480]\nfov_diagonal_deg = 30\n"));
@@ -94,7 +94,7 @@ TEST(RealMesh, IndicesFromZeroAreRefused) {
     const std::string path = asset_file("smallbody/eros/eros007790.tab");
     NARPA_SKIP_WITHOUT(path);
     EXPECT_FALSE(read_mesh(path, 1000));
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     std::filesystem::copy_file(path, folder / "eros.obj");
     const Result<MeshFile> m = read_mesh(folder / "eros.obj", 1000);
     ASSERT_FALSE(m);

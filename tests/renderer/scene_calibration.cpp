@@ -12,7 +12,7 @@
 namespace narpa {
 namespace {
 
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 constexpr const char* kRos = R"(image_width: 640
 image_height: 480
@@ -31,7 +31,7 @@ distortion_coefficients:
 )";
 
 TEST(CalibrationFile, OfRosIsRead) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto c = read_calibration(folder.write("nav.yaml", kRos));
     ASSERT_TRUE(c) << c.error().text();
     EXPECT_EQ(c->width, 640);
@@ -44,7 +44,7 @@ TEST(CalibrationFile, OfRosIsRead) {
 }
 
 TEST(CalibrationFile, OfOpenCvIsRead) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string path = folder.write("nav.yaml", "");
     cv::FileStorage file(path, cv::FileStorage::WRITE);
     file << "image_width" << 320 << "image_height" << 240;
@@ -60,7 +60,7 @@ TEST(CalibrationFile, OfOpenCvIsRead) {
 }
 
 TEST(CalibrationFile, WhatIsWrittenIsReadByUsAndByOpenCv) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::vector<std::optional<Distortion>> all{
         std::nullopt, Distortion{Distortion::Model::opencv, {0.1, -0.2, 0.001, 1.0 / 3}},
         Distortion{Distortion::Model::opencv, {0.6, 0.05, 5e-4, 3e-4, 0.01, 0.95, 0.15, 0.02}},
@@ -86,7 +86,7 @@ TEST(CalibrationFile, WhatIsWrittenIsReadByUsAndByOpenCv) {
 }
 
 TEST(CalibrationFile, ErrorsNameTheLine) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto expect_error = [&](const std::string& from, const std::string& to, int line, const char* what) {
         std::string text = kRos;
         text.replace(text.find(from), from.size(), to);
@@ -105,7 +105,7 @@ TEST(CalibrationFile, ErrorsNameTheLine) {
 }
 
 TEST(SceneCalibration, GivesSizeIntrinsicsAndDistortion) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("nav.yaml", kRos);
     const std::string path =
         folder.write("scene.toml",
@@ -124,7 +124,7 @@ TEST(SceneCalibration, GivesSizeIntrinsicsAndDistortion) {
 }
 
 TEST(SceneCalibration, LeavesNoRoomForAnotherDistortionOrSize) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("nav.yaml", kRos);
     for (const auto& [key, what] :
          {std::pair("distortion = {model = \"fisheye\", coefficients = [0, 0, 0, 0]}", "expected one of the two"),
@@ -139,7 +139,7 @@ TEST(SceneCalibration, LeavesNoRoomForAnotherDistortionOrSize) {
 }
 
 TEST(SceneDistortion, FieldsOfViewAreThoseOfTheDistortedImage) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     for (const char* field : {"fov_horizontal_deg = 100", "fov_diagonal_deg = 130"}) {
         const std::string path = folder.write(
             "scene.toml", std::string("[ambient]\nradiance = 1\n[[body]]\nname = \"b\"\nsphere = {radius_m = 1}\n"
@@ -158,7 +158,7 @@ TEST(SceneDistortion, FieldsOfViewAreThoseOfTheDistortedImage) {
 
 /// As velodyne_pointcloud of ROS has it: by laser_id, in any order.
 TEST(LidarCalibrationFile, OfRosIsRead) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto beams =
         read_lidar_calibration(folder.write("unit.yaml",
                                             "lasers:\n- {laser_id: 1, vert_correction: 0.2, rot_correction: 0.03}\n"
@@ -175,7 +175,7 @@ TEST(LidarCalibrationFile, OfRosIsRead) {
 }
 
 TEST(LidarCalibrationFile, SaysWhereAndWhatIsWrong) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::pair<const char*, const char*> cases[]{
         {"beams: 3\n", "expected lasers: a list of 2"},
         {"lasers: 3\n", "expected lasers: a list of 2"},
@@ -197,7 +197,7 @@ TEST(LidarCalibrationFile, SaysWhereAndWhatIsWrong) {
 
 /// A damaged file of a unit, as the scene's reader refuses it: where it is named, its own place, what was expected.
 TEST(LidarCalibrationFile, DamageIsRefusedByTheScene) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     std::string yaml = "lasers:\n", angles;
     for (int laser = 0; laser < 16; ++laser) {
         yaml += "- {laser_id: " + std::to_string(laser) + ", vert_correction: 0.1}\n";

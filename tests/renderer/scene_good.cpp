@@ -11,7 +11,7 @@ namespace narpa {
 namespace {
 
 using test::data_file;
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 Scene read_good(const std::string& path) {
     Result<Scene> scene = read_scene(path);
@@ -23,7 +23,7 @@ Scene read_good(const std::string& path) {
 }
 
 Scene read_good_text(const std::string& text) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     return read_good(folder.write("s.toml", text));
 }
 
@@ -239,7 +239,7 @@ TEST(SceneFile, EpochIsUtcInEveryWriting) {
                                     "2026-03-01 12:00:00",  "\"2026-03-01T12:00:00Z\"",  "\"2026-03-01T12:00:00\"",
                                     "2026-03-01T11:59:60Z"};
     for (const char* writing : writings) {
-        const TemporaryFolder folder;
+        const MemoryFolder folder;
         const auto path =
             folder.write("s.toml", std::string("[scene]\nepoch = ") + writing + "\n[sun]\n" + kSphere + kCamera);
         const Result<Scene> s = read_scene(path);
@@ -256,7 +256,7 @@ TEST(SceneFile, EpochIsUtcInEveryWriting) {
 }
 
 TEST(SceneFile, OneMeshFileOfTwoBodiesIsReadOnce) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     const std::string body = "[[body]]\nmesh = \"t.obj\"\n";
     const Scene s =

@@ -11,21 +11,13 @@
 namespace narpa {
 namespace {
 
+using test::BadFile;
 using test::data_file;
-using test::TemporaryFolder;
-
-struct BadMesh {
-    const char *name, *text;
-    int line, column;  ///< 0: the file as a whole
-    const char* words;
-};
-void PrintTo(const BadMesh& bad, std::ostream* out) {
-    *out << bad.name;
-}
+using test::MemoryFolder;
 
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
-const BadMesh kBadMeshes[] = {
+const BadFile kBadMeshes[] = {
     {"Empty", "", 0, 0, "no triangles in it"},
     {"OnlyVertices", CORNERS, 0, 0, "no triangles in it"},
     {"OnlyLines", CORNERS "l 1 2 3\np 1\n", 0, 0, "no triangles in it"},
@@ -52,19 +44,15 @@ const BadMesh kBadMeshes[] = {
     {"NothingLeft", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", 0, 0, "none of its 1 triangles can be used"},
 };
 
-class BadObjFile : public testing::TestWithParam<BadMesh> {};
+class BadObjFile : public testing::TestWithParam<BadFile> {};
 
 TEST_P(BadObjFile, SaysWhereAndWhat) {
-    const BadMesh& bad = GetParam();
-    const TemporaryFolder folder;
+    const BadFile& bad = GetParam();
+    const MemoryFolder folder;
     const std::string path = folder.write("bad.obj", bad.text);
     const Result<MeshFile> mesh = read_mesh(path, 1);
     ASSERT_FALSE(mesh);
-    const Error& e = mesh.error();
-    EXPECT_EQ(e.file, path);
-    EXPECT_EQ(e.line, bad.line) << e.text();
-    EXPECT_EQ(e.column, bad.column) << e.text();
-    EXPECT_NE(e.what.find(bad.words), e.what.npos) << e.what;
+    expect_error_of(bad, path, mesh.error());
 }
 INSTANTIATE_TEST_SUITE_P(Mesh, BadObjFile, testing::ValuesIn(kBadMeshes),
                          [](const auto& one) { return std::string(one.param.name); });
@@ -79,7 +67,7 @@ MeshFile good_mesh(const std::string& path, double scale = 1) {
 }
 
 MeshFile read_obj_text(const std::string& text, double scale = 1) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     return good_mesh(folder.write("m.obj", text), scale);
 }
 
@@ -186,7 +174,7 @@ TEST(MeshFile, MissingMaterialsAreGreyAndTold) {
 }
 
 TEST(MeshFile, MtlErrorNamesItsOwnLine) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string mtl = folder.write("m.mtl", "newmtl a\n Kd 0.5 red 0\n");
     const Result<MeshFile> m = read_mesh(folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "f 1 2 3\n"), 1);
     ASSERT_FALSE(m);
@@ -194,7 +182,7 @@ TEST(MeshFile, MtlErrorNamesItsOwnLine) {
 }
 
 TEST(MeshFile, TextureNamesWithSpacesOptionsAndForeignFolders) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("my skin.ppm", "P3 1 1 255\n255 255 255\n");
     folder.write("m.mtl", "newmtl a\nmap_Kd -o 0.5 0 -clamp on C:\\models\\my skin.ppm  \n");
     const MeshFile m = good_mesh(
@@ -204,7 +192,7 @@ TEST(MeshFile, TextureNamesWithSpacesOptionsAndForeignFolders) {
 }
 
 TEST(MeshFile, MissingTextureIsHalfTheColourAndTold) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("m.mtl", "newmtl a\nKd 0.8 0.4 0.2\nmap_Kd gone.png\n");
     folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n");
     const Result<Scene> s = read_scene(folder.write(
@@ -218,7 +206,7 @@ TEST(MeshFile, MissingTextureIsHalfTheColourAndTold) {
 }
 
 TEST(MeshFile, TextureStaysOffTrianglesWithoutCoordinates) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("m.mtl", "newmtl a\nmap_Kd t.ppm\n");
     const MeshFile m = good_mesh(
         folder.write("m.obj", "mtllib m.mtl\nusemtl a\n" CORNERS "v 0 0 1\nvt 0 0\nf 1/1 2/1 3/1\nf 1 2 4\n"));
@@ -228,7 +216,7 @@ TEST(MeshFile, TextureStaysOffTrianglesWithoutCoordinates) {
 }
 
 TEST(MeshFile, AssimpFormatsAreRead) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const MeshFile stl =
         good_mesh(folder.write("m.stl",
                                "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
@@ -256,7 +244,7 @@ constexpr const char* kGltf = R"({"asset": {"version": "2.0"}, "scene": 0, "scen
 "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})";
 
 TEST(MeshFile, GltfNodesAndMaterialsAreApplied) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const MeshFile m = good_mesh(folder.write("m.gltf", kGltf));
     ASSERT_EQ(m.mesh.faces.size(), 1u);
     EXPECT_NEAR(area_vector(m.mesh).z, 0.5, 1e-12) << "a mirrored triangle still faces the same side";
@@ -274,7 +262,7 @@ TEST(MeshFile, GltfNodesAndMaterialsAreApplied) {
 }
 
 TEST(MeshFile, FormatsThatAreNoneGiveAnError) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     for (const char* name : {"m.ply", "m.stl", "m.glb", "m.gltf", "m.3ds", "m.xyz", "noextension"}) {
         const Result<MeshFile> m =
             read_mesh(folder.write(name, "this is no mesh at all, whatever its name says\n"), 1);
@@ -284,7 +272,7 @@ TEST(MeshFile, FormatsThatAreNoneGiveAnError) {
 }
 
 TEST(MeshFile, PlyHeaderPromisesNoMoreThanTheFileHolds) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string path = folder.write("m.ply",
                                           "ply\nformat ascii 1.0\nelement vertex 49999999999999999999\n"
                                           "property float x\nend_header\n0\n");

@@ -11,13 +11,13 @@
 namespace narpa {
 namespace {
 
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 constexpr const char* kTriangle =
     "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
 
 MeshFile read_mtl(const std::string& statements) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     folder.write("m.mtl", "newmtl a\n" + statements + "\n");
     Result<MeshFile> m = read_mesh(folder.write("m.obj", kTriangle), 1);
     if (!m) {
@@ -112,7 +112,7 @@ TEST(MtlMaterial, MapsCarryTheirOptions) {
 }
 
 TEST(MtlMaterial, BadNumbersAreNamed) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string obj = folder.write("m.obj", kTriangle);
     for (const auto& [line, column, words] : {std::tuple("Pr rough", 4, "\"rough\" is not a number"),
                                               {"illum x", 7, "\"x\" is not a number"},
@@ -149,7 +149,7 @@ protected:
         }
         return std::move(*s);
     }
-    TemporaryFolder folder_;
+    MemoryFolder folder_;
 };
 
 TEST_F(BumpMap, BluePictureHoldsNormals) {
@@ -211,7 +211,7 @@ std::string gltf(const std::string& material, const std::string& more = "") {
 }
 
 MeshFile read_gltf(const std::string& text) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     Result<MeshFile> m = read_mesh(folder.write("m.gltf", text), 1);
     if (!m) {
         ADD_FAILURE() << m.error().text();

@@ -9,7 +9,7 @@ namespace narpa {
 namespace {
 
 /// What is said of the key in each table that a scene may have.
-std::string said_of(std::string_view key, const test::TemporaryFolder& folder) {
+std::string said_of(std::string_view key, const test::MemoryFolder& folder) {
     const std::string camera = "[[camera]]\nname = \"c\"\nresolution = [64, 48]\nfov_diagonal_deg = 30\n";
     const std::string line = std::string(key) + " = 1\n";
     std::string all;
@@ -27,7 +27,7 @@ std::string said_of(std::string_view key, const test::TemporaryFolder& folder) {
 }
 
 TEST(OtherNames, EachStandsForKeysThatSomeTableHas) {
-    const test::TemporaryFolder folder;
+    const test::MemoryFolder folder;
     for (const OtherName& other : other_names()) {
         const std::string said = said_of(other.name, folder);
         EXPECT_NE(said.find("unknown key \"" + std::string(other.name) + "\""), said.npos) << said;

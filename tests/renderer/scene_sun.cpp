@@ -56,7 +56,7 @@ TEST(SunDirection, IsUnitAndSmoothFarFromNow) {
 }
 
 TEST(SunDirection, SceneTakesItFromTheEpoch) {
-    const test::TemporaryFolder folder;
+    const test::MemoryFolder folder;
     const Result<Scene> s =
         read_scene(folder.write("s.toml",
                                 "[scene]\nepoch = 2000-06-21T01:48:00Z\n[sun]\n[[body]]\nname = \"b\"\n"

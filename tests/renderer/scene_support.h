@@ -1,59 +1,44 @@
-/// tests/renderer/scene_support.h - files in a folder of their own, for tests of readers.
+/// tests/renderer/scene_support.h - scene files with mistakes, and where files of tests are.
 #pragma once
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
-#include <string_view>
+
+#include "base/result.h"
+#include "tests/support/read_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace narpa::test {
 
-/// A scene file with a mistake, and the error that it gets.
-struct BadScene {
+/// A file with a mistake, and the error that it gets.
+struct BadFile {
     const char *name, *text;
-    int line, column;
+    int line, column;   ///< 0: the file as a whole
     const char* words;  ///< that the message has
 };
-inline void PrintTo(const BadScene& bad, std::ostream* out) {
+inline void PrintTo(const BadFile& bad, std::ostream* out) {
     *out << bad.name;
 }
+inline void expect_error_of(const BadFile& bad, const std::string& path, const Error& e) {
+    EXPECT_EQ(e.kind, ErrorKind::bad_input);
+    EXPECT_EQ(e.file, path);
+    EXPECT_EQ(e.line, bad.line) << e.text();
+    EXPECT_EQ(e.column, bad.column) << e.text();
+    EXPECT_NE(e.what.find(bad.words), e.what.npos) << e.what;
+}
 
-/// A new folder that goes when the test ends; in memory where there is such a place, as some tests write thousands
-/// of files.
-class TemporaryFolder {
+/// In memory where there is such a place, as some tests write thousands of files.
+class MemoryFolder : public TemporaryFolder {
 public:
-    TemporaryFolder() {
-        const std::filesystem::path memory = "/dev/shm";
-        const bool in_memory = access(memory.c_str(), W_OK) == 0;
-        std::string pattern =
-            ((in_memory ? memory : std::filesystem::temp_directory_path()) / "narpa-test-XXXXXX").string();
-        path_ = mkdtemp(pattern.data());
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-
-    /// Writes a file and gives its path.
-    std::string write(const std::string& name, std::string_view text) const {
-        const std::string file = (path_ / name).string();
-        std::ofstream(file, std::ios::binary) << text;
-        return file;
-    }
-    [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+    MemoryFolder()
+        : TemporaryFolder(access(kMemory, W_OK) == 0 ? kMemory : std::filesystem::temp_directory_path()) {}
 
 private:
-    std::filesystem::path path_;
+    static constexpr const char* kMemory = "/dev/shm";
 };
-
-inline std::string read_text(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
 
 inline std::string data_file(const std::string& name) {
     return NARPA_SOURCE_DIR "/tests/data/scenes/" + name;

@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 /// IEC 61966-2-1, its own decimals.
 double srgb_to_linear(double s) {
@@ -17,7 +17,7 @@ double srgb_to_linear(double s) {
 }
 
 TEST(TextureFile, EightBitsAreMadeLinear) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     cv::Mat image(1, 256, CV_8UC3);
     for (int i = 0; i < 256; ++i)
         image.at<cv::Vec3b>(0, i) = cv::Vec3b(0, static_cast<uchar>(255 - i), static_cast<uchar>(i));
@@ -38,7 +38,7 @@ TEST(TextureFile, EveryEightBitCodeIsWithinHalfACodeOfTheStandard) {
     // Points of IEC 61966-2-1 worked out by hand: the end of the straight part, the middle, the ends.
     EXPECT_NEAR(srgb_to_linear(10 / 255.0), 0.00303527, 1e-8);
     EXPECT_NEAR(srgb_to_linear(128 / 255.0), 0.21586050, 1e-8);
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     cv::Mat codes(16, 16, CV_8UC1);
     for (int i = 0; i < 256; ++i) codes.at<uchar>(i / 16, i % 16) = static_cast<uchar>(i);
     test::write_image_file(folder / "t.png", codes);
@@ -53,7 +53,7 @@ TEST(TextureFile, EveryEightBitCodeIsWithinHalfACodeOfTheStandard) {
 
 TEST(TextureFile, UseChoosesTheCurveWhateverTheDepth) {
     using Colour = TextureUse::Colour;
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     cv::Mat eight(1, 256, CV_8UC1), sixteen(1, 256, CV_16UC1);
     for (int i = 0; i < 256; ++i) {
         eight.at<uchar>(0, i) = static_cast<uchar>(i);
@@ -76,7 +76,7 @@ TEST(TextureFile, UseChoosesTheCurveWhateverTheDepth) {
 }
 
 TEST(TextureFile, SixteenBitsOfSrgbAreMadeLinear) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     cv::Mat image(4, 1000, CV_16UC1);
     for (int i = 0; i < 4000; ++i) image.at<std::uint16_t>(i / 1000, i % 1000) = static_cast<std::uint16_t>(i * 16);
     test::write_image_file(folder / "t.png", image);
@@ -88,7 +88,7 @@ TEST(TextureFile, SixteenBitsOfSrgbAreMadeLinear) {
 
 TEST(TextureFile, EightAndSixteenBitsOfTheSamePictureAgreeWithinHalfACode) {
     // Linear light in 16 bits, and its sRGB in 8 bits: the 8-bit code is the nearest one.
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     cv::Mat sixteen(1, 4096, CV_16UC1), eight(1, 4096, CV_8UC1);
     const auto srgb = [](double l) { return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055; };
     for (int i = 0; i < 4096; ++i) {
@@ -104,7 +104,7 @@ TEST(TextureFile, EightAndSixteenBitsOfTheSamePictureAgreeWithinHalfACode) {
 }
 
 TEST(TextureFile, NormalMapsOfEightBitsAreFlatAt128) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     test::write_image_file(folder / "n.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 128, 128)));
     test::write_image_file(folder / "ends.png", cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 64, 0)));
     const Result<Texture> n = read_texture(folder / "n.png", {.colour = TextureUse::Colour::normals});
@@ -115,7 +115,7 @@ TEST(TextureFile, NormalMapsOfEightBitsAreFlatAt128) {
 }
 
 TEST(TextureFile, BringsItsCoarserLevelsAndItsWrap) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     cv::Mat image(2, 4, CV_16UC1, cv::Scalar(1000));
     image.at<std::uint16_t>(0, 0) = 3000;
     test::write_image_file(folder / "t.png", image);
@@ -129,7 +129,7 @@ TEST(TextureFile, BringsItsCoarserLevelsAndItsWrap) {
 }
 
 TEST(TextureFile, SixteenBitsAreLinearAlready) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const cv::Mat image(2, 3, CV_16UC3, cv::Scalar(300, 200, 100));
     test::write_image_file(folder / "t.png", image);
     const Result<Texture> t = read_texture(folder / "t.png");
@@ -139,7 +139,7 @@ TEST(TextureFile, SixteenBitsAreLinearAlready) {
 }
 
 TEST(TextureFile, GreyIsCopiedAndAlphaDropped) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     test::write_image_file(folder / "grey.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(255)));
     test::write_image_file(folder / "alpha.png", cv::Mat(1, 1, CV_8UC4, cv::Scalar(255, 0, 255, 0)));
     const Result<Texture> grey = read_texture(folder / "grey.png"), alpha = read_texture(folder / "alpha.png");
@@ -158,7 +158,7 @@ TEST(TextureFile, RowsComeFromTheTop) {
 }
 
 TEST(TextureFile, WhatIsNoImageGivesAnError) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     test::write_image_file(folder / "cut.png", cv::Mat(64, 64, CV_8UC3, cv::Scalar(1, 2, 3)));
     std::filesystem::resize_file(folder / "cut.png", 40);
     for (const std::string& path : {folder.write("text.png", "not an image"), folder.write("empty.png", ""),
@@ -171,7 +171,7 @@ TEST(TextureFile, WhatIsNoImageGivesAnError) {
 }
 
 TEST(TextureFile, FormatsOfTheManualAreRead) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const cv::Mat image(31, 50, CV_8UC3, cv::Scalar(0, 0, 255));
     for (const char* name : {"t.png", "t.jpg", "t.tiff", "t.webp", "t.bmp", "t.ppm", "t.pgm", "t.pbm"}) {
         const bool is_grey = std::string(name) == "t.pgm" || std::string(name) == "t.pbm";
@@ -185,7 +185,7 @@ TEST(TextureFile, FormatsOfTheManualAreRead) {
 }
 
 TEST(TextureFile, OtherFormatsAndTooManyPixelsAreRefusedBeforeTheyAreDecoded) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto error_of = [&](const std::string& path) {
         const Result<Texture> t = read_texture(path);
         return t ? "" : t.error().text().substr(path.size());

@@ -1,11 +1,8 @@
 /// tests/renderer/star_support.h - skies of a few stars, and what an image has of one.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include "renderer/camera/star_light.h"
-#include "renderer/film/camera_image.h"
-#include "tests/support/shapes.h"
+#include "tests/renderer/camera_support.h"
 
 namespace narpa::test {
 
@@ -15,15 +12,6 @@ inline Scene sky(const std::vector<Vec3>& directions, double v_magnitude = 0) {
     scene.stars.emplace();
     for (const Vec3& d : directions) scene.stars->stars.push_back({normalized(d), v_magnitude, 0.65});
     return scene;
-}
-
-inline RadianceImage starry_image(const Scene& scene, const Camera& camera, const CameraPose& pose = {},
-                                  const BodyPoses* at = nullptr) {
-    auto render_scene = RenderScene::create(scene, 1);
-    EXPECT_TRUE(render_scene);
-    RadianceImage image(camera.width, camera.height);
-    render_radiance(*render_scene, at ? *at : placed(scene), camera, pose, {}, image);
-    return image;
 }
 
 /// Of the green band.

@@ -20,10 +20,10 @@ TEST(StarTrails, AreAsLongAsTheTurnAndEven) {
           std::optional(PointSpreadFunction{.sigma_px = 0.8})}) {
         const Camera c = trail_camera(spread);
         const Scene scene = sky({{0, 0, 1}});
-        const Spot still = spot_in(starry_image(scene, c));
+        const Spot still = spot_in(rendered(scene, c));
         constexpr double kLength_px = 50;
         const RadianceImage image =
-            starry_image(scene, c, turning({0, 2 * std::atan(0.5 * kLength_px / kTrailFocal_px), 0}));
+            rendered(scene, c, turning({0, 2 * std::atan(0.5 * kLength_px / kTrailFocal_px), 0}));
         const Spot trail = spot_in(image);
         EXPECT_NEAR(trail.sum / still.sum, 1, 1e-3);
         EXPECT_NEAR(trail.x, 60, 0.01);
@@ -40,8 +40,8 @@ TEST(StarTrails, ComeFromTheWorldFrameThatTurns) {
     scene.stars->rate_rad_s = {0, 1e-2, 0};
     CameraPose pose{{}, {}};
     pose.set_clock(-1, 1, {});
-    const RadianceImage image = starry_image(scene, c, pose);
-    const Spot still = spot_in(starry_image(scene, c));
+    const RadianceImage image = rendered(scene, c, pose);
+    const Spot still = spot_in(rendered(scene, c));
     EXPECT_NEAR(spot_in(image).sum / still.sum, 1, 1e-3);
     EXPECT_NEAR(spot_in(image).x, 60, 0.01);
     for (int x = 52; x <= 68; ++x) EXPECT_NEAR(spot_in(image, x, x + 1).sum / still.sum * 20, 1, 0.005);
@@ -53,9 +53,9 @@ TEST(StarTrails, RollingShutterSkewsTheSky) {
     constexpr double kTurn_px = 20, kRowTime = 0.8 / 60;  // each row is exposed for a fifth of the time
     for (const double row : {10.3, 30.0, 44.8}) {
         const Scene scene = sky({{0, (row - 30) / kTrailFocal_px, 1}});
-        const Spot still = spot_in(starry_image(scene, c));
+        const Spot still = spot_in(rendered(scene, c));
         const CameraPose pose = turning({0, kTurn_px / kTrailFocal_px, 0}, kRowTime);
-        const RadianceImage image = starry_image(scene, c, pose);
+        const RadianceImage image = rendered(scene, c, pose);
         EXPECT_NEAR(spot_in(image).sum / still.sum, 1, 0.001);
         for (int y = static_cast<int>(row) - 1; y <= static_cast<int>(row) + 2; ++y) {
             const Spot line = spot_in(image, 0, 121, y, y + 1);
@@ -73,7 +73,7 @@ TEST(StarTrails, OfWildTurnsAreFinite) {
     CameraPose pose{{}, {exp_rotation({0, 3, 0}), {}}, 1.0 / 60};
     pose.set_clock(0, 1, {1e30, 0, 0});
     scene.stars->rate_rad_s = {900, -1000, 800};
-    for (const Rgb& v : starry_image(scene, c, pose).pixels) ASSERT_TRUE(is_finite(v) && v.x >= 0);
+    for (const Rgb& v : rendered(scene, c, pose).pixels) ASSERT_TRUE(is_finite(v) && v.x >= 0);
 }
 
 TEST(StarTrails, EndWhereABodyComesBefore) {
@@ -85,9 +85,9 @@ TEST(StarTrails, EndWhereABodyComesBefore) {
     // Its edge reaches the star after a quarter of the exposure.
     at.set(0, {{}, {-3, 0, 100}}, {{}, {1, 0, 100}});
     const CameraPose pose{{}, {}};
-    const Spot part = spot_in(starry_image(scene, c, pose, &at));
+    const Spot part = spot_in(rendered(scene, at, c, pose));
     scene.bodies.clear();
-    EXPECT_NEAR(part.sum / spot_in(starry_image(scene, c)).sum, 0.25, 0.04);
+    EXPECT_NEAR(part.sum / spot_in(rendered(scene, c)).sum, 0.25, 0.04);
 }
 
 }  // namespace

@@ -63,12 +63,12 @@ TEST(Stars, ElectronsAreThoseThatTheApertureCollects) {
     for (const auto& spread :
          {std::optional<PointSpreadFunction>{}, std::optional(kGaussian), std::optional(kAiry)}) {
         c.point_spread = spread;
-        EXPECT_NEAR(electrons_in(starry_image(sky({{0.0003, -0.0002, 1}}, 3), c), *c.detector) / wanted, 1, 0.005);
+        EXPECT_NEAR(electrons_in(rendered(sky({{0.0003, -0.0002, 1}}, 3), c), *c.detector) / wanted, 1, 0.005);
     }
     // Off the axis the aperture is seen from the side: with cos^4 the light falls with the cosine, as it should.
     c.fx = c.fy = 100, c.vignetting = Vignetting{.cos4 = true};
     c.point_spread = kGaussian;
-    EXPECT_NEAR(electrons_in(starry_image(sky({{0.6, 0.4, 1}}, 3), c), *c.detector) /
+    EXPECT_NEAR(electrons_in(rendered(sky({{0.6, 0.4, 1}}, 3), c), *c.detector) /
                     (wanted / 100 / std::sqrt(1 + 0.36 + 0.16)),
                 1, 0.005);
 }
@@ -91,7 +91,7 @@ TEST(Stars, KeepTheirLightInEveryCamera) {
                                    std::optional(Distortion{Distortion::Model::fisheye, {0.02, -0.01, 0, 0}})}) {
         if (distortion) c.model = distorted({c.fx, c.fy, c.cx, c.cy}, *distortion);
         const CameraModelHandle model(c);
-        const Spot spot = spot_in(starry_image(sky({direction}), c));
+        const Spot spot = spot_in(rendered(sky({direction}), c));
         const auto wanted = model->project(direction);
         EXPECT_NEAR(spot.x, wanted->x, 0.01);
         EXPECT_NEAR(spot.y, wanted->y, 0.01);
@@ -102,7 +102,7 @@ TEST(Stars, KeepTheirLightInEveryCamera) {
 
 TEST(Stars, StayInOnePixelWithoutAPointSpread) {
     const Camera c = camera(21, 21, 1000);
-    const RadianceImage image = starry_image(sky({{0.0002, 0.0003, 1}}), c);
+    const RadianceImage image = rendered(sky({{0.0002, 0.0003, 1}}), c);
     EXPECT_NEAR(static_cast<double>(image.pixels[10 * 21 + 10].y) / spot_in(image).sum, 1, 0.005);
 }
 
@@ -110,7 +110,7 @@ TEST(Stars, AreDiscsWhereTheLensIsFocusedNearby) {
     Camera c = camera(61, 61, 1000);
     c.lens = Lens{.aperture_diameter_m = 0.04, .focus_distance_m = 2};  // discs of 20 px
     const Vec3 direction = {0.0002, 0.0003, 1};
-    const RadianceImage image = starry_image(sky({direction}), c);
+    const RadianceImage image = rendered(sky({direction}), c);
     const Spot spot = spot_in(image);
     EXPECT_NEAR(spot.x, 30.2, 0.01);
     EXPECT_NEAR(spot.y, 30.3, 0.01);
@@ -122,7 +122,7 @@ TEST(Stars, AreDiscsWhereTheLensIsFocusedNearby) {
             EXPECT_NEAR(v * kPi * 100, r < 10 ? 1 : 0, 0.02) << x << ", " << y;
         }
     c.lens->focus_distance_m = kInfinity;
-    EXPECT_LT(static_cast<double>(starry_image(sky({direction}), c).pixels[29 * 61 + 30].y), 0.005 * spot.sum);
+    EXPECT_LT(static_cast<double>(rendered(sky({direction}), c).pixels[29 * 61 + 30].y), 0.005 * spot.sum);
 }
 
 TEST(Stars, FollowAPointSpreadThatIsAnImage) {
@@ -132,7 +132,7 @@ TEST(Stars, FollowAPointSpreadThatIsAnImage) {
     Camera c = camera(61, 61, 1000);
     c.point_spread = PointSpreadFunction{.sigma_px = 0.6, .image = image, .samples_per_px = 2};
     for (const double x : {0.0, 0.0003, -0.0004}) {
-        const Spot spot = spot_in(starry_image(sky({{x, 0.0002, 1}}), c));
+        const Spot spot = spot_in(rendered(sky({{x, 0.0002, 1}}), c));
         EXPECT_NEAR(spot.x, 30 + 1000 * x + 0.25 * 2, 0.01);
         EXPECT_NEAR(spot.y, 30.2 - 0.25 * 1, 0.01);
     }
@@ -141,17 +141,17 @@ TEST(Stars, FollowAPointSpreadThatIsAnImage) {
 TEST(Stars, BesideTheImageGiveItTheEdgeOfTheirSpot) {
     Camera c = camera(21, 21, 1000);
     c.point_spread = PointSpreadFunction{.sigma_px = 1};
-    const Spot whole = spot_in(starry_image(sky({{0, 0, 1}}), c));
-    const Spot half = spot_in(starry_image(sky({{-0.0105, 0, 1}}), c));  // on the outer border of the first column
+    const Spot whole = spot_in(rendered(sky({{0, 0, 1}}), c));
+    const Spot half = spot_in(rendered(sky({{-0.0105, 0, 1}}), c));  // on the outer border of the first column
     EXPECT_NEAR(half.sum / whole.sum, 0.5, 0.005);
-    EXPECT_EQ(spot_in(starry_image(sky({{-0.03, 0, 1}, {0, 0, -1}}), c)).sum, 0);
+    EXPECT_EQ(spot_in(rendered(sky({{-0.03, 0, 1}, {0, 0, -1}}), c)).sum, 0);
 }
 
 TEST(Stars, VeilingGlareSpreadsTheirLightToo) {
     Camera c = camera(21, 21, 1000);
-    const double sum = spot_in(starry_image(sky({{0, 0, 1}}), c)).sum;
+    const double sum = spot_in(rendered(sky({{0, 0, 1}}), c)).sum;
     c.veiling_glare = 0.1;
-    const RadianceImage image = starry_image(sky({{0, 0, 1}}), c);
+    const RadianceImage image = rendered(sky({{0, 0, 1}}), c);
     EXPECT_NEAR(static_cast<double>(image.pixels[0].y), 0.1 * sum / (21 * 21), 1e-6 * sum);
 }
 
@@ -161,10 +161,10 @@ TEST(Stars, BodiesHideThem) {
     add_sphere(scene, 1, {2, 0, 100});  // of 10 px, black without a Sun, before the second
     Camera c = camera(101, 101, 1000);
     c.point_spread = kGaussian;
-    const Spot spot = spot_in(starry_image(scene, c));
+    const Spot spot = spot_in(rendered(scene, c));
     EXPECT_NEAR(spot.x, 30, 0.01);
     scene.bodies.clear();
-    EXPECT_NEAR(spot_in(starry_image(scene, c)).sum / spot.sum, 2, 1e-3);
+    EXPECT_NEAR(spot_in(rendered(scene, c)).sum / spot.sum, 2, 1e-3);
 }
 
 TEST(Stars, AreDisplacedByTheVelocityOfTheObserver) {
@@ -187,7 +187,7 @@ TEST(Stars, AreDisplacedByTheVelocityOfTheObserver) {
     scene.stars->velocity_m_s = {29790, 0, 0};
     CameraPose pose;
     pose.set_clock(0, 0, {0, -7500, 0});
-    const Spot spot = spot_in(starry_image(scene, c, pose));
+    const Spot spot = spot_in(rendered(scene, c, pose));
     EXPECT_NEAR(spot.x, 50 + 1e5 * beta, 0.01);
     EXPECT_NEAR(spot.y, 50 - 1e5 * 7500 / 299792458, 0.01);
 }
@@ -197,11 +197,11 @@ TEST(Stars, TurnWithTheWorldFrame) {
     c.point_spread = kGaussian;
     Scene scene = sky({{1, 0, 0}});
     scene.stars->q_icrs_world = exp_rotation({0, kPi / 2, 0});  // the world's z is ICRS's x
-    EXPECT_NEAR(spot_in(starry_image(scene, c)).x, 50, 0.01);
+    EXPECT_NEAR(spot_in(rendered(scene, c)).x, 50, 0.01);
     scene.stars->rate_rad_s = {0, 1e-3, 0};  // the world's z turns towards its x, so stars go to -x
     CameraPose pose;
     pose.set_clock(19.9, 20.1, {});
-    EXPECT_NEAR(spot_in(starry_image(scene, c, pose)).x, 50 - 1000 * std::tan(0.02), 0.01);
+    EXPECT_NEAR(spot_in(rendered(scene, c, pose)).x, 50 - 1000 * std::tan(0.02), 0.01);
 }
 
 TEST(Stars, AreTheSameOnAnyNumberOfThreadsAndAllocateNothing) {
@@ -215,9 +215,9 @@ TEST(Stars, AreTheSameOnAnyNumberOfThreadsAndAllocateNothing) {
     Camera c = camera(160, 120, 100);
     c.point_spread = kBoth;
     const CameraPose pose = turning({0.02, 0.05, 0.1}, 0.5 / 119);
-    const RadianceImage all = starry_image(scene, c, pose);
+    const RadianceImage all = rendered(scene, c, pose);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
-    EXPECT_EQ(starry_image(scene, c, pose).pixels, all.pixels);
+    EXPECT_EQ(rendered(scene, c, pose).pixels, all.pixels);
     if (!kAllocationsAreCounted) GTEST_SKIP() << "the sanitizer has its own heap";
     auto render_scene = RenderScene::create(scene, 1);
     ASSERT_TRUE(render_scene);

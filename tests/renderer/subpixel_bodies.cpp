@@ -3,15 +3,13 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/subpixel_bodies.h"
 #include "tests/renderer/camera_support.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/oracle.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -21,10 +19,8 @@ using namespace test;
 constexpr double kFocal = 1319.4792168823421;  // 30 degrees across the diagonal of 500 x 500
 
 RadianceImage render(const RenderScene& render_scene, const Camera& c, const Rigid3& T,
-                     FrameSettings settings = {}) {
-    RadianceImage image(c.width, c.height);
-    render_radiance(render_scene, placed(render_scene.scene()), c, T, settings, image);
-    return image;
+                     const FrameSettings& settings = {}) {
+    return rendered(render_scene, placed(render_scene.scene()), c, T, settings);
 }
 
 /// What a Lambert sphere sends to a far camera under a point Sun.
@@ -92,9 +88,7 @@ std::vector<double> fluxes(const Far& far, FrameSettings settings) {
 }
 
 TEST(TinyBody, OracleOfThePointSource) {
-    std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/point_source.json");
-    if (!file) GTEST_SKIP() << "no reference numbers beside the project: ../shared/oracles/point_source.json";
-    const nlohmann::json reference = nlohmann::json::parse(file);
+    NEED_ORACLE(reference, "point_source");
     const Mesh fine = icosphere(6, 5);
     int judged = 0, as_mesh = 0;
     for (const auto& c : reference["cases"]) {

@@ -4,8 +4,7 @@
 #include <cmath>
 
 #include "renderer/camera/scene_camera.h"
-#include "renderer/film/camera_image.h"
-#include "tests/support/shapes.h"
+#include "tests/renderer/camera_support.h"
 
 namespace narpa {
 namespace {
@@ -30,14 +29,6 @@ Camera with_ghost(double radius_px = 20, double scale = 1) {
     return c;
 }
 
-RadianceImage ghost_image(const Scene& scene, const Camera& c, const CameraPose& pose = {}) {
-    const auto render_scene = RenderScene::create(scene, 1);
-    EXPECT_TRUE(render_scene);
-    RadianceImage image(c.width, c.height);
-    render_radiance(*render_scene, placed(scene), c, pose, {}, image);
-    return image;
-}
-
 /// Light-weighted mean position; z: the sum of radiance.
 Vec3 centroid_and_light(const RadianceImage& image) {
     Vec3 sum;
@@ -53,7 +44,7 @@ TEST(SunGhost, HasItsShareOfTheSunsLight) {
     const double right = 0.12, below = -0.05;
     for (const double radius_px : {1.0, 1.7, 5.0, 20.5, 40.0}) {
         const Camera c = with_ghost(radius_px);
-        const double light = centroid_and_light(ghost_image(sun_at(right, below), c)).z / (c.fx * c.fy);
+        const double light = centroid_and_light(rendered(sun_at(right, below), c)).z / (c.fx * c.fy);
         const double cosine = sun_at(right, below).sun->direction.z;
         EXPECT_NEAR(light / (kStrength * kIrradiance * cosine), 1, radius_px < 2 ? 0.04 : 0.005) << radius_px;
     }
@@ -61,7 +52,7 @@ TEST(SunGhost, HasItsShareOfTheSunsLight) {
 
 TEST(SunGhost, IsEvenlyLit) {
     const Camera c = with_ghost(20);
-    const RadianceImage image = ghost_image(sun_at(0, 0), c);
+    const RadianceImage image = rendered(sun_at(0, 0), c);
     const auto at = [&](int x, int y) { return image.pixels[static_cast<std::size_t>(y * kGhostSide + x)].y; };
     EXPECT_GT(at(100, 100), 0);
     EXPECT_EQ(at(100, 100), at(113, 110));
@@ -75,7 +66,7 @@ void expect_opposite_the_sun(const Camera& c, double right, double below) {
     const Scene scene = sun_at(right, below);
     const auto sun = model->project(scene.sun->direction), axis = model->project({0, 0, 1});
     ASSERT_TRUE(sun && axis);
-    const Vec3 at = centroid_and_light(ghost_image(scene, c));
+    const Vec3 at = centroid_and_light(rendered(scene, c));
     EXPECT_NEAR(at.x, axis->x - c.ghost->scale * (sun->x - axis->x), 0.01);
     EXPECT_NEAR(at.y, axis->y - c.ghost->scale * (sun->y - axis->y), 0.01);
 }
@@ -103,7 +94,7 @@ TEST(SunGhost, GoesWithTheDistortedImage) {
 
 TEST(SunGhost, IsGoneBehindABodyAndBeyondItsAngle) {
     const auto light = [](const Scene& scene) {
-        return centroid_and_light(ghost_image(scene, with_ghost(20, 0.3))).z;
+        return centroid_and_light(rendered(scene, with_ghost(20, 0.3))).z;
     };
     // In the last tenth it fades evenly.
     const double whole = light(sun_at(0.4499, 0)) / std::cos(0.4499);
@@ -124,7 +115,7 @@ TEST(SunGhost, IsGoneBehindABodyAndBeyondItsAngle) {
 TEST(SunGhost, TakesEachRowOfARollingShutterInTurn) {
     const Camera c = with_ghost(60);
     const auto turned = [](double angle) { return Rigid3{exp_rotation({0, angle, 0}), {}}; };
-    const RadianceImage image = ghost_image(sun_at(0, 0), c, {turned(-0.1), turned(0.1), 1.0 / (kGhostSide - 1)});
+    const RadianceImage image = rendered(sun_at(0, 0), c, {turned(-0.1), turned(0.1), 1.0 / (kGhostSide - 1)});
     const CameraModelHandle model(c);
     for (const int y : {60, 100, 140}) {
         double sum = 0, x_sum = 0;
@@ -143,7 +134,7 @@ TEST(SunGhost, LeavesTheImageBelowItAsItWas) {
     scene.bodies[0].initial.T_world_body.t = {0, 3, 30};
     Camera plain = with_ghost();
     plain.ghost.reset();
-    const RadianceImage without = ghost_image(scene, plain), with = ghost_image(scene, with_ghost(200));
+    const RadianceImage without = rendered(scene, plain), with = rendered(scene, with_ghost(200));
     const float added = with.pixels[0].y - without.pixels[0].y;
     EXPECT_GT(added, 0);
     for (std::size_t i = 0; i < with.pixels.size(); ++i)

@@ -3,42 +3,19 @@
 
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/film/camera_image.h"
 #include "renderer/integrator/sampler.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/light/sun_disc.h"
 #include "renderer/material/bsdf.h"
 #include "renderer/material/texture_lookup.h"
-#include "tests/support/shapes.h"
+#include "tests/renderer/camera_support.h"
 
 namespace narpa {
 namespace {
 
 using namespace test;
 constexpr double kSolar = 1361;
-
-RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, int spp = 1) {
-    const auto render_scene = RenderScene::create(s, 1);
-    EXPECT_TRUE(render_scene);
-    RadianceImage image(c.width, c.height);
-    FrameSettings settings;
-    settings.spp = spp;
-    render_radiance(*render_scene, placed(s), c, T, settings, image);
-    return image;
-}
-
-/// Irradiance on the camera's aperture plane: radiance times the projected solid angle of each pixel.
-double irradiance(const RadianceImage& image, const Camera& c) {
-    double sum = 0;
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const double u = (x - c.cx) / c.fx, v = (y - c.cy) / c.fy, cos2 = 1 / (1 + u * u + v * v);
-            sum += static_cast<double>(image.pixels[static_cast<std::size_t>(y * image.width + x)].y) * cos2 *
-                   cos2 / (c.fx * c.fy);
-        }
-    return sum;
-}
 
 class LambertSphere : public testing::TestWithParam<double> {};
 
@@ -49,7 +26,7 @@ TEST_P(LambertSphere, IrradianceAtThisPhaseIsTheClosedFormToOnePerMille) {
     add_sphere(s, radius, {});
     add_sun(s, {std::cos(phase), std::sin(phase), 0});
     const Camera c = camera(200, 200, 180 * distance / (2 * radius));  // 180 px across
-    const double seen = irradiance(render(s, c, looking({distance, 0, 0}, {}), 16), c);
+    const double seen = irradiance(rendered(s, c, looking({distance, 0, 0}, {}), {.spp = 16}), c);
     // Lambert's law integrated over the lit and visible lune (far away).
     const double expected = kSolar * 2 * albedo / (3 * kPi) * std::pow(radius / distance, 2) *
                             (std::sin(phase) + (kPi - phase) * std::cos(phase));
@@ -64,7 +41,7 @@ TEST(Lambert, PlaneUnderTheSunFollowsTheCosine) {
         add_mesh(s, plate(10, 10));
         add_sun(s, {std::sin(zenith), 0, std::cos(zenith)});
         const Camera c = camera(8, 8, 20);
-        for (const Rgb& p : render(s, c, looking({0.1, 0.2, 5}, {0, 0, 0}, {0, 1, 0})).pixels)
+        for (const Rgb& p : rendered(s, c, looking({0.1, 0.2, 5}, {0, 0, 0}, {0, 1, 0})).pixels)
             EXPECT_NEAR(static_cast<double>(p.x), 0.25 * kSolar * std::cos(zenith) / kPi, 1e-5 * kSolar);
     }
 }
@@ -75,10 +52,10 @@ TEST(Lambert, FurnaceGivesBackExactlyTheAmbientRadiance) {
     s.ambient = {2, 3, 5};
     add_sphere(s, 1, {});
     const Camera c = camera(32, 32, 60);
-    for (const Rgb& p : render(s, c, looking({3, 0, 0}, {})).pixels)
+    for (const Rgb& p : rendered(s, c, looking({3, 0, 0}, {})).pixels)
         EXPECT_TRUE((p == Rgb{2, 3, 5}) || (p == Rgb{})) << p.x;
     // And a camera inside sees it everywhere.
-    for (const Rgb& p : render(s, c, looking({0.2, 0, 0}, {1, 1, 0})).pixels) EXPECT_EQ(p, (Rgb{2, 3, 5}));
+    for (const Rgb& p : rendered(s, c, looking({0.2, 0, 0}, {1, 1, 0})).pixels) EXPECT_EQ(p, (Rgb{2, 3, 5}));
 }
 
 TEST(Emission, IsSeenInTheDarkFromBothSides) {
@@ -89,7 +66,7 @@ TEST(Emission, IsSeenInTheDarkFromBothSides) {
     add_mesh(s, plate(10, 10));
     const Camera c = camera(4, 4, 10);
     for (const double z : {5.0, -5.0})
-        for (const Rgb& p : render(s, c, looking({0.1, 0.2, z}, {0, 0, 0}, {0, 1, 0})).pixels)
+        for (const Rgb& p : rendered(s, c, looking({0.1, 0.2, z}, {0, 0, 0}, {0, 1, 0})).pixels)
             EXPECT_EQ(p, (Rgb{7, 8, 9}));
 }
 
@@ -116,7 +93,7 @@ TEST(Sun, SetSunLightsNothingAndABodyCastsAShadow) {
     Scene night = s;
     night.sun->direction = {0, 0, -1};
     const Camera c = camera(8, 8, 20);
-    for (const Rgb& p : render(night, c, looking({4, 0, 5}, {4.1, 0, 0}, {0, 1, 0})).pixels) EXPECT_EQ(p, Rgb{});
+    for (const Rgb& p : rendered(night, c, looking({4, 0, 5}, {4.1, 0, 0}, {0, 1, 0})).pixels) EXPECT_EQ(p, Rgb{});
 }
 
 TEST(Sun, PenumbraOfAStraightEdgeIsTheVisiblePartOfTheDisc) {
@@ -130,7 +107,7 @@ TEST(Sun, PenumbraOfAStraightEdgeIsTheVisiblePartOfTheDisc) {
     s.sun->angular_diameter_rad = 0.02;
     Camera c = camera(41, 1, 0);
     c.fx = c.fy = 41 / 0.24 * 1.0;  // 0.24 m across at 1 m
-    const RadianceImage image = render(s, c, looking({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), 1024);
+    const RadianceImage image = rendered(s, c, looking({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), {.spp = 1024});
     for (int x = 0; x < 41; ++x) {
         const double d = (x - 20) / c.fx, cut = std::clamp(d / (10 * std::tan(0.01)), -1.0, 1.0);
         const double visible = 1 - (std::acos(cut) - cut * std::sqrt(1 - cut * cut)) / kPi;
@@ -304,7 +281,7 @@ TEST(Texture, OnAPlateAndOnASphere) {
     s.textures.push_back({"t", 2, 2, {65535, 0, 0, 0, 65535, 0, 0, 0, 65535, 0, 0, 65535}});
     add_mesh(s, plate(2, 2));
     const Camera c = camera(101, 101, 250);
-    const RadianceImage image = render(s, c, looking({0, 0, 5}, {0, 0, 0}, {0, 1, 0}));
+    const RadianceImage image = rendered(s, c, looking({0, 0, 5}, {0, 0, 0}, {0, 1, 0}));
     const auto at = [&](int x, int y) { return image.pixels[static_cast<std::size_t>(y * 101 + x)]; };
     EXPECT_GT(at(25, 25).x, 0.9f);
     EXPECT_GT(at(75, 25).y, 0.9f);
@@ -316,7 +293,7 @@ TEST(Texture, OnAPlateAndOnASphere) {
     add_sphere(globe, 1, {});
     // Longitude 90 deg east is u = 0.25 (red), 90 deg west u = 0.75 (green); south is blue.
     const auto colour = [&](const Vec3& from) {
-        return render(globe, camera(1, 1, 1000), looking(from, {0, 0, 0}, {0.1, 0, 1})).pixels[0];
+        return rendered(globe, camera(1, 1, 1000), looking(from, {0, 0, 0}, {0.1, 0, 1})).pixels[0];
     };
     EXPECT_GT(colour({0, 4, 4}).x, 0.9f);
     EXPECT_GT(colour({0, -4, 4}).y, 0.9f);

@@ -15,7 +15,7 @@
 namespace narpa {
 namespace {
 
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 std::string dem_file(const std::string& name) {
     return NARPA_SOURCE_DIR "/tests/data/dem/" + name;
@@ -130,7 +130,7 @@ TEST(Dem, AWholePlanetFromAMapOfIt) {
 
 TEST(Dem, ARayMeetsTheTriangleBetweenThePosts) {
     NEEDS_GDAL();
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const auto scene = read_scene(
         folder.write("s.toml", "[sun]\ndirection = [1, 1, 1]\n[[body]]\nname = \"mars\"\ndem = {file = \"" +
                                    dem_file("mars.tif") +
@@ -193,7 +193,7 @@ TEST(Dem, ErrorsSayWhatToDo) {
 
 TEST(Dem, ATruncatedFileIsAnError) {
     NEEDS_GDAL();
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string whole = test::read_text(dem_file("mars.tif"));
     for (const std::size_t size : {8u, 100u, 400u, 700u, 3000u}) {
         const auto t =
@@ -206,7 +206,7 @@ TEST(Dem, ATruncatedFileIsAnError) {
 /// GDAL's own file systems, which include the network. A FIFO, which would be waited for, is no file either.
 TEST(Dem, ALabelOpensNoFileOutsideOfItsFolder) {
     NEEDS_GDAL();
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     const std::string inside = folder / "dem";
     std::filesystem::create_directory(inside);
     for (const std::string& data : {folder / "pds3.img", inside + "/pds3.img"})

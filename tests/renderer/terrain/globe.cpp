@@ -13,7 +13,7 @@
 namespace narpa {
 namespace {
 
-using test::TemporaryFolder;
+using test::MemoryFolder;
 
 constexpr std::int64_t kDay_ns = 86'400'000'000'000,
                        kEquinox2026_ns = 1'774'018'560'000'000'000;  // 20 March, 14:56
@@ -71,7 +71,7 @@ TEST(Rotation, ThePoleOfMarsIsInCygnus) {
 }
 
 TEST(Icq, SixGridsAreAClosedBody) {
-    const TemporaryFolder folder;
+    const MemoryFolder folder;
     constexpr int kCells = 4;
     std::string text = std::to_string(kCells) + "\n";
     for (int face = 0; face < 6; ++face)

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "base/write_file.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/scene/calibration_file.h"
@@ -47,13 +47,6 @@ Calibration calibration_of(const Camera& c) {
     return {c.width, c.height, pinhole_of(c), c.distortion};
 }
 
-Status write(const std::string& file, const std::string& text) {
-    std::ofstream out(file, std::ios::binary);
-    out << text;
-    if (!out.flush()) return Error{"cannot be written", file, 0, 0, ErrorKind::failed};
-    return Ok{};
-}
-
 }  // namespace
 
 Status write_calibration(const Scene& scene, const std::string& folder) {
@@ -68,12 +61,12 @@ Status write_calibration(const Scene& scene, const std::string& folder) {
         {"lidars", nlohmann::json::array()}};
     for (const Camera& c : scene.cameras) {
         document["cameras"].push_back(describe(scene, c));
-        if (Status good = write(folder + "/" + c.name + ".yaml", calibration_text(c.name, calibration_of(c)));
+        if (Status good = write_file(folder + "/" + c.name + ".yaml", calibration_text(c.name, calibration_of(c)));
             !good)
             return good;
     }
     for (const Lidar& l : scene.lidars) document["lidars"].push_back(describe(scene, l));
-    return write(folder + "/calibration.json", document.dump(2) + "\n");
+    return write_file(folder + "/calibration.json", document.dump(2) + "\n");
 }
 
 }  // namespace narpa::cli

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numeric>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "apps/scene_options.h"
 #include "base/base64.h"
 #include "base/nearest_name.h"
+#include "base/write_file.h"
 #include "emulator/world.h"
 #include "plot/plot.h"
 #include "renderer/image/image_file.h"
@@ -155,11 +155,7 @@ nlohmann::json to_json(const MapOptions& o, const View& view) {
 }
 
 Status write_document(const std::string& path, const nlohmann::json& document) {
-    std::ofstream out(path);
-    out << document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-    out.close();
-    if (!out) return Error{"cannot be written", path, 0, 0, ErrorKind::failed};
-    return Ok{};
+    return write_file(path, document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n');
 }
 
 Status write_map(const MapOptions& o, const std::string& extension, const View& view) {

@@ -10,6 +10,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/write_file.h"
+
 namespace narpa {
 namespace {
 
@@ -56,10 +58,7 @@ Status write_run_record(const std::string& folder, const Scene& scene) {
         {"scene", unknown ? scene.file : file.lexically_normal().string()},
         {"render",
          {{"method", r.method == Method::path ? kPath : kDirect}, {"max_depth", r.max_depth}, {"seed", r.seed}}}};
-    std::ofstream out(file_in(folder));
-    out << document.dump(2) << '\n';
-    if (!out.flush()) return Error{"cannot be written", file_in(folder), 0, 0, ErrorKind::failed};
-    return Ok{};
+    return write_file(file_in(folder), document.dump(2) + '\n');
 }
 
 Result<RunRecord> read_run_record(const std::string& folder) {

@@ -6,11 +6,11 @@
 #include <array>
 #include <cmath>
 #include <deque>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
+#include "base/write_file.h"
 #include "drivers/can/remote_clock.h"
 #include "drivers/descriptor.h"
 #include "protocols/can/messages.h"
@@ -331,12 +331,9 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
     if (!flown) return flown.error();
     nlohmann::json document = node.report();
     document["version"] = options.version;
-    if (!options.log_folder.empty()) {
-        const std::string path = options.log_folder + "/dynamics.json";
-        std::ofstream file(path);
-        file << document.dump(2) << '\n';
-        if (!file.flush()) return Error{"cannot be written", path, 0, 0, ErrorKind::failed};
-    }
+    if (!options.log_folder.empty())
+        if (Status written = write_file(options.log_folder + "/dynamics.json", document.dump(2) + '\n'); !written)
+            return written.error();
     return document;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/program_beside.h"
+#include "base/write_file.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/report.h"
 #include "rehearsal/runner/run_folder.h"
@@ -161,10 +162,10 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     const std::string page = o.run.folder + "/index.html";
     if (Status good = draw_charts(o.run.folder, campaign_plot(*scenario, contacts_of(runs))); !good)
         return good.error();
-    if (Status good = write_text(page, campaign_page(*scenario, summary, o.run.folder)); !good) return good.error();
+    if (Status good = write_file(page, campaign_page(*scenario, summary, o.run.folder)); !good) return good.error();
     if (Status good = write_junit(o.run.folder + "/junit.xml", campaign_junit(scenario->name, runs)); !good)
         return good.error();
-    if (Status good = write_text(o.run.folder + "/summary.json", summary.dump(2) + "\n"); !good)
+    if (Status good = write_file(o.run.folder + "/summary.json", summary.dump(2) + "\n"); !good)
         return good.error();
     return summary;
 }

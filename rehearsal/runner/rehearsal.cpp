@@ -12,6 +12,7 @@
 #include <filesystem>
 
 #include "base/program_beside.h"
+#include "base/write_file.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/judge/judge.h"
 #include "rehearsal/runner/child_process.h"
@@ -127,14 +128,14 @@ private:
         for (const char* name : {"emulator", "dynamics", "navigation"})
             fs::create_directories(in_folder(name), failed);
         // The mark of a rehearsal's folder, even if this one gets no further.
-        if (Status good = write_text(in_folder("rehearsal.json"), "{}\n"); !good) return good;
+        if (Status good = write_file(in_folder("rehearsal.json"), "{}\n"); !good) return good;
         const auto texts = scenario_texts(scenario_);
         if (!texts) return texts.error();
         hash_ = texts->hash;
-        if (Status good = write_text(in_folder("scenario.toml"), texts->scenario); !good) return good;
+        if (Status good = write_file(in_folder("scenario.toml"), texts->scenario); !good) return good;
         if (!texts->map.empty())
-            if (Status good = write_text(in_folder("map.toml"), texts->map); !good) return good;
-        return write_text(in_folder("scene.toml"), texts->scene);
+            if (Status good = write_file(in_folder("map.toml"), texts->map); !good) return good;
+        return write_file(in_folder("scene.toml"), texts->scene);
     }
 
     /// A FIFO for each camera without a device, a free UDP port for each LiDAR.
@@ -295,7 +296,7 @@ private:
                      {"dynamics", ChildProcess::shell_line(dynamics_.command)}}},
                    {"version", options_.version},
                    {"begun", utc_now()}};
-        return write_text(in_folder("rehearsal.json"), record_.dump(2) + "\n");
+        return write_file(in_folder("rehearsal.json"), record_.dump(2) + "\n");
     }
 
     // --- While it runs ---
@@ -404,12 +405,12 @@ private:
             if (Status good = draw_charts(options_.folder, rehearsal_plot(scenario_, judge_.bus(), v)); !good)
                 return good.error();
             const std::string page = rehearsal_page(scenario_, judge_.bus(), v, record_, options_.folder);
-            if (Status good = write_text(done.page, page); !good) return good.error();
+            if (Status good = write_file(done.page, page); !good) return good.error();
         }
         if (Status good = write_junit(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)); !good)
             return good.error();
         // Last: a folder with result.json is complete.
-        if (Status good = write_text(in_folder("result.json"), done.result.dump(2) + "\n"); !good)
+        if (Status good = write_file(in_folder("result.json"), done.result.dump(2) + "\n"); !good)
             return good.error();
         return done;
     }

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
+#include "base/write_file.h"
 #include "renderer/scene/based_on.h"
 
 namespace narpa::rehearsal {
@@ -49,15 +49,8 @@ Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
     return texts;
 }
 
-Status write_text(const std::string& file, std::string_view text) {
-    std::ofstream out(file, std::ios::binary);
-    out << text;
-    if (!out.flush()) return Error{"cannot be written", file, 0, 0, ErrorKind::failed};
-    return Ok{};
-}
-
 Status write_junit(const std::string& file, const std::string& suites) {
-    return write_text(file,
+    return write_file(file,
                       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n" + suites + "</testsuites>\n");
 }
 

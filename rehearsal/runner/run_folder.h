@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "base/result.h"
 #include "drivers/descriptor.h"
@@ -22,7 +21,6 @@ struct ScenarioTexts {
 };
 Result<ScenarioTexts> scenario_texts(const Scenario& scenario);
 
-Status write_text(const std::string& file, std::string_view text);
 /// An XML document of test suites.
 Status write_junit(const std::string& file, const std::string& suites);
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/write_file.h"
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/rehearsal.h"
@@ -41,10 +42,14 @@ RehearsalOptions options(const test::TemporaryFolder& folder) {
 
 const Console kSilent{[](std::string_view) {}, [](double, double, std::string_view) {}};
 
-TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
+class Whole : public testing::Test {
+protected:
     const test::TemporaryFolder folder;
     const StopFlag stop{false};
     RehearsalOptions o = options(folder);
+};
+
+TEST_F(Whole, WritesAllFilesAndRepeatsByteForByte) {
     const auto done = run_rehearsal(o, kSilent, stop);
     ASSERT_TRUE(done) << done.error().text();
     const Verdict& v = done->verdict;
@@ -81,10 +86,7 @@ TEST(Whole, WritesAllFilesAndRepeatsByteForByte) {
     EXPECT_EQ(nlohmann::json::parse(read_text(o.folder + "/emulator/run.json"))["render"]["seed"], 9);
 }
 
-TEST(Whole, NamesAProgramThatEndsTooSoon) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
-    RehearsalOptions o = options(folder);
+TEST_F(Whole, NamesAProgramThatEndsTooSoon) {
     o.navigation = "echo ready; echo out of fuel >&2; sleep 0.2; exit 7";
     const auto done = run_rehearsal(o, kSilent, stop);
     ASSERT_TRUE(done) << done.error().text();
@@ -96,10 +98,7 @@ TEST(Whole, NamesAProgramThatEndsTooSoon) {
     EXPECT_TRUE(fs::exists(o.folder + "/index.html"));
 }
 
-TEST(Whole, EndsAfterTooLongWithoutProgress) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
-    RehearsalOptions o = options(folder);
+TEST_F(Whole, EndsAfterTooLongWithoutProgress) {
     o.dynamics = "sleep 100";
     o.patience_s = 0.3;
     const auto done = run_rehearsal(o, kSilent, stop);
@@ -109,10 +108,7 @@ TEST(Whole, EndsAfterTooLongWithoutProgress) {
     EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics sent nothing"), std::string::npos);
 }
 
-TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
-    RehearsalOptions o = options(folder);
+TEST_F(Whole, BadInputOfTheEmulatorIsBadInput) {
     o.bus = "slcan:notaport";
     const auto done = run_rehearsal(o, kSilent, stop);
     ASSERT_FALSE(done);
@@ -123,10 +119,7 @@ TEST(Whole, BadInputOfTheEmulatorIsBadInput) {
               std::string::npos);
 }
 
-TEST(Whole, AFailedStartKeepsTheEarlierRun) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
-    RehearsalOptions o = options(folder);
+TEST_F(Whole, AFailedStartKeepsTheEarlierRun) {
     ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
     const auto kept = [&](const char* file) { return read_text(o.folder + "/" + file); };
     const std::string result = kept("result.json"), record = kept("rehearsal.json"), log = kept("emulator/can.log");
@@ -149,10 +142,7 @@ TEST(Whole, AFailedStartKeepsTheEarlierRun) {
 }
 
 /// A navigation that the user starts some time after the request.
-TEST(Whole, WaitsForANavigationStartedByTheUser) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
-    RehearsalOptions o = options(folder);
+TEST_F(Whole, WaitsForANavigationStartedByTheUser) {
     o.navigation = "none";
     std::FILE* own = nullptr;
     int asked = 0;
@@ -188,9 +178,7 @@ TEST(Whole, WaitsForANavigationStartedByTheUser) {
 }
 
 /// The log of somebody else, whose record is valid but for the commands in it.
-TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
+TEST_F(Whole, AReplayNeverRunsACommandOfTheLog) {
     const auto scenario = read_scenario(short_scenario(folder));
     ASSERT_TRUE(scenario);
     const std::string proof = folder / "it-ran";
@@ -201,15 +189,15 @@ TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
                                 {"seed", 1u},
                                 {"dynamics", ""},
                                 {"navigation", ""}};
-    RerunOptions o{folder / "log", "", "", 1, "test", NARPA_BUILD_DIR "/bin"};
-    fs::create_directories(o.folder);
+    RerunOptions log{folder / "log", "", "", 1, "test", NARPA_BUILD_DIR "/bin"};
+    fs::create_directories(log.folder);
     for (const char* program : {"dynamics", "navigation"})
         for (const std::string& command : {"touch " + proof, "\x1b[2Jnone; touch " + proof}) {
             nlohmann::json hostile = record;
             hostile[program] = command;
             hostile["command_lines"] = {{program, "touch " + proof}};
-            ASSERT_TRUE(write_text(o.folder + "/rehearsal.json", hostile.dump()));
-            const auto done = rerun(o, kSilent, stop);
+            ASSERT_TRUE(write_file(log.folder + "/rehearsal.json", hostile.dump()));
+            const auto done = rerun(log, kSilent, stop);
             ASSERT_FALSE(done) << hostile;
             EXPECT_EQ(done.error().kind, ErrorKind::bad_input);
             EXPECT_NE(done.error().text().find("a command in a log is never run by itself"), std::string::npos)
@@ -219,15 +207,12 @@ TEST(Whole, AReplayNeverRunsACommandOfTheLog) {
         }
 
     // Named by the caller, it is run.
-    o.navigation = "touch " + proof + "; exit 9";
-    EXPECT_FALSE(rerun(o, kSilent, stop));
+    log.navigation = "touch " + proof + "; exit 9";
+    EXPECT_FALSE(rerun(log, kSilent, stop));
     EXPECT_TRUE(fs::exists(proof));
 }
 
-TEST(Whole, ASecondRunIntoTheSameFolderIsRefused) {
-    const test::TemporaryFolder folder;
-    const StopFlag stop{false};
-    RehearsalOptions o = options(folder);
+TEST_F(Whole, ASecondRunIntoTheSameFolderIsRefused) {
     o.dynamics = "sleep 100";
     o.patience_s = 0.3;
     std::optional<Result<RehearsalResult>> second;
@@ -245,31 +230,28 @@ TEST(Whole, ASecondRunIntoTheSameFolderIsRefused) {
     EXPECT_TRUE(claim_folder(o.folder, "rehearsal.json")) << "and is unlocked at its end";
 }
 
-TEST(Whole, ACampaignShowsHowFarARunIs) {
-    const test::TemporaryFolder folder;
+TEST_F(Whole, ACampaignShowsHowFarARunIs) {
     const std::string log = folder / "0001.log";
     EXPECT_EQ(progress_of(log).text, "");
-    ASSERT_TRUE(write_text(log,
+    ASSERT_TRUE(write_file(log,
                            "rehearsing: starting, 2 s so far\nrehearsing: t = 23.0 s of about 92 s, 7.78 m, leg 1 "
                            "\"hold at 2 m\", moving, gates good, 25 %, about 37 s to go\n"));
     EXPECT_EQ(progress_of(log).text, "t = 23.0 s of about 92 s");
     EXPECT_DOUBLE_EQ(progress_of(log).share, 0.25);
-    ASSERT_TRUE(write_text(log, "rehearsing: t = 100.0 s of at most 400 s, 7.78 m, 60 s so far\n"));
+    ASSERT_TRUE(write_file(log, "rehearsing: t = 100.0 s of at most 400 s, 7.78 m, 60 s so far\n"));
     EXPECT_EQ(progress_of(log).text, "t = 100.0 s of at most 400 s");
     EXPECT_DOUBLE_EQ(progress_of(log).share, 0.25);
-    ASSERT_TRUE(write_text(log, "rehearsing: t = 99.0 s of about 99 s, drawing charts and page, 20 s so far\n"));
+    ASSERT_TRUE(write_file(log, "rehearsing: t = 99.0 s of about 99 s, drawing charts and page, 20 s so far\n"));
     EXPECT_DOUBLE_EQ(progress_of(log).share, 1);
-    ASSERT_TRUE(write_text(log, "narpa: interrupted\n"));
+    ASSERT_TRUE(write_file(log, "narpa: interrupted\n"));
     EXPECT_EQ(progress_of(log).text, "");
 }
 
-TEST(Whole, RejectsImpossibleCampaigns) {
-    const test::TemporaryFolder folder;
+TEST_F(Whole, RejectsImpossibleCampaigns) {
     const auto refused = [&](const RehearsalOptions& run, int jobs) {
         const auto done = run_campaign({run, 2, jobs}, kSilent, StopFlag{false});
         return done ? std::string() : done.error().what;
     };
-    RehearsalOptions o = options(folder);
     o.bus = "vcan0";
     EXPECT_NE(refused(o, 2).find("cannot share a bus"), std::string::npos);
     o = options(folder);

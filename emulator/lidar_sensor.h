@@ -52,7 +52,6 @@ public:
     [[nodiscard]] nlohmann::json report() const override;
     [[nodiscard]] std::string in_words(bool lockstep) const override;
 
-    [[nodiscard]] const LidarUnit& unit() const noexcept { return unit_; }
     [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }
     [[nodiscard]] double sweeps() const noexcept {
         return static_cast<double>(stats_.packets) * static_cast<double>(unit_.packet_period_ns()) * 1e-9 *

@@ -39,7 +39,6 @@ public:
     [[nodiscard]] const std::vector<TrackedFrame>& frames() const noexcept { return frames_; }
     /// Frames that arrived while the estimator was busy.
     [[nodiscard]] std::uint64_t skipped() const noexcept { return skipped_; }
-    [[nodiscard]] const FrameTracker& tracker() const noexcept { return *tracker_; }
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
     Status finish();

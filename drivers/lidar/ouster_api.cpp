@@ -95,7 +95,6 @@ struct OusterApi::State {
     json metadata;
     json staged;  ///< configuration until the sensor starts anew
     [[nodiscard]] json& active() { return metadata.at("config_params"); }
-    [[nodiscard]] const json& active() const { return metadata.at("config_params"); }
 };
 
 OusterApi::OusterApi(std::unique_ptr<State> state) : state_(std::move(state)) {}

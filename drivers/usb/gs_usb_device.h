@@ -47,8 +47,6 @@ public:
     [[nodiscard]] int give(int endpoint, std::span<std::uint8_t> room) noexcept override;
 
     // --- From the CAN thread ---
-    /// Readable when the host has sent something.
-    [[nodiscard]] int wake_fd() const noexcept { return wake_fd_; }
     /// Serves the bus once: waits at most timeout_ns, then carries frames both ways. True: UsbIpServer::wake is
     /// due.
     bool turn(CanBus& bus, std::int64_t timeout_ns) noexcept;

@@ -136,7 +136,6 @@ struct Normal {
     Matrix9 noise = Matrix9::Zero();  ///< covariance of `b`
     Vector b = Vector::Zero();
     double squares = 0, expected_squares = 0;  ///< of the residuals
-    Correlation correlation;
 };
 
 class PatchFit {
@@ -188,7 +187,6 @@ private:
         n.b += weight * residual * J;
         n.squares += weight * residual * residual;
         n.expected_squares += weight * (kSoftNoise * noise + unexplained);
-        n.correlation.add(dn, s.dn);
         return true;
     }
     /// A pixel's weight, less towards the patch's edge.
@@ -279,8 +277,7 @@ std::optional<SubPixelMatch> fit_patch(const Patch& patch, const StereoView& her
         if (step.head<2>().norm() < kSettled_px) {
             const Matrix9 C = factors.solve(factors.solve(n->noise).transpose());
             const double misfit = n->squares / n->expected_squares;
-            return SubPixelMatch{px0 + p.head<2>(), std::max(1.0, misfit) * C.topLeftCorner<2, 2>(),
-                                 n->correlation.value(), misfit};
+            return SubPixelMatch{px0 + p.head<2>(), std::max(1.0, misfit) * C.topLeftCorner<2, 2>(), misfit};
         }
         p += step;
         if ((px0 + p.head<2>() - start.px).norm() > kFarthest_px) return {};

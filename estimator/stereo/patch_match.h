@@ -113,7 +113,6 @@ inline constexpr double kApart_px = 3;
 struct SubPixelMatch {
     Eigen::Vector2d px{0, 0};
     Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
-    double correlation = 0;
     /// Squared residuals over what is expected of them. The covariance has grown by it where it is above 1.
     double misfit = 0;
 };

@@ -62,7 +62,6 @@ public:
     OusterFormat(OusterProfile profile, int beams) noexcept : profile_(profile), beams_(beams) {}
 
     [[nodiscard]] OusterProfile profile() const noexcept { return profile_; }
-    [[nodiscard]] int beams() const noexcept { return beams_; }
     [[nodiscard]] std::size_t bytes() const noexcept;
     [[nodiscard]] std::uint32_t range_mm_max() const noexcept;
     [[nodiscard]] std::uint32_t range_step_mm() const noexcept;

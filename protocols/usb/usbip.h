@@ -17,7 +17,6 @@
 
 namespace narpa {
 
-inline constexpr std::uint16_t kUsbIpPort = 3240;
 inline constexpr std::uint16_t kUsbIpVersion = 0x0111;
 
 // --- Before an import ------------------------------------------------

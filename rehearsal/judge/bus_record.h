@@ -30,7 +30,6 @@ public:
     [[nodiscard]] std::optional<Motion> at(std::int64_t t_ns) const;
     [[nodiscard]] bool empty() const { return samples_.empty(); }
     [[nodiscard]] std::int64_t newest_ns() const { return samples_.back().t_ns; }
-    [[nodiscard]] std::size_t size() const { return samples_.size(); }
 
 private:
     struct Sample {

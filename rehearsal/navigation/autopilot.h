@@ -52,7 +52,6 @@ public:
 
     /// `t_start_ns`: the scenario's time 0; `attitude`: the chaser's at that time. Errors: the filter's.
     Status start(std::int64_t t_start_ns, const AttitudeReport& attitude);
-    [[nodiscard]] bool started() const noexcept { return estimator_.has_value(); }
 
     // The following need start().
 

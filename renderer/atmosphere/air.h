@@ -56,7 +56,6 @@ public:
 
     [[nodiscard]] const AirDescription& description() const { return description_; }
     [[nodiscard]] std::size_t lanes() const { return lanes_; }
-    [[nodiscard]] const std::vector<SpectralNode>& nodes() const { return nodes_; }
     [[nodiscard]] double ground_radius_m() const { return description_.ground_radius_m; }
     [[nodiscard]] double top_radius_m() const { return description_.ground_radius_m + description_.top_m; }
     [[nodiscard]] AirDensities densities(double height_m) const noexcept;

@@ -51,7 +51,6 @@ public:
     /// Direct light on a surface that faces the Sun, with (`scaled`) or without what is scattered strongly forward.
     [[nodiscard]] Spectrum sunlight(double height_m, double sun_cosine, bool scaled) const noexcept;
 
-    [[nodiscard]] int orders() const { return orders_; }
     /// Bytes of the tables.
     [[nodiscard]] std::size_t bytes() const { return tables_.bytes(); }
 
@@ -64,7 +63,6 @@ private:
     Air air_;
     PanelRule rule_;
     AirTables tables_;
-    int orders_ = 0;
 };
 
 /// From a height above the ground, metres.

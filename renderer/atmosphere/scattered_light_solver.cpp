@@ -42,10 +42,8 @@ void ScatteredLight::solve(const AirResolution& resolution) {
     Moments once{std::vector<float>(tables_.moments.size()), std::vector<float>(tables_.irradiance.size())};
     tbb::parallel_for(std::size_t{0}, tables_.heights, [&](std::size_t i) { gather(i, resolution, true, once); });
     tables_.set_scattered(once.moments, once.irradiance);
-    for (orders_ = 1; orders_ < resolution.most_orders;) {
-        ++orders_;
+    for (int orders = 1; orders < resolution.most_orders; ++orders)
         if (iterate(resolution, once) < kConverged) break;
-    }
 }
 
 /// One more order of scattering, from light scattered or reflected once; returns the largest change, relative to

@@ -62,7 +62,6 @@ struct PathStart {
     std::uint32_t pixel, sample;  ///< as of PathNumbers
     bool sunlit = false;          ///< of surfaces that are lit: the sunlight there is not zero
 
-    [[nodiscard]] bool met() const noexcept { return is_set(hits->met, lane); }
     [[nodiscard]] bool lit() const noexcept { return is_set(surfaces->lanes, lane); }
 };
 /// Most paths that are reused among each other.

@@ -40,8 +40,6 @@ public:
     [[nodiscard]] double most_lidar_backscatter_1_m() const noexcept override { return lidar_air_.most_1_m(); }
     [[nodiscard]] int body() const noexcept override { return static_cast<int>(body_); }
 
-    [[nodiscard]] const ScatteredLight& light() const { return light_; }
-
 private:
     /// From world to the planet's sphere.
     struct Frame {

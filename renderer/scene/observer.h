@@ -28,7 +28,6 @@ public:
     [[nodiscard]] GroundObserver after(double dt_s) const;
 
     [[nodiscard]] const Vec3& position_m() const { return position_m_; }
-    [[nodiscard]] const Vec3& velocity_m_s() const { return velocity_m_s_; }
     /// Geodetic.
     [[nodiscard]] const Vec3& zenith() const { return zenith_; }
     [[nodiscard]] const Vec3& north() const { return north_; }

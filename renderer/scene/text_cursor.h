@@ -58,7 +58,6 @@ public:
                 .line = static_cast<int>(line),
                 .column = static_cast<int>(column)};
     }
-    [[nodiscard]] const std::string& file() const { return file_; }
 
 private:
     static constexpr char kContinued = '\v';  ///< stands for the line break after a backslash

@@ -1,7 +1,6 @@
 """narpa.dbc and narpa.can: against the example in protocols/can/README.md, and against canmatrix for every signal."""
 import logging
 import unittest
-from decimal import Decimal
 
 import needs
 

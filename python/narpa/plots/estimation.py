@@ -4,7 +4,7 @@ import math
 import numpy as np
 
 from narpa.plots.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, SKY, VERMILION
-from narpa.plots.style import column, figure, image, logarithmic, number, positive, show_image
+from narpa.plots.style import column, figure, image, logarithmic, positive, show_image
 
 QUANTITIES = (("rotation", "rad", "attitude error, deg", math.degrees(1)), ("position", "m", "position error, m", 1))
 

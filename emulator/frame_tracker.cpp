@@ -28,6 +28,15 @@ PoseTrackerSettings tracker_settings(const TrackerOptions& options) {
     return settings;
 }
 
+/// The answer of a method, and where it is usable, the pose and its covariance.
+void take_answer(const auto& estimate, const Rigid3& pose, TrackedFrame& out) {
+    out.answer = estimate.answer;
+    out.why = estimate.answer.why;
+    if (!estimate.answer.usable()) return;
+    out.measured = pose;
+    out.covariance = estimate.covariance;
+}
+
 }  // namespace
 
 Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor, const std::string& name) {
@@ -202,12 +211,8 @@ void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPos
     const FeatureEstimate e = features_->align(image, at, out.guess, motion);
     out.matches = e.agreeing;
     out.renders = static_cast<int>(e.rounds.size());
-    out.answer = e.answer;
-    out.why = e.answer.why;
-    if (!e.answer.usable()) return;
-    out.measured = e.T_camera_target;
-    out.covariance = e.covariance;
-    out.bound = e.bound;
+    take_answer(e, e.T_camera_target, out);
+    if (out.measured) out.bound = e.bound;
 }
 
 /// Starts from the pose by features; without one, from the guess.
@@ -223,11 +228,7 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
     }
     out.matches = static_cast<int>(e->pixels);
     out.renders += e->renders;
-    out.answer = e->answer;
-    out.why = e->answer.why;
-    if (!e->answer.usable()) return;
-    out.measured = e->T_camera_body;
-    out.covariance = e->covariance;
+    take_answer(*e, e->T_camera_body, out);
 }
 
 void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
@@ -243,11 +244,7 @@ void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses
     }
     out.matches = static_cast<int>(e->pixels);
     out.renders = e->renders;
-    out.answer = e->answer;
-    out.why = e->answer.why;
-    if (!e->answer.usable()) return;
-    out.measured = e->T_camera_target;
-    out.covariance = e->covariance;
+    take_answer(*e, e->T_camera_target, out);
 }
 
 DenseOptions FrameTracker::dense_options(const ApparentMotion& motion) const {

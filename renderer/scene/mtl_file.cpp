@@ -82,8 +82,8 @@ private:
         return true;
     }
 
-    bool read_float(float& x) {
-        const std::string_view token = in_.token();
+    bool read_float(float& x) { return read_float(x, in_.token()); }
+    bool read_float(float& x, std::string_view token) {
         const std::optional<double> number = number_from(token);
         if (!number) return fail(token, fmt::format("\"{}\" is not a number", token));
         x = static_cast<float>(*number);
@@ -98,24 +98,16 @@ private:
                 fmt::format("{}: material \"{}\": {} colour passed over", path_, given_->name, first));
             return true;
         }
-        const std::optional<double> x = number_from(first);
-        if (!x) return fail(first, fmt::format("\"{}\" is not a number", first));
-        c.x = c.y = c.z = static_cast<float>(*x);
+        if (!read_float(c.x, first)) return false;
+        c.y = c.z = c.x;
         const std::string_view second = in_.token();
-        if (second.empty()) return true;
-        const std::optional<double> y = number_from(second);
-        if (!y) return fail(second, fmt::format("\"{}\" is not a number", second));
-        c.y = static_cast<float>(*y);
-        return read_float(c.z);
+        return second.empty() || (read_float(c.y, second) && read_float(c.z));
     }
 
     bool read_opacity(float& x) {
         std::string_view token = in_.token();
         if (token == "-halo") token = in_.token();
-        const std::optional<double> number = number_from(token);
-        if (!number) return fail(token, fmt::format("\"{}\" is not a number", token));
-        x = static_cast<float>(*number);
-        return true;
+        return read_float(x, token);
     }
 
     /// `map_Kd [-option arguments]... file name`; the name may hold spaces.

@@ -1,14 +1,12 @@
 // `narpa bench estimate --only pnp`: trials, tallies and verdict; no test depends on times.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "bench/pnp.h"
 #include "estimator/pose/pose_estimate.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/command.h"
 
 namespace narpa {
 namespace {
@@ -85,27 +83,17 @@ TEST(PnpBench, VerdictComparesErrorsFailuresAndTimes) {
     EXPECT_EQ(judge({cell}).cells_with_more_failures, 0);
 }
 
-struct PnpDone {
-    int status = 0;
-    nlohmann::json document;
-};
-
-PnpDone pnp_bench(const std::string& arguments) {
-    const test::TemporaryFolder folder;
-    const std::string out = folder / "out.json";
-    const std::string command = std::string("timeout 60 ") + NARPA_BIN +
-                                " bench estimate --only pnp --nominal-only " + arguments + " --json > " + out +
-                                " 2> /dev/null";
-    const int status = std::system(command.c_str());
-    std::ifstream file(out);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, nlohmann::json::parse(file, nullptr, false)};
+test::Done pnp_bench(const std::string& arguments) {
+    return test::run_command("timeout 60 " NARPA_BIN " bench estimate --only pnp --nominal-only " + arguments +
+                             " --json 2> /dev/null");
 }
 
 TEST(PnpBench, RunsFromTheCommandLine) {
-    const PnpDone done = pnp_bench("--trials 5 --points 6 --noise-px 0.5 --ranges 10,30");
-    ASSERT_TRUE(done.document.is_object());
-    EXPECT_EQ(done.document["pnp"]["cells"].size(), 2u);
-    EXPECT_EQ(done.status, done.document["passed"].get<bool>() ? 0 : 1);
+    const test::Done done = pnp_bench("--trials 5 --points 6 --noise-px 0.5 --ranges 10,30");
+    const auto document = nlohmann::json::parse(done.out, nullptr, false);
+    ASSERT_TRUE(document.is_object());
+    EXPECT_EQ(document["pnp"]["cells"].size(), 2u);
+    EXPECT_EQ(done.status, document["passed"].get<bool>() ? 0 : 1);
 }
 
 TEST(PnpBench, RefusesSettingsWithoutTrials) {

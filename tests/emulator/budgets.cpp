@@ -60,15 +60,7 @@ protected:
             with_render(small_scene("rate_hz = 10\nembedded_line = true\n" + camera_keys), render_keys),
             "[160, 48]");
     }
-    std::unique_ptr<Emulator> run(const std::string& text, const RunOptions& o) {
-        auto emulator = Emulator::create(scene(text), o);
-        EXPECT_TRUE(emulator) << emulator.error().text();
-        if (!emulator) return nullptr;
-        StopFlag stop{false};
-        const Status status = (*emulator)->run(stop);
-        EXPECT_TRUE(status) << status.error().text();
-        return *std::move(emulator);
-    }
+    std::unique_ptr<Emulator> run(const std::string& text, const RunOptions& o) { return ran(scene(text), o); }
     RunOptions lockstep(const std::string& bus, int threads) {
         RunOptions o;
         o.bus = bus;
@@ -109,11 +101,11 @@ TEST_P(SameBytes, InTwentyRunsOnOneToFourThreadsUnderLoadOrNot) {
     for (int i = 0; i < 20; ++i) {
         const Load load(i % 3 == 2);
         ASSERT_TRUE(run(text, lockstep(bus, 1 + i % 4)));
-        const std::string again = slurp(folder_ / "nav.y4m");
-        if (i == 0) video = again, ledger = slurp(folder_ / "log/nav.ledger.csv");
+        const std::string again = read_text(folder_ / "nav.y4m");
+        if (i == 0) video = again, ledger = read_text(folder_ / "log/nav.ledger.csv");
         ASSERT_GT(again.size(), 5 * kPixels);
         ASSERT_TRUE(again == video) << "run " << i;
-        ASSERT_EQ(slurp(folder_ / "log/nav.ledger.csv"), ledger) << "run " << i;
+        ASSERT_EQ(read_text(folder_ / "log/nav.ledger.csv"), ledger) << "run " << i;
     }
 }
 
@@ -156,7 +148,7 @@ TEST_F(Budgets, OfRaysAreKeptAndReportedAlikeInLogOnBusAndInImage) {
     loop.join();
 
     const std::vector<Row> rows = read_rows(folder_ / "log/nav.ledger.csv");
-    const std::string video = slurp(folder_ / "nav.y4m");
+    const std::string video = read_text(folder_ / "nav.y4m");
     ASSERT_EQ(rows.size(), 8U);
     ASSERT_EQ(on_bus.size(), 8U);
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -257,7 +249,7 @@ TEST_P(BudgetOfTime, IsADeadlineThatEachWholeFrameMeetsOrIsCountedToMiss) {
     }
     EXPECT_EQ(c.deadline_missed, missed);
     EXPECT_EQ(c.handed_over, handed_over);
-    const std::string video = slurp(folder_ / "nav.y4m");
+    const std::string video = read_text(folder_ / "nav.y4m");
     EXPECT_EQ(video.size() - video.find('\n') - 1, handed_over * (kPixels + 6));
 }
 

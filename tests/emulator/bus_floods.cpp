@@ -257,15 +257,13 @@ TEST_F(BusFlood, ALockstepRunMakesNoFramesForARefusedCommandAndReportsIt) {
     o.lockstep = true;
     o.video = {{"nav", "none"}};
     o.on_refusal = [&](const std::string& what) { refusals.push_back(what); };
-    auto emulator = Emulator::create(scene(small_scene()), o);
-    ASSERT_TRUE(emulator) << emulator.error().text();
-    StopFlag stop{false};
-    ASSERT_TRUE((*emulator)->run(stop));
-    EXPECT_EQ(camera_of(**emulator).stats().frames, 4U);
+    const auto emulator = ran(scene(small_scene()), o);
+    ASSERT_TRUE(emulator);
+    EXPECT_EQ(camera_of(*emulator).stats().frames, 4U);
     const std::string expected =
         "pose commands refused because they are for more than 60 s ahead (command_ahead_max_s in [render]): 1";
     EXPECT_EQ(refusals, std::vector{expected});
-    EXPECT_EQ((*emulator)->notices(), std::vector{expected});
+    EXPECT_EQ(emulator->notices(), std::vector{expected});
 }
 
 }  // namespace

@@ -57,14 +57,9 @@ protected:
         o.lockstep = true;
         o.log_folder = folder_ / "run";
         for (const std::string& camera : cameras) o.video.emplace_back(camera, folder_ / (camera + ".y4m").c_str());
-        auto emulator = Emulator::create(scene(scene_text), o);
-        if (!emulator) {
-            ADD_FAILURE() << emulator.error().text();
-            return {};
-        }
-        const Status status = (*emulator)->run(StopFlag{false});
-        EXPECT_TRUE(status) << status.error().text();
-        for (const CameraSensor* camera : (*emulator)->sensors_of<CameraSensor>())
+        const auto emulator = ran(scene(scene_text), o);
+        if (!emulator) return {};
+        for (const CameraSensor* camera : emulator->sensors_of<CameraSensor>())
             counters_.push_back(camera->control()->counters());
         return read_traffic();
     }
@@ -207,7 +202,7 @@ TEST_F(CameraControlTest, ReplayRefusesARegionOutsideTheImage) {
     for (int k = 0; k <= 3; ++k) pose(k);
     (void)run(small_scene(operated()));
     const std::string ledger = folder_ / "run/nav.ledger.csv";
-    std::string text = slurp(ledger);
+    std::string text = read_text(ledger);
     text.replace(text.find(",64,48,"), 7, ",65,48,");
     std::ofstream(ledger) << text;
     const auto replay = Replay::open(folder_ / "run", "nav", "");
@@ -299,7 +294,7 @@ TEST_F(CameraControlTest, AutoExposureReachesItsLevel) {
     const Traffic dark = run(small_scene(operated("control = {auto_exposure = true, auto_exposure_level = 0.2}")));
     ASSERT_GT(dark.states.size(), 40U);
     EXPECT_NE(dark.states.front().settings.exposure_ns, dark.states.back().settings.exposure_ns);
-    const std::string video = slurp(folder_ / "nav.y4m");
+    const std::string video = read_text(folder_ / "nav.y4m");
     const std::size_t size = 64 * 48;
     const std::span last(reinterpret_cast<const std::uint8_t*>(video.data()) + video.size() - size, size);
     EXPECT_NEAR(mean_level({64, 48, PixelFormat::grey}, {0, 0, 64, 48}, last), 0.2, 0.01);

@@ -64,15 +64,7 @@ protected:
         o.video = {{"nav", "none"}};
         o.estimate = TrackerOptions{};
         o.estimate->start_deg = o.estimate->start_percent = 3;
-        auto emulator = Emulator::create(docking(), o);
-        if (!emulator) {
-            ADD_FAILURE() << emulator.error().text();
-            return nullptr;
-        }
-        StopFlag stop{false};
-        const Status status = (*emulator)->run(stop);
-        EXPECT_TRUE(status) << status.error().text();
-        return *std::move(emulator);
+        return ran(docking(), o);
     }
 };
 

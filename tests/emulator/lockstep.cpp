@@ -21,20 +21,14 @@ protected:
         o.log_folder = out;
         o.video = {{"nav", out + ".y4m"}};
         o.lidar = {{"top", out + ".pcap"}};
-        auto emulator = Emulator::create(scene(scene_text), o);
-        if (!emulator) {
-            ADD_FAILURE() << emulator.error().text();
-            return {};
-        }
-        StopFlag stop{false};
-        const Status status = (*emulator)->run(stop);
-        EXPECT_TRUE(status) << status.error().text();
-        if (counters) *counters = (*emulator)->can()->counters();
-        frames_ = camera_of(**emulator).stats().frames;
-        packets_ = lidar_of(**emulator).stats().packets;
-        emulator->reset();
-        return {slurp(out + ".y4m"), slurp(out + ".pcap"), slurp(out + "/nav.truth.csv"),
-                slurp(out + "/nav.ledger.csv")};
+        auto emulator = ran(scene(scene_text), o);
+        if (!emulator) return {};
+        if (counters) *counters = emulator->can()->counters();
+        frames_ = camera_of(*emulator).stats().frames;
+        packets_ = lidar_of(*emulator).stats().packets;
+        emulator.reset();
+        return {read_text(out + ".y4m"), read_text(out + ".pcap"), read_text(out + "/nav.truth.csv"),
+                read_text(out + "/nav.ledger.csv")};
     }
     std::uint64_t frames_ = 0, packets_ = 0;
 };
@@ -119,12 +113,10 @@ TEST_F(Lockstep, EndsBeforeTheFrameAtItsDuration) {
     o.lockstep = true;
     o.duration_s = 1;
     o.video = {{"nav", "none"}};
-    auto emulator = Emulator::create(scene(small_scene()), o);
+    const auto emulator = ran(scene(small_scene()), o);
     ASSERT_TRUE(emulator);
-    StopFlag stop{false};
-    ASSERT_TRUE((*emulator)->run(stop));
-    EXPECT_EQ(camera_of(**emulator).stats().frames, 10U);
-    EXPECT_EQ((*emulator)->t_ns(), 1'000'000'000);
+    EXPECT_EQ(camera_of(*emulator).stats().frames, 10U);
+    EXPECT_EQ(emulator->t_ns(), 1'000'000'000);
 }
 
 TEST_F(Lockstep, TakesNoBudgetInWallTime) {

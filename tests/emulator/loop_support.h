@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "emulator/lidar_sensor.h"
 #include "protocols/can/messages.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::test {
@@ -82,6 +82,19 @@ protected:
         return *std::move(read);
     }
 
+    /// After its run; null where it cannot be made.
+    static std::unique_ptr<Emulator> ran(Scene scene, const RunOptions& o) {
+        auto emulator = Emulator::create(std::move(scene), o);
+        if (!emulator) {
+            ADD_FAILURE() << emulator.error().text();
+            return nullptr;
+        }
+        const StopFlag stop{false};
+        const Status status = (*emulator)->run(stop);
+        EXPECT_TRUE(status) << status.error().text();
+        return *std::move(emulator);
+    }
+
     /// The chaser closes in and turns slowly: pose k is for time k * 100 ms.
     static PoseCommand command(int k) {
         const double t = 0.1 * k;
@@ -103,11 +116,6 @@ protected:
             EXPECT_TRUE((*bus)->send(frame));
         }
         return spec;
-    }
-
-    static std::string slurp(const std::string& path) {
-        std::ifstream in(path, std::ios::binary);
-        return {std::istreambuf_iterator<char>(in), {}};
     }
 
     TemporaryFolder folder_;

@@ -28,14 +28,7 @@ protected:
         o.bus = record(commands);
         o.lockstep = lockstep;
         o.video = {{"nav", "none"}};
-        auto emulator = Emulator::create(scene(scene_text), o);
-        if (!emulator) {
-            ADD_FAILURE() << emulator.error().text();
-            return nullptr;
-        }
-        StopFlag stop{false};
-        EXPECT_TRUE((*emulator)->run(stop));
-        return *std::move(emulator);
+        return ran(scene(scene_text), o);
     }
 };
 

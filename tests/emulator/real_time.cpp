@@ -197,7 +197,7 @@ TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
     while (emulator->t_ns() < 250'000'000) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     stop_ = true;
     loop.join();
-    const std::string video = slurp(folder_ / "a.y4m");
+    const std::string video = read_text(folder_ / "a.y4m");
     const VideoCounters sent = camera_of(*emulator).sinks().front()->counters();
     EXPECT_GE(sent.written, 1U);
     EXPECT_EQ(sent.written + sent.ring_full + sent.failed, camera_of(*emulator).stats().handed_over);

@@ -46,14 +46,7 @@ protected:
         o.duration_s = lockstep ? 0 : 0.1 * commands;
         o.log_folder = log;
         o.video = {{"nav", "none"}};
-        auto emulator = Emulator::create(scene(text), o);
-        if (!emulator) {
-            ADD_FAILURE() << emulator.error().text();
-            return log;
-        }
-        StopFlag stop{false};
-        const Status status = (*emulator)->run(stop);
-        EXPECT_TRUE(status) << status.error().text();
+        ran(scene(text), o);
         return log;
     }
 
@@ -82,7 +75,7 @@ protected:
 
     /// Writes the file anew with the first `from` replaced.
     static void tamper(const std::string& file, const std::string& from, const std::string& to) {
-        std::string text = slurp(file);
+        std::string text = read_text(file);
         ASSERT_NE(text.find(from), std::string::npos) << file;
         text.replace(text.find(from), from.size(), to);
         std::ofstream(file) << text;
@@ -90,7 +83,7 @@ protected:
     /// Gives a row of the ledger another value.
     static void set_cell(const std::string& log, std::size_t row, std::string_view column,
                          const std::string& value) {
-        std::string text = slurp(log + "/nav.ledger.csv");
+        std::string text = read_text(log + "/nav.ledger.csv");
         std::size_t index = 0;
         for (std::size_t at = 0; ledger_header().substr(at, column.size()) != column; ++index)
             at = ledger_header().find(',', at) + 1;
@@ -182,12 +175,8 @@ TEST_F(ReplayTest, TheLogsChecksumIsOfTheBytesAsHandedOver) {
     o.lockstep = true;
     o.log_folder = folder_ / "log";
     o.video = {{"nav", folder_ / "a.y4m"}};
-    auto emulator = Emulator::create(scene(scene_with("spp = 1", kDetector)), o);
-    ASSERT_TRUE(emulator);
-    StopFlag stop{false};
-    ASSERT_TRUE((*emulator)->run(stop));
-    emulator->reset();
-    const std::string video = slurp(folder_ / "a.y4m");
+    ASSERT_TRUE(ran(scene(scene_with("spp = 1", kDetector)), o));
+    const std::string video = read_text(folder_ / "a.y4m");
     const auto frames = read_ledger_log(o.log_folder + "/nav.ledger.csv");
     ASSERT_TRUE(frames);
     ASSERT_EQ(frames->size(), 2U);
@@ -249,7 +238,7 @@ TEST_F(ReplayTest, FindsARowThatIsNotAsTheFrameWas) {
         {"t_exposure_mid_ns", "200000000", "image_crc32: "},
         {"frame", "9", "image_crc32: "},
     };
-    const std::string good = slurp(log + "/nav.ledger.csv");
+    const std::string good = read_text(log + "/nav.ledger.csv");
     for (const auto& forgery : forgeries) {
         SCOPED_TRACE(forgery.column);
         std::ofstream(log + "/nav.ledger.csv") << good;
@@ -278,7 +267,8 @@ TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     const std::string log = run(scene_with("budget_rays = 20000"), 3);
     const std::string ledger = log + "/nav.ledger.csv", truth = log + "/nav.truth.csv",
                       record_file = log + "/run.json";
-    const std::string good_ledger = slurp(ledger), good_truth = slurp(truth), good_record = slurp(record_file);
+    const std::string good_ledger = read_text(ledger), good_truth = read_text(truth),
+                      good_record = read_text(record_file);
 
     const auto bad_cell = [&](std::string_view column, const std::string& value, const std::string& words) {
         std::ofstream(ledger) << good_ledger;

@@ -15,6 +15,7 @@
 
 #include "base/pose.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/read_file.h"
 
 namespace narpa {
 namespace {
@@ -22,11 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kDockingScene = fs::path(NARPA_BUILD_DIR) / "scenes" / "docking";
-
-std::string bytes_of(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// An OBJ file as written: corners by number of position, so that what meets in space meets here.
 struct ObjMesh {
@@ -167,9 +163,9 @@ TEST(DockingScene, GeneratorWritesTheSameBytesAgain) {
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
     int compared = 0;
     for (const auto& entry : fs::directory_iterator(again)) {
-        const std::string first = bytes_of(kDockingScene / entry.path().filename());
+        const std::string first = test::read_text(kDockingScene / entry.path().filename());
         EXPECT_FALSE(first.empty()) << entry.path();
-        EXPECT_TRUE(first == bytes_of(entry.path())) << entry.path();
+        EXPECT_TRUE(first == test::read_text(entry.path())) << entry.path();
         ++compared;
     }
     EXPECT_EQ(compared, 10);

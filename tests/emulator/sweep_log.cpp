@@ -24,12 +24,9 @@ protected:
         o.lidar = {{"top", o.log_folder + ".pcap"}};
         std::string text = small_scene();
         text.replace(text.find("rate_hz = 10\n[render]"), 12, "rate_hz = 10\n" + lidar_keys);
-        auto emulator = Emulator::create(scene(text), o);
-        ASSERT_TRUE(emulator) << emulator.error().text();
-        const StopFlag stop{false};
-        const Status status = (*emulator)->run(stop);
-        ASSERT_TRUE(status) << status.error().text();
-        packets_ = lidar_of(**emulator).stats().packets;
+        const auto emulator = ran(scene(text), o);
+        ASSERT_TRUE(emulator);
+        packets_ = lidar_of(*emulator).stats().packets;
     }
     static std::int64_t whole(const std::map<std::string, std::string>& row, const char* column) {
         return std::stoll(row.at(column));
@@ -73,8 +70,8 @@ TEST_F(SweepLogs, AreTheSameOnAnyNumberOfThreads) {
     run("one", 1, true);
     run("many", 5, true);
     for (const char* file : {"/top.sweeps.csv", "/top.shots.csv"}) {
-        EXPECT_GT(slurp((folder_ / "one") + file).size(), 1000U);
-        EXPECT_EQ(slurp((folder_ / "one") + file), slurp((folder_ / "many") + file)) << file;
+        EXPECT_GT(read_text((folder_ / "one") + file).size(), 1000U);
+        EXPECT_EQ(read_text((folder_ / "one") + file), read_text((folder_ / "many") + file)) << file;
     }
 }
 

@@ -4,20 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <sstream>
 
+#include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::rehearsal {
 namespace {
 
 const std::string kScenarios = NARPA_BUILD_DIR "/scenes/rehearsal/";
-
-std::string text_of(const std::string& path) {
-    std::ostringstream out;
-    out << std::ifstream(path).rdbuf();
-    return out.str();
-}
 
 TEST(Orbit, LvlhRotatesAboutTheMomentum) {
     const Orbit orbit;
@@ -101,7 +95,7 @@ TEST(Scenario, InheritsMissingKeys) {
 
 TEST(Scenario, ErrorsNameTheFileThatHasThem) {
     const test::TemporaryFolder folder;
-    std::ofstream(folder / "base.toml") << text_of(kScenarios + "docking.toml") << "\nsurprise = 1\n";
+    std::ofstream(folder / "base.toml") << test::read_text(kScenarios + "docking.toml") << "\nsurprise = 1\n";
     std::ofstream(folder / "over.toml")
         << "[scenario]\nbased_on = \"base.toml\"\nname = \"over\"\nscene = \"" << kScenarios << "scene.toml\"\n";
     const auto s = read_scenario(folder / "over.toml");
@@ -134,7 +128,7 @@ class BadScenario : public testing::TestWithParam<Bad> {};
 
 TEST_P(BadScenario, IsNamedWithItsPlace) {
     const Bad& bad = GetParam();
-    std::string text = text_of(kScenarios + "docking.toml");
+    std::string text = test::read_text(kScenarios + "docking.toml");
     const std::size_t at = text.find(bad.from);
     ASSERT_NE(at, std::string::npos) << bad.from;
     text.replace(at, bad.from.size(), bad.to);

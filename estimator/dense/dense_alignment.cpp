@@ -21,7 +21,7 @@ constexpr double kAgree = 25;
 /// The coarsest level shows the target no smaller than this.
 constexpr double kLeastExtent_px = 16;
 
-/// Where the weakest motion's standard deviation is larger than this part of the largest that counts as observed,
+/// Where a motion's standard deviation is larger than this part of the largest that counts as observed,
 /// the image may not be linear over it. The loss rises by at least this part of what a linear image's would, at so
 /// many standard deviations.
 constexpr double kSurelyLinear = 0.2, kRise_sigmas = 4, kLeastRise = 0.5;
@@ -36,16 +36,18 @@ void keep_better(DenseEstimate& answer, DenseEstimate& other) {
     if (other.excess_loss < answer.excess_loss) std::swap(answer, other);
 }
 
-/// One standard deviation of the motion that the image holds least.
-Vector6 weakest_motion(const DenseEstimate& e) {
+/// One standard deviation of each of the two motions that the image holds least, if it is that weak.
+std::vector<Vector6> weak_motions(const DenseEstimate& e) {
+    constexpr int kMost = 2;
     const Observability o = observability_of(e.covariance, norm(e.T_camera_body.t));
-    return o.motions.col(0) / std::sqrt(o.eigenvalues[0]);
-}
-
-bool is_weak(const DenseEstimate& e) {
-    const Vector6 motion = weakest_motion(e);
-    return std::max(motion.head<3>().norm() / kMostRotation_rad,
-                    motion.tail<3>().norm() / (kMostTranslation * norm(e.T_camera_body.t))) > kSurelyLinear;
+    std::vector<Vector6> out;
+    for (int i = 0; i < kMost; ++i) {
+        const Vector6 motion = o.motions.col(i) / std::sqrt(o.eigenvalues[i]);
+        if (std::max(motion.head<3>().norm() / kMostRotation_rad,
+                     motion.tail<3>().norm() / (kMostTranslation * norm(e.T_camera_body.t))) > kSurelyLinear)
+            out.push_back(motion);
+    }
+    return out;
 }
 
 /// Turns a plane with this normal about its intersection with the image's so that it is tilted to the other side of
@@ -143,7 +145,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
     Fit fit;
     if (e.status == DenseStatus::converged && options.rivals > 0)
         compete(frame, at, T_camera_body_guess, options, frame_variance, e, fit);
-    if (e.status == DenseStatus::converged && options.rivals > 0 && fit.failed.empty() && is_weak(e))
+    if (e.status == DenseStatus::converged && options.rivals > 0 && fit.failed.empty() && !weak_motions(e).empty())
         examine(frame, at, options, frame_variance, e, fit);
     if (e.status == DenseStatus::converged) {
         observe(e.T_camera_body, e.covariance, fit);
@@ -261,8 +263,10 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
         const auto window = window_about(render_scene_.tracer(), camera, target_, e.T_camera_body);
         return level(options.finest, camera, *window, at, options, frame, frame_variance);
     };
-    const Vector6 aside = kAside_sigmas * weakest_motion(e);
-    std::vector<Rigid3> starts{displaced(e.T_camera_body, aside), displaced(e.T_camera_body, -aside)};
+    std::vector<Rigid3> starts;
+    for (const Vector6& motion : weak_motions(e))
+        for (const double sigmas : {kAside_sigmas, -kAside_sigmas})
+            starts.push_back(displaced(e.T_camera_body, sigmas * motion));
     LevelView& view = view_of_answer();
     LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).examine();
     if (const auto face = view.flat_face())

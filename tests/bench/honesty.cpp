@@ -20,13 +20,15 @@ std::vector<HonestyRow> run(const HonestyOptions& o, int first) {
 /// Trials whose good answers were beyond 6 sigma: valleys in which steps ended early, frames blurred by what the
 /// model does not know, and another target; from 10000 on other minima along a weak motion, and images that are not
 /// linear over its standard deviation; from 100000 on a false minimum to which coarse levels led both starts, and
-/// Jacobians that said too much of weak motions; from 140000 on a weak motion beside which no descent converged.
+/// Jacobians that said too much of weak motions; from 140000 on a weak motion beside which no descent converged,
+/// and another minimum along the second weakest motion.
 TEST(Honesty, DenseTrialsThatLied) {
     HonestyOptions o;
     o.methods = {"dense"};
     o.trials = 1;
-    for (const int trial : {25,    32,    55,    146,   4,     38,     10,     11704,  10799,  11543,  10026, 10139,
-                            10296, 10653, 11764, 11229, 10001, 100022, 100450, 101152, 105170, 105816, 140667})
+    for (const int trial :
+         {25,    32,    55,    146,   4,     38,     10,     11704,  10799,  11543,  10026,  10139,
+          10296, 10653, 11764, 11229, 10001, 100022, 100450, 101152, 105170, 105816, 140667, 150014})
         for (const HonestyRow& row : run(o, trial))
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
@@ -50,8 +52,8 @@ TEST(Honesty, FeatureTrialsThatLied) {
     o.methods = {"features"};
     o.trials = 1;
     o.size = 240;
-    for (const int trial : {20467, 20191, 20769, 21232, 20275, 20277, 20292, 20829, 21163, 20132, 20757, 21300,
-                            20691, 21083, 30272, 30583, 31595, 40416, 41019, 63168})
+    for (const int trial : {20467, 20191, 20769, 21232, 20275, 20277, 20292, 20829, 21163, 20132,
+                            20757, 21300, 20691, 21083, 30272, 30583, 31595, 40416, 41019, 63168})
         for (const HonestyRow& row : run(o, trial))
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }

@@ -17,9 +17,8 @@ constexpr double kNoFit = 4;
 constexpr double kPriorHolds = 4, kLeastOff = 1e-3;
 /// Or a loss of so much beyond that of noise: station and cube in clean and in saturated frames have up to 8.
 constexpr double kMostMisfit = 10;
-/// So many motions, those that are held least, are rendered so far to both sides: by so many standard deviations,
-/// but not many times the limit of observed motions, and at least by so many pixels.
-constexpr int kRenderedMotions = 3;
+/// The weakest motions are rendered so far to both sides: by so many standard deviations, but not many times the
+/// limit of observed motions, and at least by so many pixels.
 constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
 
 }  // namespace
@@ -55,22 +54,16 @@ void LevelSolver::finish() {
             widened(of_noise, response_to_motions(last)) + e_.covariance_of_model + to_go * to_go.transpose();
 }
 
-/// The motions that are held least are those in which the changes of the pixels cancel, so that errors of the
-/// Jacobian matter there. They are rendered to both sides, with equal samples; the others count as shown as they
-/// are.
+/// Rendered to both sides, with equal samples.
 Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     const std::vector<float> signal(view_.images().signal.begin(), view_.images().signal.end()),
         variance(view_.images().signal_variance.begin(), view_.images().signal_variance.end());
     PhotometricImages here = view_.images();
     here.signal = signal, here.signal_variance = variance;
     const Observability o = observability_of(last.pose_covariance(), norm(e_.T_camera_body.t));
-    const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();  // one sigma of each
-    const Matrix6 in_sigmas = inverse(motions);
-    Matrix6 shown = Matrix6::Identity();
     settings_.spp = std::max(2, o_.samples_per_pixel);
     std::vector<float> change(signal.size());
-    for (int i = 0; i < kRenderedMotions; ++i) {
-        const Vector6 motion = motions.col(i);
+    return response_to_weakest(o, [&](int i, const Vector6& motion) {
         const double within_limits = kRendered_limits * std::sqrt(o.eigenvalues[i]);
         const double sigmas =
             std::max(std::min(kRendered_sigmas, within_limits), kRendered_px / distance_px(motion));
@@ -80,10 +73,8 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
         e_.renders += 2;
         for (std::size_t p = 0; p < change.size(); ++p)
             change[p] = (change[p] - view_.images().signal[p]) / static_cast<float>(2 * sigmas);
-        const Vector6 step = last.pose_step(response(here, e_.exposure, robust_, change));
-        shown += (step - motion) * in_sigmas.row(i);
-    }
-    return shown;
+        return last.pose_step(response(here, e_.exposure, robust_, change));
+    });
 }
 
 double LevelSolver::rise(double sigmas) {

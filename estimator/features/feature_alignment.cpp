@@ -218,8 +218,6 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     else if (e.floor_px > settings_.floor_most_px)
         fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
                                  settings_.floor_most_px);
-    else if (e.agreeing < settings_.fewest_agreeing)
-        fit.failed = fmt::format("{} matches agree, expected at least {}", e.agreeing, settings_.fewest_agreeing);
     else
         compare_with_mirrored(frame, at, guess, motion, e, fit);
     e.covariance_of_model = covariance_by(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal));

@@ -26,9 +26,6 @@ struct FeatureSettings {
     int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
     double floor_most_px = 1;  ///< refused where matches scatter by more: the model is not what the frame shows
-    /// Refused where fewer matches agree: their scatter does not show when some of them slid together. Of such
-    /// answers 5 of 123 were beyond 6 sigma, of 261 others none. kFewestMatches: where a filter tests each pose.
-    int fewest_agreeing = 15;
     ModelUncertainty model{};  ///< of it the light and the albedo are not used: matches that they move scatter
 };
 

@@ -17,7 +17,6 @@ FeatureSettings feature_settings(std::uint64_t seed, const ModelUncertainty& mod
     f.model = model;
     f.seed = seed;
     f.renders_max = 4;
-    f.fewest_agreeing = kFewestMatches;
     f.settled_px = 0.1;  // the filter's prediction is usually so near that one render is enough
     return f;
 }

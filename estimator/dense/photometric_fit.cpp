@@ -307,12 +307,10 @@ double blur_score(const PhotometricImages& images, const Exposure& exposure, con
         }
     };
     const Residuals residuals(images, exposure, 0);
-    // How a blur changes a pixel: as its variance times half the Laplacian.
-    const auto has_term = [&](std::size_t p) {
-        return images.chosen.empty() || images.chosen[p] != 0 || images.signal[p] == 0;
-    };
+    // How a blur changes a pixel: as its variance times half the Laplacian. Noise of the pixel's own samples is in
+    // both that and its residual: it must be small.
     const auto by_blur = [&](const Residual& r, std::size_t p) {
-        if (!has_term(p)) return 0.0;
+        if (!images.chosen.empty() && images.chosen[p] == 0 && images.signal[p] != 0) return 0.0;
         const auto& S = images.signal;
         const auto width = static_cast<std::size_t>(images.width);
         const auto around = static_cast<double>(S[p - 1] + S[p + 1] + S[p - width] + S[p + width]);
@@ -324,17 +322,9 @@ double blur_score(const PhotometricImages& images, const Exposure& exposure, con
                                });
                            }).shared;
     const Vector8 taken = fit.information.inverse() * shared;  // by pose and exposure
-    // The render's noise in a pixel is in its residual and, fourfold, in its Laplacian: what it makes on average.
-    const auto of_render = [&](const Residual& r, std::size_t p) {
-        const double s = 2 * exposure.gain * r.inverse_s;
-        return images.signal_variance.empty() || !has_term(p)
-                   ? 0.0
-                   : s * s * static_cast<double>(images.signal_variance[p]);
-    };
     const Sum sum = sum_rows<Sum>(images, [&](int y, Sum& row) {
         residuals.each(y, [&](const Residual& r, std::size_t p) {
-            const double term =
-                (by_blur(r, p) - r.inverse_s * design(images, exposure, p).dot(taken)) * r.r - of_render(r, p);
+            const double term = (by_blur(r, p) - r.inverse_s * design(images, exposure, p).dot(taken)) * r.r;
             row.score += term;
             row.variance += term * term;
         });

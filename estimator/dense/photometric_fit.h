@@ -113,8 +113,8 @@ struct PhotometricEquations {
 /// By how many standard deviations the residuals show a blur that the prediction does not have (negative: one that
 /// it has too much of): the score of the blur's variance at zero (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948),
 /// with pose, gain and offset unknown. Its own variance is the sum of its squared terms, so that noise of another
-/// size than expected changes nothing; what the render's noise adds to both residual and Laplacian is subtracted.
-/// `fit`: the equations there, of least squares at the noise (Robustness{1, inf, 0}).
+/// size than expected changes nothing. `fit`: the equations there, of least squares at the noise (Robustness{1,
+/// inf, 0}).
 [[nodiscard]] double blur_score(const PhotometricImages& images, const Exposure& exposure,
                                 const PhotometricEquations& fit);
 /// The gradient that a change of the predicted signal, DN, of each pixel would make, were it the measured image's.

@@ -19,7 +19,7 @@ constexpr double kAll = std::numeric_limits<double>::infinity();
 /// A bright disc before the dark, whose edge is `blur_px` wide, and how it changes with six motions of a plane.
 struct Disc {
     SensorModel sensor{.top_dn = 4095, .read_dn2 = 25};
-    std::vector<float> signal, measured, signal_variance;
+    std::vector<float> signal, measured;
     std::vector<PixelDerivative> derivative;
 
     static double light(double x, double y, double blur_px) {
@@ -46,19 +46,17 @@ struct Disc {
                 .measured = measured,
                 .measured_variance = {},
                 .signal = signal,
-                .signal_variance = signal_variance,
+                .signal_variance = {},
                 .derivative = derivative};
     }
-    /// Of a frame with this blur, after a fit with a render of so much noise, DN.
-    double score(double blur_px, std::mt19937_64& random, double render_noise = 0) {
+    /// Of a frame with this blur, after a fit.
+    double score(double blur_px, std::mt19937_64& random) {
         std::normal_distribution<double> normal(0, 5);
         measured.clear();
         for (int y = 0; y < kSide; ++y)
             for (int x = 0; x < kSide; ++x)
                 measured.push_back(static_cast<float>(light(x, y, blur_px) + normal(random)));
         const std::vector<float> unmoved = signal;
-        for (float& v : signal) v += static_cast<float>(render_noise * normal(random) / 5);
-        signal_variance.assign(signal.size(), static_cast<float>(render_noise * render_noise));
         const PhotometricEquations first = equations(images(), {}, {1, kAll, 0});
         const Eigen::Matrix<double, 8, 1> step = first.information.inverse() * first.gradient;
         for (std::size_t p = 0; p < signal.size(); ++p)
@@ -116,16 +114,6 @@ TEST(BlurScore, OfNoiseIsAStandardNormalNumber) {
     }
     EXPECT_NEAR(sum / kFrames, 0, 0.2);
     EXPECT_NEAR(squares / kFrames, 1, 0.25);
-}
-
-/// The render's noise is in a pixel's residual and in its Laplacian: not a blur.
-TEST(BlurScore, OfARenderWithNoiseTooHasNoBias) {
-    Disc disc;
-    std::mt19937_64 random(7);
-    constexpr int kFrames = 100;
-    double sum = 0;
-    for (int i = 0; i < kFrames; ++i) sum += disc.score(0.4, random, 3);
-    EXPECT_NEAR(sum / kFrames, 0, 0.4);
 }
 
 TEST(BlurScore, ShowsABlurThatTheModelDoesNotHave) {

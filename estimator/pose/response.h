@@ -20,8 +20,8 @@ inline constexpr double kLeastShown = 1e-4;
 /// errors of the Jacobian matter. The others count as shown as they are.
 inline constexpr int kMeasuredMotions = 3;
 
-/// R. `o`: of the covariance C (observability_of). `shown(i, motion)`: what a change of the pose by the i-th of
-/// them, by one standard deviation, looks like, as an error (pose_estimate.h).
+/// R. `o`: of the covariance C (observability_of). `shown(i, motion)`: the change of the pose that the measurements
+/// show when the pose changes by `motion`, one standard deviation of the i-th of them.
 template <class Shown>
 [[nodiscard]] Matrix6 response_to_weakest(const Observability& o, Shown&& shown) {
     const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();

@@ -214,7 +214,7 @@ std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
     Vector6 left = way;
     const bool of_few_pixels = !view_.images().chosen.empty();
     for (int k = 0; k < kMeetingSteps; ++k) {
-        if (k > 0 && of_few_pixels) settings_.spp *= kOfChosen.first_samples;
+        if (k > 0) settings_.spp *= (of_few_pixels ? kOfChosen : kOfAll).first_samples;
         render(e_.T_camera_body);
         ++e_.renders;
         differentiate(kReach_px, std::max(1, o_.fineness / kCoarseFineness));

@@ -223,6 +223,7 @@ private:
         DenseOptions dense;
         dense.samples_per_pixel = 32, dense.fineness = 4;
         dense.model = o_.told;
+        dense.guess_error = {o_.start_deg * kDegree, 0.01 * o_.start_percent};
         dense.motion = moving;
         target.dense->set_detector(*camera.detector);
         const auto e = target.dense->align(*image, at, guess, dense, variance);

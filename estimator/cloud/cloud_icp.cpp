@@ -33,8 +33,6 @@ constexpr double kBetter = 0.5;
 constexpr double kBesideCircle = 0.15;
 /// Other surfaces are looked for so near to a beam, in standard deviations of the range.
 constexpr double kElsewhere_sigmas = 2;
-/// An answer further from the start, in parts of the search, was not looked for: a symmetry led there.
-constexpr double kSearched = 2.5;
 
 /// So many of n points would be found with a chance below 5 % if their share were `least` (Clopper and Pearson
 /// 1934): of few points nearly all must be.

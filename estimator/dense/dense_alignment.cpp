@@ -150,6 +150,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
     if (e.status == DenseStatus::converged) {
         observe(e.T_camera_body, e.covariance, fit);
         compare_with_guess(e.T_camera_body, T_camera_body_guess, fit);
+        fit.guess_error = options.guess_error;
         const bool known = !frame_variance.empty() && options.model == ModelUncertainty{};
         fit.residual = e.residual;
         fit.residual_most = known ? options.residual_most : options.residual_most_unknown;

@@ -28,15 +28,17 @@ Answer judge(Fit fit) {
     answer.root_information = fit.root_information;
     answer.rivals = std::move(fit.rivals);
     answer.why.clear();
+    const GuessError off = fit.observability.unobserved == 0 ? fit.guess_error : GuessError{};
+    const double most_turn = kSearched * off.rotation_rad, most_shift = kSearched * off.part_of_range * fit.range_m;
     if (!fit.failed.empty()) {
         answer.why = std::move(fit.failed);
     } else if (!(fit.residual <= fit.residual_most)) {
         answer.why = fmt::format("residuals are {:.3g} times what noise explains, expected at most {:.3g}",
                                  fit.residual, fit.residual_most);
     } else if (const double turn = fit.moved.head<3>().norm(), shift = fit.moved.tail<3>().norm();
-               turn > kMostTurn_rad || shift > kMostShift * fit.range_m) {
-        answer.why = fmt::format("{:.0f} deg and {:.3g} m from the guess, which cannot be so far off",
-                                 turn / kDegree, shift);
+               turn > most_turn || shift > most_shift) {
+        answer.why = fmt::format("{:.3g} deg and {:.3g} m from the guess, expected at most {:.3g} deg and {:.3g} m",
+                                 turn / kDegree, shift, most_turn / kDegree, most_shift);
     } else if (fit.observability.unobserved == 6 || !fit.root_information.allFinite()) {
         answer.why = "no motion of the target is observed";
     } else if (!answer.rivals.empty()) {

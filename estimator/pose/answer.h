@@ -29,13 +29,18 @@ inline constexpr double kElsewhere = 100;
 /// It cannot be excluded where its chi-square is at most so much above the answer's: four sigma.
 inline constexpr double kAsLikely = 16;
 
-/// An answer further from its guess was not looked for: a symmetry of the target led there, or nothing did. Shift
-/// is a part of the range.
-inline constexpr double kMostTurn_rad = 1, kMostShift = 0.5;
+/// How far a guess may be off, in attitude and as a part of the range.
+struct GuessError {
+    double rotation_rad = 0.4, part_of_range = 0.2;
+};
+/// An answer that is further from its guess than so many times that was not looked for: a symmetry of the target
+/// led there, or another target.
+inline constexpr double kSearched = 2.5;
 
 struct Fit {
     std::string failed;               ///< why there is no pose; empty: there is one
     Vector6 moved = Vector6::Zero();  ///< from the guess, if there was one
+    GuessError guess_error{};         ///< where a motion is not observed, the default's
     double range_m = 0;
     /// Size of the residuals over that which the stated noise explains, and the largest that is accepted.
     double residual = 0, residual_most = 1;

@@ -43,6 +43,15 @@ TEST(Answer, FarFromTheGuessIsRefused) {
     EXPECT_EQ(judge(fit).kind, AnswerKind::good);
     compare_with_guess({exp_rotation({0, 0, 1.5708}), {0, 0, 10}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused) << "by a quarter turn, a symmetry of a cube";
+    fit.guess_error = {0.1, 0.05};
+    compare_with_guess({exp_rotation({0, 0, 0.24}), {0, 0, 11.2}}, guess, fit);
+    EXPECT_EQ(judge(fit).kind, AnswerKind::good);
+    compare_with_guess({exp_rotation({0, 0, 0.26}), {0, 0, 11.2}}, guess, fit);
+    EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
+    compare_with_guess({exp_rotation({0, 0, 0.24}), {0, 0, 11.3}}, guess, fit);
+    EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
+    fit.observability.unobserved = 1;
+    EXPECT_EQ(judge(fit).kind, AnswerKind::unobservable) << "that motion may be off by anything";
     compare_with_guess({{}, {0, 0, 16}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
 }

@@ -206,7 +206,7 @@ void FeatureAlignment::compare_with_mirrored(const MeasuredImage& frame, const B
     const Vector6 apart = error_between(e.T_camera_target, other.T_camera_target);
     if (normalised_error_squared(apart, e.covariance + other.covariance) > kSameSquared)
         fit.rivals.push_back({other.T_camera_target, 0});
-    e.covariance += apart * apart.transpose();
+    e.covariance += 0.5 * apart * apart.transpose();
 }
 
 FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,

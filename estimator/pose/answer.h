@@ -40,7 +40,7 @@ inline constexpr double kSearched = 2.5;
 struct Fit {
     std::string failed;               ///< why there is no pose; empty: there is one
     Vector6 moved = Vector6::Zero();  ///< from the guess, if there was one
-    GuessError guess_error{};         ///< where a motion is not observed, the default's
+    GuessError guess_error{};         ///< counts where all motions are observed, else the default
     double range_m = 0;
     /// Size of the residuals over that which the stated noise explains, and the largest that is accepted.
     double residual = 0, residual_most = 1;

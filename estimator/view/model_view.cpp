@@ -8,6 +8,9 @@
 namespace narpa {
 namespace {
 
+/// In images of more pixels thousands hold the pose, and what this overstates beside edges looks like a blur.
+constexpr std::size_t kFewPixels = 20'000;
+
 /// No variance below that of half a sample of the contrast with the neighbours, those that are chosen.
 void allow_for_missed_light(const RadianceImage& image, int samples, std::span<const std::uint8_t> chosen,
                             std::vector<float>& variance) {
@@ -67,7 +70,8 @@ void ModelView::render_with_variance(const Rigid3& T_camera_target, const FrameS
                                      std::span<const std::uint8_t> chosen) {
     const CameraPose path = place(T_camera_target);
     renderer_.render(at_, path, settings, radiance_, aovs_.variance, chosen);
-    allow_for_missed_light(radiance_, settings.spp, chosen, aovs_.variance);
+    if (radiance_.pixels.size() <= kFewPixels)
+        allow_for_missed_light(radiance_, settings.spp, chosen, aovs_.variance);
 }
 
 Rigid3 ModelView::T_world_camera(double row) const noexcept {

@@ -258,6 +258,8 @@ void LevelSolver::shift() {
 
 void LevelSolver::render(const Rigid3& T) {
     view_.render(T, settings_);
+    // Of a large target thousands of pixels determine the pose, and overstated variances bias the score of a blur.
+    if (!coarse_ && pixels_of(view_.window()) < kManyPixels) view_.allow_for_missed_light(settings_.spp);
 }
 
 void LevelSolver::differentiate(double reach_px, int fineness) {

@@ -143,6 +143,20 @@ void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
     }
 }
 
+void LevelView::allow_for_missed_light(int samples) {
+    const auto width = static_cast<std::size_t>(window_.width);
+    for (int y = 1; y < window_.height - 1; ++y)
+        for (int x = 1; x < window_.width - 1; ++x) {
+            const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            float least = signal_[p], most = least;
+            for (const std::size_t middle : {p - width, p, p + width})
+                for (const std::size_t q : {middle - 1, middle, middle + 1})
+                    least = std::min(least, signal_[q]), most = std::max(most, signal_[q]);
+            const float half_a_sample = 0.5f * (most - least) / static_cast<float>(samples);
+            signal_variance_[p] = std::max(signal_variance_[p], half_a_sample * half_a_sample);
+        }
+}
+
 void LevelView::predict(const Vector6& step) {
     for (std::size_t i = 0; i < signal_.size(); ++i) signal_[i] += columns_[i].dot(step.cast<float>());
 }

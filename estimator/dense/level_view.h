@@ -42,6 +42,11 @@ public:
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);
+    /// After `render` of all pixels with so many samples each: makes no variance less than that of half a sample of
+    /// the contrast with the neighbours. The sample variance of a pixel with few bright samples is unreliable:
+    /// stratified samples measure the bright area to about half a sample, so that all may miss it. This overstates
+    /// the variance beside edges.
+    void allow_for_missed_light(int samples);
     /// Moves the latest render's signal by so small a step of the pose that the Jacobian tells its change.
     void predict(const Vector6& step);
     /// From now on `render` and `differentiate` work on these pixels alone, those that are not 0. The others keep

@@ -1,40 +1,6 @@
 #include "estimator/view/model_view.h"
 
-#include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <vector>
-
 namespace narpa {
-namespace {
-
-/// In images of more pixels thousands hold the pose, and what this overstates beside edges looks like a blur.
-constexpr std::size_t kFewPixels = 20'000;
-
-/// No variance below that of half a sample of the contrast with the neighbours, those that are chosen.
-void allow_for_missed_light(const RadianceImage& image, int samples, std::span<const std::uint8_t> chosen,
-                            std::vector<float>& variance) {
-    const auto width = static_cast<std::size_t>(image.width);
-    const float half_a_sample = 0.5f / static_cast<float>(samples);
-    const auto is_chosen = [&](std::size_t p) { return chosen.empty() || chosen[p] != 0; };
-    tbb::parallel_for(1, std::max(image.height - 1, 1), [&](int y) {
-        const std::size_t row = static_cast<std::size_t>(y) * width;
-        for (std::size_t p = row + 1; p + 1 < row + width; ++p) {
-            if (!is_chosen(p)) continue;
-            float least = mean_band(image.pixels[p]), most = least;
-            for (const std::size_t middle : {p - width, p, p + width})
-                for (const std::size_t q : {middle - 1, middle, middle + 1}) {
-                    if (!is_chosen(q)) continue;
-                    least = std::min(least, mean_band(image.pixels[q]));
-                    most = std::max(most, mean_band(image.pixels[q]));
-                }
-            const float missed = half_a_sample * (most - least);
-            variance[p] = std::max(variance[p], missed * missed);
-        }
-    });
-}
-
-}  // namespace
 
 Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, BodyPoses& at) {
     const Rigid3 T_world_camera = at.T_world_body[target] * inverse(T_camera_target);
@@ -70,8 +36,6 @@ void ModelView::render_with_variance(const Rigid3& T_camera_target, const FrameS
                                      std::span<const std::uint8_t> chosen) {
     const CameraPose path = place(T_camera_target);
     renderer_.render(at_, path, settings, radiance_, aovs_.variance, chosen);
-    if (radiance_.pixels.size() <= kFewPixels)
-        allow_for_missed_light(radiance_, settings.spp, chosen, aovs_.variance);
 }
 
 Rigid3 ModelView::T_world_camera(double row) const noexcept {

@@ -37,12 +37,7 @@ public:
     /// Renders the image at this pose, with `aovs` also depth, position, normal and body. Allocates nothing after
     /// the first call of a kind.
     void render(const Rigid3& T_camera_target, const FrameSettings& settings, bool aovs);
-    /// The image and `Aovs::variance`, but no other of them. `chosen`: CameraRenderer::render. Stratified samples
-    /// find how much of a pixel is bright to about half a sample: all may have missed it, or one have met it by
-    /// chance, and neither shows in their own variance. So in images of up to 20,000 pixels that is at least half
-    /// a sample of the contrast with the
-    /// neighbours, squared: too much for pixels beside an edge, but a pixel that is believed too much can lead to a
-    /// false pose.
+    /// The image and `Aovs::variance`, but no other of them. `chosen`: CameraRenderer::render.
     void render_with_variance(const Rigid3& T_camera_target, const FrameSettings& settings,
                               std::span<const std::uint8_t> chosen = {});
 

@@ -2,14 +2,13 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
-#include <Eigen/LU>
-
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include "base/constants.h"
 #include "estimator/dense/dense_alignment.h"
+#include "estimator/dense/level_view.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
 #include "renderer/scene/scene_file.h"
@@ -76,27 +75,6 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     const Vector6 error = error_between(truth, e->T_camera_body);
     EXPECT_LT(error.head<3>().norm(), 0.02 * kRadPerDeg);
     EXPECT_LT(error.tail<3>().norm(), 1e-3 * norm(truth.t));
-}
-
-/// What the second start leaves is not the noise of fewer samples.
-TEST_F(DockingFrame, ASecondStartThatAgreesAddsLittleToTheCovariance) {
-    const MeasuredImage frame = frame_at(truth, true);
-    const Rigid3 guess = displaced(truth, off_by(3, 0.03, norm(truth.t)));
-    DenseAlignment dense(*render_scene, camera, 0);
-    double added = 0;
-    constexpr int kSeeds = 2;
-    for (int k = 0; k < kSeeds; ++k) {
-        DenseOptions o;
-        o.seed = static_cast<std::uint64_t>(k + 1);
-        const auto with = dense.align(frame, at, guess, o);
-        o.rivals = 0;
-        const auto without = dense.align(frame, at, guess, o);
-        ASSERT_TRUE(with && without);
-        ASSERT_EQ(with->answer.kind, AnswerKind::good) << with->answer.why;
-        const Matrix6 more = with->covariance - without->covariance;
-        added += (without->covariance.inverse() * more).trace() / kSeeds;
-    }
-    EXPECT_LT(added, 30);  // variances; measured 12, with the samples of all steps alike 70
 }
 
 TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
@@ -177,16 +155,19 @@ TEST_F(DockingFrame, ChosenPixelsAreThoseOfTheWholeImage) {
 
 /// Pixels of which little is bright: of few samples none may have met that, or one by chance.
 TEST_F(DockingFrame, VarianceAllowsForMissedLight) {
-    ModelView view(*render_scene, camera, 0, at);
+    const SensorModel sensor = sensor_model(camera);
+    LevelView view(*render_scene, camera, sensor, 1, {0, 0, camera.width, camera.height}, 0, at);
+    view.begin_frame(at, {}, row_times(camera), {}, {});
     FrameSettings s;
     s.spp = 16;
     constexpr std::uint64_t kFrames = 100;
     std::vector<std::vector<double>> light, stated;
     for (s.seed = 1; s.seed <= kFrames; ++s.seed) {
-        view.render_with_variance(truth, s);
-        auto& of_frame = light.emplace_back();
-        for (const Rgb& pixel : view.radiance().pixels) of_frame.push_back(mean_band(vec_cast<double>(pixel)));
-        stated.emplace_back(view.aovs().variance.begin(), view.aovs().variance.end());
+        view.render(truth, s);
+        view.allow_for_missed_light(s.spp);
+        const PhotometricImages images = view.images();
+        light.emplace_back(images.signal.begin(), images.signal.end());
+        stated.emplace_back(images.signal_variance.begin(), images.signal_variance.end());
     }
     std::vector<double> mean(light.front().size());
     for (const auto& frame : light)

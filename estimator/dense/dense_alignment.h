@@ -36,7 +36,7 @@ struct DenseOptions {
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
     ApparentMotion motion{};   ///< the target's, in camera axes: during the exposure, for cameras with a shutter
-    GuessError guess_error{};  ///< an answer further from the guess than 2.5 times that is refused
+    GuessError guess_error{};  ///< answers further from the guess are refused
     ModelUncertainty model{};
     /// The camera's pose in the world, where the light is known in the camera's axes: the target's attitude to the
     /// light is then that of the pose, and its shading holds the attitude too. Empty: the light is known in the

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "estimator/pose/symmetric.h"
@@ -9,11 +12,30 @@
 namespace narpa {
 namespace {
 
+/// Of a pose that is observed: so many standard deviations further from the guess than that can be off.
+constexpr double kBeyondGuess_sigmas = 2;
+
 /// Takes motions in units of the limits to (rotation rad, translation m).
 Vector6 limits(double range_m) {
     Vector6 most;
     most << Eigen::Vector3d::Constant(kMostRotation_rad), Eigen::Vector3d::Constant(kMostTranslation * range_m);
     return most;
+}
+
+/// The standard deviation along a shift.
+double sigma_along(const Eigen::Vector3d& shift, const Eigen::Matrix3d& covariance) {
+    const Eigen::Vector3d direction = shift.stableNormalized();
+    return std::sqrt(std::max(0.0, direction.dot(covariance * direction)));
+}
+
+/// Largest distance from the guess, rad and m.
+std::array<double, 2> farthest(const Fit& fit) {
+    const bool observed = fit.observability.unobserved == 0;
+    const GuessError most = observed ? fit.guess_error : GuessError{};
+    const double sigmas = observed ? kBeyondGuess_sigmas : 0;
+    return {most.rotation_rad + sigmas * sigma_along(fit.moved.head<3>(), fit.covariance.topLeftCorner<3, 3>()),
+            most.part_of_range * fit.range_m +
+                sigmas * sigma_along(fit.moved.tail<3>(), fit.covariance.bottomRightCorner<3, 3>())};
 }
 
 std::string in_words(const Observability& o) {
@@ -28,15 +50,14 @@ Answer judge(Fit fit) {
     answer.root_information = fit.root_information;
     answer.rivals = std::move(fit.rivals);
     answer.why.clear();
-    const GuessError off = fit.observability.unobserved == 0 ? fit.guess_error : GuessError{};
-    const double most_turn = kSearched * off.rotation_rad, most_shift = kSearched * off.part_of_range * fit.range_m;
+    const double turn = fit.moved.head<3>().norm(), shift = fit.moved.tail<3>().norm();
+    const auto [most_turn, most_shift] = farthest(fit);
     if (!fit.failed.empty()) {
         answer.why = std::move(fit.failed);
     } else if (!(fit.residual <= fit.residual_most)) {
         answer.why = fmt::format("residuals are {:.3g} times what noise explains, expected at most {:.3g}",
                                  fit.residual, fit.residual_most);
-    } else if (const double turn = fit.moved.head<3>().norm(), shift = fit.moved.tail<3>().norm();
-               turn > most_turn || shift > most_shift) {
+    } else if (turn > most_turn || shift > most_shift) {
         answer.why = fmt::format("{:.3g} deg and {:.3g} m from the guess, expected at most {:.3g} deg and {:.3g} m",
                                  turn / kDegree, shift, most_turn / kDegree, most_shift);
     } else if (fit.observability.unobserved == 6 || !fit.root_information.allFinite()) {
@@ -68,6 +89,7 @@ Observability observability_of(const Matrix6& covariance, double range_m) {
 void observe(const Rigid3& T, const Matrix6& covariance, Fit& fit) {
     fit.observability = observability_of(covariance, norm(T.t));
     fit.root_information = fit.observability.root_information(inverse(covariance), 1);
+    fit.covariance = covariance;
 }
 
 void compare_with_guess(const Rigid3& T, const Rigid3& guess, Fit& fit) {

@@ -29,19 +29,18 @@ inline constexpr double kElsewhere = 100;
 /// It cannot be excluded where its chi-square is at most so much above the answer's: four sigma.
 inline constexpr double kAsLikely = 16;
 
-/// How far a guess may be off, in attitude and as a part of the range.
+/// The largest error of a guess, in attitude and as a part of the range. An answer that is further from its guess, by
+/// more than two standard deviations of its own, is another minimum, a symmetry of the target, or another target.
 struct GuessError {
-    double rotation_rad = 0.4, part_of_range = 0.2;
+    double rotation_rad = 1, part_of_range = 0.5;
 };
-/// An answer that is further from its guess than so many times that was not looked for: a symmetry of the target
-/// led there, or another target.
-inline constexpr double kSearched = 2.5;
 
 struct Fit {
     std::string failed;               ///< why there is no pose; empty: there is one
     Vector6 moved = Vector6::Zero();  ///< from the guess, if there was one
     GuessError guess_error{};         ///< counts where all motions are observed, else the default
     double range_m = 0;
+    Matrix6 covariance = Matrix6::Zero();
     /// Size of the residuals over that which the stated noise explains, and the largest that is accepted.
     double residual = 0, residual_most = 1;
     Observability observability{};

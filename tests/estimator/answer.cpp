@@ -44,11 +44,12 @@ TEST(Answer, FarFromTheGuessIsRefused) {
     compare_with_guess({exp_rotation({0, 0, 1.5708}), {0, 0, 10}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused) << "by a quarter turn, a symmetry of a cube";
     fit.guess_error = {0.1, 0.05};
-    compare_with_guess({exp_rotation({0, 0, 0.24}), {0, 0, 11.2}}, guess, fit);
-    EXPECT_EQ(judge(fit).kind, AnswerKind::good);
-    compare_with_guess({exp_rotation({0, 0, 0.26}), {0, 0, 11.2}}, guess, fit);
+    fit.covariance.diagonal() << 1e-4, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2;  // 0.01 rad, 0.1 m
+    compare_with_guess({exp_rotation({0, 0, 0.119}), {0, 0, 10.69}}, guess, fit);
+    EXPECT_EQ(judge(fit).kind, AnswerKind::good) << "further by less than two sigma";
+    compare_with_guess({exp_rotation({0, 0, 0.121}), {0, 0, 10.69}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
-    compare_with_guess({exp_rotation({0, 0, 0.24}), {0, 0, 11.3}}, guess, fit);
+    compare_with_guess({exp_rotation({0, 0, 0.119}), {0, 0, 10.71}}, guess, fit);
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
     fit.observability.unobserved = 1;
     EXPECT_EQ(judge(fit).kind, AnswerKind::unobservable) << "that motion may be off by anything";

@@ -33,7 +33,8 @@ constexpr double kBetter = 0.5;
 constexpr double kBesideCircle = 0.15;
 /// Other surfaces are looked for so near to a beam, in standard deviations of the range.
 constexpr double kElsewhere_sigmas = 2;
-/// Of the search: further from the guess than so many times its reach is a symmetry of the target, or another target.
+/// Of the search: further from the guess than so many times its reach is a symmetry of the target, or another
+/// target.
 constexpr double kSearched = 2.5;
 
 /// So many of n points would be found with a chance below 5 % if their share were `least` (Clopper and Pearson

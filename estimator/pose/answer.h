@@ -29,8 +29,9 @@ inline constexpr double kElsewhere = 100;
 /// It cannot be excluded where its chi-square is at most so much above the answer's: four sigma.
 inline constexpr double kAsLikely = 16;
 
-/// The largest error of a guess, in attitude and as a part of the range. An answer that is further from its guess, by
-/// more than two standard deviations of its own, is another minimum, a symmetry of the target, or another target.
+/// The largest error of a guess, in attitude and as a part of the range. An answer that is further from its guess,
+/// by more than two standard deviations of its own, is another minimum, a symmetry of the target, or another
+/// target.
 struct GuessError {
     double rotation_rad = 1, part_of_range = 0.5;
 };

@@ -1,6 +1,8 @@
 #include "renderer/integrator/wavefront.h"
 
 #include <algorithm>
+#include <new>
+#include <type_traits>
 
 #include "base/constants.h"
 #include "base/each_isa.h"
@@ -17,6 +19,14 @@ NARPA_EACH_ISA void draw_points(const PathNumbers& from, std::size_t n, const La
                                 const Lanes<std::uint32_t>& sample, std::uint32_t group,
                                 BatchSampler::Points& u) noexcept {
     BatchSampler(from.seed, from.frame, n, pixel, sample).points(group, u);
+}
+
+/// Assigns what `make` returns, without a temporary: parts of that would be stored in one size and loaded in
+/// another, for which processors wait.
+template <class T>
+void assign(T& to, const auto& make) {
+    static_assert(std::is_trivially_destructible_v<T>);
+    ::new (&to) T(make());
 }
 
 }  // namespace
@@ -97,7 +107,7 @@ void Wavefront::extend() {
         tracer_.intersect(at_, from, directions, lanes_below(n), hits);
         for (std::size_t k = 0; k < n; ++k) {
             if (is_set(hits.met, k))
-                hits_[first + k] = hits[k];
+                assign(hits_[first + k], [&] { return hits[k]; });
             else
                 hits_[first + k].body = -1;
         }
@@ -159,8 +169,10 @@ void Wavefront::shade(std::size_t i) {
     Path& path = paths_[i];
     const Hit& hit = hits_[i];
     path.length_m += hit.range_m;
-    vertices_[i] =
-        PathVertex(tracer_, at_, hit, directions_[i], settings_.pixel_angle_rad * path.length_m, !settings_.direct);
+    assign(vertices_[i], [&] {
+        const double width_m = settings_.pixel_angle_rad * path.length_m;
+        return PathVertex(tracer_, at_, hit, directions_[i], width_m, !settings_.direct);
+    });
     const Surface& surface = vertices_[i].surface();
     if (surface.emission != Rgb{} && !path.lit) {
         const double light_pdf =
@@ -300,7 +312,7 @@ void Wavefront::begin_reused(std::span<const PathStart> starts) {
             path.sunlit = s.lit() && s.sunlit;
             path.throughput = Rgb{1, 1, 1} / probability;
             if (receivers_) path.start = {.anchor = s.rays->origin[s.lane], .time = s.rays->time[s.lane]};
-            hits_[n_] = (*s.hits)[s.lane];
+            assign(hits_[n_], [&] { return (*s.hits)[s.lane]; });
             directions_[n_] = s.rays->direction[s.lane];
             ++n_;
         }

@@ -22,9 +22,15 @@ constexpr double kAgree = 25;
 constexpr double kLeastExtent_px = 16;
 
 /// Where a motion's standard deviation is larger than this part of the largest that counts as observed,
-/// the image may not be linear over it. The loss rises by at least this part of what a linear image's would, at so
-/// many standard deviations.
-constexpr double kSurelyLinear = 0.2, kRise_sigmas = 4, kLeastRise = 0.5;
+/// the image may not be linear over it.
+constexpr double kSurelyLinear = 0.2;
+/// Along so many motions that are held least, and at so many standard deviations, the loss then rises by at least
+/// this part of what a linear image's would. Far away a robust loss rises less.
+struct Rise {
+    int motions;
+    double sigmas, least;
+};
+constexpr std::array kRises{Rise{1, 4, 0.5}, Rise{3, 8, 0.35}};
 /// Answers that are turned by so much against the guess have a third start.
 constexpr double kFarTurn_rad = 0.07;
 /// Other minima are looked for so many standard deviations away.
@@ -300,8 +306,9 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     }
     LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
     solver.examine();
-    if (!(solver.rise(kRise_sigmas) > kLeastRise))
-        fit.failed = fmt::format("the image is not linear in the pose over {:g} standard deviations", kRise_sigmas);
+    const auto bends = [&](const Rise& r) { return !(solver.rise(r.motions, r.sigmas) > r.least); };
+    if (const auto r = std::ranges::find_if(kRises, bends); r != kRises.end())
+        fit.failed = fmt::format("the image is not linear in the pose over {:g} standard deviations", r->sigmas);
 }
 
 DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,

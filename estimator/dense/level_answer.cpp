@@ -77,17 +77,19 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     });
 }
 
-double LevelSolver::rise(double sigmas) {
+double LevelSolver::rise(int motions, double sigmas) {
     const Observability o = observability_of(e_.covariance, norm(e_.T_camera_body.t));
-    const Vector6 motion = sigmas / std::sqrt(o.eigenvalues[0]) * o.motions.col(0);
+    render(e_.T_camera_body);
     const double here = cost(view_.images(), e_.exposure, {}).robust;
     double least = std::numeric_limits<double>::infinity();
-    for (const double side : {-1.0, 1.0}) {
-        const Eigen::Vector2d step = equations_.exposure_step(side * motion);
-        const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
-        render(displaced(e_.T_camera_body, side * motion));
-        least = std::min(least, cost(view_.images(), exposure, {}).robust - here);
-    }
+    for (int i = 0; i < motions; ++i)
+        for (const double side : {-sigmas, sigmas}) {
+            const Vector6 motion = side / std::sqrt(o.eigenvalues[i]) * o.motions.col(i);
+            const Eigen::Vector2d step = equations_.exposure_step(motion);
+            const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
+            render(displaced(e_.T_camera_body, motion));
+            least = std::min(least, cost(view_.images(), exposure, {}).robust - here);
+        }
     return least / (sigmas * sigmas);
 }
 

@@ -25,12 +25,16 @@ constexpr double kLeastExtent_px = 16;
 /// the image may not be linear over it.
 constexpr double kSurelyLinear = 0.2;
 /// Along so many motions that are held least, and at so many standard deviations, the loss then rises by at least
-/// this part of what a linear image's would. Far away a robust loss rises less.
-struct Rise {
+/// this part of what a linear image's would. Far away a robust loss rises less. And by no more than where the
+/// valley along the motion bends, over one standard deviation, by one of the other motions.
+struct Linear {
     int motions;
     double sigmas, least;
+    [[nodiscard]] bool allows(const LevelSolver::Rise& rise) const {
+        return rise.least > least && rise.most < 1 + sigmas * sigmas;
+    }
 };
-constexpr std::array kRises{Rise{1, 4, 0.5}, Rise{3, 8, 0.35}};
+constexpr std::array kLinear{Linear{1, 4, 0.5}, Linear{3, 8, 0.35}};
 /// Answers that are turned by so much against the guess have a third start.
 constexpr double kFarTurn_rad = 0.07;
 /// Other minima are looked for so many standard deviations away.
@@ -306,9 +310,10 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     }
     LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
     solver.examine();
-    const auto bends = [&](const Rise& r) { return !(solver.rise(r.motions, r.sigmas) > r.least); };
-    if (const auto r = std::ranges::find_if(kRises, bends); r != kRises.end())
-        fit.failed = fmt::format("the image is not linear in the pose over {:g} standard deviations", r->sigmas);
+    for (const Linear& linear : kLinear)
+        if (!linear.allows(solver.rise(linear.motions, linear.sigmas)))
+            fit.failed =
+                fmt::format("the image is not linear in the pose over {:g} standard deviations", linear.sigmas);
 }
 
 DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,

@@ -77,20 +77,21 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     });
 }
 
-double LevelSolver::rise(int motions, double sigmas) {
+LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
     const Observability o = observability_of(e_.covariance, norm(e_.T_camera_body.t));
     render(e_.T_camera_body);
     const double here = cost(view_.images(), e_.exposure, {}).robust;
-    double least = std::numeric_limits<double>::infinity();
+    Rise rise{std::numeric_limits<double>::infinity(), 0};
     for (int i = 0; i < motions; ++i)
         for (const double side : {-sigmas, sigmas}) {
             const Vector6 motion = side / std::sqrt(o.eigenvalues[i]) * o.motions.col(i);
             const Eigen::Vector2d step = equations_.exposure_step(motion);
             const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
             render(displaced(e_.T_camera_body, motion));
-            least = std::min(least, cost(view_.images(), exposure, {}).robust - here);
+            const double rises = (cost(view_.images(), exposure, {}).robust - here) / (sigmas * sigmas);
+            rise = {std::min(rise.least, rises), std::max(rise.most, rises)};
         }
-    return least / (sigmas * sigmas);
+    return rise;
 }
 
 Result<Matrix6> LevelSolver::bound() {

@@ -35,9 +35,12 @@ public:
     [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
     /// Renders with the last step's rays and linearises at the estimate's pose.
     void examine();
-    /// After examine(): how the loss rises along the `motions` that are held least, over what the covariance says;
-    /// the least at this many standard deviations to both sides. About one where the image is linear so far.
-    [[nodiscard]] double rise(int motions, double sigmas);
+    struct Rise {
+        double least, most;
+    };
+    /// After examine(): how the loss rises along the `motions` that are held least, over what the covariance says,
+    /// at this many standard deviations to both sides. About one where the image is linear so far.
+    [[nodiscard]] Rise rise(int motions, double sigmas);
     /// DenseAlignment::bound at the estimate.
     Result<Matrix6> bound();
 

@@ -81,7 +81,7 @@ TEST(PythonCan, ReadmeProgramCommandsAPose) {
     const std::string path = testing::TempDir() + "narpa_readme_" + std::to_string(::getpid()) + ".py";
     std::ofstream(path) << text;
 
-    FILE* pipe = ::popen(("/usr/bin/python3 " + path + " 2>&1").c_str(), "r");
+    FILE* pipe = ::popen(("/usr/bin/python3 -P " + path + " 2>&1").c_str(), "r");
     ASSERT_NE(pipe, nullptr);
     PoseDecoder decoder(0x100);
     PoseCommand command;

@@ -57,7 +57,7 @@ def start_navigation(log):
     """Attaches the camera that the emulator serves and starts the navigation, which `narpa rehearse` asks for: it streams
     before the first frame is made."""
     wait_until = usb_devices.wait_until
-    wait_until("narpa rehearse asks for the navigation", lambda: "LOG=" in log.read_text(), 120)
+    wait_until("narpa rehearse asks for the navigation", lambda: "LOG=" in log.read_text(), 240)
     told = dict(re.findall(r"^  (\w+)=(.*)$", log.read_text(), flags=re.M))
     usb_devices.attach(CAMERA_PORT)
     wait_until("uvcvideo has the camera", usb_devices.usb_camera)

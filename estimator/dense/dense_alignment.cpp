@@ -205,7 +205,7 @@ void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, co
     if (fit.failed.empty() && fit.rivals.empty()) start_near(frame, at, guess, options, frame_variance, e, fit);
 }
 
-/// Steps from where the other's coarse levels ended lead to the answer. How far they are apart is part of its
+/// Steps from where the other's coarse levels ended lead to the answer. The variance of the two is part of its
 /// error.
 bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
     other.exposure = e.exposure, other.renders = 0;
@@ -214,7 +214,7 @@ bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOp
     LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);
     const auto apart = solver.miss(e.T_camera_body);
     e.renders += other.renders;
-    if (apart) e.covariance += *apart * apart->transpose();
+    if (apart) e.covariance += 0.5 * *apart * apart->transpose();
     return apart.has_value();
 }
 

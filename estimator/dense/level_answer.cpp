@@ -20,6 +20,9 @@ constexpr double kMostMisfit = 10;
 /// The weakest motions are rendered so far to both sides: by so many standard deviations, but not many times the
 /// limit of observed motions, and at least by so many pixels.
 constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
+/// And count as shown by no more than so many times what the Jacobian says: answers of which more was measured had
+/// too small a covariance by it.
+constexpr double kMostShown = 1.3;
 
 }  // namespace
 
@@ -50,8 +53,8 @@ void LevelSolver::finish() {
         off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
         e_.status = DenseStatus::does_not_fit;
     else
-        e_.covariance =
-            widened(of_noise, response_to_motions(last)) + e_.covariance_of_model + to_go * to_go.transpose();
+        e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kMostShown) +
+                        e_.covariance_of_model + to_go * to_go.transpose();
 }
 
 /// Rendered to both sides, with equal samples.
@@ -79,8 +82,6 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
 
 LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
     const Observability o = observability_of(e_.covariance, norm(e_.T_camera_body.t));
-    render(e_.T_camera_body);
-    const double here = cost(view_.images(), e_.exposure, {}).robust;
     Rise rise{std::numeric_limits<double>::infinity(), 0};
     for (int i = 0; i < motions; ++i)
         for (const double side : {-sigmas, sigmas}) {
@@ -88,7 +89,7 @@ LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
             const Eigen::Vector2d step = equations_.exposure_step(motion);
             const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
             render(displaced(e_.T_camera_body, motion));
-            const double rises = (cost(view_.images(), exposure, {}).robust - here) / (sigmas * sigmas);
+            const double rises = (cost(view_.images(), exposure, {}).robust - examined_loss_) / (sigmas * sigmas);
             rise = {std::min(rise.least, rises), std::max(rise.most, rises)};
         }
     return rise;

@@ -243,6 +243,7 @@ void LevelSolver::examine() {
     render(e_.T_camera_body);
     differentiate(kDerivativeServes_px, std::max(1, o_.fineness / kCoarseFineness));
     linearise();
+    examined_loss_ = cost(view_.images(), e_.exposure, {}).robust;
 }
 
 void LevelSolver::shift() {

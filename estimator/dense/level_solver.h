@@ -91,7 +91,8 @@ private:
     PhotometricCost cost_{};
     PhotometricEquations equations_{};
     Vector6 last_step_ = Vector6::Zero();
-    double stride_ = 1;  ///< factor of the step length
+    double stride_ = 1;         ///< factor of the step length
+    double examined_loss_ = 0;  ///< of examine()
 };
 
 }  // namespace narpa

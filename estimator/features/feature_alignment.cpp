@@ -312,8 +312,9 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     }
     estimate.floor_px = floor_px;
     if (estimate.agreeing < kMany)
-        estimate.covariance = widened(estimate.covariance, response(points, scale, render_settings, T_of_view,
-                                                                    estimate.covariance, floor_px));
+        estimate.covariance = covariance_by_response(
+            estimate.covariance,
+            response(points, scale, render_settings, T_of_view, estimate.covariance, floor_px));
     const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);
     estimate.by_focal =
         shift_by_focal({model, points.body_m, points.pixels, 1, as_weighed}, estimate.T_camera_target);

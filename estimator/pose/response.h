@@ -34,8 +34,9 @@ template <class Shown>
     return response;
 }
 
-/// R^-1 C R^-T. Motions of which more is shown than there is count as shown as they are, so that nothing of C is
-/// taken away; and of all motions at least kLeastShown. `response`: of errors (pose_estimate.h).
-[[nodiscard]] Matrix6 widened(const Matrix6& covariance, const Matrix6& response);
+/// R^-1 C R^-T. Motions of which more than `most_shown` times is shown count as shown so often: with 1 nothing of C
+/// is taken away; and all motions count as shown by at least kLeastShown. `response`: of errors (pose_estimate.h).
+[[nodiscard]] Matrix6 covariance_by_response(const Matrix6& covariance, const Matrix6& response,
+                                             double most_shown = 1);
 
 }  // namespace narpa

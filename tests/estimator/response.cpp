@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 #include "estimator/pose/symmetric.h"
@@ -19,26 +20,30 @@ Matrix6 lopsided_covariance() {
 
 TEST(Response, OfTheIdentityChangesNothing) {
     const Matrix6 C = lopsided_covariance();
-    EXPECT_LT((widened(C, Matrix6::Identity()) - C).norm(), 1e-12 * C.norm());
+    EXPECT_LT((covariance_by_response(C, Matrix6::Identity()) - C).norm(), 1e-12 * C.norm());
 }
 
 TEST(Response, ToHalfOfAMotionIsFourTimesItsVariance) {
     Matrix6 response = Matrix6::Identity();
     response(2, 2) = 0.5;
-    const Matrix6 C = widened(Matrix6::Identity(), response);
+    const Matrix6 C = covariance_by_response(Matrix6::Identity(), response);
     EXPECT_NEAR(C(2, 2), 4, 1e-12);
     EXPECT_NEAR(C(1, 1), 1, 1e-12);
 }
 
-TEST(Response, ToMoreThanAMotionTakesNothingAway) {
-    EXPECT_LT((widened(lopsided_covariance(), 3 * Matrix6::Identity()) - lopsided_covariance()).norm(), 1e-12);
+TEST(Response, ToMoreThanAMotionTakesNothingAwayUnlessAsked) {
+    EXPECT_LT(
+        (covariance_by_response(lopsided_covariance(), 3 * Matrix6::Identity()) - lopsided_covariance()).norm(),
+        1e-12);
+    const Matrix6 taken = covariance_by_response(lopsided_covariance(), 3 * Matrix6::Identity(), 1.5);
+    EXPECT_LT((taken - lopsided_covariance() / 2.25).norm(), 1e-12);
 }
 
 /// What a measurement shows of nothing is not known.
 TEST(Response, ToNothingIsBeyondAllLimits) {
     Matrix6 response = Matrix6::Identity();
     response(0, 0) = 0;
-    const Matrix6 C = widened(Matrix6::Identity(), response);
+    const Matrix6 C = covariance_by_response(Matrix6::Identity(), response);
     EXPECT_NEAR(C(0, 0), 1 / (kLeastShown * kLeastShown), 1);
     EXPECT_NEAR(C(3, 3), 1, 1e-9);
 }
@@ -60,17 +65,20 @@ TEST(Response, StatesTheScatterOfPosesFromAWrongJacobian) {
     const Columns J = truth + draw(0.15);
     const Matrix6 information = J.transpose() * J, C = inverse(information);
     const Matrix6 response = C * J.transpose() * truth;
-    const Matrix6 stated = widened(C, response);
-    double nees = 0, as_before = 0;
+    const Matrix6 stated = covariance_by_response(C, response);
+    const Matrix6 exactly = covariance_by_response(C, response, std::numeric_limits<double>::infinity());
+    double nees = 0, by_all = 0, as_before = 0;
     for (int k = 0; k < kDraws; ++k) {
         Eigen::Matrix<double, kPixels, 1> noise;
         for (double& v : noise) v = normal(random);
         const Vector6 error = inverse(J.transpose() * truth) * (J.transpose() * noise);
         nees += normalised_error_squared(error, stated) / kDraws;
+        by_all += normalised_error_squared(error, exactly) / kDraws;
         as_before += error.dot(information * error) / kDraws;
     }
     EXPECT_GT(nees, 5);
     EXPECT_LT(nees, 6.3);
+    EXPECT_NEAR(by_all, 6, 0.3);
     EXPECT_GT(as_before, 8);
 }
 

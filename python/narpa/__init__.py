@@ -4,12 +4,9 @@
     narpa.dbc       the DBC file itself: messages, signals, encoding
     narpa.y4m       video streams, as `narpa run --video CAMERA=FILE.y4m` writes them
     narpa.vlp16     VLP-16 data packets, as `narpa run --lidar LIDAR=udp:HOST:PORT` sends them
-<<<<<<< HEAD
     narpa.points    packets of LiDARs that a file describes
     narpa.pcap      UDP datagrams of a capture
-=======
     narpa.ouster    lidar packets of Ouster's sensors, by the metadata of each
->>>>>>> a36d870 (docs: Ouster OS1, its packets, metadata and HTTP interface)
     narpa.rotation  quaternions (w, x, y, z)
     narpa.plots     the plots of narpa's commands (needs matplotlib)
 

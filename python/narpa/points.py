@@ -27,8 +27,8 @@ def decode(packet):
     """A Packet, whose `points` are its returns as an array of POINT; `shot` counts within the frame."""
     if len(packet) < HEADER.size:
         raise ValueError(f"a packet of {len(packet)} bytes, expected {HEADER.size} or more")
-    magic, version, flags, count, frame, first, shots, start_ns, *rest = _fields(packet)
-    range_step_um, velocity_step_um_s, checksum = rest
+    (magic, version, flags, count, frame, first, start_ns, shots, range_step_um, velocity_step_um_s,
+     checksum) = HEADER.unpack_from(packet)  # fmt: skip
     if magic != MAGIC or version != 1 or flags > 1:
         raise ValueError("not a point packet of version 1")
     if len(packet) != HEADER.size + count * RECORD.itemsize:
@@ -55,8 +55,3 @@ def decode(packet):
 def read_pcap(path):
     """The packets of a capture, each decoded."""
     return (decode(payload) for payload in pcap.udp_payloads(path) if payload[:4] == MAGIC)
-
-
-def _fields(packet):
-    magic, version, flags, count, frame, first, start_ns, shots, *rest = HEADER.unpack_from(packet)
-    return magic, version, flags, count, frame, first, shots, start_ns, *rest

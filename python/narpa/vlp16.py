@@ -14,7 +14,7 @@ BUFFER_BYTES, SO_RCVBUFFORCE = 4 << 20, 33  # asm-generic/socket.h; the socket m
 BLOCKS, LASERS = 12, 16
 LASER_PERIOD_S, SEQUENCE_PERIOD_S = 2.304e-6, 55.296e-6
 RANGE_STEP_M, AZIMUTH_STEP_DEG = 0.002, 0.01
-STRONGEST_RETURN, VLP_16 = 0x37, 0x22
+STRONGEST_RETURN, LAST_RETURN, VLP_16 = 0x37, 0x38, 0x22
 NO_REFLECTIVITY = 255  # what a packet has in place of one where there is no return
 ELEVATION_DEG = np.array([-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15], float)
 # Height of each laser over the sensor's origin ("vertical correction", table 9-1).
@@ -36,6 +36,8 @@ def decode(packet):
     stamp_us, mode, product = struct.unpack_from("<IBB", packet, BLOCKS * BLOCK.itemsize)
     if product != VLP_16:
         raise ValueError(f"a packet of product 0x{product:02X}, expected 0x{VLP_16:02X}, the VLP-16")
+    if mode not in (STRONGEST_RETURN, LAST_RETURN):
+        raise ValueError(f"a packet of return mode 0x{mode:02X}, expected one return a shot: 0x37 (strongest) or 0x38 (last)")
     starts = blocks["azimuth_cdeg"] * AZIMUTH_STEP_DEG
     turns = np.diff(starts) % 360  # from block to block; the last one turns as the one before
     turns = np.append(turns, turns[-1])

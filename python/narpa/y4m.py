@@ -20,8 +20,8 @@ class Reader:
         self.file = os.fdopen(os.open(path, os.O_RDWR if is_fifo(path) else os.O_RDONLY), "rb")
         self.width = self.height = self.colour = self.period_s = None  # known with the first frame
 
-    def read_header(self):
-        line = self.file.readline().decode("ascii", "replace").split()
+    def read_header(self, line):
+        line = line.decode("ascii", "replace").split()
         if line[:1] != ["YUV4MPEG2"]:
             raise ValueError(f"{self.file.name}: not a Y4M stream: it does not begin with YUV4MPEG2")
         fields = {word[0]: word[1:] for word in line[1:]}
@@ -32,11 +32,15 @@ class Reader:
             raise ValueError(f"the stream has C{self.colour} frames, expected one of {', '.join('C' + c for c in SAMPLES)}")
 
     def read_bytes(self):
-        """The samples of the next frame; None at the end of the stream."""
-        if self.width is None:
-            self.read_header()
-        if not self.file.readline():
+        """The samples of the next frame; None at the end of the stream. The next writer of a FIFO begins with a header."""
+        line = self.file.readline()
+        if line and (self.width is None or line.startswith(b"YUV4MPEG2")):
+            self.read_header(line)
+            line = self.file.readline()
+        if not line:
             return None
+        if not line.startswith(b"FRAME"):
+            raise ValueError(f"{self.file.name}: a frame does not begin with FRAME")
         size = int(self.width * self.height * SAMPLES[self.colour])
         data = self.file.read(size)
         return data if len(data) == size else None

@@ -60,7 +60,8 @@ class Packets(unittest.TestCase):
 
     def test_errors_say_what_was_expected(self):
         good = packet(np.zeros((24, 16)))
-        for bad, what in ((b"", "expected 1206"), (b"\0" + good[1:], "FF EE"), (good[:-1] + b"\x21", "0x21, expected 0x22")):
+        for bad, what in ((b"", "expected 1206"), (b"\0" + good[1:], "FF EE"), (good[:-1] + b"\x21", "0x21, expected 0x22"),
+                          (good[:-2] + b"\x39\x22", "0x39, expected one return")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, what):
                 vlp16.decode(bad)
 

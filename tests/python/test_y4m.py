@@ -44,9 +44,14 @@ class Video(unittest.TestCase):
     def test_a_frame_that_is_cut_off_is_none(self):
         self.assertIsNone(self.written(b"YUV4MPEG2 W2 H2 F1:1 Cmono\nFRAME\n\x01").read())
 
+    def test_another_stream_may_follow(self):
+        data = b"YUV4MPEG2 W2 H1 F1:1 Cmono\nFRAME\n\x01\x02YUV4MPEG2 W1 H3 F1:1 Cmono\nFRAME\n\x03\x04\x05"
+        self.assertEqual([frame.tolist() for frame in self.written(data)], [[[1, 2]], [[3], [4], [5]]])
+
     def test_errors_say_what_was_expected(self):
         for data, what in ((b"P5 64 48\n", "YUV4MPEG2"), (b"YUV4MPEG2 W2 H2 Cstrange\n", "Cstrange frames"),
-                           (b"YUV4MPEG2 W2 H1 F1:1 C422\nFRAME\n\x01\x02\x03\x04", "read_bytes")):  # fmt: skip
+                           (b"YUV4MPEG2 W2 H1 F1:1 C422\nFRAME\n\x01\x02\x03\x04", "read_bytes"),
+                           (b"YUV4MPEG2 W2 H1 F1:1 Cmono\nframe\n\x01\x02", "begin with FRAME")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, what):
                 self.written(data).read()
         with self.assertRaisesRegex(ValueError, "expected"):

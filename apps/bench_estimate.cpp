@@ -333,7 +333,7 @@ Command add_bench_estimate(Parser bench_command) {
         .comma_separated()
         .range(1e-6, 100.0)
         .finite();
-    c.option("--ranges", o->pnp.ranges_m, "pnp: metres to the body").comma_separated().range(1.0, 1e6).finite();
+    c.option("--ranges", o->pnp.ranges_m, "pnp: metres to the body").comma_separated().range(1.0, 1e6);
     const Option nominal = c.flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c.flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases").excludes(nominal);
     c.option("--seed", o->pnp.seed, "pnp: of all draws").shows_default();
@@ -344,8 +344,8 @@ Command add_bench_estimate(Parser bench_command) {
         .type_name("BODY");
     c.option("--size", o->size, "approach: pixels of the camera's longer side").range(32, 10'000).shows_default();
     c.option("--frames", o->approach.frames, "approach: frames").range(2, 100'000);
-    c.option("--from", o->approach.from_m, "approach: m from the target's origin").range(0.01, 1e7).finite();
-    c.option("--to", o->approach.to_m, "approach: m from the target's origin").range(0.01, 1e7).finite();
+    c.option("--from", o->approach.from_m, "approach: m from the target's origin").range(0.01, 1e7);
+    c.option("--to", o->approach.to_m, "approach: m from the target's origin").range(0.01, 1e7);
     c.option("--along", o->along, "approach: from the target towards the camera, target axes")
         .type_name("X,Y,Z")
         .comma_separated()
@@ -355,11 +355,8 @@ Command add_bench_estimate(Parser bench_command) {
         .comma_separated()
         .values(3, 3);
     c.option("--turn", o->turn_deg_s, "approach: deg/s that the camera turns, where the scene gives it a shutter")
-        .range(0.0, 100.0)
-        .finite();
-    c.option("--speed", o->approach.speed_m_s, "approach: m/s that it passes the target, likewise")
-        .range(0.0, 1e4)
-        .finite();
+        .range(0.0, 100.0);
+    c.option("--speed", o->approach.speed_m_s, "approach: m/s that it passes the target, likewise").range(0.0, 1e4);
     c.option("--ignore", o->approach.ignored,
              fmt::format("approach: what the estimators do not know of the camera, separated by commas: {}",
                          fmt::join(kIgnorable, ", ")))
@@ -370,8 +367,7 @@ Command add_bench_estimate(Parser bench_command) {
     c.option("--basin-trials", o->approach.basin_trials, "approach: starts of each distance; 0: none")
         .range(0, 100'000);
     c.option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")
-        .range(0.01, 1e7)
-        .finite();
+        .range(0.01, 1e7);
     c.option("--honesty-trials", o->honesty.trials, "honesty: frames, sweeps or sets of points of each method")
         .range(1, 1'000'000)
         .shows_default();
@@ -395,7 +391,7 @@ Command add_bench_estimate(Parser bench_command) {
         .type_name("LIST");
     c.option("--first-trial", o->first_trial, "honesty: number of the first").range(0, 1'000'000'000);
     c.option("--model-error", o->model_error,
-             "honesty: how the world differs from the believed model, standard deviations (docs/estimation.md)")
+             "honesty: errors of the believed model, standard deviations (docs/estimation-accuracy.md)")
         .type_name("NAME=VALUE,...");
     c.option("--told", o->told, "honesty: what the estimators are told of it").type_name("NAME=VALUE,...");
     c.option("--cold-trials", o->cold.trials, "cold: frames").range(1, 1'000'000).shows_default();

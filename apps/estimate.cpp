@@ -341,8 +341,7 @@ Command add_estimate(Parser app) {
         .type_name("FILE.pcap");
     c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot")
         .type_name("SECONDS")
-        .range(-9e9, 9e9)
-        .finite();
+        .range(-9e9, 9e9);
     c.option("--range-noise", o->range_noise_m,
              "Standard deviation of the sweep's ranges (default: that of the scene, or 0.02)")
         .type_name("METRES")

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "apps/cli.h"
 #include "drivers/can/can_bus.h"
@@ -28,7 +29,7 @@ constexpr std::int64_t kMs = 1'000'000;
 
 /// One body's commands on the wire.
 struct Commander {
-    std::uint32_t base_id = 0;
+    std::optional<std::uint32_t> base_id{};
     std::uint8_t counter = 0;
     std::int64_t newest_ns = std::numeric_limits<std::int64_t>::min();
 };
@@ -53,10 +54,15 @@ Result<std::map<std::string, Commander>> commanders(const FlyOptions& o, const s
         if (*end != 0) return Error{fmt::format("--id {}, expected BODY=ID, like chaser=0x100", text)};
         if (auto good = check_body_base_id(id); !good)
             return Error{fmt::format("--id {}: {}", text, good.error().what)};
-        at->second.base_id = static_cast<std::uint32_t>(id);
+        const auto base_id = static_cast<std::uint32_t>(id);
+        if (at->second.base_id) return Error{fmt::format("--id {}: the body has an identifier already", text)};
+        for (const auto& [name, c] : all)
+            if (c.base_id == base_id)
+                return Error{fmt::format("--id {}: that is the identifier of body \"{}\"", text, name)};
+        at->second.base_id = base_id;
     }
     for (const auto& [name, c] : all)
-        if (c.base_id == 0 && o.ids.size() < all.size())
+        if (!c.base_id)
             return Error{fmt::format("body \"{}\" has no identifier, expected --id {}=ID", name, name),
                          o.trajectory};
     return all;
@@ -140,7 +146,7 @@ private:
         Commander& c = bodies_.at(row.body);
         const PoseCommand command{c.counter++, t_ns, row.motion};
         FrameSet frames;
-        if (const EncodeStatus encoded = encode(command, c.base_id, fd_, frames); !encoded)
+        if (const EncodeStatus encoded = encode(command, *c.base_id, fd_, frames); !encoded)
             return Error{fmt::format("row at {} s of \"{}\": {}", static_cast<double>(row.t_ns) * 1e-9, row.body,
                                      encoded.text()),
                          options_.trajectory};
@@ -222,14 +228,17 @@ Command add_fly(Parser app) {
     c.option("TRAJECTORY", o->trajectory,
              "Poses of bodies over time (CSV, with the columns of a run's CAMERA.truth.csv)")
         .required();
-    c.option("--can", o->bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | log:FILE").type_name("BUS").required();
+    c.option("--can", o->bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER] | log:FILE")
+        .type_name("BUS")
+        .required();
     c.option("--id", o->ids,
              "Base identifier of a body's commands, the scene's can_id (default: 0x100, for a file with one body)")
         .type_name("BODY=ID")
         .repeatable();
     c.option("--start", o->start_s,
              "Simulation time of the trajectory's time 0 (default: about 0.3 s ahead; 0 in lockstep)")
-        .type_name("SECONDS");
+        .type_name("SECONDS")
+        .range(-9e9, 9e9);
     c.option("--lead", o->lead_s, "Seconds by which a command is sent before its time of validity")
         .type_name("SECONDS")
         .range(0.0, 1.0)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <optional>
 #include <span>
 #include <sstream>
 #include <type_traits>
@@ -31,6 +32,19 @@ const char* placeholder(const std::vector<T>&) {
     return placeholder(T{});
 }
 
+template <class T>
+constexpr bool is_unsigned(const T*) {
+    return std::is_unsigned_v<T>;
+}
+template <class T>
+constexpr bool is_unsigned(const std::optional<T>*) {
+    return std::is_unsigned_v<T>;
+}
+template <class T>
+constexpr bool is_unsigned(const std::vector<T>*) {
+    return std::is_unsigned_v<T>;
+}
+
 }  // namespace
 
 Option Option::required() const {
@@ -40,7 +54,7 @@ Option Option::range(int least, int most) const {
     return Option(option_->check(CLI::Range(least, most)));
 }
 Option Option::range(double least, double most) const {
-    return Option(option_->check(CLI::Range(least, most)));
+    return Option(option_->check(CLI::Range(least, most))).finite();
 }
 Option Option::range(std::uint64_t least, std::uint64_t most) const {
     return Option(option_->check(CLI::Range(least, most)));
@@ -94,7 +108,10 @@ Parser Parser::subcommand(const std::string& name, const std::string& help) cons
 }
 template <class T>
 Option Parser::option(const std::string& names, T& value, const std::string& help) const {
-    return Option(app_->add_option(names, value, help)->type_name(placeholder(value)));
+    const Option option(app_->add_option(names, value, help)->type_name(placeholder(value)));
+    if constexpr (is_unsigned(static_cast<T*>(nullptr)))  // CLI11 takes -1 for the largest number
+        option.check([](const std::string& text) { return text.starts_with("-") ? text + " is negative" : ""; });
+    return option;
 }
 Option Parser::flag(const std::string& names, bool& value, const std::string& help) const {
     return Option(app_->add_flag(names, value, help));

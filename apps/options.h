@@ -20,11 +20,11 @@ public:
     explicit Option(CLI::Option* option) : option_(option) {}
 
     Option required() const;
-    /// least <= value <= most.
+    /// least <= value <= most; not NaN.
     Option range(int least, int most) const;
     Option range(double least, double most) const;
     Option range(std::uint64_t least, std::uint64_t most) const;
-    /// Refuses NaN and infinity; `range` lets NaN through.
+    /// Refuses NaN and infinity.
     Option finite() const;
     Option one_of(const std::vector<std::string>& values) const;
     /// `complaint` returns what is wrong with a value; empty: nothing.

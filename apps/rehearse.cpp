@@ -113,7 +113,7 @@ Command add_rehearse(Parser app) {
                                  "continues an interrupted campaign")
                             .range(1, 100000);
     c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
-    c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2")
+    c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2 | usb:[ADAPTER]")
         .type_name("BUS")
         .shows_default();
     c.option("--video", o->video, "A device instead of a FIFO, like nav=/dev/video10; may be given many times")

@@ -147,9 +147,10 @@ Command add_run(Parser app) {
              "--estimate", o->run.estimate_camera,
              "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
             .values(0, 1)
-            .type_name("CAMERA");
+            .type_name("[CAMERA]");
     o->estimator.add_to(c, "estimate-");
-    for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-seed"})
+    for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-range-guess",
+                             "--estimate-seed"})
         c.find(name).needs(estimate);
     o->budget.add_to(c);
     c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")

@@ -38,23 +38,19 @@ Status simulate(Arguments& a) {
 
 void add_options(Arguments& a, const cli::Parser& p) {
     p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
-    p.option("--can", a.bus, "vcan0 | slcan:PORT | udp:239.74.163.2").type_name("BUS").required();
+    p.option("--can", a.bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER]").type_name("BUS").required();
     p.flag("--lockstep", a.options.lockstep,
            "Each control period waits for its actuator command; the same seed gives the same bytes");
-    p.option("--seed", a.seed, "Of all random draws (default: the scenario's)").check([](const std::string& text) {
-        return text.starts_with("-") ? text + " is negative" : "";
-    });
+    p.option("--seed", a.seed, "Of all random draws (default: the scenario's)");
     p.option("--log", a.options.log_folder, "Folder for truth.csv and dynamics.json").type_name("DIR");
     p.option("--wait", a.options.wait_s, "How long to wait for the bus and for the first heartbeat")
         .type_name("SECONDS")
         .range(0.0, 3600.0)
-        .finite()
         .shows_default();
     p.option("--patience", a.options.patience_s,
              "In lockstep: how long to wait for an actuator command, and at the end for the emulator")
         .type_name("SECONDS")
         .range(0.1, 86400.0)
-        .finite()
         .shows_default();
     p.examples({"narpa-dynamics build/release/scenes/rehearsal/docking-camera.toml --can slcan:29537 --lockstep"});
 }

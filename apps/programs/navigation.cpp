@@ -49,7 +49,9 @@ Status run(Arguments& a) {
 
 void add_options(Arguments& a, const cli::Parser& p) {
     p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
-    p.option("--can", a.node.bus, "vcan0 | slcan:PORT | udp:239.74.163.2").type_name("BUS").required();
+    p.option("--can", a.node.bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER]")
+        .type_name("BUS")
+        .required();
     p.option("--video", a.video,
              "A FIFO, FILE.y4m, /dev/videoN or bridge:[ADDRESS:]PORT, for each of the scenario's cameras")
         .type_name("CAMERA=SOURCE")
@@ -63,7 +65,6 @@ void add_options(Arguments& a, const cli::Parser& p) {
     p.option("--wait", a.node.wait_s, "How long to wait for the bus")
         .type_name("SECONDS")
         .range(0.0, 3600.0)
-        .finite()
         .shows_default();
     p.option("--log", a.node.log, "Folder for navigation.csv, measurements.csv, navigation.json and pictures")
         .type_name("DIR");

@@ -147,6 +147,28 @@ def check_errors():
     expect_refusal(2, r'plural\.toml:3:\d+: unknown key "bodies".*did you mean "body"', "check", plural)
 
 
+def check_numbers():
+    """What is no number, below zero, or named twice is refused, not taken for something else."""
+    out = ["-o", folder / "no.png"]
+    for arguments in (
+        ["run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "nan"],
+        ["render", support.SCENE, "--time", "nan", *out],
+        ["render", support.SCENE, "--budget-ms", "nan", *out],
+        ["scan", support.SCENE, "--lidar", support.LIDAR, "--duration", "inf", "-o", folder / "no.pcap"],
+        ["render", support.SCENE, "--seed", "-1", *out],
+    ):
+        expect_refusal(2, re.escape(f"{arguments[-3] if arguments[-2] == '-o' else arguments[-1]}"), *arguments)
+    expect_refusal(2, "--estimate-range-guess requires --estimate", "run", support.SCENE, "--estimate-range-guess", "5")
+    two = folder / "two.csv"
+    header = "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
+    two.write_text(header + "".join(f"0,{name},0,0,0,1,0,0,0,0,0,0,0,0,0\n" for name in "ab"))
+    fly = ["fly", two, "--can", f"log:{folder}/two.log", "--wait", "0"]
+    expect_refusal(2, "nan", *fly, "--id", "a=0x100", "--id", "b=0x110", "--start", "nan")
+    expect_refusal(2, "a=0x110: the body has an identifier already", *fly, "--id", "a=0x100", "--id", "a=0x110")
+    expect_refusal(2, 'b=0x100: that is the identifier of body "a"', *fly, "--id", "a=0x100", "--id", "b=0x100")
+    expect_refusal(2, 'body "b" has no identifier, expected --id b=ID', *fly, "--id", "a=0x100")
+
+
 def check_output():
     """What a command says of its files and its picture."""
     aside = folder / "aside.toml"
@@ -262,5 +284,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_output, check_sensors, check_exposure, check_silence, check_modes, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_folders):
     check()

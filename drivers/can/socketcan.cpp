@@ -21,7 +21,10 @@ namespace {
 struct Interface {
     int index = 0;
     bool up = false, carries_fd = false;
+    int send_queue = 0;  ///< frames; 0: there is none (virtual interfaces)
 };
+/// A frame's ledger, reply and estimate are sent at once: 26 classic frames of a camera.
+constexpr int kBurst = 64;
 
 /// The interface as it is now; index 0 with errno when there is none of that name.
 Interface find_interface(int fd, const std::string& name) noexcept {
@@ -31,6 +34,7 @@ Interface find_interface(int fd, const std::string& name) noexcept {
     if (::ioctl(fd, SIOCGIFINDEX, &request) != 0) return found;
     found.index = request.ifr_ifindex;
     if (::ioctl(fd, SIOCGIFMTU, &request) == 0) found.carries_fd = request.ifr_mtu >= static_cast<int>(CANFD_MTU);
+    if (::ioctl(fd, SIOCGIFTXQLEN, &request) == 0) found.send_queue = request.ifr_qlen;
     if (::ioctl(fd, SIOCGIFFLAGS, &request) == 0) found.up = (request.ifr_flags & IFF_UP) != 0;
     return found;
 }
@@ -78,8 +82,11 @@ canfd_frame to_kernel(const CanFrame& frame) noexcept {
 
 class SocketCan final : public CanBus {
 public:
-    SocketCan(Descriptor fd, std::string interface, bool carries_fd)
-        : fd_(std::move(fd)), interface_(std::move(interface)), carries_fd_(carries_fd) {}
+    SocketCan(Descriptor fd, std::string interface, const Interface& found)
+        : fd_(std::move(fd)),
+          interface_(std::move(interface)),
+          send_queue_(found.send_queue),
+          carries_fd_(found.carries_fd) {}
 
     [[nodiscard]] bool receive(ReceivedFrame& out) noexcept override {
         // Bounded, so that a storm of error reports cannot keep the caller here.
@@ -131,7 +138,11 @@ public:
 
     [[nodiscard]] bool carries_fd() const noexcept override { return carries_fd_; }
     [[nodiscard]] std::string description() const override {
-        return "SocketCAN: " + interface_ + (carries_fd_ ? " (CAN FD)" : " (classic CAN)");
+        std::string out = "SocketCAN: " + interface_ + (carries_fd_ ? " (CAN FD)" : " (classic CAN)");
+        if (send_queue_ > 0 && send_queue_ < kBurst)
+            out += ", drops what its queue of " + std::to_string(send_queue_) +
+                   " frames cannot hold; try: sudo ip link set " + interface_ + " txqueuelen 1000";
+        return out;
     }
 
 private:
@@ -159,6 +170,7 @@ private:
 
     Descriptor fd_;
     std::string interface_;
+    int send_queue_;
     bool carries_fd_, bound_ = true, down_ = false;
     LossCount losses_;
     RetryTimer retry_{};
@@ -196,7 +208,7 @@ CanBusResult open_socketcan(const std::string& interface) {
         return Error{.what = interface + ": not a CAN interface (" + std::strerror(errno) + ")",
                      .kind = ErrorKind::missing,
                      .remedy = "ip -br link show type can   (the CAN interfaces of this machine)"};
-    return CanBusResult(std::make_unique<SocketCan>(std::move(fd), interface, found.carries_fd));
+    return CanBusResult(std::make_unique<SocketCan>(std::move(fd), interface, found));
 }
 
 }  // namespace narpa

@@ -41,8 +41,10 @@ def compare(video, folder, what):
 def vcan(wire):
     folder = support.work_folder()
     video = folder / "nav.y4m"
+    link("vcan0", "txqueuelen", "10")  # as real interfaces have it
     with start("vcan0", video) as run:
-        run.wait_for("vcan0")
+        run.wait_for("vcan0 .*queue of 10 frames.*ip link set vcan0 txqueuelen 1000")
+        link("vcan0", "txqueuelen", "1000")
         bus = listen(run, "vcan0")
         for frame in range(4):
             cansend("vcan0", wire.command(POSES[frame], frame * support.PERIOD_NS, frame, fd=frame % 2 == 1))

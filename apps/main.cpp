@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "apps/cli.h"
+#include "apps/print_error.h"
 #include "apps/shipped.h"
 #include "base/each_isa.h"
 #include "base/lanes.h"
@@ -131,7 +132,7 @@ int main(int argc, char** argv) {
     try {
         return narpa::cli::run(argc, argv);
     } catch (const std::exception& e) {  // out of memory and the like: nothing of ours throws
-        fmt::print(stderr, "narpa: {}\n", e.what());
+        narpa::cli::print_error("narpa: {}\n", e.what());
         return 1;
     }
 }

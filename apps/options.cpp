@@ -1,5 +1,8 @@
 #include "apps/options.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -329,10 +332,18 @@ std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<
     return name + ": " + e.what() + help;
 }
 
+/// The number of a standard stream that was closed would go to the next file that is opened, and messages with it.
+/// Nothing can be written to the stream afterwards either.
+void occupy_closed_streams() {
+    for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        if (::fcntl(fd, F_GETFD) < 0) ::open("/dev/null", O_RDONLY);
+}
+
 }  // namespace
 
 int parse_and_run(int argc, char** argv, const ProgramTexts& texts, const std::function<void(Parser)>& add_options,
                   const std::function<int()>& run, bool* json) {
+    occupy_closed_streams();
     CLI::App app{texts.description, texts.name};
     app.set_version_flag("--version", texts.version);
     app.fallthrough();

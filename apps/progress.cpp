@@ -9,6 +9,8 @@
 #include <condition_variable>
 #include <cstdio>
 
+#include "apps/print_error.h"
+
 namespace narpa::cli {
 namespace {
 
@@ -54,7 +56,7 @@ Progress::Progress(std::string what, std::function<Step()> poll)
 Progress::~Progress() {
     thread_.request_stop();
     thread_.join();
-    if (on_terminal()) fmt::print(stderr, "\r\033[K");
+    if (on_terminal()) print_error("\r\033[K");
 }
 
 void Progress::show(Step step) {
@@ -80,13 +82,13 @@ void Progress::print(const std::stop_token& stop) {
         }
         const std::string line =
             progress_line(what_, step, Seconds(std::chrono::steady_clock::now() - began).count());
-        terminal ? fmt::print(stderr, "\r\033[K{}", line.substr(0, columns())) : fmt::print(stderr, "{}\n", line);
+        terminal ? print_error("\r\033[K{}", line.substr(0, columns())) : print_error("{}\n", line);
         std::fflush(stderr);
     }
 }
 
 void say(std::string_view text) {
-    fmt::print(stderr, "{}{}\n", on_terminal() ? "\r\033[K" : "", text);
+    print_error("{}{}\n", on_terminal() ? "\r\033[K" : "", text);
 }
 
 }  // namespace narpa::cli

@@ -32,7 +32,7 @@ Status simulate(Arguments& a) {
     notify_ready(a.ready_fd);
     const auto flown = run_dynamics(*scenario, a.options, **bus, stop_flag());
     if (!flown) return flown.error();
-    fmt::print(stderr, "{}\n", in_words(*flown));
+    cli::print_error("{}\n", in_words(*flown));
     return Ok{};
 }
 

@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <exception>
 #include <functional>
 #include <string>
 
 #include "apps/options.h"
+#include "apps/print_error.h"
 #include "base/ready.h"
 #include "base/result.h"
 
@@ -18,7 +18,7 @@ namespace narpa::cli {
 inline int run_program(int argc, char** argv, const ProgramTexts& texts, int& ready_fd,
                        const std::function<void(Parser)>& add_options, const std::function<Status()>& run) {
     const auto fail = [&](const std::string& what, int status) {
-        fmt::print(stderr, "{}: {}\n", texts.name, what);
+        print_error("{}: {}\n", texts.name, what);
         return status;
     };
     const auto add_all = [&](const Parser& p) {

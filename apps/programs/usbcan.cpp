@@ -63,10 +63,9 @@ Status run_usbcan(const UsbCanArguments& a) {
     if (!server) return server.error();
 
     stop_on_signals();
-    fmt::print(stderr, "bus behind the adapter: {}\n", (*bus)->description());
-    fmt::print(stderr,
-               "gs_usb adapter {} at {}:{}; on the host, as root: usbip --tcp-port {} attach -r HOST -b {}\n",
-               a.serial, listen->host, (*server)->port(), (*server)->port(), UsbIpServer::kBusId);
+    cli::print_error("bus behind the adapter: {}\n", (*bus)->description());
+    cli::print_error("gs_usb adapter {} at {}:{}; on the host, as root: usbip --tcp-port {} attach -r HOST -b {}\n",
+                     a.serial, listen->host, (*server)->port(), (*server)->port(), UsbIpServer::kBusId);
     notify_ready(a.ready_fd, fmt::format("USBIP={}:{}\n", listen->host, (*server)->port()));
     constexpr std::int64_t kPollPeriod_ns = 100'000'000;
     while (!stop_flag().load(std::memory_order_relaxed))

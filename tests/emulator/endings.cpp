@@ -72,6 +72,21 @@ TEST_F(Ending, AFullDiskFailsTheProgramWhoseDocumentItDidNotTake) {
     EXPECT_NE(said.find("standard output cannot be written: No space left"), std::string::npos) << said;
 }
 
+TEST_F(Ending, ARunWhoseMessagesNobodyTakesKeepsItsFiles) {
+    const std::string video = folder_ / "nav.y4m", log = folder_ / "log";
+    for (const std::string closed : {"2>/dev/full", "2>&-"}) {
+        if (closed == "2>/dev/full" && ::access("/dev/full", W_OK) != 0) continue;
+        SCOPED_TRACE(closed);
+        EXPECT_EQ(run_command(NARPA_BIN " list " + closed).status, 0);
+        // Its progress is due after two seconds.
+        const auto [status, said] = run_command(run_ + "--video nav=" + video + " --duration 2.5 " + closed);
+        EXPECT_EQ(status, 0) << said;
+        EXPECT_EQ(read_text(video).find("small: "), std::string::npos) << "its summary is in the video";
+        EXPECT_EQ(run_command(lockstep_ + "--video nav=none --log " + log + " " + closed).status, 0);
+        EXPECT_EQ(read_rows(log + "/nav.ledger.csv").size(), 11U);
+    }
+}
+
 TEST_F(Ending, ASignalEndsARunInEveryState) {
     const std::string fifo = folder_ / "nav.fifo";
     ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);

@@ -39,8 +39,6 @@ class CameraSensor final : public Sensor {
 public:
     CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks);
 
-    /// Writes truth (trajectory CSV), ledger (CSV) and contact sheet to this folder.
-    Status log_to(const std::string& folder, bool wait_when_full);
     /// Keeps each frame's ledger for send_telemetry.
     void keep_ledgers() noexcept { keeps_ledgers_ = true; }
     /// Gives each frame that is handed over to the estimator too, which must outlive the run.
@@ -50,6 +48,8 @@ public:
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.camera().name; }
     [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-camera", 50, true}; }
     [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
+    /// Truth (trajectory CSV), ledger (CSV) and contact sheet.
+    Status log_to(const std::string& folder, bool wait_when_full) override;
     void start_at(std::int64_t t_ns) noexcept override;
     void plan() noexcept override;
     [[nodiscard]] std::int64_t schedule_holds_ns() const noexcept override {

@@ -77,8 +77,6 @@ Result<std::unique_ptr<Sensor>> open_camera(const World& world, std::size_t inde
     if (sinks->empty()) return std::unique_ptr<Sensor>();
     auto camera = std::make_unique<CameraSensor>(world, index, *std::move(sinks));
     if (telemetry) camera->keep_ledgers();
-    if (!o.log_folder.empty())
-        if (auto logs = camera->log_to(o.log_folder, o.lockstep); !logs) return logs.error();
     return std::unique_ptr<Sensor>(std::move(camera));
 }
 
@@ -115,8 +113,6 @@ Result<std::unique_ptr<Sensor>> open_lidar(const World& world, std::size_t index
     if (sinks->empty() && !beams) return std::unique_ptr<Sensor>();
     auto lidar = std::make_unique<LidarSensor>(world, index, *std::move(sinks), o.log_shots);
     if (beams) lidar->keep_beams();
-    if (!o.log_folder.empty())
-        if (auto logs = lidar->log_to(o.log_folder, o.lockstep); !logs) return logs.error();
     return std::unique_ptr<Sensor>(std::move(lidar));
 }
 
@@ -159,8 +155,6 @@ Result<std::unique_ptr<OnlineEstimator>> open_estimator(const World& world, cons
         if (!tracker) return tracker.error();
         auto estimator = std::make_unique<OnlineEstimator>(*std::move(tracker), world, *index, options.lockstep);
         if (telemetry) estimator->keep_reports();
-        if (!options.log_folder.empty())
-            if (auto log = estimator->log_to(options.log_folder); !log) return log.error();
         camera->show_to(*estimator);
         return estimator;
     }
@@ -194,35 +188,46 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
 
 Status Emulator::open() {
     const bool logs = !options_.log_folder.empty();
-    if (logs) {
+    if (logs) {  // sinks may be files in it
         std::error_code error;
         std::filesystem::create_directories(options_.log_folder, error);
         if (error) return Error{"cannot create folder: " + error.message(), options_.log_folder};
-        if (auto recorded = write_run_record(options_.log_folder, world_->scene()); !recorded)
-            return recorded.error();
     }
     if (!options_.bus.empty()) {
         auto bus = open_can_bus(options_.bus, CanRole::hub);
         if (!bus) return bus.error();
         bus_ = *std::move(bus);
-        if (logs) {
-            auto log = RowLog::create(options_.log_folder + "/can.log", "", options_.lockstep, CanNode::kLogLines);
-            if (!log) return log.error();
-            can_log_ = *std::move(log);
-        }
-        can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), options_.lockstep);
     }
-    auto sensors = open_sensors(*world_, options_, can_ != nullptr);
+    auto sensors = open_sensors(*world_, options_, bus_ != nullptr);
     if (!sensors) return sensors.error();
     sensors_ = *std::move(sensors);
-    for (const auto& sensor : sensors_)
-        if (auto* camera = dynamic_cast<CameraSensor*>(sensor.get()); camera && camera->control() && can_)
-            can_->operate(*camera->control());
     if (options_.estimate) {
-        auto estimator = open_estimator(*world_, options_, sensors_, can_ != nullptr);
+        auto estimator = open_estimator(*world_, options_, sensors_, bus_ != nullptr);
         if (!estimator) return estimator.error();
         estimator_ = *std::move(estimator);
     }
+    if (logs)  // last: a run that cannot start leaves the log of an earlier one
+        if (auto opened = open_logs(); !opened) return opened;
+    if (!bus_) return Ok{};
+    can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), options_.lockstep);
+    for (const auto& sensor : sensors_)
+        if (auto* camera = dynamic_cast<CameraSensor*>(sensor.get()); camera && camera->control())
+            can_->operate(*camera->control());
+    return Ok{};
+}
+
+Status Emulator::open_logs() {
+    const std::string& folder = options_.log_folder;
+    if (auto removed = remove_run(folder); !removed) return removed;
+    if (auto recorded = write_run_record(folder, world_->scene()); !recorded) return recorded;
+    for (const auto& sensor : sensors_)
+        if (auto opened = sensor->log_to(folder, options_.lockstep); !opened) return opened;
+    if (estimator_)
+        if (auto opened = estimator_->log_to(folder); !opened) return opened;
+    if (!bus_) return Ok{};
+    auto log = RowLog::create(folder + "/can.log", "", options_.lockstep, CanNode::kLogLines);
+    if (!log) return log.error();
+    can_log_ = *std::move(log);
     return Ok{};
 }
 

@@ -79,6 +79,8 @@ private:
 
     Emulator();
     Status open();
+    /// In place of those of an earlier run in the folder.
+    Status open_logs();
 
     void run_real_time(const StopFlag& stop);
     void become_real_time(const char* name, int priority);

@@ -28,8 +28,6 @@ public:
     /// `truth`: for the log, of each shot.
     LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
                 bool truth = false);
-    /// Logs sweeps, and shots where it was made with `truth`, to files of its name in the folder.
-    Status log_to(const std::string& folder, bool wait_when_full);
 
     /// Keeps each shot's report for send_telemetry. At most kMostBeams_hz shots a second.
     void keep_beams() noexcept { keeps_beams_ = true; }
@@ -39,6 +37,8 @@ public:
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.lidar().name; }
     [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-lidar", 55, false}; }
     [[nodiscard]] std::vector<std::string> outputs() const override;
+    /// Sweeps, and shots where it was made with `truth`.
+    Status log_to(const std::string& folder, bool wait_when_full) override;
     void start_at(std::int64_t t_ns) noexcept override;
     /// All shots of the packet come before it is complete.
     [[nodiscard]] std::int64_t last_pose_ns() const noexcept override { return due_ns() - 1; }

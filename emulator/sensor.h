@@ -36,6 +36,10 @@ public:
     /// Where its items go, one text for each sink.
     [[nodiscard]] virtual std::vector<std::string> outputs() const = 0;
 
+    /// Creates its logs in this folder. Before `warm_up`; without it there are none. `wait_when_full`:
+    /// RowLog::create.
+    virtual Status log_to(const std::string& /*folder*/, bool /*wait_when_full*/) { return Ok{}; }
+
     // The schedule of the next item, simulation time in ns.
 
     /// The first item at or after this time is next.

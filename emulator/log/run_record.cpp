@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <string_view>
+#include <vector>
 
 #include "base/write_file.h"
 
@@ -47,7 +50,32 @@ Key whole_number(const char* at, std::uint64_t least, std::uint64_t most) {
             fmt::format("a whole number from {} to {}", least, most)};
 }
 
+/// What a run has logged under the names of its sensors.
+constexpr std::array<std::string_view, 7> kEndings{
+    ".truth.csv", ".ledger.csv", ".estimate.csv", ".estimate.png", ".estimate.json", ".sweeps.csv", ".shots.csv"};
+constexpr std::string_view kLedgerEnding = kEndings[1];
+
 }  // namespace
+
+Status remove_run(const std::string& folder) {
+    namespace fs = std::filesystem;
+    std::error_code failed;
+    if (!fs::exists(file_in(folder), failed)) return Ok{};  // the files are not a run's
+    std::vector<fs::path> files{fs::path(folder) / "can.log"};
+    for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
+        const std::string path = at->path();
+        const auto is_of = [&](std::string_view ending) { return path.ends_with(ending); };
+        if (std::ranges::any_of(kEndings, is_of)) files.emplace_back(path);
+        if (is_of(kLedgerEnding))  // the camera's contact sheet
+            files.emplace_back(path.substr(0, path.size() - kLedgerEnding.size()) + ".png");
+    }
+    files.emplace_back(file_in(folder));
+    for (const fs::path& file : files) {
+        if (fs::symlink_status(file, failed).type() != fs::file_type::regular) continue;
+        if (!fs::remove(file, failed) && failed) return Error{"cannot be removed: " + failed.message(), file};
+    }
+    return Ok{};
+}
 
 Status write_run_record(const std::string& folder, const Scene& scene) {
     std::error_code unknown;

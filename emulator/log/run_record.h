@@ -1,4 +1,4 @@
-/// emulator/log/run_record.h - run.json: the settings of a whole run in its log folder.
+/// emulator/log/run_record.h - a run's log folder as a whole, and run.json in it: the settings of the run.
 #pragma once
 
 #include <string>
@@ -17,6 +17,9 @@ struct RunRecord {
     std::uint64_t seed = 0;
 };
 
+/// Removes the log of an earlier run, whose sensors may be others, from its folder. Other files stay, and so do
+/// links, which the next log writes through.
+Status remove_run(const std::string& folder);
 /// Writes FOLDER/run.json.
 Status write_run_record(const std::string& folder, const Scene& scene);
 /// Reads it back. Errors name file, line and what was expected.

@@ -198,7 +198,7 @@ void CameraSensor::log(const FrameLedger& l) noexcept {
     append(l.t_exposure_end_ns, unit_.motions_at_end());
     // After the hand-over, which so never waits for it.
     ledger_log_->append({row.data(), format_ledger_row(row, l, image_crc32(unit_.bytes()))});
-    sheet_->offer(l.frame, unit_.bytes());
+    sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
 }
 
 Status CameraSensor::finish() {

@@ -17,8 +17,9 @@ class ContactSheet {
 public:
     explicit ContactSheet(const VideoFormat& format);
 
-    /// Adds the frame if its number is a multiple of the stride. Allocates nothing.
-    void offer(std::uint64_t frame, std::span<const std::uint8_t> bytes) noexcept;
+    /// Adds the frame, whose exposure has this middle, if its number is a multiple of the stride. Allocates
+    /// nothing.
+    void offer(std::uint64_t frame, std::int64_t t_mid_ns, std::span<const std::uint8_t> bytes) noexcept;
     /// Writes the sheet as PNG, linear values encoded by the sRGB curve. No file without frames.
     [[nodiscard]] Status write(const std::string& path) const;
 
@@ -31,7 +32,7 @@ private:
     VideoFormat format_;
     int scale_, width_, height_;                    ///< source pixels per thumbnail pixel; thumbnail size
     std::vector<std::vector<std::uint8_t>> tiles_;  ///< blue, green, red
-    std::vector<std::uint64_t> frames_;             ///< number of each tile's frame
+    std::vector<std::int64_t> times_ns_;            ///< of each tile's frame
     std::size_t used_ = 0;
     std::uint64_t stride_ = 1;
 };

@@ -230,10 +230,14 @@ std::vector<std::pair<std::string_view, std::uint64_t>> CommandCounters::rejecte
 
 CommandCounters CanNode::counters() const noexcept {
     CommandCounters c = counters_;
-    for (const Listener& l : listeners_)
+    const auto add = [&](const auto& decoder) {
         for (std::size_t s = 0; s < kDecodeStatusCount; ++s)
-            c.by_status[s] += l.decoder.count(static_cast<DecodeStatus>(s));
-    c.by_status[static_cast<std::size_t>(DecodeStatus::not_mine)] = 0;  // counted once for all bodies in `foreign`
+            c.by_status[s] += decoder.count(static_cast<DecodeStatus>(s));
+    };
+    for (const Listener& l : listeners_) add(l.decoder);
+    add(camera_commands_);
+    add(camera_triggers_);
+    c.by_status[static_cast<std::size_t>(DecodeStatus::not_mine)] = 0;  // counted once for all in `foreign`
     return c;
 }
 

@@ -23,7 +23,7 @@ struct CommandCounters {
     std::uint64_t past = 0;           ///< time of validity not after the newest: late, repeated, out of order
     std::uint64_t overrun = 0;        ///< further ahead than the track is deep
     std::uint64_t too_far_ahead = 0;  ///< time of validity beyond the scene's command_ahead_max_s
-    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets, by PoseDecoder
+    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets of bodies and cameras
     std::uint64_t foreign = 0;                                  ///< frames of other identifiers
     std::uint64_t not_logged = 0;                               ///< frames left out of the log
     std::uint64_t missed = 0;                                   ///< lost commands, by gaps in the counters

@@ -61,6 +61,8 @@ protected:
         if (!emulator) return {};
         for (const CameraSensor* camera : emulator->sensors_of<CameraSensor>())
             counters_.push_back(camera->control()->counters());
+        for (const auto& [cause, n] : emulator->can()->counters().rejected())
+            if (n > 0) rejected_[cause] = n;
         return read_traffic();
     }
 
@@ -91,6 +93,7 @@ protected:
     std::unique_ptr<CanBus> bus_;
     int poses_ = 0;
     std::vector<CameraControlCounters> counters_;
+    std::map<std::string_view, std::uint64_t> rejected_;
 };
 
 CameraCommand random_command(std::mt19937& rng, int counter) {
@@ -298,6 +301,20 @@ TEST_F(CameraControlTest, AutoExposureReachesItsLevel) {
     const std::size_t size = 64 * 48;
     const std::span last(reinterpret_cast<const std::uint8_t*>(video.data()) + video.size() - size, size);
     EXPECT_NEAR(mean_level({64, 48, PixelFormat::grey}, {0, 0, 64, 48}, last), 0.2, 0.01);
+}
+
+TEST_F(CameraControlTest, SpoiltCommandsAndTriggersAreCounted) {
+    open();
+    pose(0);
+    CanFrame command = encode_fd(CameraCommand{}), trigger = encode_fd(CameraTrigger{9, 1, true, 0});
+    command.data[9] ^= 0x40;
+    add(command);
+    trigger.size = 8;
+    add(trigger);
+    add(trigger);
+    pose(1);
+    EXPECT_TRUE(run(small_scene(operated())).replies.empty());
+    EXPECT_EQ(rejected_, (std::map<std::string_view, std::uint64_t>{{"bad_checksum", 1}, {"too_short", 2}}));
 }
 
 TEST_F(CameraControlTest, CommandsThatCannotBeAreAnswered) {

@@ -305,7 +305,7 @@ std::string advice(const CameraSensor& camera, const Camera& settings, std::int6
     const std::uint64_t due = s.frames + s.skipped;
     const double period_ms = static_cast<double>(settings.period_ns) * 1e-6;
     if (share(s.skipped + s.deadline_missed, due) <= kAdvisedShare) return {};
-    const double needs_ms = (s.render.percentile_ns(0.99) + s.sensor.percentile_ns(0.99)) * 1e-6;
+    const double needs_ms = s.render.percentile_ns(0.99) * 1e-6;  // the detector's share is in it
     std::string text = fmt::format("camera {}: {} of {} frames were skipped and {} late. ", settings.name,
                                    s.skipped, due, s.deadline_missed);
     if (budget_ns > 0 && static_cast<double>(budget_ns) * 1e-6 < 0.9 * period_ms && s.skipped == 0)

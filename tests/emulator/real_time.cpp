@@ -1,5 +1,6 @@
 // The real-time loop: it keeps step, takes no memory after its start, and ends when it should.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -7,6 +8,7 @@
 #include <atomic>
 #include <thread>
 
+#include "emulator/report.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/allocation_counter.h"
 
@@ -42,6 +44,21 @@ TEST_F(RealTime, MakesOrCountsEveryFrameAndPacketOfItsDuration) {
     const VideoCounters sent = camera_of(*emulator).sinks().front()->counters();
     EXPECT_EQ(sent.written + sent.ring_full + sent.failed,
               c.handed_over);  // a disk may pause for longer than the ring lasts
+}
+
+TEST_F(RealTime, AdviceStatesHowLongAFrameTakes) {
+    RunOptions o;
+    o.duration_s = 0.5;
+    o.video = {{"nav", "none"}};
+    const std::string camera = "rate_hz = 500\ndetector = {exposure_s = 0.0005, shot_noise = true}";
+    const auto emulator = start(with_resolution(small_scene(camera), "[640, 480]"), o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE(emulator->run(stop_));
+    const CameraStats& c = camera_of(*emulator).stats();
+    ASSERT_GT(c.sensor.percentile_ns(0.99), 200'000) << "it is part of the rendering, and shows beside it";
+    ASSERT_EQ(advice(*emulator).size(), 1U);
+    const std::string takes = fmt::format("A frame takes {:.1f} ms", c.render.percentile_ns(0.99) * 1e-6);
+    EXPECT_NE(advice(*emulator)[0].find(takes), std::string::npos) << takes << "\n" << advice(*emulator)[0];
 }
 
 /// By samples, by a budget in time, and by paths within one.

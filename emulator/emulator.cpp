@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "emulator/camera_sensor.h"
 #include "emulator/lidar_sensor.h"
@@ -29,6 +30,26 @@ Status check_budget(const Scene& scene, const RunOptions& options) {
             return Error{fmt::format("--budget-ms {}, expected at most the period of camera \"{}\", {} ms",
                                      static_cast<double>(budget_ns) * 1e-6, c.name,
                                      static_cast<double>(c.period_ns) * 1e-6)};
+    }
+    return Ok{};
+}
+
+/// Two writers of one file or device would overwrite each other's items.
+Status check_files(const RunOptions& options) {
+    namespace fs = std::filesystem;
+    std::set<fs::path> taken;
+    for (const auto& [flag, outputs] : {std::pair{"--video", &options.video}, {"--lidar", &options.lidar}}) {
+        for (const auto& [name, sink] : *outputs) {
+            std::error_code unknown;
+            const bool is_device_or_fifo = fs::is_other(sink, unknown);
+            if (!is_device_or_fifo && !sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
+            const fs::path file = fs::weakly_canonical(fs::absolute(sink, unknown), unknown);
+            if (!unknown && !taken.insert(file).second)
+                return Error{
+                    fmt::format("{} {}={}: another output goes there too, expected a file or device of its "
+                                "own for each",
+                                flag, name, sink)};
+        }
     }
     return Ok{};
 }
@@ -172,6 +193,7 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
     if (options.lockstep && options.bus.empty())
         return Error{"--lockstep needs --can BUS: the clock advances only with commands"};
     if (auto good = check_budget(scene, options); !good) return good.error();
+    if (auto good = check_files(options); !good) return good.error();
     auto world = World::create(std::move(scene));
     if (!world) return world.error();
     if (options.lockstep && !(*world)->has_commanded_bodies())

@@ -110,28 +110,29 @@ struct Wavefront::ShadowBatch {
     SurfacePoints from;
     Vec3Lanes directions;
     Lanes<double> range_m{};
+    bool endless = true;  ///< none of the rays has an end
     std::uint32_t lanes = 0;
 };
 void Wavefront::fill(const PerPath<ShadowRay>& rays, std::size_t first, std::size_t end, ShadowBatch& batch) {
     const std::size_t n = std::min(kLanes, end - first);
     batch.lanes = lanes_below(n);
+    batch.endless = true;
     for (std::size_t k = 0; k < n; ++k) {
         const ShadowRay& ray = rays[first + k];
         batch.from.put(k, hits_[ray.path]);
         batch.directions.put(k, ray.direction);
         batch.range_m[k] = ray.range_m;
+        batch.endless &= ray.range_m == kInfinity;
     }
     rays_traced_ += n;
 }
 
-/// All of the rays have an end, or none.
 void Wavefront::trace_shadow_rays(PerPath<ShadowRay>& rays, std::size_t n) {
     ShadowBatch b;
     for (std::size_t first = 0; first < n; first += kLanes) {
         fill(rays, first, n, b);
-        const std::uint32_t dark = b.range_m[0] == kInfinity
-                                       ? tracer_.occluded(at_, b.from, b.directions, b.lanes)
-                                       : tracer_.occluded(at_, b.from, b.directions, b.range_m, b.lanes);
+        const std::uint32_t dark = b.endless ? tracer_.occluded(at_, b.from, b.directions, b.lanes)
+                                             : tracer_.occluded(at_, b.from, b.directions, b.range_m, b.lanes);
         for_each_lane(b.lanes & ~dark, [&](std::size_t k) {
             const ShadowRay& ray = rays[first + k];
             if (medium_ == nullptr)

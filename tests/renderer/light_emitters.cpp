@@ -282,6 +282,28 @@ TEST(Emitters, OfAllKindsAddUp) {
     EXPECT_LT(together.error, 0.01 * sum);
 }
 
+TEST(Emitters, AtFiniteAndInfiniteDistanceAddUp) {
+    // A ceiling above the lamp, under which the other light comes in from the side.
+    for (const Light::Kind kind : {Light::Kind::point, Light::Kind::rectangle, Light::Kind::disc}) {
+        Scene both = floor_scene();
+        add_mesh(both, plate(4, 4), {exp_rotation({kPi, 0, 0}), {0, 0, 2}});
+        both.lights.push_back(lamp(kind, shining_at({0, 0, 1}, {0, 0, 0}), {8, 8, 8}));
+        both.lights[0].width_m = both.lights[0].height_m = both.lights[0].radius_m = 0.1;
+        both.lights.push_back(lamp(Light::Kind::directional, shining_at({}, {1, 0, -0.5}), {3, 3, 3}));
+        double sum = 0, error2 = 0;
+        for (const Light& l : both.lights) {
+            Scene one = both;
+            one.lights = {l};
+            const Estimate e = irradiance_at(one, 0.1, 0, 1024);
+            EXPECT_GT(e.mean.x, 0.01);
+            sum += e.mean.x, error2 += e.error * e.error;
+        }
+        const Estimate together = irradiance_at(both, 0.1, 0, 4096);
+        EXPECT_NEAR(together.mean.x, sum, kSigmas * std::sqrt(error2 + together.error * together.error));
+        EXPECT_LT(together.error, 0.01 * sum);
+    }
+}
+
 TEST(Lights, WithoutLightsSunOnlyDirectLightingSuffices) {
     Scene s = floor_scene();
     add_sun(s, {0, 0, 1});

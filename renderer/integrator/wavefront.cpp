@@ -249,8 +249,8 @@ BsdfSample Wavefront::next_direction(std::size_t i, const SamplePoint& numbers) 
     BsdfSample s;
     if (choice < share)
         s.l = path.small_bodies.direction(tracer_, at_, path.start, choice / share, u, v);
-    else
-        s = vertices_[i].scatter({lobe, u, v});
+    else if (s = vertices_[i].scatter({lobe, u, v}); s.weight == Rgb{})
+        return s;  // below the surface: folded above it, it is none of the directions that `respond` counts
     const PathVertex::Response r = vertices_[i].respond(s.l);
     s.pdf = scatter_pdf(path, s.l, r.pdf);
     s.weight = r.f_cos == Rgb{} ? Rgb{} : r.f_cos * static_cast<float>(1 / s.pdf);

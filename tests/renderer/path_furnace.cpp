@@ -1,4 +1,5 @@
 // Light in an even environment: what comes back follows from the albedo alone, whatever the shape.
+#include "renderer/light/small_body_sampling.h"
 #include "tests/renderer/path_support.h"
 
 namespace narpa {
@@ -151,6 +152,28 @@ TEST(Furnace, NoMaterialReflectsMoreThanItReceives) {
             EXPECT_LT(e.mean.x, 1 + kSigmas * e.error + 1e-4) << static_cast<int>(kind);
             EXPECT_GT(e.mean.x, 0.05) << static_cast<int>(kind);
         }
+    }
+}
+
+TEST(Furnace, ASmallBodyInTheSkyNeitherMakesNorLosesLight) {
+    // It is as bright as the sky; the Sun, by which rays are sent to it, is all but dark.
+    for (const float roughness : {0.3f, 0.6f, 1.0f}) {
+        Scene s;
+        s.materials = {lambert(1), lambert(1)};
+        s.materials[0].kind = Material::Kind::ggx;
+        s.materials[0].metallic = 1;
+        s.materials[0].roughness = roughness;
+        s.ambient = {1, 1, 1};
+        add_sun(s, {0, 1, 0}, 1e-9);
+        add_sphere(s, 1, {});
+        const Ray ray = ray_to({4, 0, 0}, {0, 0.5, 0.6});
+        const PathSettings settings{.max_depth = 8};
+        const Estimate alone = light_along(s, ray, settings, 2048);
+        add_sphere(s, 0.05, {100, 0, 0}, 1);
+        ASSERT_TRUE(SmallBodySampling::may_help(RenderScene::create(s, 1)->tracer(), placed(s)));
+        const Estimate both = light_along(s, ray, settings, 2048);
+        EXPECT_NEAR(both.mean.x, alone.mean.x, kSigmas * std::hypot(alone.error, both.error) + 1e-6) << roughness;
+        EXPECT_LT(both.error, 0.01);
     }
 }
 

@@ -117,7 +117,9 @@ void Wavefront::extend() {
 
 /// Adds what the rays have found; paths that have escaped, or that end here, leave.
 void Wavefront::arrive(int vertex) {
-    if (medium_ != nullptr) find_segments(vertex);
+    // Method "direct": further rays only look for lamps, and the light that the air sends them is in `ambient`.
+    const bool in_medium = medium_ != nullptr && !(vertex > 0 && settings_.direct);
+    if (in_medium) find_segments(vertex);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < n_; ++i) {
         Path& path = paths_[i];
@@ -126,7 +128,7 @@ void Wavefront::arrive(int vertex) {
         if (lights_.any_with_extent())
             add(path, lights_.radiance_before(range_m, at_, path.start, group_, directions_[i], path.direction_pdf,
                                               medium_));
-        if (medium_ != nullptr) {
+        if (in_medium) {
             add(path, segments_[i].in_scattering);
             path.throughput = path.throughput * segments_[i].transmittance;
         }

@@ -57,6 +57,26 @@ TEST(AtmosphereInAScene, GroundAndSkyAreBrightInTheirColours) {
     EXPECT_NEAR(direct.z / paths.z, 1, 0.02);
 }
 
+TEST(AtmosphereInAScene, ALampThatHardlyShinesAddsNoSkylight) {
+    // Lamps that have an extent are sought by a further ray, on whose way there is air.
+    Scene s = earth_scene(40);
+    s.atmosphere->samples_per_band = 1;
+    s.atmosphere->steps = 4;
+    add_sphere(s, 1, {0, 0, 6'371'001});
+    const Ray ray = ray_to({0, -5, 6'371'002}, {0.3, 0, 6'371'001.2});
+    const PathSettings settings{.direct = true};
+    const Vec3 without = light_along(s, ray, settings, 16).mean;
+    Light dim;
+    dim.kind = Light::Kind::disc;
+    dim.radius_m = 1e-3;
+    dim.emission = {1e-9f, 1e-9f, 1e-9f};
+    dim.T_mount_light = {exp_rotation({kPi, 0, 0}), {0, 0, 6'371'006}};
+    s.lights.push_back(dim);
+    const Vec3 with = light_along(s, ray, settings, 16).mean;
+    EXPECT_GT(without.z, 1);
+    for (int band = 0; band < 3; ++band) EXPECT_NEAR(with[band], without[band], 1e-5 * without[band]);
+}
+
 TEST(AtmosphereInAScene, SunlightIsThatOfTheColumn) {
     const Scene s = earth_scene(60);
     const AtmosphereMedium medium(s, 2);

@@ -36,7 +36,13 @@ int planet_body(TableReader& table, const std::vector<Body>& bodies) {
     return -1;
 }
 
-void read_ground(TableReader& table, const Body& body, const Scene& scene, AirDescription& air) {
+/// Will it be textured? The files of textures are opened after everything else.
+bool names_texture(const SceneReading& reading, int material) {
+    return std::any_of(reading.textures.begin(), reading.textures.end(),
+                       [&](const NamedTexture& t) { return t.material == material; });
+}
+
+void read_ground(TableReader& table, const Body& body, const SceneReading& reading, AirDescription& air) {
     const std::optional<double> own = mean_radius_m(body);
     const auto radius = table.number("ground_radius_m", {.low = 1e5, .high = 1e9});
     if (own && radius)
@@ -49,8 +55,8 @@ void read_ground(TableReader& table, const Body& body, const Scene& scene, AirDe
     if (own && !table.has("ground_albedo")) {
         const int material = std::holds_alternative<Sphere>(body.shape) ? std::get<Sphere>(body.shape).material
                                                                         : std::get<Ellipsoid>(body.shape).material;
-        const Material& m = scene.materials[static_cast<std::size_t>(material)];
-        if (m.kind == Material::Kind::lambert && !is_textured(m))
+        const Material& m = reading.scene.materials[static_cast<std::size_t>(material)];
+        if (m.kind == Material::Kind::lambert && !names_texture(reading, material))
             air.ground_albedo = std::min(1.0, static_cast<double>(mean_band(m.diffuse)));
     }
     air.ground_albedo = table.number("ground_albedo", kUnit).value_or(air.ground_albedo);
@@ -82,7 +88,7 @@ void read_planet_air(TableReader& root, SceneReading& reading) {
     a.body = planet_body(*table, scene.bodies);
     const Planet planet = table->choice<Planet>("planet", kPlanets).value_or(Planet::earth);
     a.air = planet == Planet::earth ? earth_air() : mars_air();
-    if (a.body >= 0) read_ground(*table, scene.bodies[static_cast<std::size_t>(a.body)], scene, a.air);
+    if (a.body >= 0) read_ground(*table, scene.bodies[static_cast<std::size_t>(a.body)], reading, a.air);
     read_air(*table, a.air);
     a.samples_per_band =
         static_cast<int>(table->integer("samples_per_band", 1, Air::kMaxPerBand).value_or(a.samples_per_band));

@@ -91,6 +91,23 @@ TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
         << "the mesh and the material name the same file";
 }
 
+TEST(SceneFile, GroundOfTheAirIsAnUntexturedLambertBodys) {
+    const MemoryFolder folder;
+    folder.write("t.ppm", "P3 1 1 255\n9 9 9\n");
+    const auto albedo = [&](const std::string& material, const std::string& air) {
+        return read_good(folder.write("s.toml", "[sun]\ndirection = [1, 0, 0]\n[atmosphere]\nbody = \"p\"\n" + air +
+                                                    "\n[[body]]\nname = \"p\"\nsphere = {radius_m = 6e6}\n"
+                                                    "material = {" +
+                                                    material + "}\n" + kCamera))
+            .atmosphere->air.ground_albedo;
+    };
+    EXPECT_NEAR(albedo("albedo = [0.3, 0.4, 0.5]", ""), 0.4, 1e-6);
+    EXPECT_EQ(albedo("albedo = [0.3, 0.4, 0.5], texture = \"t.ppm\"", ""), 0.1);
+    EXPECT_EQ(albedo("texture = \"t.ppm\"", "planet = \"mars\""), 0.2);
+    EXPECT_EQ(albedo("kind = \"hapke\"", ""), 0.1);
+    EXPECT_EQ(albedo("texture = \"t.ppm\"", "ground_albedo = 0.7"), 0.7);
+}
+
 TEST(SceneFile, ReadsCamerasAndLidars) {
     const Scene s = read_good(data_file("complete.toml"));
     ASSERT_EQ(s.cameras.size(), 2u);

@@ -94,7 +94,7 @@ void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits,
                 const ShotSettings& settings, LidarReturn& r) {
     const Vec3 back = -path.direction;
     const Surface surface = surface_of(tracer, at, hits, i, path.direction);
-    const double cosine = dot(surface.normal, back);
+    const double cosine = std::max(dot(surface.normal, back), 0.0);  // smooth normals may turn away at the limb
     const double reflectivity = std::numbers::pi * mean(bsdf(surface, surface.normal, back, back)) +
                                 static_cast<double>(surface.material->retroreflectance);
     r.range_m = path.range_m;

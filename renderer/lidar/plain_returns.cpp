@@ -68,7 +68,7 @@ NARPA_EACH_ISA void send_back(const PlainSurfaces& surfaces, const Vec3Lanes& no
     Lanes<float> lobe{};
     for (std::size_t i = 0; i < kLanes; ++i) {
         const Vec3 back = -direction[i];
-        cosine[i] = dot(normal[i], back);
+        cosine[i] = std::max(dot(normal[i], back), 0.0);  // smooth normals may turn away at the limb
         r_v[i] = 2 * cosine[i] * cosine[i] - dot(back, back);
     }
     if (surfaces.shiny)

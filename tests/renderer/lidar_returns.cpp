@@ -73,5 +73,37 @@ TEST(LidarReturns, AreToTheBitThoseOfSingleShots) {
     for (const int n : met) EXPECT_GT(n, 100);
 }
 
+/// Where the normals of a smooth mesh turn away from the LiDAR, between its limb and that of the ball it stands
+/// for.
+TEST(LidarReturns, NoSurfaceReflectsLessThanNothing) {
+    Scene scene;
+    scene.materials = {lambert(0.5f)};
+    scene.materials[0].retroreflectance = 2;
+    add_mesh(scene, icosphere(1, 1, true), {{}, {0, 0, 10}});
+    const auto render_scene = RenderScene::create(scene, 1);
+    ASSERT_TRUE(render_scene);
+    const BodyPoses at = placed(scene);
+    const std::vector<Motion> still(scene.bodies.size());
+    for (const bool moving : {false, true}) {
+        ShotSettings settings{.range_max_m = 18};
+        if (moving) settings.motions = still;
+        int met = 0, limb = 0;
+        for (int k = 0; k < 720; ++k)
+            for (int i = 0; i < 40; ++i) {
+                const double phi = k * kPi / 360, r = 0.8 + 0.005 * i;
+                const LidarReturn seen =
+                    shoot(render_scene->tracer(), at,
+                          Ray{{}, normalized(Vec3{r * std::cos(phi), r * std::sin(phi), 10})}, settings);
+                if (seen.body < 0) continue;
+                ++met;
+                limb += seen.cos_incidence <= 0;
+                EXPECT_GE(seen.reflectivity, 0);
+                EXPECT_GE(seen.cos_incidence, 0);
+            }
+        EXPECT_GT(met, 1000);
+        EXPECT_GT(limb, 10);
+    }
+}
+
 }  // namespace
 }  // namespace narpa

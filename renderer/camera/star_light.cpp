@@ -120,9 +120,9 @@ double StarLight::set_moments(const BodyPoses& at, const CameraPose& pose) noexc
     return turn_rad;
 }
 
-void StarLight::add(const Tracer& tracer, const BodyPoses& at, const CameraPose& pose, const ImageOptics& optics,
-                    RadianceImage& image) noexcept {
-    const Frame f{tracer, at, pose, optics, image};
+void StarLight::add(const Tracer& tracer, const Medium* medium, const BodyPoses& at, const CameraPose& pose,
+                    const ImageOptics& optics, RadianceImage& image) noexcept {
+    const Frame f{tracer, medium, at, pose, optics, image};
     const double turn_rad = set_moments(at, pose);
     const Quat q_icrs_world = field_.q_icrs_world_at(pose.seconds(kMidExposure));
     const Vec3 velocity_m_s = q_icrs_world * (field_.velocity_m_s + pose.velocity_m_s());
@@ -199,7 +199,11 @@ void StarLight::trace(const Frame& f, std::size_t first) noexcept {
     }
     HitBatch hits;
     f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
-    for (std::size_t i = 0; i < rays.n; ++i) segments[i].hidden = is_set(hits.met, i);
+    for (std::size_t i = 0; i < rays.n; ++i) {
+        segments[i].hidden = is_set(hits.met, i);
+        if (f.medium != nullptr && !segments[i].hidden)
+            segments[i].light = segments[i].light * f.medium->transmittance(f.at, rays[i], kInfinity);
+    }
 }
 
 void StarLight::draw_row(const Segment& s, const CameraPose& pose, int y, Rgb* row) const noexcept {

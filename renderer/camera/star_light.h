@@ -12,6 +12,7 @@
 #include "renderer/camera/image_optics.h"
 #include "renderer/camera/point_response.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/light/medium.h"
 
 namespace narpa {
 
@@ -30,10 +31,11 @@ public:
     StarLight(const Scene& scene, const Camera& camera);
 
     /// Adds the stars that no body hides to an image that has its point spread already. `optics`: of the same
-    /// camera. Hidden is decided by rays from the lens's centre, one for each pixel that a star's image passes.
-    /// Same bytes on any number of threads; runs on the calling thread's TBB arena; allocates nothing.
-    void add(const Tracer& tracer, const BodyPoses& at, const CameraPose& pose, const ImageOptics& optics,
-             RadianceImage& image) noexcept;
+    /// camera. Hidden is decided by rays from the lens's centre, one for each pixel that a star's image passes;
+    /// along the same rays `medium`, which may be null, dims them. Same bytes on any number of threads; runs on the
+    /// calling thread's TBB arena; allocates nothing.
+    void add(const Tracer& tracer, const Medium* medium, const BodyPoses& at, const CameraPose& pose,
+             const ImageOptics& optics, RadianceImage& image) noexcept;
 
 private:
     /// The straight part of a trail between two moments; the whole image of a star where there is one only.
@@ -50,6 +52,7 @@ private:
     };
     struct Frame {
         const Tracer& tracer;
+        const Medium* medium;
         const BodyPoses& at;
         const CameraPose& pose;
         const ImageOptics& optics;

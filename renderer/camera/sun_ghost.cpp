@@ -36,17 +36,18 @@ double SunGhost::share_within_hood(double angle_rad) const noexcept {
     return std::clamp((ghost_.within_rad - angle_rad) / (kHoodShade * ghost_.within_rad), 0.0, 1.0);
 }
 
-void SunGhost::add(const Tracer& tracer, const BodyPoses& at, const CameraPose& pose,
+void SunGhost::add(const Tracer& tracer, const Medium* medium, const BodyPoses& at, const CameraPose& pose,
                    RadianceImage& image) const noexcept {
     const Rigid3& T_world_camera = pose.middle();
     const std::optional<ImagePoint> middle = centre(T_world_camera);
-    if (!middle || tracer.intersect(at, {T_world_camera.t, sun_.direction}, kInfinity).body >= 0) return;
+    const Ray to_sun{T_world_camera.t, sun_.direction};
+    if (!middle || tracer.intersect(at, to_sun, kInfinity).body >= 0) return;
     const double cosine = (conjugate(T_world_camera.q) * sun_.direction).z;
     const double irradiance = sun_.irradiance_w_m2 * cosine * share_within_hood(std::acos(std::min(cosine, 1.0)));
     // Of the disc whose edge add_row draws one pixel wide.
     const double area_px = kPi * (ghost_.radius_px * ghost_.radius_px + 1.0 / 12);
-    const auto radiance =
-        static_cast<float>(ghost_.strength * irradiance * model_->pixels_per_sr({0, 0, 1}) / area_px);
+    const auto grey = static_cast<float>(ghost_.strength * irradiance * model_->pixels_per_sr({0, 0, 1}) / area_px);
+    const Rgb radiance = grey * (medium == nullptr ? Rgb{1, 1, 1} : medium->transmittance(at, to_sun, kInfinity));
     for (int y = 0; y < image.height; ++y) {
         const std::optional<ImagePoint> here =
             pose.moves() ? centre(pose.at(pose.time(y, image.height, 0.5))) : middle;
@@ -54,7 +55,7 @@ void SunGhost::add(const Tracer& tracer, const BodyPoses& at, const CameraPose& 
     }
 }
 
-void SunGhost::add_row(const ImagePoint& centre, float radiance, int y, RadianceImage& image) const noexcept {
+void SunGhost::add_row(const ImagePoint& centre, const Rgb& radiance, int y, RadianceImage& image) const noexcept {
     const double reach = ghost_.radius_px + 0.5, dy = y - centre.y, half = std::sqrt(reach * reach - dy * dy);
     if (!(half > 0)) return;
     const auto column = [&](double x) { return static_cast<int>(std::clamp<double>(x, 0, image.width)); };
@@ -62,7 +63,7 @@ void SunGhost::add_row(const ImagePoint& centre, float radiance, int y, Radiance
         const double lit = std::clamp(reach - std::hypot(x - centre.x, dy), 0.0, 1.0);
         Rgb& pixel = image.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
                                   static_cast<std::size_t>(x)];
-        pixel = pixel + static_cast<float>(lit) * radiance * Rgb{1, 1, 1};
+        pixel = pixel + static_cast<float>(lit) * radiance;
     }
 }
 

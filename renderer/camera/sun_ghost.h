@@ -15,6 +15,7 @@
 #include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/image/radiance_image.h"
+#include "renderer/light/medium.h"
 
 namespace narpa {
 
@@ -27,16 +28,16 @@ public:
     /// Adds an evenly lit disc to the image, unless the Sun is outside the ghost's angle or a body hides its centre
     /// at mid-exposure. The radiance of its pixels is that with which the detector collects `strength` of the Sun's
     /// light through the aperture, irradiance * cos(angle from the axis), less over the last tenth of the ghost's
-    /// angle. Each row has the disc where it is in the
-    /// middle of the row's exposure. Its light is right within 0.5 % from a radius of 5 px on, 4 % at 1 px.
+    /// angle and as much less as `medium`, which may be null, dims the Sun. Each row has the disc where it is in
+    /// the middle of the row's exposure. Its light is right within 0.5 % from a radius of 5 px on, 4 % at 1 px.
     /// Allocates nothing.
-    void add(const Tracer& tracer, const BodyPoses& at, const CameraPose& pose,
+    void add(const Tracer& tracer, const Medium* medium, const BodyPoses& at, const CameraPose& pose,
              RadianceImage& image) const noexcept;
 
 private:
     [[nodiscard]] std::optional<ImagePoint> centre(const Rigid3& T_world_camera) const noexcept;
     [[nodiscard]] double share_within_hood(double angle_rad) const noexcept;
-    void add_row(const ImagePoint& centre, float radiance, int y, RadianceImage& image) const noexcept;
+    void add_row(const ImagePoint& centre, const Rgb& radiance, int y, RadianceImage& image) const noexcept;
 
     Sun sun_;
     Ghost ghost_;

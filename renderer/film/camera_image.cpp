@@ -127,9 +127,9 @@ struct CameraRenderer::Impl {
 
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
         optics.apply(before_optics, out);
-        if (stars) stars->add(render_scene.tracer(), at, pose, optics, out);
+        if (stars) stars->add(render_scene.tracer(), render_scene.medium(), at, pose, optics, out);
         optics.add_veil(out);
-        if (ghost) ghost->add(render_scene.tracer(), at, pose, out);
+        if (ghost) ghost->add(render_scene.tracer(), render_scene.medium(), at, pose, out);
     }
 };
 

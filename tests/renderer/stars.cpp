@@ -1,6 +1,7 @@
 // Stars in the image: where they stand, how much light they give, what hides them.
 #include <tbb/global_control.h>
 
+#include "renderer/atmosphere/air.h"
 #include "renderer/camera/detector.h"
 #include "tests/renderer/star_support.h"
 #include "tests/support/allocation_counter.h"
@@ -165,6 +166,33 @@ TEST(Stars, BodiesHideThem) {
     EXPECT_NEAR(spot.x, 30, 0.01);
     scene.bodies.clear();
     EXPECT_NEAR(spot_in(rendered(scene, c)).sum / spot.sum, 2, 1e-3);
+}
+
+TEST(Stars, AirDimsThem) {
+    // From the ground at night, at two heights above the horizon.
+    for (const double zenith_deg : {30.0, 80.0}) {
+        const double z = zenith_deg * kPi / 180;
+        Scene scene = sky({{0, 0, 1}});
+        scene.materials.push_back(lambert(0.3f));
+        add_sphere(scene, 6'371'000, -6'371'002 * Vec3{std::sin(z), 0, std::cos(z)});
+        Camera c = camera(21, 21, 1000);
+        c.point_spread = kGaussian;
+        const RadianceImage vacuum = rendered(scene, c);
+        scene.atmosphere.emplace();
+        scene.atmosphere->air = earth_air();
+        scene.atmosphere->samples_per_band = 1;
+        scene.atmosphere->steps = 4;
+        const auto render_scene = RenderScene::create(scene, 2);
+        ASSERT_TRUE(render_scene);
+        const RadianceImage through = rendered(*render_scene, placed(scene), c);
+        const Rgb expected = render_scene->medium()->transmittance(placed(scene), {{}, {0, 0, 1}}, kInfinity);
+        EXPECT_LT(expected.z, zenith_deg < 45 ? 0.8f : 0.4f);
+        const std::size_t middle = 10 * 21 + 10;
+        for (int band = 0; band < 3; ++band)
+            EXPECT_NEAR(through.pixels[middle][band] / vacuum.pixels[middle][band], expected[band],
+                        1e-5f * expected[band])
+                << zenith_deg;
+    }
 }
 
 TEST(Stars, AreDisplacedByTheVelocityOfTheObserver) {

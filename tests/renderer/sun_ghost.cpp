@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "renderer/atmosphere/air.h"
 #include "renderer/camera/scene_camera.h"
 #include "tests/renderer/camera_support.h"
 
@@ -139,6 +140,35 @@ TEST(SunGhost, LeavesTheImageBelowItAsItWas) {
     EXPECT_GT(added, 0);
     for (std::size_t i = 0; i < with.pixels.size(); ++i)
         EXPECT_NEAR(with.pixels[i].y - without.pixels[i].y, added, 1e-4f * with.pixels[i].y);
+}
+
+TEST(SunGhost, IsDimmedByTheAir) {
+    // From the ground, the Sun 75 degrees from the zenith.
+    const double z = 75 * kPi / 180;
+    Scene scene = sun_at(0, 0);
+    scene.bodies.clear();
+    add_sphere(scene, 6'371'000, -6'371'002 * Vec3{std::sin(z), 0, std::cos(z)});
+    Camera plain = with_ghost();
+    plain.ghost->strength = 1;
+    const Camera ghost = plain;
+    plain.ghost.reset();
+    const auto added = [&](const RenderScene& render_scene) {
+        const std::size_t middle = kGhostSide * kGhostSide / 2 + kGhostSide / 2;
+        const BodyPoses at = placed(scene);
+        return rendered(render_scene, at, ghost).pixels[middle] - rendered(render_scene, at, plain).pixels[middle];
+    };
+    const Rgb vacuum = added(*RenderScene::create(scene, 1));
+    scene.atmosphere.emplace();
+    scene.atmosphere->air = earth_air();
+    scene.atmosphere->samples_per_band = 1;
+    scene.atmosphere->steps = 4;
+    const auto render_scene = RenderScene::create(scene, 2);
+    ASSERT_TRUE(render_scene);
+    const Rgb expected = render_scene->medium()->transmittance(placed(scene), {{}, {0, 0, 1}}, kInfinity);
+    EXPECT_LT(expected.z, 0.5f);
+    const Rgb through = added(*render_scene);
+    for (int band = 0; band < 3; ++band)
+        EXPECT_NEAR(through[band] / vacuum[band], expected[band], 1e-3f * expected[band]);
 }
 
 }  // namespace

@@ -149,6 +149,12 @@ private:
         const bool needed = geographic_ || r.on != DemRequest::On::plane || r.radii;
         if (needed && !(a > 0 && b > 0 && a < 1e12 && b < 1e12 && b > 0.1 * a && b < 10 * a))
             return Error{"it names no ellipsoid, expected ellipsoid_m = [equatorial, polar]"};
+        // Heights stand on the ellipsoid at geodetic latitudes; a distance from the centre does neither.
+        if (r.radii && a != b)
+            return Error{fmt::format(
+                "its ellipsoid is flattened, of {:.10g} and {:.10g} m, and radii are those of a sphere: "
+                "expected ellipsoid_m = [radius, radius]",
+                a, b)};
         place_.equatorial_m = a, place_.polar_m = b;
         return Ok{};
     }

@@ -1,11 +1,13 @@
 // DEM files, each format the same 40 x 30 posts: heights, places, holes; scenes with a dem; damaged files.
 #include "renderer/scene/dem_process.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <cmath>
 
+#include "base/constants.h"
 #include "base/program_beside.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene/scene_file.h"
@@ -189,6 +191,60 @@ TEST(Dem, ErrorsSayWhatToDo) {
         ASSERT_FALSE(limited);
         EXPECT_NE(limited.error().what.find("the DEM reader"), std::string::npos);
     }
+}
+
+/// A map, in 40 x 20 posts of this number, of a sphere of 1000 km.
+std::string globe(const MemoryFolder& folder, float number) {
+    const std::vector<float> posts(40 * 20, number);
+    folder.write("globe.img", {reinterpret_cast<const char*>(posts.data()), posts.size() * sizeof(float)});
+    return folder.write("globe.lbl", fmt::format(R"(PDS_VERSION_ID = PDS3
+RECORD_TYPE = FIXED_LENGTH
+RECORD_BYTES = 160
+FILE_RECORDS = 20
+^IMAGE = "globe.img"
+OBJECT = IMAGE
+  LINES = 20
+  LINE_SAMPLES = 40
+  SAMPLE_TYPE = PC_REAL
+  SAMPLE_BITS = 32
+END_OBJECT = IMAGE
+OBJECT = IMAGE_MAP_PROJECTION
+  MAP_PROJECTION_TYPE = "SIMPLE CYLINDRICAL"
+  A_AXIS_RADIUS = 1000 <KM>
+  B_AXIS_RADIUS = 1000 <KM>
+  C_AXIS_RADIUS = 1000 <KM>
+  COORDINATE_SYSTEM_NAME = "PLANETOCENTRIC"
+  POSITIVE_LONGITUDE_DIRECTION = "EAST"
+  CENTER_LATITUDE = 0.0 <DEGREE>
+  CENTER_LONGITUDE = 180.0 <DEGREE>
+  LINE_PROJECTION_OFFSET = 9.5
+  SAMPLE_PROJECTION_OFFSET = 19.5
+  MAP_SCALE = {:.9f} <KM/PIXEL>
+  MAP_RESOLUTION = {:.9f} <PIXEL/DEGREE>
+END_OBJECT = IMAGE_MAP_PROJECTION
+END
+)",
+                                                 2 * kPi * 1000 / 40, 40 / 360.0));
+}
+
+TEST(Dem, RadiiAreOfASphere) {
+    NEEDS_GDAL();
+    const MemoryFolder folder;
+    DemRequest r = request_of(globe(folder, 1e6f));
+    r.on = DemRequest::On::ellipsoid;
+    r.radii = true;
+    for (const double given_m : {DemRequest::kFromFile, 0.95e6}) {
+        r.equatorial_m = r.polar_m = given_m;
+        const auto sphere = read_dem_in_process(r);
+        ASSERT_TRUE(sphere) << sphere.error().text();
+        for (const Vec3f& p : sphere->positions)
+            EXPECT_NEAR(norm(sphere->origin_m + vec_cast<double>(p)), 1e6, 0.2);
+    }
+    r.polar_m = 0.9e6;
+    const auto flattened = read_dem_in_process(r);
+    ASSERT_FALSE(flattened);
+    EXPECT_NE(flattened.error().what.find("expected ellipsoid_m = [radius, radius]"), std::string::npos)
+        << flattened.error().text();
 }
 
 TEST(Dem, ATruncatedFileIsAnError) {

@@ -311,9 +311,9 @@ Result<OpenDem> open_with_gdal(const DemRequest& request) {
         dem.heights = std::make_unique<WholePlanet>(std::move(dem.heights), dem.placement.first_pole != 0,
                                                     dem.placement.last_pole != 0);
     const double c = 0.5 * (dem.heights->columns() - 1), w = 0.5 * (dem.heights->rows() - 1);
-    std::array<Vec3, 3> p{Vec3{c - 0.25, w, 0}, Vec3{c + 0.25, w, 0}, Vec3{c, w, 0}};
+    std::array<Vec3, 4> p{Vec3{c - 0.25, w, 0}, Vec3{c + 0.25, w, 0}, Vec3{c, w - 0.25, 0}, Vec3{c, w + 0.25, 0}};
     if (dem.heights->columns() < 2 || dem.heights->rows() < 2 || !dem.placement.place(p)) return dem;
-    dem.spacing_m = 2 * norm(p[1] - p[0]);
+    dem.spacing = {2 * norm(p[1] - p[0]), 2 * norm(p[3] - p[2])};
     return dem;
 }
 

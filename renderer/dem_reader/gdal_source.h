@@ -9,11 +9,11 @@
 
 namespace narpa {
 
-/// An open DEM and where it lies. `spacing_m`: between posts in the middle.
+/// An open DEM and where it lies. `spacing`: between posts in the middle.
 struct OpenDem {
     std::unique_ptr<HeightSource> heights;
     Placement placement;
-    double spacing_m = 0;
+    PostSpacing spacing;
 };
 
 /// GeoTIFF, PDS3, PDS4, ISIS3 cubes and PNG; the first band. Errors say what is wrong, without the file's name.

@@ -40,7 +40,11 @@ Result<TerrainMesh> read_terrain(const DemRequest& request, int terminal) {
     if (finer > 1) {
         if (dem->heights->columns() > (1 << 20) / finer || dem->heights->rows() > (1 << 20) / finer)
             return Error{"it has too many posts for its detail, expected at most 2^20 along a side with it"};
-        detailed = std::make_unique<DetailedSource>(*dem->heights, dem->spacing_m, request.detail);
+        if (dem->heights->goes_around() && (request.detail.craters > 0 || request.detail.rocks > 0))
+            return Error{
+                "it goes around the planet, where craters and rocks would break off at the seam and stretch to the "
+                "poles: expected no craters_per_m2 and no rocks_share in its detail"};
+        detailed = std::make_unique<DetailedSource>(*dem->heights, dem->spacing, request.detail);
         dem->placement.posts_per_post = finer;
     }
     ProgressLine line(terminal, request.path);

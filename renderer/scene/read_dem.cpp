@@ -28,7 +28,8 @@ TerrainDetail read_detail(TableReader& table) {
     TerrainDetail d;
     table.require("posts", "how many times finer than the DEM, 2 to 64");
     d.posts_per_post = static_cast<int>(table.integer("posts", 2, 64).value_or(2));
-    d.craters = table.number("craters_per_m2", {.low = 0, .high = 10}).value_or(0);
+    // From 2.4 on, cells would hold more craters than DetailedSource draws.
+    d.craters = table.number("craters_per_m2", {.low = 0, .high = 1}).value_or(0);
     d.rocks = table.number("rocks_share", {.low = 0, .high = 0.5}).value_or(0);
     d.seed = static_cast<std::uint64_t>(table.integer("seed", 0, 1'000'000'000).value_or(0));
     table.finish();

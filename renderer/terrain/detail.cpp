@@ -88,11 +88,14 @@ struct CellRows {
 
 }  // namespace
 
-DetailedSource::DetailedSource(HeightSource& coarse, double spacing_m, const TerrainDetail& detail)
-    : coarse_(coarse), spacing_m_(spacing_m / detail.posts_per_post), detail_(detail) {
+DetailedSource::DetailedSource(HeightSource& coarse, const PostSpacing& spacing, const TerrainDetail& detail)
+    : coarse_(coarse),
+      spacing_{spacing.x_m / detail.posts_per_post, spacing.y_m / detail.posts_per_post},
+      detail_(detail) {
     constexpr double kStep = 1.189207115002721;  // 2^(1/4): within a step, numbers fall as D^-2
-    for (double high = 2 * spacing_m; high > 2.01 * spacing_m_; high /= kStep) {
-        const double low = std::max(high / kStep, 2 * spacing_m_);
+    const double least = 2 * std::max(spacing_.x_m, spacing_.y_m);
+    for (double high = 2 * std::max(spacing.x_m, spacing.y_m); high > 1.005 * least; high /= kStep) {
+        const double low = std::max(high / kStep, least);
         if (detail.craters > 0)
             sizes_.push_back({low, high, detail.craters * (1 / (low * low) - 1 / (high * high)), false});
         if (detail.rocks > 0) sizes_.push_back({low, high, rocks_between(detail.rocks, low, high), true});
@@ -135,9 +138,9 @@ void DetailedSource::add_features(const Sizes& sizes, std::uint64_t stream, int 
     const double cell_m = 8 * sizes.high_m, reach_m = (sizes.rocks ? 0.5 : 0.5 * kCraterReach) * sizes.high_m;
     const int width = columns();
     const auto cell_of = [&](double m) { return static_cast<std::int64_t>(std::floor(m / cell_m)); };
-    const std::int64_t last_column = cell_of(width * spacing_m_ + reach_m),
-                       last_row = cell_of((row + count) * spacing_m_ + reach_m);
-    for (std::int64_t j = cell_of(row * spacing_m_ - reach_m); j <= last_row; ++j)
+    const std::int64_t last_column = cell_of(width * spacing_.x_m + reach_m),
+                       last_row = cell_of((row + count) * spacing_.y_m + reach_m);
+    for (std::int64_t j = cell_of(row * spacing_.y_m - reach_m); j <= last_row; ++j)
         for (std::int64_t i = cell_of(-reach_m); i <= last_column; ++i) {
             CellRandom random(detail_.seed, stream, i, j);
             for (int left = random.poisson(sizes.per_m2 * cell_m * cell_m); left > 0; --left) {
@@ -148,14 +151,14 @@ void DetailedSource::add_features(const Sizes& sizes, std::uint64_t stream, int 
                 const double a = 1 / (sizes.low_m * sizes.low_m), b = 1 / (sizes.high_m * sizes.high_m);
                 const double diameter = 1 / std::sqrt(a + u * (b - a)), radius = 0.5 * diameter;
                 const double reach = sizes.rocks ? radius : kCraterReach * radius;
-                const int top = std::max(row, static_cast<int>(std::ceil((y - reach) / spacing_m_))),
+                const int top = std::max(row, static_cast<int>(std::ceil((y - reach) / spacing_.y_m))),
                           bottom =
-                              std::min(row + count - 1, static_cast<int>(std::floor((y + reach) / spacing_m_))),
-                          from = std::max(0, static_cast<int>(std::ceil((x - reach) / spacing_m_))),
-                          to = std::min(width - 1, static_cast<int>(std::floor((x + reach) / spacing_m_)));
+                              std::min(row + count - 1, static_cast<int>(std::floor((y + reach) / spacing_.y_m))),
+                          from = std::max(0, static_cast<int>(std::ceil((x - reach) / spacing_.x_m))),
+                          to = std::min(width - 1, static_cast<int>(std::floor((x + reach) / spacing_.x_m)));
                 for (int r = top; r <= bottom; ++r)
                     for (int c = from; c <= to; ++c) {
-                        const double off = std::hypot(c * spacing_m_ - x, r * spacing_m_ - y) / radius;
+                        const double off = std::hypot(c * spacing_.x_m - x, r * spacing_.y_m - y) / radius;
                         if (off < reach / radius)
                             heights[static_cast<std::size_t>(r - row) * static_cast<std::size_t>(width) +
                                     static_cast<std::size_t>(c)] +=

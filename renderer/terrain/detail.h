@@ -20,12 +20,17 @@ struct TerrainDetail {
     std::uint64_t seed = 0;
 };
 
+/// Metres between posts, along the rows and along the columns.
+struct PostSpacing {
+    double x_m = 0, y_m = 0;
+};
+
 /// A DEM on a grid that is finer by a whole number: smooth between its posts, with the features of TerrainDetail
-/// whose diameters are between two posts of the finer grid and two of the coarser.
+/// whose diameters are between two posts of the finer grid and two of the coarser, along the wider spacing.
 class DetailedSource final : public HeightSource {
 public:
-    /// `spacing_m`: between posts of `coarse`, which must outlive this.
-    DetailedSource(HeightSource& coarse, double spacing_m, const TerrainDetail& detail);
+    /// `spacing`: of `coarse`, which must outlive this and, where there are features, not go around a planet.
+    DetailedSource(HeightSource& coarse, const PostSpacing& spacing, const TerrainDetail& detail);
 
     [[nodiscard]] int columns() const override;
     [[nodiscard]] int rows() const override;
@@ -41,7 +46,7 @@ private:
     void add_features(const Sizes& sizes, std::uint64_t stream, int row, int count, double* heights) const;
 
     HeightSource& coarse_;
-    double spacing_m_;  ///< of the finer grid
+    PostSpacing spacing_;  ///< of the finer grid
     TerrainDetail detail_;
     std::vector<Sizes> sizes_;
     std::vector<double> coarse_rows_;

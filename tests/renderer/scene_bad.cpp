@@ -122,6 +122,8 @@ const BadFile kBad[] = {
     {"DemPath", BODY "dem = {file = \"a.tif\", seen_from_m = [[0, 0]]}\n", 3, 38, "expected [[x, y, z], ...]"},
     {"DemGround", BODY "dem = {file = \"a.tif\", on = \"sea\"}\n", 3, 29, "expected one of \"plane\""},
     {"RotationWithoutEpoch", BALL "rotation = \"mars\"\n", 4, 12, "expected an epoch in [scene]"},
+    {"DemWithMoreCratersThanAreDrawn", BODY "dem = {file = \"a.tif\", detail = {posts = 2, craters_per_m2 = 2}}\n",
+     3, 62, "got 2, expected a number"},
     {"DemMissing", BODY "dem = \"nowhere.tif\"\n", 3, 7, "nowhere.tif: no such file"},
     {"SphereWithoutRadius", BODY "sphere = {}\n", 3, 10, "has no \"radius_m\""},
     {"SphereRadiusZero", BODY "sphere = {radius_m = 0}\n", 3, 22, "got 0, expected a number in (0"},

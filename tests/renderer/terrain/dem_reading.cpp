@@ -247,6 +247,25 @@ TEST(Dem, RadiiAreOfASphere) {
         << flattened.error().text();
 }
 
+TEST(Dem, NoCratersAndRocksAboutAWholePlanet) {
+    NEEDS_GDAL();
+    const MemoryFolder folder;
+    DemRequest r = request_of(globe(folder, 0));
+    r.on = DemRequest::On::ellipsoid;
+    r.detail.posts_per_post = 2;
+    EXPECT_TRUE(read_dem_in_process(r));
+    for (const bool rocks : {false, true}) {
+        (rocks ? r.detail.rocks : r.detail.craters) = 0.1;
+        const auto t = read_dem_in_process(r);
+        ASSERT_FALSE(t);
+        EXPECT_NE(t.error().what.find("it goes around the planet"), std::string::npos) << t.error().text();
+        r.detail.craters = 0;
+    }
+    DemRequest part = request_of(dem_file("mars.tif"));
+    part.detail = {.posts_per_post = 2, .craters = 0.01};
+    EXPECT_TRUE(read_dem_in_process(part));
+}
+
 TEST(Dem, ATruncatedFileIsAnError) {
     NEEDS_GDAL();
     const MemoryFolder folder;

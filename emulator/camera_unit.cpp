@@ -108,7 +108,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     const std::int64_t begun_ns = monotonic_ns();
     FrameSettings settings;
     settings.spp = render.spp;
-    settings.seed = render.seed;
+    settings.seed = seed_of_camera(render.seed, index_);
     settings.frame = frame;
     settings.method = render.method;
     settings.max_depth = render.max_depth;
@@ -121,7 +121,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     // The allowance includes the time by which the renderer stopped late.
     if (settings.budget.kind == FrameBudget::Kind::time)
         t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
-    narpa::expose(camera_, radiance_, render.seed, frame, bytes_, sensor_array_.get());
+    narpa::expose(camera_, radiance_, settings.seed, frame, bytes_, sensor_array_.get());
     if (camera_.control) read_out(format(), settings_.region, settings_.binning, bytes_);
     durations_.sensor_ns = monotonic_ns() - lit_ns;
 

@@ -16,6 +16,12 @@
 
 namespace narpa {
 
+/// Of the noise and the samples of a scene's camera: cameras that look at the same things share none of them. The
+/// first has the scene's seed.
+[[nodiscard]] constexpr std::uint64_t seed_of_camera(std::uint64_t scene_seed, std::size_t index) noexcept {
+    return scene_seed + index * 0x9e3779b97f4a7c15u;  // 2^64 over the golden ratio (D. E. Knuth, TAOCP 3, 6.4)
+}
+
 /// The radiance in each band at full scale of the digital numbers, W m^-2 sr^-1. A frame's expected error is a
 /// fraction of it.
 [[nodiscard]] double full_scale_radiance(const Camera& camera) noexcept;

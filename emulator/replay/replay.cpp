@@ -151,7 +151,7 @@ FrameSettings Replay::settings_of(std::size_t i) const {
     const FrameLedger& logged = frames_[i].ledger;
     const RenderSettings& render = world_->scene().render;
     FrameSettings s;
-    s.seed = render.seed;
+    s.seed = seed_of_camera(render.seed, index_);
     s.frame = logged.frame;
     s.method = render.method;
     s.max_depth = render.max_depth;

@@ -84,8 +84,9 @@ public:
                           fmt::format("row {} of {}", k + 1, rows.size()));
             ++k;
             const std::int64_t t = row.t_ns + start_ns_;
-            if (!options_.lockstep) wait_for(t - std::llround(options_.lead_s * 1e9));
-            if (auto fits = check_mode(); !fits) return fits;
+            if (!options_.lockstep)
+                if (auto waited = wait_for(t - std::llround(options_.lead_s * 1e9)); !waited) return waited;
+            if (auto fits = check_run(); !fits) return fits;
             if (auto sent = send(row, t); !sent) return sent;
             if (options_.lockstep)
                 if (auto reached = wait_in_lockstep(); !reached) return reached;
@@ -105,7 +106,7 @@ private:
                 bus_.wait(50 * kMs);
                 clock_.listen(bus_);
             }
-            if (auto fits = check_mode(); !fits) return fits;
+            if (auto fits = check_run(); !fits) return fits;
             if (!clock_.synchronized()) {
                 if (!bus_.ended() && options_.wait_s > 0 && !stop_flag())
                     return Error{
@@ -124,9 +125,15 @@ private:
         return Ok{};
     }
 
-    /// An emulator in lockstep starts with heartbeats in the state `starting`; one in real time does not.
-    Status check_mode() const {
+    /// Whether it is the run that the trajectory began with, in the mode of this side. An emulator in lockstep
+    /// starts with heartbeats in the state `starting`; one in real time does not.
+    Status check_run() const {
         if (!clock_.synchronized()) return Ok{};
+        if (clock_.restarted())
+            return Error{
+                "the emulator was started again, and its clock with it: expected `narpa fly` once for each of "
+                "its runs",
+                options_.bus, 0, 0, ErrorKind::failed};
         const RunState state = clock_.newest().state;
         if (!options_.lockstep && (state == RunState::starting || state == RunState::lockstep))
             return Error{"the emulator runs in lockstep, expected --lockstep here too", options_.bus};
@@ -135,11 +142,13 @@ private:
         return Ok{};
     }
 
-    void wait_for(std::int64_t t_ns) {
+    Status wait_for(std::int64_t t_ns) {
         for (std::int64_t left; (left = t_ns - clock_.now_ns()) > 0 && !stop_flag();) {
             bus_.wait(std::min<std::int64_t>(left, 100 * kMs));
             clock_.listen(bus_);
+            if (auto fits = check_run(); !fits) return fits;
         }
+        return Ok{};
     }
 
     Status send(const TrajectoryRow& row, std::int64_t t_ns) {
@@ -165,7 +174,7 @@ private:
         const std::int64_t deadline = monotonic_ns() + std::llround(options_.wait_s * 1e9);
         while (!clock_.reached(granted)) {
             clock_.listen(bus_);
-            if (auto fits = check_mode(); !fits) return fits;
+            if (auto fits = check_run(); !fits) return fits;
             if (clock_.reached(granted)) break;
             if (stop_flag()) return Ok{};
             if (monotonic_ns() > deadline)

@@ -10,11 +10,14 @@
 namespace narpa {
 
 bool RemoteClock::accept(const ReceivedFrame& received) noexcept {
-    if (decode(received.frame, newest_.t_ns, newest_) != DecodeStatus::complete) return false;
-    // The heartbeat with the least delay is the most accurate.
+    const std::int64_t before_ns = newest_.t_ns;
+    if (decode(received.frame, before_ns, newest_) != DecodeStatus::complete) return false;
+    const bool restarted = synchronized_ && newest_.t_ns < before_ns;
+    // The heartbeat with the least delay is the most accurate, of the run that goes on.
     const std::int64_t offset_ns = newest_.t_ns - received.t_received_ns;
-    offset_ns_ = synchronized_ ? std::max(offset_ns_, offset_ns) : offset_ns;
+    offset_ns_ = synchronized_ && !restarted ? std::max(offset_ns_, offset_ns) : offset_ns;
     synchronized_ = true;
+    restarted_ = restarted_ || restarted;
     return true;
 }
 

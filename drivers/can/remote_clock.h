@@ -23,6 +23,8 @@ public:
     void start_here() noexcept;
 
     [[nodiscard]] bool synchronized() const noexcept { return synchronized_; }
+    /// The clock went back at least once: another run of the emulator has begun, and the clock is that one's.
+    [[nodiscard]] bool restarted() const noexcept { return restarted_; }
     /// In real time: the emulator's time now. Heartbeats carry whole microseconds.
     [[nodiscard]] std::int64_t now_ns() const noexcept;
     /// The last heartbeat; in lockstep its time is the simulation time.
@@ -36,7 +38,7 @@ public:
 private:
     Heartbeat newest_{};
     std::int64_t offset_ns_ = 0;
-    bool synchronized_ = false;
+    bool synchronized_ = false, restarted_ = false;
 };
 
 /// Opens a bus as a client. While the bus does not exist yet (the emulator may still be reading its scene) it

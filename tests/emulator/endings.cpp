@@ -3,7 +3,11 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <future>
+#include <utility>
 
+#include "emulator/trajectory.h"
+#include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
 
@@ -85,6 +89,28 @@ TEST_F(Ending, ARunWhoseMessagesNobodyTakesKeepsItsFiles) {
         EXPECT_EQ(run_command(lockstep_ + "--video nav=none --log " + log + " " + closed).status, 0);
         EXPECT_EQ(read_rows(log + "/nav.ledger.csv").size(), 11U);
     }
+}
+
+TEST_F(Ending, ATrajectoryEndsWithTheRunThatItWasFlownFor) {
+    const auto hub = open_or_fail("slcan:0", CanRole::hub);
+    ASSERT_TRUE(hub);
+    std::ofstream(folder_ / "long.csv") << kTrajectoryHeader << "\n0,chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n"
+                                        << "100,chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n";
+    const std::string command =
+        "timeout 20 " NARPA_BIN " fly " + (folder_ / "long.csv") + " --can slcan:" + std::to_string(hub_port(*hub));
+    auto flight = std::async(std::launch::async, [&] { return run_command(command + " 2>&1"); });
+    // A run that has lasted for a minute, until its first command; then another.
+    std::int64_t start_ns = monotonic_ns() - 60 * kSecond_ns;
+    bool commanded = false;
+    while (flight.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready) {
+        for (ReceivedFrame out; hub->receive(out);)
+            if (!std::exchange(commanded, true)) start_ns = monotonic_ns();
+        hub->send(encode(Heartbeat{.t_ns = monotonic_ns() - start_ns, .state = RunState::running}));
+    }
+    const auto [status, said] = flight.get();
+    EXPECT_TRUE(commanded);
+    EXPECT_EQ(status, 1) << said;
+    EXPECT_NE(said.find("the emulator was started again"), std::string::npos) << said;
 }
 
 TEST_F(Ending, ASignalEndsARunInEveryState) {

@@ -122,9 +122,11 @@ Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& text, const
     Descriptor fd(::socket(destination->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     if (!fd) return Error{what + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
     if (auto set = set_route(fd.get(), *destination, *address, what); !set) return set.error();
-    const std::string by = address->interface.empty() ? "" : " by " + address->interface;
-    return std::unique_ptr<PacketSink>(std::make_unique<UdpSink>(
-        std::move(fd), *destination, *port, network.position_port_offset(), address->host + by));
+    std::string host = address->host;
+    if (host != destination->text()) host += " (" + destination->text() + ")";
+    if (!address->interface.empty()) host += " by " + address->interface;
+    return std::unique_ptr<PacketSink>(
+        std::make_unique<UdpSink>(std::move(fd), *destination, *port, network.position_port_offset(), host));
 }
 
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) {

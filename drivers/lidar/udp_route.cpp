@@ -1,9 +1,11 @@
 #include "drivers/lidar/udp_route.h"
 
+#include <arpa/inet.h>
 #include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -106,11 +108,21 @@ Result<UdpDestination> UdpDestination::resolve(const std::string& host, const st
     hints.ai_socktype = SOCK_DGRAM;
     if (const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found); error != 0)
         return Error{what + ": unknown host \"" + host + "\": " + ::gai_strerror(error)};
+    const addrinfo* best = found;
+    for (const addrinfo* a = found; a != nullptr && best->ai_family != AF_INET; a = a->ai_next)
+        if (a->ai_family == AF_INET) best = a;
     UdpDestination destination;
-    std::memcpy(&destination.address, found->ai_addr, found->ai_addrlen);
-    destination.size = found->ai_addrlen;
+    std::memcpy(&destination.address, best->ai_addr, best->ai_addrlen);
+    destination.size = best->ai_addrlen;
     ::freeaddrinfo(found);
     return destination;
+}
+
+std::string UdpDestination::text() const {
+    std::array<char, INET6_ADDRSTRLEN> text{};
+    const void* bytes = address.ss_family == AF_INET6 ? static_cast<const void*>(&as_ipv6(address).sin6_addr)
+                                                      : &as_ipv4(address).sin_addr;
+    return ::inet_ntop(address.ss_family, bytes, text.data(), text.size());
 }
 
 void UdpDestination::set_port(int port) noexcept {

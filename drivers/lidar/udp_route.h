@@ -29,8 +29,11 @@ struct UdpDestination {
     sockaddr_storage address{};
     socklen_t size = 0;
 
-    /// Looks the host up. `what` begins its Errors.
+    /// Looks the host up. Of a name with addresses of both families it is an IPv4 one: most drivers of LiDARs
+    /// listen there alone. `what` begins its Errors.
     static Result<UdpDestination> resolve(const std::string& host, const std::string& what);
+    /// "192.168.1.70", without interface and port.
+    [[nodiscard]] std::string text() const;
     void set_port(int port) noexcept;
     [[nodiscard]] bool is_multicast() const noexcept;
 };

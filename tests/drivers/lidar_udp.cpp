@@ -1,11 +1,15 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cstring>
+#include <fstream>
 #include <numeric>
 
 #include "drivers/lidar/packet_sink.h"
@@ -13,6 +17,8 @@
 #include "protocols/lidar/velodyne.h"
 #include "tests/drivers/video_support.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/read_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace narpa {
 namespace {
@@ -83,6 +89,36 @@ TEST(UdpSink, DataAndPositionPacketsReachTheirPorts) {
         return;
     }
     GTEST_SKIP() << "no pair of free ports on loopback";
+}
+
+/// What the sink for this host says of itself where the system's table of names is `hosts`; empty: it has none, or
+/// this user may not have a table of its own.
+std::string description_where(const std::string& hosts, const std::string& host) {
+    const test::TemporaryFolder folder;
+    const std::string table = folder / "hosts", said = folder / "said";
+    std::ofstream(table) << hosts;
+    const pid_t child = ::fork();
+    if (child == 0) {
+        const bool own = ::unshare(::geteuid() == 0 ? CLONE_NEWNS : CLONE_NEWUSER | CLONE_NEWNS) == 0 &&
+                         ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+                         ::mount(table.c_str(), "/etc/hosts", nullptr, MS_BIND, nullptr) == 0;
+        const auto sink = open_packet_sink("udp:" + host + ":2368", vlp16().network, 0, false);
+        if (own && sink) std::ofstream(said) << (*sink)->description();
+        ::_exit(0);
+    }
+    ::waitpid(child, nullptr, 0);
+    return test::read_text(said);
+}
+
+TEST(UdpSink, ANameWithAddressesOfBothFamiliesIsThatOfIpv4) {
+    const std::string both = "::1 both.test\n127.0.0.7 both.test\n";
+    if (description_where(both, "127.0.0.7").empty()) GTEST_SKIP() << "no file system of this user's own";
+    EXPECT_EQ(description_where(both, "both.test"),
+              "UDP to both.test (127.0.0.7), data port 2368, position port 8308");
+    EXPECT_EQ(description_where(both, "127.0.0.7"), "UDP to 127.0.0.7, data port 2368, position port 8308");
+    if (!open_packet_sink("udp:[::1]:2368", vlp16().network, 0, false)) return;  // no IPv6 here
+    EXPECT_EQ(description_where("::1 six.test\n", "six.test"),
+              "UDP to six.test (::1), data port 2368, position port 8308");
 }
 
 /// A free port for packets of data and position on loopback.

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/pose/median.h"
 #include "estimator/pose/response.h"
 #include "estimator/pose/symmetric.h"
 
@@ -36,6 +37,9 @@ constexpr double kNear_px = 2 * kMoved_px;
 constexpr std::size_t kFewestFlows = 5;
 /// Answers from two starts whose distance has a larger normalised square are two poses.
 constexpr double kSameSquared = 30;
+/// Views whose light differs from the frame's by more than this part are scaled to it: optical flow takes every
+/// difference for motion. A model is not that much darker or brighter than what it is a model of.
+constexpr double kSameLight = 0.01, kMostGain = 3;
 /// Side of the blocks in which the target is searched.
 constexpr int kBlock_px = 6;
 
@@ -140,21 +144,50 @@ void FeatureAlignment::find_target() {
         }
 }
 
+double FeatureAlignment::gain_about(const std::vector<FeatureMatch>& matches, const MeasuredImage& frame) const {
+    const RadianceImage& view = view_.radiance();
+    std::vector<double> gains;
+    for (const FeatureMatch& m : matches) {
+        if (is_clipped(frame, m.frame_u, m.frame_v)) continue;
+        const auto sum = [&](double u, double v, auto&& light) {
+            double out = 0;
+            const int x = static_cast<int>(std::lround(u)), y = static_cast<int>(std::lround(v));
+            for (int dy = -kFlowHalfWindow_px; dy <= kFlowHalfWindow_px; ++dy)
+                for (int dx = -kFlowHalfWindow_px; dx <= kFlowHalfWindow_px; ++dx)
+                    out += light(frame.index(std::clamp(x + dx, 0, frame.width - 1),
+                                             std::clamp(y + dy, 0, frame.height - 1))) -
+                           sensor_.black_dn;
+            return out;
+        };
+        const double in_frame =
+            sum(m.frame_u, m.frame_v, [&](std::size_t p) { return static_cast<double>(frame.dn[p]); });
+        const double in_view = sum(m.view_u, m.view_v, [&](std::size_t p) { return sensor_.dn(view.pixels[p]); });
+        if (in_view > 0) gains.push_back(std::clamp(in_frame / in_view, 1 / kMostGain, kMostGain));
+    }
+    return gains.empty() ? 1 : upper_median(std::span(gains));
+}
+
 /// Features of the view as it was rendered last that lie on the target, and where the frame has them.
 void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
                               ModelMatches& points) {
     points = {};
     const auto target = static_cast<int>(view_.target());
     find_target();
-    ByteImage view_bytes = scale.scaled(view_.radiance());
-    if (view_bytes.height != frame.height) {  // the frame's last row was its embedded line
-        view_bytes.height = frame.height;
-        const auto pixels = static_cast<std::size_t>(frame.height) * static_cast<std::size_t>(frame.width);
-        view_bytes.pixels.resize(pixels), on_target_.resize(pixels);
-    }
+    // The frame's last row may have been its embedded line.
+    const auto pixels = static_cast<std::size_t>(frame.height) * static_cast<std::size_t>(frame.width);
+    on_target_.resize(pixels);
+    ByteImage view_bytes;
+    const auto match = [&] {
+        view_bytes = scale.scaled(view_.radiance(), gain_);
+        view_bytes.height = frame.height, view_bytes.pixels.resize(pixels);
+        return match_corners(view_bytes, frame_bytes, on_target_, settings_.features);
+    };
+    std::vector<FeatureMatch> matches = match();
+    if (const double gain = gain_about(matches, frame); std::abs(gain / gain_ - 1) > kSameLight)
+        gain_ = gain, matches = match();
     const Rigid3 T_target_world = inverse(view_.T_world_target());
     HitBatch hits;
-    for (const FeatureMatch& m : match_corners(view_bytes, frame_bytes, on_target_, settings_.features)) {
+    for (const FeatureMatch& m : matches) {
         const double u = m.view_u, v = m.view_v;
         view_.trace_pixels(std::array<ImagePoint, 5>{{{u, v},
                                                       {u + kNeighbour_px, v},
@@ -241,6 +274,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     render_settings.spp = times_.exposure_s > 0 ? settings_.spp_over_time : settings_.spp;
     render_settings.seed = settings_.seed;
     PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
+    gain_ = 1;
     double floor_px = 1;  // until there are matches
     ModelMatches points;
     Rigid3 T_of_view = guess;

@@ -85,6 +85,8 @@ private:
     void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
                 ModelMatches& points);
     void find_target();
+    /// How much more light the frame has than the view about these matches: median of their windows; 1 without any.
+    [[nodiscard]] double gain_about(const std::vector<FeatureMatch>& matches, const MeasuredImage& frame) const;
     [[nodiscard]] Matrix6 response(const ModelMatches& points, const ByteScale& scale,
                                    const FrameSettings& settings, const Rigid3& T_camera_target,
                                    const Matrix6& covariance, double floor_px);
@@ -97,6 +99,7 @@ private:
     RowTimes times_;
     FeatureSettings settings_;
     std::vector<std::uint8_t> on_target_;  ///< of each pixel of the view
+    double gain_ = 1;                      ///< of the frame's light over the view's
 };
 
 }  // namespace narpa

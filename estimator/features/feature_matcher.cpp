@@ -50,10 +50,11 @@ ByteImage ByteScale::scaled(const MeasuredImage& frame) const {
     return out;
 }
 
-ByteImage ByteScale::scaled(const RadianceImage& view) const {
+ByteImage ByteScale::scaled(const RadianceImage& view, double gain) const {
     ByteImage out{view.width, view.height, {}};
     out.pixels.reserve(view.pixels.size());
-    for (const Rgb& L : view.pixels) out.pixels.push_back(step(sensor_.dn(L)));
+    for (const Rgb& L : view.pixels)
+        out.pixels.push_back(step(sensor_.black_dn + gain * (sensor_.dn(L) - sensor_.black_dn)));
     return out;
 }
 

@@ -33,7 +33,8 @@ public:
 
     /// With the variances of sensor noise and of rounding to eight bits.
     [[nodiscard]] ByteImage scaled(const MeasuredImage& frame) const;
-    [[nodiscard]] ByteImage scaled(const RadianceImage& view) const;
+    /// `gain`: how much more light the frame has than the view.
+    [[nodiscard]] ByteImage scaled(const RadianceImage& view, double gain = 1) const;
 
 private:
     [[nodiscard]] std::uint8_t step(double dn) const;

@@ -27,8 +27,8 @@ protected:
         camera_ = coarser_camera(scene_.cameras[0], 2);
     }
 
-    /// A frame from x metres before the port, with the detector's noise.
-    MeasuredImage frame_at(double x_m, std::uint32_t number, int spp = 16) {
+    /// A frame from x metres before the port, with the detector's noise; `light`: so many times what there is.
+    MeasuredImage frame_at(double x_m, std::uint32_t number, int spp = 16, double light = 1) {
         at_ = BodyPoses(scene_.bodies.size());
         at_.set(kStation, scene_.bodies[kStation].initial.T_world_body);
         at_.set(kChaser, {scene_.bodies[kChaser].initial.T_world_body.q, {x_m, 0.03 * x_m, -0.02 * x_m}});
@@ -42,7 +42,9 @@ protected:
         view.render(truth_, settings, false);
         std::vector<std::uint8_t> bytes(
             frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns}));
-        expose(camera_, view.radiance(), 5, number, bytes);
+        Camera exposing = camera_;
+        exposing.detector->exposure_s *= light;
+        expose(exposing, view.radiance(), 5, number, bytes);
         return *measured_image(camera_, bytes);
     }
     /// So many degrees and per cent of the range off the truth.
@@ -98,6 +100,26 @@ TEST_F(FeatureAlignmentTest, HasNoBiasInFramesOfOneSampleAPixel) {
         sum += (e.T_camera_target.t.z - truth_.t.z) / truth_.t.z / kFrames;
     }
     EXPECT_NEAR(sum, 0, 1.5e-4);
+}
+
+/// Optical flow alone takes the difference of brightness for motion.
+TEST_F(FeatureAlignmentTest, IsAsGoodWhereTheFrameIsDarkerOrBrighterThanTheModel) {
+    FeatureAlignment alignment(*render_scene_, camera_, kStation, BodyPoses(2));
+    const auto error_with = [&](double light) {
+        std::mt19937_64 random(3);
+        double sum = 0;
+        for (const double x_m : {40.0, 20.0, 8.0}) {
+            const MeasuredImage frame = frame_at(x_m, 7, 16, light);
+            const FeatureEstimate e = alignment.align(frame, at_, off_by(3, random));
+            EXPECT_TRUE(e.answer.usable()) << light << ", " << x_m << " m: " << name(e.status);
+            const Vector6 error = error_between(e.T_camera_target, truth_);
+            EXPECT_LT(normalised_error_squared(error, e.covariance), 20) << light << ", " << x_m << " m";
+            sum += error.tail<3>().norm() / norm(truth_.t);
+        }
+        return sum;
+    };
+    const double exact = error_with(1);
+    for (const double light : {0.6, 1.3}) EXPECT_LT(error_with(light), 2 * exact) << light;
 }
 
 TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {

@@ -35,7 +35,8 @@ template <class Shown>
 }
 
 /// R^-1 C R^-T. Motions of which more than `most_shown` times is shown count as shown so often: with 1 nothing of C
-/// is taken away; and all motions count as shown by at least kLeastShown. `response`: of errors (pose_estimate.h).
+/// is taken away, nor where a motion is shown by less than half, as the Jacobian then is wrong in others too. All
+/// motions count as shown by at least kLeastShown. `response`: of errors (pose_estimate.h).
 [[nodiscard]] Matrix6 covariance_by_response(const Matrix6& covariance, const Matrix6& response,
                                              double most_shown = 1);
 

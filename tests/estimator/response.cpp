@@ -39,6 +39,14 @@ TEST(Response, ToMoreThanAMotionTakesNothingAwayUnlessAsked) {
     EXPECT_LT((taken - lopsided_covariance() / 2.25).norm(), 1e-12);
 }
 
+TEST(Response, ToLessThanHalfOfAMotionTakesNothingOfOthersAway) {
+    Matrix6 response = 2 * Matrix6::Identity();
+    response(2, 2) = 0.6;
+    EXPECT_NEAR(covariance_by_response(Matrix6::Identity(), response, 1.5)(0, 0), 1 / 2.25, 1e-12);
+    response(2, 2) = 0.4;
+    EXPECT_NEAR(covariance_by_response(Matrix6::Identity(), response, 1.5)(0, 0), 1, 1e-12);
+}
+
 /// What a measurement shows of nothing is not known.
 TEST(Response, ToNothingIsBeyondAllLimits) {
     Matrix6 response = Matrix6::Identity();

@@ -26,7 +26,7 @@ struct FeatureSettings {
     int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
     double floor_most_px = 1;  ///< refused where matches scatter by more: the model is not what the frame shows
-    ModelUncertainty model{};  ///< of it the light and the albedo are not used: matches that they move scatter
+    ModelUncertainty model{};  ///< without albedo, which scales the light, and light: matches that it moves scatter
 };
 
 enum class FeatureStatus : std::uint8_t {

@@ -331,8 +331,7 @@ Command add_bench_estimate(Parser bench_command) {
     c.option("--points", o->pnp.points, "pnp: numbers of points").comma_separated().range(4, 1000);
     c.option("--noise-px", o->pnp.noise_px, "pnp: standard deviations of a pixel")
         .comma_separated()
-        .range(1e-6, 100.0)
-        .finite();
+        .range(1e-6, 100.0);
     c.option("--ranges", o->pnp.ranges_m, "pnp: metres to the body").comma_separated().range(1.0, 1e6);
     const Option nominal = c.flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c.flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases").excludes(nominal);

@@ -21,32 +21,21 @@
 namespace narpa::cli {
 namespace {
 
-/// Of a value whose option has no type_name: a whole number, another number, text.
+/// The type of one value of an option.
 template <class T>
-const char* placeholder(const T&) {
-    return std::is_integral_v<T> ? "N" : std::is_floating_point_v<T> ? "X" : "TEXT";
-}
+struct OneValue {
+    using Type = T;
+};
 template <class T>
-const char* placeholder(const std::optional<T>&) {
-    return placeholder(T{});
-}
+struct OneValue<std::optional<T>> : OneValue<T> {};
 template <class T>
-const char* placeholder(const std::vector<T>&) {
-    return placeholder(T{});
-}
+struct OneValue<std::vector<T>> : OneValue<T> {};
 
+/// What --help shows for a value of an option without type_name: a whole number, another number, text.
 template <class T>
-constexpr bool is_unsigned(const T*) {
-    return std::is_unsigned_v<T>;
-}
-template <class T>
-constexpr bool is_unsigned(const std::optional<T>*) {
-    return std::is_unsigned_v<T>;
-}
-template <class T>
-constexpr bool is_unsigned(const std::vector<T>*) {
-    return std::is_unsigned_v<T>;
-}
+constexpr const char* kKindOfValue = std::is_integral_v<T>         ? "N"
+                                     : std::is_floating_point_v<T> ? "X"
+                                                                   : "TEXT";
 
 }  // namespace
 
@@ -111,8 +100,9 @@ Parser Parser::subcommand(const std::string& name, const std::string& help) cons
 }
 template <class T>
 Option Parser::option(const std::string& names, T& value, const std::string& help) const {
-    const Option option(app_->add_option(names, value, help)->type_name(placeholder(value)));
-    if constexpr (is_unsigned(static_cast<T*>(nullptr)))  // CLI11 takes -1 for the largest number
+    using Value = typename OneValue<T>::Type;
+    const Option option(app_->add_option(names, value, help)->type_name(kKindOfValue<Value>));
+    if constexpr (std::is_unsigned_v<Value>)  // CLI11 takes -1 for the largest number
         option.check([](const std::string& text) { return text.starts_with("-") ? text + " is negative" : ""; });
     return option;
 }

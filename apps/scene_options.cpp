@@ -111,8 +111,7 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "For a start by search in frames: range, known to 30 % (default: the truth, off by up to 30 % at "
                "random)")
         .type_name("METRES")
-        .range(1e-3, 1e9)
-        .finite();
+        .range(1e-3, 1e9);
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
 }
 

@@ -38,7 +38,7 @@ constexpr std::size_t kFewestFlows = 5;
 /// Answers from two starts whose distance has a larger normalised square are two poses.
 constexpr double kSameSquared = 30;
 /// Views whose light differs from the frame's by more than this part are scaled to it: optical flow takes every
-/// difference for motion. A model is not that much darker or brighter than what it is a model of.
+/// difference for motion. A match with a ratio above kMostGain is a wrong one.
 constexpr double kSameLight = 0.01, kMostGain = 3;
 /// Side of the blocks in which the target is searched.
 constexpr int kBlock_px = 6;
@@ -167,9 +167,10 @@ double FeatureAlignment::gain_about(const std::vector<FeatureMatch>& matches, co
     return gains.empty() ? 1 : upper_median(std::span(gains));
 }
 
-/// Features of the view as it was rendered last that lie on the target, and where the frame has them.
+/// Features of the view as it was rendered last that lie on the target, and where the frame has them. `gain`: of
+/// the frame's light over the view's, as found in the view before.
 void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
-                              ModelMatches& points) {
+                              double& gain, ModelMatches& points) {
     points = {};
     const auto target = static_cast<int>(view_.target());
     find_target();
@@ -178,13 +179,13 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
     on_target_.resize(pixels);
     ByteImage view_bytes;
     const auto match = [&] {
-        view_bytes = scale.scaled(view_.radiance(), gain_);
+        view_bytes = scale.scaled(view_.radiance(), gain);
         view_bytes.height = frame.height, view_bytes.pixels.resize(pixels);
         return match_corners(view_bytes, frame_bytes, on_target_, settings_.features);
     };
     std::vector<FeatureMatch> matches = match();
-    if (const double gain = gain_about(matches, frame); std::abs(gain / gain_ - 1) > kSameLight)
-        gain_ = gain, matches = match();
+    if (const double found = gain_about(matches, frame); std::abs(found / gain - 1) > kSameLight)
+        gain = found, matches = match();
     const Rigid3 T_target_world = inverse(view_.T_world_target());
     HitBatch hits;
     for (const FeatureMatch& m : matches) {
@@ -274,14 +275,13 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     render_settings.spp = times_.exposure_s > 0 ? settings_.spp_over_time : settings_.spp;
     render_settings.seed = settings_.seed;
     PnpRefiner refiner(static_cast<std::size_t>(settings_.features));
-    gain_ = 1;
-    double floor_px = 1;  // until there are matches
+    double gain = 1, floor_px = 1;  // until there are matches
     ModelMatches points;
     Rigid3 T_of_view = guess;
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();
         view_.render(estimate.T_camera_target, render_settings, false);
-        gather(frame, frame_bytes, scale, points);
+        gather(frame, frame_bytes, scale, gain, points);
         to_mid_exposure(estimate.T_camera_target, motion, times_, points.pixels, points.body_m);
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;

@@ -26,7 +26,9 @@ struct FeatureSettings {
     int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
     double floor_most_px = 1;  ///< refused where matches scatter by more: the model is not what the frame shows
-    ModelUncertainty model{};  ///< without albedo, which scales the light, and light: matches that it moves scatter
+    /// The albedo is not used, as views are scaled to the frame's light; nor is the light, as matches that its
+    /// direction moves scatter.
+    ModelUncertainty model{};
 };
 
 enum class FeatureStatus : std::uint8_t {
@@ -82,7 +84,7 @@ public:
 private:
     [[nodiscard]] FeatureEstimate estimate(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                            const ApparentMotion& motion);
-    void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
+    void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale, double& gain,
                 ModelMatches& points);
     void find_target();
     /// How much more light the frame has than the view about these matches: median of their windows; 1 without any.
@@ -99,7 +101,6 @@ private:
     RowTimes times_;
     FeatureSettings settings_;
     std::vector<std::uint8_t> on_target_;  ///< of each pixel of the view
-    double gain_ = 1;                      ///< of the frame's light over the view's
 };
 
 }  // namespace narpa

@@ -109,8 +109,7 @@ double ModelMatches::freedom(const CameraModel& camera, const Rigid3& T, double 
 
 double ModelMatches::inflation(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
                                const Matrix6& covariance, double floor_px) const {
-    constexpr int kParts = 4;          // each way
-    constexpr double kPriorParts = 4;  // a scatter of one counts as if measured from so many
+    constexpr int kParts = 4;  // each way
     double left = kInfinity, top = kInfinity, right = -kInfinity, bottom = -kInfinity;
     for (const Pixel& p : pixels)
         left = std::min(left, p.u), right = std::max(right, p.u), top = std::min(top, p.v),
@@ -132,10 +131,8 @@ double ModelMatches::inflation(const CameraModel& camera, const Rigid3& T, const
     for (const Vector6& pull : pulls) scatter += pull * pull.transpose();
     const auto parts = static_cast<double>(std::ranges::count_if(members, [](int n) { return n > 0; }));
     constexpr double kUnknowns = 6;
-    const double freedom = parts - kUnknowns;
-    if (!(freedom > 0)) return 1;
-    const double measured = parts / freedom * (inverse(covariance) * C * scatter * C).trace() / kUnknowns;
-    return std::max(1.0, (kPriorParts + freedom * measured) / (kPriorParts + freedom));
+    const double few = parts / std::max(1.0, parts - kUnknowns);
+    return std::max(1.0, few * (inverse(covariance) * C * scatter * C).trace() / kUnknowns);
 }
 
 double ModelMatches::floor_px(const CameraModel& camera, const Rigid3& T, double freedom) const {

@@ -41,8 +41,7 @@ struct ModelMatches {
     [[nodiscard]] double freedom(const CameraModel& camera, const Rigid3& T, double floor_px) const;
     /// How much larger the errors of the pose may be than `covariance` says, in variance, at least 1: by the
     /// scatter of the pulls of parts of the target, whose matches share errors of model and light (clustered
-    /// residuals: K.-Y. Liang, S. Zeger, Biometrika 73, 1986). Few parts measure it badly, so that it is averaged
-    /// with the one that is expected. C: the inverse of the matches' information.
+    /// residuals: K.-Y. Liang, S. Zeger, Biometrika 73, 1986). C: the inverse of the matches' information.
     [[nodiscard]] double inflation(const CameraModel& camera, const Rigid3& T, const Matrix6& C,
                                    const Matrix6& covariance, double floor_px) const;
     /// The excess error of a match beyond the sensor's noise that makes chi^2 equal to its degrees of freedom; 0

@@ -5,8 +5,8 @@
 namespace narpa {
 namespace {
 
-/// Of 75 answers with the least response, below 0.7, the NEES was 7.4 with all of R and 6.2 with nothing taken
-/// away.
+/// An answer whose weakest motion was shown by 0.44 had NEES 53, and 42 with nothing taken away. Of the 32 of 620
+/// answers below this the mean NEES becomes 4.5 instead of 5.4 by it.
 constexpr double kHalfShown = 0.5;
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "emulator/camera_unit.h"
+#include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
@@ -50,6 +51,20 @@ TEST(CameraNoise, IsAnotherInEachCameraOfAScene) {
     EXPECT_EQ(left, pixels(scene, 0));
     EXPECT_EQ(right, pixels(scene, 1));
     EXPECT_NEAR(correlation(left, right), 0, 5 / std::sqrt(96 * 64));  // five standard deviations
+}
+
+/// A single sample would be in the middle of the pixel.
+TEST(CameraNoise, SamplesAreOthersInEachCameraOfAScene) {
+    Scene scene = stereo_pair();
+    for (Camera& camera : scene.cameras) camera.detector.reset(), camera.white_radiance = 500;
+    test::add_sun(scene, {1, 0, -1}, 1361);
+    scene.materials.push_back(test::lambert(0.5F));
+    test::add_sphere(scene, 1, {0, 0, 5});
+    scene.render.spp = 2;
+    const std::vector<double> left = pixels(scene, 0), right = pixels(scene, 1);
+    EXPECT_EQ(left, pixels(scene, 0));
+    EXPECT_NE(left, right);
+    EXPECT_GT(correlation(left, right), 0.9);  // of the same ball
 }
 
 }  // namespace

@@ -5,10 +5,19 @@
 
 #include <cmath>
 
+#include "renderer/atmosphere/air.h"
 #include "renderer/film/camera_image.h"
 #include "tests/support/shapes.h"
 
 namespace narpa::test {
+
+/// The Earth's air, sampled coarsely: for tests that do not ask how well.
+inline Atmosphere coarse_earth_air() {
+    Atmosphere a;
+    a.air = earth_air();
+    a.samples_per_band = 1, a.steps = 4;
+    return a;
+}
 
 inline RadianceImage rendered(const RenderScene& render_scene, const BodyPoses& at, const Camera& c,
                               const CameraPose& pose = {}, const FrameSettings& settings = {},

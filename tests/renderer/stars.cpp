@@ -1,7 +1,6 @@
 // Stars in the image: where they stand, how much light they give, what hides them.
 #include <tbb/global_control.h>
 
-#include "renderer/atmosphere/air.h"
 #include "renderer/camera/detector.h"
 #include "tests/renderer/star_support.h"
 #include "tests/support/allocation_counter.h"
@@ -178,10 +177,7 @@ TEST(Stars, AirDimsThem) {
         Camera c = camera(21, 21, 1000);
         c.point_spread = kGaussian;
         const RadianceImage vacuum = rendered(scene, c);
-        scene.atmosphere.emplace();
-        scene.atmosphere->air = earth_air();
-        scene.atmosphere->samples_per_band = 1;
-        scene.atmosphere->steps = 4;
+        scene.atmosphere = coarse_earth_air();
         const auto render_scene = RenderScene::create(scene, 2);
         ASSERT_TRUE(render_scene);
         const RadianceImage through = rendered(*render_scene, placed(scene), c);

@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "renderer/atmosphere/air.h"
 #include "renderer/camera/scene_camera.h"
 #include "tests/renderer/camera_support.h"
 
@@ -158,10 +157,7 @@ TEST(SunGhost, IsDimmedByTheAir) {
         return rendered(render_scene, at, ghost).pixels[middle] - rendered(render_scene, at, plain).pixels[middle];
     };
     const Rgb vacuum = added(*RenderScene::create(scene, 1));
-    scene.atmosphere.emplace();
-    scene.atmosphere->air = earth_air();
-    scene.atmosphere->samples_per_band = 1;
-    scene.atmosphere->steps = 4;
+    scene.atmosphere = coarse_earth_air();
     const auto render_scene = RenderScene::create(scene, 2);
     ASSERT_TRUE(render_scene);
     const Rgb expected = render_scene->medium()->transmittance(placed(scene), {{}, {0, 0, 1}}, kInfinity);

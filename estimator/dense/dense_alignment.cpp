@@ -49,7 +49,7 @@ void keep_better(DenseEstimate& answer, DenseEstimate& other) {
 /// One standard deviation of each of the two motions that the image holds least, if it is that weak.
 std::vector<Vector6> weak_motions(const DenseEstimate& e) {
     constexpr int kMost = 2;
-    const Observability o = observability_of(e.covariance, norm(e.T_camera_body.t));
+    const Observability o = observability_of(e.covariance_of_image(), norm(e.T_camera_body.t));
     std::vector<Vector6> out;
     for (int i = 0; i < kMost; ++i) {
         const Vector6 motion = o.motions.col(i) / std::sqrt(o.eigenvalues[i]);

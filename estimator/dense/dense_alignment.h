@@ -85,6 +85,9 @@ struct DenseEstimate {
     Window window{};         ///< of the last level
     double blur = 0;         ///< blur_score, standard deviations
     Answer answer;
+
+    /// Without what the model's uncertainty leaves open: that much the image itself holds.
+    [[nodiscard]] Matrix6 covariance_of_image() const { return covariance - covariance_of_model; }
 };
 
 class DenseAlignment {

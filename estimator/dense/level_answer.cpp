@@ -81,7 +81,7 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
 }
 
 LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
-    const Observability o = observability_of(e_.covariance, norm(e_.T_camera_body.t));
+    const Observability o = observability_of(e_.covariance_of_image(), norm(e_.T_camera_body.t));
     Rise rise{std::numeric_limits<double>::infinity(), 0};
     for (int i = 0; i < motions; ++i)
         for (const double side : {-sigmas, sigmas}) {

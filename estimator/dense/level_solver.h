@@ -38,7 +38,7 @@ public:
     struct Rise {
         double least, most;
     };
-    /// After examine(): how the loss rises along the `motions` that are held least, over what the covariance says,
+    /// After examine(): how the loss rises along the `motions` that the image holds least, over what it should,
     /// at this many standard deviations to both sides. About one where the image is linear so far.
     [[nodiscard]] Rise rise(int motions, double sigmas);
     /// DenseAlignment::bound at the estimate.

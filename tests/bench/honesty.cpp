@@ -44,6 +44,19 @@ TEST(Honesty, DenseTrialsThatLied) {
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
+/// The loss rises as the image says, however much wider an error of the model makes the covariance (nearly all were
+/// refused).
+TEST(Honesty, DenseAnswersWhereTheSizeIsUncertain) {
+    HonestyOptions o;
+    o.methods = {"dense"}, o.conditions = {"plain"};
+    o.trials = 8;
+    o.world.scale = o.told.scale = 0.01;
+    int good = 0, beyond = 0;
+    for (const HonestyRow& row : run(o, 0)) good += row.answers[0], beyond += row.beyond;
+    EXPECT_GE(good, 5);
+    EXPECT_EQ(beyond, 0);
+}
+
 /// The third start is held against the answer where the second has left the view of another window, without a
 /// Jacobian (it crashed).
 TEST(Honesty, DenseThirdStartAfterAWholeSecondDescent) {

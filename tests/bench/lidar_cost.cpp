@@ -13,7 +13,7 @@ namespace {
 using test::Done;
 
 Done bench_lidar(const std::string& arguments, const std::string& streams) {
-    return test::run_command(std::string("timeout 120 ") + NARPA_BIN + " bench lidar " + arguments + streams);
+    return test::run_command(std::string(test::kTimeLimit) + NARPA_BIN + " bench lidar " + arguments + streams);
 }
 
 TEST(BenchLidar, RangeErrorFallsWithTheNumberOfSubRays) {

@@ -18,7 +18,7 @@ namespace {
 using test::Done;
 
 Done bench(const std::string& arguments, const std::string& streams) {
-    return test::run_command(std::string("timeout 60 ") + NARPA_BIN + " bench loop " + arguments + streams);
+    return test::run_command(std::string(test::kTimeLimit) + NARPA_BIN + " bench loop " + arguments + streams);
 }
 
 /// The first that this process may use, from the beginning again where there are fewer.

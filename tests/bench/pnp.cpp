@@ -84,7 +84,8 @@ TEST(PnpBench, VerdictComparesErrorsFailuresAndTimes) {
 }
 
 test::Done pnp_bench(const std::string& arguments) {
-    return test::run_command("timeout 60 " NARPA_BIN " bench estimate --only pnp --nominal-only " + arguments +
+    return test::run_command(std::string(test::kTimeLimit) +
+                             NARPA_BIN " bench estimate --only pnp --nominal-only " + arguments +
                              " --json 2> /dev/null");
 }
 

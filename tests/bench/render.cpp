@@ -18,7 +18,7 @@ namespace {
 using test::Done;
 
 Done bench(const std::string& arguments, const char* streams) {
-    return test::run_command(std::string("timeout 120 ") + NARPA_BIN + " bench render " + arguments + streams);
+    return test::run_command(std::string(test::kTimeLimit) + NARPA_BIN + " bench render " + arguments + streams);
 }
 
 TEST(BenchRender, TheCornellBoxConvergesToItsReferenceWithoutBias) {

@@ -11,7 +11,7 @@ namespace {
 
 TEST(BenchTerrain, CountsTheTrianglesThatEachViewSees) {
     const test::Done done = test::run_command(
-        std::string("timeout 120 ") + NARPA_BIN +
+        std::string(test::kTimeLimit) + NARPA_BIN +
         " bench terrain --posts 400 --heights 600,100 --visible-rays 2 --turns 1 --json 2>/dev/null");
     ASSERT_EQ(done.status, 0) << done.out;
     const auto found = nlohmann::json::parse(done.out);
@@ -52,7 +52,7 @@ TEST(BenchTerrain, FaultsNameTheHeightAndTheBound) {
 
 TEST(BenchTerrain, HeightsAreAboveTheGround) {
     const test::Done done =
-        test::run_command(std::string("timeout 120 ") + NARPA_BIN + " bench terrain --heights 100,-5 2>&1");
+        test::run_command(std::string(test::kTimeLimit) + NARPA_BIN + " bench terrain --heights 100,-5 2>&1");
     EXPECT_EQ(done.status, 2);
     EXPECT_NE(done.out.find("--heights: Value -5 not in range"), std::string::npos) << done.out;
 }

@@ -38,7 +38,7 @@ TEST_P(BadInput, IsAnsweredWithASentenceAndAnExitStatus) {
     std::string arguments = replaced(m.arguments, "SCENE", folder_ / "scene.toml");
     arguments = replaced(replaced(arguments, "BAD", folder_ / "bad.toml"), "FOLDER", folder_ / "");
 
-    const std::string command = std::string("timeout 60 ") + NARPA_BIN + " " + arguments + " 2>&1 >/dev/null";
+    const std::string command = std::string(kTimeLimit) + NARPA_BIN + " " + arguments + " 2>&1 >/dev/null";
     const auto [status, said] = run_command(command);
     EXPECT_EQ(status, m.exit_status) << said;
     EXPECT_NE(said.find(m.words), std::string::npos) << "expected: " << m.words << "\nsaid: " << said;

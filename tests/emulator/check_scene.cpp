@@ -12,7 +12,7 @@ namespace narpa::test {
 namespace {
 
 Done run_check(const std::string& arguments) {
-    return run_command(std::string("timeout 20 ") + NARPA_BIN + " check " + arguments);
+    return run_command(std::string(kTimeLimit) + NARPA_BIN + " check " + arguments);
 }
 
 constexpr const char* kComplete = NARPA_SOURCE_DIR "/tests/data/scenes/complete.toml";

@@ -18,7 +18,7 @@ class Ending : public LoopTest {
 protected:
     void SetUp() override {
         std::ofstream(folder_ / "scene.toml") << small_scene();
-        run_ = "timeout 60 " NARPA_BIN " run " + (folder_ / "scene.toml") + " ";
+        run_ = std::string(kTimeLimit) + NARPA_BIN " run " + (folder_ / "scene.toml") + " ";
         lockstep_ = run_ + "--lockstep --can " + record(11) + " ";
     }
     /// A file of this name on a disk that is full.
@@ -37,7 +37,7 @@ protected:
         const std::string ready = folder_ / "ready";
         const auto [status, said] = run_command(
             "exec 3>" + ready + "; " NARPA_BIN " run " + (folder_ / "scene.toml") + " " + arguments +
-            " --ready-fd 3 2>&1 & run=$!; (sleep 30; kill -9 $run) >/dev/null 2>&1 & watch=$!; until grep -q "
+            " --ready-fd 3 2>&1 & run=$!; (sleep 120; kill -9 $run) >/dev/null 2>&1 & watch=$!; until grep -q "
             "READY " +
             ready +
             "; do sleep 0.05; done; sleep 0.3; kill -INT $run; wait $run; status=$?; kill $watch; exit $status");
@@ -96,8 +96,8 @@ TEST_F(Ending, ATrajectoryEndsWithTheRunThatItWasFlownFor) {
     ASSERT_TRUE(hub);
     std::ofstream(folder_ / "long.csv") << kTrajectoryHeader << "\n0,chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n"
                                         << "100,chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n";
-    const std::string command =
-        "timeout 20 " NARPA_BIN " fly " + (folder_ / "long.csv") + " --can slcan:" + std::to_string(hub_port(*hub));
+    const std::string command = std::string(kTimeLimit) + NARPA_BIN " fly " + (folder_ / "long.csv") +
+                                " --can slcan:" + std::to_string(hub_port(*hub));
     auto flight = std::async(std::launch::async, [&] { return run_command(command + " 2>&1"); });
     // A run that has lasted for a minute, until its first command; then another.
     std::int64_t start_ns = monotonic_ns() - 60 * kSecond_ns;

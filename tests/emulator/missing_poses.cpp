@@ -118,7 +118,7 @@ TEST_F(MissingPoses, FramesThatNobodyGotAreAmongTheFaults) {
 
 TEST_F(MissingPoses, AreTheExitStatus) {
     std::ofstream(folder_ / "scene.toml") << other_identifier();
-    const auto [status, said] = run_command("timeout 20 " NARPA_BIN " run " + (folder_ / "scene.toml") +
+    const auto [status, said] = run_command(std::string(kTimeLimit) + NARPA_BIN " run " + (folder_ / "scene.toml") +
                                             " --lockstep --video nav=none --can " + record(5) + " 2>&1");
     EXPECT_EQ(status, 1) << said;
     EXPECT_NE(said.find("failed: no pose command was accepted for \"chaser\""), std::string::npos) << said;

@@ -418,7 +418,7 @@ TEST(BudgetCost, IsTheMeanOverFramesOfWhatEachCost) {
 // --- The program ------------------------------------------------------------
 
 Done replay(const std::string& arguments, const char* streams) {
-    return test::run_command(std::string("timeout 60 ") + NARPA_BIN + " replay " + arguments + streams);
+    return test::run_command(std::string(test::kTimeLimit) + NARPA_BIN + " replay " + arguments + streams);
 }
 
 TEST_F(ReplayTest, TheProgramReportsHowManyFramesRepeat) {

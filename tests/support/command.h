@@ -14,6 +14,10 @@ struct Done {
     std::string out;  ///< what it wrote on standard output
 };
 
+/// Before a program that could hang: exit status 124 after this time, which a sanitizer's build on a busy machine
+/// does not need.
+inline constexpr const char* kTimeLimit = "timeout 120 ";
+
 /// A command of the shell, which can send standard error elsewhere.
 inline Done run_command(const std::string& command) {
     Done done;

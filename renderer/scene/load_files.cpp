@@ -28,10 +28,10 @@ public:
     explicit Loader(SceneReading& reading) : r_(reading) {}
 
     void load_mesh(const NamedMesh& named) {
-        const auto key = std::pair(canonical(named.path), named.scale);
+        const MeshKey key(canonical(named.path), named.scale, named.crease_rad);
         auto known = meshes_.find(key);
         if (known == meshes_.end()) {
-            Result<MeshFile> file = read_mesh(named.path, named.scale);
+            Result<MeshFile> file = read_mesh(named.path, named.scale, named.crease_rad);
             if (!file) return blame(named, file.error());
             r_.scene.warnings.insert(r_.scene.warnings.end(), file->warnings.begin(), file->warnings.end());
             known = meshes_.emplace(key, std::move(*file)).first;
@@ -48,7 +48,7 @@ public:
 
 private:
     using Colour = TextureUse::Colour;
-    using MeshKey = std::pair<std::string, double>;
+    using MeshKey = std::tuple<std::string, double, double>;
     using TextureKey = std::tuple<std::string, Colour, Texture::Wrap>;
 
     static TextureKey texture_key(const MeshTexture& texture, const TextureUse& use) {
@@ -76,7 +76,7 @@ private:
         std::map<std::uint16_t, std::uint16_t> scene_material;  // of materials that some face has
         for (std::uint16_t& m : mesh.face_material) {
             auto [it, is_new] = scene_material.try_emplace(m);
-            if (is_new) it->second = add_material(file.materials[m], key.second);
+            if (is_new) it->second = add_material(file.materials[m], std::get<1>(key));
             m = it->second;
         }
         r_.scene.meshes.push_back(std::move(mesh));

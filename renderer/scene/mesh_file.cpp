@@ -9,6 +9,7 @@
 #include "renderer/scene/file_bytes.h"
 #include "renderer/scene/mesh_process.h"
 #include "renderer/scene/mesh_readers.h"
+#include "renderer/scene/smooth_normals.h"
 
 namespace narpa {
 
@@ -218,7 +219,8 @@ void tell_dropped(MeshFile& file, const std::string& path) {
 
 }  // namespace
 
-Result<MeshFile> read_mesh(const std::string& path, double scale, const MeshReaderLimits& limits) {
+Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_rad,
+                           const MeshReaderLimits& limits) {
     if (const Status plain = check_plain_file(path); !plain) return plain.error();
     const std::string extension = extension_of(path);
     const bool is_obj = extension == ".obj" || extension == ".tab";
@@ -234,6 +236,10 @@ Result<MeshFile> read_mesh(const std::string& path, double scale, const MeshRead
     if (soup->triangles.empty())
         return Error{.what = "no triangles in it, expected a mesh with faces", .file = path};
     const std::size_t given = soup->triangles.size();
+    if (crease_rad > 0 && soup->normals.empty())
+        add_smooth_normals(*soup, crease_rad);
+    else if (crease_rad > 0)
+        soup->warnings.push_back(path + ": has normals of its own, crease_angle_deg is not used");
     MeshFile file = MeshBuilder(*soup, scale).build();
     file.mesh.name = path;
     if (file.mesh.faces.empty())

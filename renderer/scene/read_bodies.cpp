@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/constants.h"
 #include "renderer/scene/iau_rotation.h"
 #include "renderer/scene/scene_parts.h"
 
@@ -35,6 +36,7 @@ NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<
     return {.body = reading.scene.bodies.size(),
             .path = (reading.folder / file).string(),
             .scale = table.number("scale", {.low = 0, .high = 1e12, .low_open = true}).value_or(1),
+            .crease_rad = kRadPerDeg * table.number("crease_angle_deg", {.low = 0, .high = 180}).value_or(0),
             .material = material,
             .place = table.place("mesh")};
 }
@@ -59,7 +61,10 @@ void read_shape(TableReader& table, Body& body, SceneReading& reading) {
     const auto mesh = table.text("mesh");
     auto sphere = table.table("sphere"), ellipsoid = table.table("ellipsoid");
     check_one_shape(table);
-    if (!table.has("mesh")) table.refuse("scale", "belongs to a mesh; other shapes have their size in metres");
+    if (!table.has("mesh")) {
+        table.refuse("scale", "belongs to a mesh; other shapes have their size in metres");
+        table.refuse("crease_angle_deg", "belongs to a mesh");
+    }
     if (mesh) {
         reading.meshes.push_back(named_mesh(table, *mesh, own, reading));
     } else if (sphere) {

@@ -18,8 +18,8 @@ namespace narpa {
 struct NamedMesh {
     std::size_t body = 0;
     std::string path;
-    double scale = 1;
-    std::optional<int> material;  ///< replaces the mesh's own; index into Scene::materials
+    double scale = 1, crease_rad = 0;  ///< of read_mesh
+    std::optional<int> material;       ///< replaces the mesh's own; index into Scene::materials
     toml::source_region place;
 };
 

@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "renderer/scene/mesh_file.h"
 #include "renderer/scene/mesh_readers.h"
@@ -98,6 +101,70 @@ TEST(MeshFile, CubeIsClosedAndFacesOutward) {
     EXPECT_TRUE(cube.mesh.normals.empty()) << "the file gives none";
     EXPECT_EQ(cube.mesh.uvs.size(), cube.mesh.positions.size());
     EXPECT_TRUE(cube.warnings.empty());
+}
+
+/// About the origin, without normals in the file.
+MeshFile smoothed_cube(double crease_rad) {
+    const MemoryFolder folder;
+    const std::string text =
+        "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n"
+        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    const Result<MeshFile> cube = read_mesh(folder.write("cube.obj", text), 1, crease_rad);
+    EXPECT_TRUE(cube) << cube.error().text();
+    return *cube;
+}
+
+TEST(MeshFile, EdgesBelowTheCreaseAngleAreSmooth) {
+    const MeshFile sharp = smoothed_cube(1.5), smooth = smoothed_cube(1.6);
+    ASSERT_EQ(sharp.mesh.normals.size(), 24u) << "each face has its own";
+    for (const Vec3f& n : sharp.mesh.normals) EXPECT_FLOAT_EQ(std::abs(n.x) + std::abs(n.y) + std::abs(n.z), 1);
+    ASSERT_EQ(smooth.mesh.normals.size(), 8u) << "the faces share their corners";
+    for (std::size_t i = 0; i < 8; ++i) {
+        const Vec3 outward = normalized(vec_cast<double>(smooth.mesh.positions[i]));
+        EXPECT_LT(norm(vec_cast<double>(smooth.mesh.normals[i]) - outward), 1e-6)
+            << "by angle: however a face is cut into triangles";
+    }
+    EXPECT_TRUE(smoothed_cube(0).mesh.normals.empty());
+}
+
+TEST(MeshFile, ASmoothBallHasTheNormalsOfABall) {
+    std::string text;
+    constexpr int kAround = 48, kRings = 24;  // a vertex at each pole, where 48 triangles meet
+    for (int i = 0; i <= kRings; ++i)
+        for (int k = 0; k < kAround; ++k) {
+            const double z = std::numbers::pi * i / kRings, turn = 2 * std::numbers::pi * k / kAround;
+            text += fmt::format("v {:.17g} {:.17g} {:.17g}\n", i % kRings ? std::sin(z) * std::cos(turn) : 0.0,
+                                i % kRings ? std::sin(z) * std::sin(turn) : 0.0, std::cos(z));
+        }
+    for (int i = 0; i < kRings; ++i)
+        for (int k = 0; k < kAround; ++k) {
+            const int a = i * kAround + k + 1, b = i * kAround + (k + 1) % kAround + 1;
+            text += fmt::format("f {} {} {} {}\n", a, a + kAround, b + kAround, b);
+        }
+    const MemoryFolder folder;
+    const Result<MeshFile> ball = read_mesh(folder.write("ball.obj", text), 3, 0.5);
+    ASSERT_TRUE(ball) << ball.error().text();
+    ASSERT_EQ(ball->mesh.normals.size(), ball->mesh.positions.size());
+    EXPECT_EQ(ball->mesh.positions.size(), 2u + kAround * (kRings - 1));
+    for (std::size_t i = 0; i < ball->mesh.normals.size(); ++i)
+        EXPECT_LT(norm(vec_cast<double>(ball->mesh.normals[i]) - vec_cast<double>(ball->mesh.positions[i]) / 3),
+                  3e-3);
+}
+
+TEST(MeshFile, NormalsOfTheFileStay) {
+    const MemoryFolder folder;
+    const std::string with_normals = CORNERS "vn 0 0.6 0.8\nf 1//1 2//1 3//1\n";
+    const Result<MeshFile> own = read_mesh(folder.write("own.obj", with_normals), 1, 1);
+    ASSERT_TRUE(own);
+    EXPECT_FLOAT_EQ(own->mesh.normals[0].y, 0.6f);
+    ASSERT_EQ(own->warnings.size(), 1u);
+    EXPECT_NE(own->warnings[0].find("crease_angle_deg is not used"), std::string::npos) << own->warnings[0];
+    // Triangles without area, and coordinates that are not finite, add nothing.
+    const Result<MeshFile> odd =
+        read_mesh(folder.write("odd.obj", CORNERS "v 1e300 0 0\nv 2 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 4\n"), 1, 1);
+    ASSERT_TRUE(odd);
+    ASSERT_EQ(odd->mesh.faces.size(), 1u);
+    for (const std::uint32_t v : odd->mesh.faces[0]) EXPECT_FLOAT_EQ(odd->mesh.normals[v].z, 1);
 }
 
 TEST(MeshFile, MtlBecomesLambertAndPhong) {

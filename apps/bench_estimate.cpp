@@ -7,6 +7,7 @@
 
 #include "apps/bench_scene.h"
 #include "apps/cli.h"
+#include "apps/scene_options.h"
 #include "bench/approach.h"
 #include "bench/cold.h"
 #include "bench/filter.h"
@@ -205,39 +206,6 @@ Outcome bench_filter(const EstimateBenchOptions& o, Findings& findings) {
     if (auto drawn = plot(o, "filter", "Kalman filter: NEES over time", "runs", document); !drawn)
         return drawn.error();
     return document;
-}
-
-/// NAME=VALUE, separated by commas.
-Result<ModelUncertainty> model_uncertainty(const std::string& text, const char* option, double* distortion) {
-    ModelUncertainty u;
-    for (std::size_t from = 0; from < text.size();) {
-        const std::size_t end = std::min(text.find(',', from), text.size());
-        const std::string item = text.substr(from, end - from);
-        from = end + 1;
-        const std::size_t equals = item.find('=');
-        const std::string name = item.substr(0, equals);
-        double value = 0;
-        std::size_t read = 0;
-        try {
-            if (equals != std::string::npos) value = std::stod(item.substr(equals + 1), &read);
-        } catch (const std::exception&) {
-            read = 0;
-        }
-        const bool number = read > 0 && equals + 1 + read == item.size() && std::isfinite(value);
-        const auto field = std::ranges::find(kModelErrors, name, &ModelErrorName::name);
-        const bool known = field != std::end(kModelErrors) || (distortion && name == "distortion");
-        if (!number || !known || (value < 0 && name != "distortion")) {
-            std::string names;
-            for (const ModelErrorName& n : kModelErrors) names += (names.empty() ? "" : ", ") + std::string(n.name);
-            return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item, names,
-                                     distortion ? ", distortion" : "")};
-        }
-        if (field != std::end(kModelErrors))
-            u.*(field->field) = field->unit * value;
-        else
-            *distortion = value;
-    }
-    return u;
 }
 
 Outcome bench_honesty(const EstimateBenchOptions& o, Findings& findings) {

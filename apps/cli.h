@@ -29,6 +29,7 @@ Command add_render(Parser app);
 Command add_map(Parser app);
 Command add_scan(Parser app);
 Command add_replay(Parser app);
+Command add_compare(Parser app);
 Command add_estimate(Parser app);
 Command add_rehearse(Parser app);
 /// Of `narpa bench`.

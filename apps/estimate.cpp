@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <random>
 
 #include "apps/cli.h"
@@ -21,6 +20,7 @@
 #include "estimator/search/cloud_search.h"
 #include "estimator/view/measured_image.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/image/image_file.h"
 
 namespace narpa::cli {
 namespace {
@@ -38,6 +38,7 @@ struct EstimateOptions {
     std::string frame, sweep;  ///< FILE.raw: the device's bytes; FILE.pcap
     double time_s = 0;
     double range_noise_m = 0;  ///< of the sweep, standard deviation; 0: the scene's
+    bool no_truth = false;     ///< the poses are a guess
     PoseOptions pose;
 
     std::vector<Option> only_of_files, only_of_logs;
@@ -119,41 +120,38 @@ Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t
     return world;
 }
 
-/// Prints an estimate beside the truth; returns the document, which has passed where the pose is usable.
+/// Prints an estimate beside the truth, where there is one; returns the document, which has passed where the pose
+/// is usable.
 nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
-                    const Rigid3& truth, const Answer& answer) {
-    const Vector6 error = error_between(T, truth);
+                    const std::optional<Rigid3>& truth, const Answer& answer) {
+    const Vector6 error = truth ? error_between(T, *truth) : Vector6(Vector6::Zero());
     const double nees = normalised_error_squared(error, covariance);
-    say(
-        fmt::format("{}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})\n"
-                    "  off the truth by {:.4f} deg and {:.3g} m; standard deviations {:.4f} deg, {:.3g} m; bound "
-                    "{:.4f} deg, {:.3g} m; NEES {:.2f}, 6 expected, 95 % band {:g} to {:g}; {}",
-                    what, T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z, error.head<3>().norm() / kDegree,
-                    error.tail<3>().norm(), rotation_sigma(covariance) / kDegree, position_sigma(covariance),
-                    rotation_sigma(bound) / kDegree, position_sigma(bound), nees, kNeesLow, kNeesHigh,
-                    nees_verdict(nees, kNeesLow, kNeesHigh)));
+    say(fmt::format("{}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})", what,
+                    T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z));
+    if (truth)
+        say(fmt::format(
+            "  off the truth by {:.4f} deg and {:.3g} m; NEES {:.2f}, 6 expected, 95 % band {:g} to {:g}; {}",
+            error.head<3>().norm() / kDegree, error.tail<3>().norm(), nees, kNeesLow, kNeesHigh,
+            nees_verdict(nees, kNeesLow, kNeesHigh)));
+    say(fmt::format("  standard deviations {:.4f} deg, {:.3g} m; bound {:.4f} deg, {:.3g} m",
+                    rotation_sigma(covariance) / kDegree, position_sigma(covariance),
+                    rotation_sigma(bound) / kDegree, position_sigma(bound)));
     say(fmt::format("  {}{}{}", kAnswerKinds[static_cast<std::size_t>(answer.kind)], answer.why.empty() ? "" : ": ",
                     answer.why));
     std::array<std::array<double, 6>, 6> rows{};
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) rows[std::size_t(i)][std::size_t(j)] = covariance(i, j);
-    return {{"passed", answer.usable()},
-            {"answer", to_json(answer)},
-            {"pose", to_json(T)},
-            {"truth", to_json(truth)},
-            {"covariance", rows},
-            {"error_rotation_rad", error.head<3>().norm()},
-            {"error_position_m", error.tail<3>().norm()},
-            {"bound_rotation_rad", rotation_sigma(bound)},
-            {"bound_position_m", position_sigma(bound)},
-            {"nees", std::isfinite(nees) ? nlohmann::json(nees) : nlohmann::json(nullptr)}};
-}
-
-Result<std::vector<std::uint8_t>> bytes_of(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
-    if (!file.is_open() || file.bad()) return Error{"cannot be read, expected the bytes of a frame", path};
-    return bytes;
+    nlohmann::json document{{"passed", answer.usable()},
+                            {"answer", to_json(answer)},
+                            {"pose", to_json(T)},
+                            {"covariance", rows},
+                            {"bound_rotation_rad", rotation_sigma(bound)},
+                            {"bound_position_m", position_sigma(bound)}};
+    if (!truth) return document;
+    document["truth"] = to_json(*truth);
+    document["error_rotation_rad"] = error.head<3>().norm(), document["error_position_m"] = error.tail<3>().norm();
+    document["nees"] = std::isfinite(nees) ? nlohmann::json(nees) : nlohmann::json(nullptr);
+    return document;
 }
 
 /// One turn from the capture's first packet on; times count from its first shot.
@@ -205,7 +203,7 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
     if (!camera) return camera.error();
     auto tracker = FrameTracker::create(**world, *camera, tracker_options);
     if (!tracker) return tracker.error();
-    auto bytes = bytes_of(o.frame);
+    auto bytes = read_frame(o.frame, scene.cameras[*camera]);
     if (!bytes) return bytes.error();
     if (auto image = measured_image(scene.cameras[*camera], *bytes); !image)
         return Error{image.error().what, o.frame};
@@ -221,7 +219,15 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
     TrackedFrame tracked;
     {
         const Progress progress("estimating the pose in " + o.frame);
-        threads.arena.execute([&] { tracked = (*tracker)->take(taken, *bytes, at); });
+        threads.arena.execute([&] {
+            tracked = (*tracker)->take(taken, *bytes, at);
+            if (tracker_options.has_truth || tracker_options.search || !tracked.measured) return;
+            // Again from there, with the light that falls on the target in that attitude.
+            at.set((*tracker)->target(),
+                   (*world)->camera_pose(scene.cameras[*camera], o.time_s, at) * *tracked.measured);
+            tracker = FrameTracker::create(**world, *camera, tracker_options);
+            tracked = (*tracker)->take(taken, *bytes, at);
+        });
     }
     if (!tracked.measured) {
         say(fmt::format("{} gives no pose: {}: {}", o.frame,
@@ -230,7 +236,8 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
     }
     nlohmann::json document =
         show(fmt::format("{} in camera {}", scene.bodies[(*tracker)->target()].name, scene.cameras[*camera].name),
-             *tracked.measured, tracked.covariance, tracked.bound, tracked.truth, tracked.answer);
+             *tracked.measured, tracked.covariance, tracked.bound,
+             o.no_truth ? std::optional<Rigid3>() : tracked.truth, tracked.answer);
     document["matches"] = tracked.matches;
     document["renders"] = tracked.renders;
     return document;
@@ -264,6 +271,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     const double search_m = 0.01 * tracker.start_percent * norm(truth.t) +
                             tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;
+    settings.model = tracker.model;
     settings.noise = range_noise_of(lidar);
     settings.certain = certain_return_of(lidar, scene);
     if (o.range_noise_m > 0) settings.noise.range_m = o.range_noise_m;
@@ -281,8 +289,9 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     }
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
-    nlohmann::json document = show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name),
-                                   e.T_lidar_target, e.covariance, e.bound, truth, e.answer);
+    nlohmann::json document =
+        show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name), e.T_lidar_target, e.covariance,
+             e.bound, o.no_truth ? std::optional<Rigid3>() : truth, e.answer);
     const int unobserved = e.observability.unobserved;
     say(
         fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
@@ -300,6 +309,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
 Outcome estimate(EstimateOptions o) {
     auto tracker = o.tracker.options();
     if (!tracker) return tracker.error();
+    tracker->has_truth = !o.no_truth;
     std::error_code error;
     if (std::filesystem::exists(o.input + "/rehearsal.json", error)) o.input += "/emulator";
     const bool of_log = std::filesystem::is_directory(o.input, error);
@@ -315,11 +325,11 @@ Outcome estimate(EstimateOptions o) {
         return Error{"a range is guessed for frames, not for a sweep, which measures it"};
     if (o.frame.empty() && o.sweep.empty() && !find_file(FileKind::scene, o.input))
         return Error{
-            "no such folder, expected that of a logged run or rehearsal, or a scene with --frame FILE.raw or "
+            "no such folder, expected that of a logged run or rehearsal, or a scene with --frame FILE or "
             "--sweep FILE.pcap",
             o.input};
     if (o.frame.empty() == o.sweep.empty())
-        return Error{"with a scene, expected one of --frame FILE.raw and --sweep FILE.pcap", o.input};
+        return Error{"with a scene, expected one of --frame FILE and --sweep FILE.pcap", o.input};
     return o.frame.empty() ? estimate_sweep(o, *tracker) : estimate_frame(o, *tracker);
 }
 
@@ -335,8 +345,11 @@ Command add_estimate(Parser app) {
         .required();
     c.option("--camera,--lidar", o->sensor, "Name of the camera or LiDAR (default: the first of the scene)")
         .type_name("NAME");
-    c.option("--frame", o->frame, "A frame's bytes as the device takes them, as `render` writes them")
-        .type_name("FILE.raw");
+    c.option(
+         "--frame", o->frame,
+         "A frame, also of a real camera: FILE.png, .tif or .pgm in the camera's size and format, or the bytes in "
+         "FILE.raw")
+        .type_name("FILE");
     c.option("--sweep", o->sweep, "The LiDAR's data packets, from the first on for one turn")
         .type_name("FILE.pcap");
     c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot")
@@ -346,6 +359,8 @@ Command add_estimate(Parser app) {
              "Standard deviation of the sweep's ranges (default: that of the scene, or 0.02)")
         .type_name("METRES")
         .range(1e-6, 1e3);
+    c.flag("--no-truth", o->no_truth,
+           "The poses are not the truth but a guess, off by up to --start: begin there, and compare with nothing");
     o->pose.add_to(c);
     c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
     o->tracker.add_to(c, "");
@@ -354,13 +369,14 @@ Command add_estimate(Parser app) {
     c.option("--csv", o->csv, "A row for each frame").type_name("FILE.csv");
     c.option("-o,--output", o->picture, "Errors over time, with three standard deviations and bound")
         .type_name("FILE.png");
-    for (const char* name : {"--frame", "--sweep", "--time", "--range-noise", "--pose", "--trajectory"})
+    for (const char* name :
+         {"--frame", "--sweep", "--time", "--range-noise", "--no-truth", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
     c.footer("Exit status 1 if no frame gave a pose, or that of a single frame or sweep is ambiguous or refused.");
     c.group("Results");
-    c.examples(
-        {"narpa estimate out/first-flight -o out/errors.png", "narpa estimate docking --frame out/frame.raw"});
+    c.examples({"narpa estimate out/first-flight -o out/errors.png", "narpa estimate docking --frame out/frame.raw",
+                "narpa estimate asteroid.toml --frame image.png --no-truth --uncertainty scale=0.01,light_deg=1"});
     return [o] { return estimate(*o); };
 }
 

@@ -114,7 +114,7 @@ int run(int argc, char** argv) {
     Command chosen;
     const auto add_subcommands = [&](const Parser& app) {
         app.choice<Command>({add_list, add_check, add_rehearse, add_run, add_fly, add_render, add_map, add_scan,
-                             add_estimate, add_replay, add_bench},
+                             add_estimate, add_compare, add_replay, add_bench},
                             chosen);
         app.examples({"narpa rehearse docking                        a docking in a closed loop, with a report",
                       "narpa render docking -o out/view.png          what the camera sees",

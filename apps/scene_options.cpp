@@ -1,12 +1,14 @@
 #include "apps/scene_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <ranges>
 
 #include "base/nearest_name.h"
 #include "emulator/trajectory.h"
@@ -93,6 +95,38 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
     return world.load(*rows, t_from_ns, t_to_ns);
 }
 
+Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option, double* distortion) {
+    ModelUncertainty u;
+    for (std::size_t from = 0; from < text.size();) {
+        const std::size_t end = std::min(text.find(',', from), text.size());
+        const std::string item = text.substr(from, end - from);
+        from = end + 1;
+        const std::size_t equals = item.find('=');
+        const std::string name = item.substr(0, equals);
+        double value = 0;
+        std::size_t read = 0;
+        try {
+            if (equals != std::string::npos) value = std::stod(item.substr(equals + 1), &read);
+        } catch (const std::exception&) {
+            read = 0;
+        }
+        const bool number = read > 0 && equals + 1 + read == item.size() && std::isfinite(value);
+        const auto field = std::ranges::find(kModelErrors, name, &ModelErrorName::name);
+        const bool known = field != std::end(kModelErrors) || (distortion && name == "distortion");
+        if (!number || !known || (value < 0 && name != "distortion")) {
+            std::string names;
+            for (const ModelErrorName& n : kModelErrors) names += (names.empty() ? "" : ", ") + std::string(n.name);
+            return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item, names,
+                                     distortion ? ", distortion" : "")};
+        }
+        if (field != std::end(kModelErrors))
+            u.*(field->field) = field->unit * value;
+        else
+            *distortion = value;
+    }
+    return u;
+}
+
 void TrackerFlags::add_to(Parser app, const std::string& prefix) {
     const std::string dashes = "--" + prefix;
     app.option(dashes + "target", tracker.target,
@@ -112,11 +146,23 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "random)")
         .type_name("METRES")
         .range(1e-3, 1e9);
+    app.option(dashes + "uncertainty", uncertainty,
+               "What is not exact in the scene, standard deviations: " +
+                   fmt::format("{}", fmt::join(kModelErrors | std::views::transform(&ModelErrorName::name), ", ")))
+        .type_name("NAME=VALUE,...");
+    app.option(dashes + "frame-noise", tracker.frame_noise_dn,
+               "For all pixels: noise of the frames beside the detector's, standard deviation; 0 of a real camera "
+               "(default: not known, so that only large residuals are refused)")
+        .type_name("DN")
+        .range(0.0, 1e5);
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
 }
 
 Result<TrackerOptions> TrackerFlags::options() const {
     TrackerOptions o = tracker;
+    auto model = model_uncertainty(uncertainty, "--uncertainty");
+    if (!model) return model.error();
+    o.model = *model;
     o.method = method == "dense" ? CameraMethod::dense : CameraMethod::features;
     o.search = start == "search";
     if (o.search) return o;

@@ -33,10 +33,16 @@ struct PoseOptions {
     [[nodiscard]] Status load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const;
 };
 
+/// NAME=VALUE of kModelErrors, separated by commas; with `distortion` also that name. `option` is its name, for
+/// messages.
+Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option,
+                                           double* distortion = nullptr);
+
 /// How poses are estimated: options of `estimate` and of `run --estimate`.
 struct TrackerFlags {
     std::string method = "features";
     std::string start = "2,2";
+    std::string uncertainty;
     TrackerOptions tracker;
 
     /// With `prefix` before each name: --target, or --estimate-target.

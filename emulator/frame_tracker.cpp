@@ -35,6 +35,7 @@ void take_answer(const auto& estimate, const Rigid3& pose, TrackedFrame& out) {
     if (!estimate.answer.usable()) return;
     out.measured = pose;
     out.covariance = estimate.covariance;
+    out.covariance_of_model = estimate.covariance_of_model;
 }
 
 }  // namespace
@@ -62,6 +63,7 @@ Result<std::size_t> target_of(const World& world, int mount, std::string_view se
 }
 
 Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
+    if (!o.has_truth) return truth;
     return displaced(truth, random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(truth.t), random));
 }
 
@@ -88,6 +90,7 @@ FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t t
       tracker_(tracker_settings(options)) {
     FeatureSettings features;
     features.spp = options.spp;
+    features.model = options.model;
     features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
     features_ = std::make_unique<FeatureAlignment>(world.render_scene(), camera_, target,
                                                    BodyPoses(world.scene().bodies.size()), features);
@@ -168,20 +171,26 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
         const UpdateResult update = tracker_.update(measurement);
         out.nis = update.nis;
         if (update.outcome != UpdateOutcome::taken) out.why = update.why;
-        if (update.outcome == UpdateOutcome::taken) out.state = EstimateState::measured;
+        if (update.outcome == UpdateOutcome::taken) {
+            out.state = EstimateState::measured;
+            covariance_of_model_ = out.covariance_of_model;
+        }
     }
     if (tracker_.started()) {
         // Chaser axes to camera axes: the mounting is exact.
         const PoseFilter::Pose known = tracker_.filter().pose(q_frame_chaser);
         const Rigid3 T_camera_chaser = inverse(T_chaser_camera());
         out.filtered = T_camera_chaser * known.T_chaser_target;
-        out.filtered_covariance = covariance_in_other_axes(T_camera_chaser.q, known.covariance);
+        out.filtered_covariance =
+            covariance_in_other_axes(T_camera_chaser.q, known.covariance) + covariance_of_model_;
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
     out.ms = seconds_since(start_ns) * 1e3;
     if ((searched || pixels_) && out.measured) {  // at the truth: after the estimate, and not part of its time
-        const auto bound = searched ? search_->bound(at, T_world_camera, out.truth, dense_options({}))
-                                    : pixels_->bound(at, out.truth, dense_options(moving));
+        const Rigid3& there = options_.has_truth ? out.truth : *out.measured;
+        const DenseOptions dense = dense_options(searched ? ApparentMotion{} : moving, T_world_camera);
+        const auto bound =
+            searched ? search_->bound(at, T_world_camera, there, dense) : pixels_->bound(at, there, dense);
         if (bound) out.bound = *bound;
     }
     return out;
@@ -203,7 +212,7 @@ void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses&
         return;
     }
     measure_by_features(*image, at, motion, out);
-    if (pixels_) measure_by_pixels(*image, at, motion, out);
+    if (pixels_) measure_by_pixels(*image, at, dense_options(motion, T_world_camera), out);
 }
 
 void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPoses& at,
@@ -216,11 +225,11 @@ void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPos
 }
 
 /// Starts from the pose by features; without one, from the guess.
-void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
+void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const DenseOptions& options,
                                      TrackedFrame& out) {
-    DenseOptions dense = dense_options(motion);
+    DenseOptions dense = options;
     if (out.measured) dense.coarsest = 1;
-    const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense);
+    const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense, frame_variance(image));
     out.measured.reset();
     if (!e) {
         out.why = e.error().what;
@@ -234,10 +243,11 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
 void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
                                      TrackedFrame& out) {
     SearchOptions o;
-    const double off = std::uniform_real_distribution(-o.range_part, o.range_part)(random_);
+    const double most = options_.has_truth ? o.range_part : 0;
+    const double off = std::uniform_real_distribution(-most, most)(random_);
     o.range_m = options_.range_guess_m > 0 ? options_.range_guess_m : norm(out.truth.t) / (1 + off);
-    o.dense = dense_options({});
-    const auto e = search_->find(image, at, T_world_camera, o);
+    o.dense = dense_options({}, T_world_camera);
+    const auto e = search_->find(image, at, T_world_camera, o, frame_variance(image));
     if (!e) {
         out.why = e.error().what;
         return;
@@ -247,9 +257,17 @@ void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses
     take_answer(*e, e->T_camera_target, out);
 }
 
-DenseOptions FrameTracker::dense_options(const ApparentMotion& motion) const {
+std::vector<float> FrameTracker::frame_variance(const MeasuredImage& image) const {
+    if (!options_.frame_noise_dn) return {};
+    return std::vector<float>(image.dn.size(), static_cast<float>(std::pow(*options_.frame_noise_dn, 2)));
+}
+
+/// Without a truth the target's attitude in the world, and so its light, is not known but by the camera's.
+DenseOptions FrameTracker::dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const {
     DenseOptions dense;
     dense.motion = motion;
+    dense.model = options_.model;
+    if (!options_.has_truth) dense.T_world_camera = T_world_camera;
     dense.seed = ~options_.seed;
     dense.method = world_.scene().render.method;
     dense.max_depth = world_.scene().render.max_depth;

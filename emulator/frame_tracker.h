@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/result.h"
 #include "emulator/world.h"
@@ -16,6 +17,7 @@
 #include "estimator/pose/answer.h"
 #include "estimator/pose/apparent_motion.h"
 #include "estimator/pose/camera_method.h"
+#include "estimator/pose/model_uncertainty.h"
 #include "protocols/estimate.h"
 #include "protocols/ledger.h"
 
@@ -33,8 +35,13 @@ struct TrackerOptions {
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
     bool search = false;                      ///< no guess but of the range, known to 30 % (estimator/search)
     double range_guess_m = 0;                 ///< for the search; 0: the truth, off by up to 30 % at random
-    std::uint64_t seed = 1;                   ///< of the first guess's direction
-    int spp = 4;                              ///< of the renders that frames are compared with
+    bool has_truth = true;  ///< false: the poses of the bodies are a guess, where the estimate starts
+    ModelUncertainty model{};
+    /// Standard deviation of the frames' noise beside the detector's, for pixels; 0: none, as of a real camera.
+    /// Empty: not known, as of renders of few samples.
+    std::optional<double> frame_noise_dn{};
+    std::uint64_t seed = 1;  ///< of the first guess's direction
+    int spp = 4;             ///< of the renders that frames are compared with
     /// What drives the relative motion beyond a constant velocity and rate: power spectral densities, m^2 s^-3 and
     /// rad^2 s^-3. As a chaser's that brakes with some cm s^-2.
     double acceleration_psd = 1e-3, angular_acceleration_psd = 1e-5;
@@ -43,7 +50,8 @@ struct TrackerOptions {
 /// The body whose pose is estimated by a sensor on the body `mount`. Errors list the names of all bodies.
 [[nodiscard]] Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor,
                                             const std::string& name);
-/// The truth displaced by the start errors of the options, in directions drawn at random.
+/// The truth displaced by the start errors of the options, in directions drawn at random; without a truth the
+/// guess.
 [[nodiscard]] Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& options, std::mt19937_64& random);
 
 /// The result of one frame. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
@@ -54,11 +62,12 @@ struct TrackedFrame {
     std::string why;  ///< why the frame gave no pose
     Answer answer;    ///< of this frame alone
     Rigid3 truth{};
-    Rigid3 guess{};                        ///< the pose of the first render
-    std::optional<Rigid3> measured;        ///< by this frame alone, where the answer is usable
-    Matrix6 covariance = Matrix6::Zero();  ///< of `measured`
-    Matrix6 bound = Matrix6::Zero();       ///< Cramer-Rao, for the sensor's noise and the method's measurements
-    Rigid3 filtered{};                     ///< by all frames so far; where the state is not lost
+    Rigid3 guess{};                                 ///< the pose of the first render
+    std::optional<Rigid3> measured;                 ///< by this frame alone, where the answer is usable
+    Matrix6 covariance = Matrix6::Zero();           ///< of `measured`
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< its part by the model's uncertainty
+    Matrix6 bound = Matrix6::Zero();  ///< Cramer-Rao, for the sensor's noise and the method's measurements
+    Rigid3 filtered{};                ///< by all frames so far; where the state is not lost
     Matrix6 filtered_covariance = Matrix6::Zero();
     double nis = 0;   ///< normalised innovation squared of `measured`; 0 for the first
     double ms = 0;    ///< wall time that the frame took
@@ -97,12 +106,13 @@ private:
                  const ApparentMotion& motion, TrackedFrame& out);
     void measure_by_features(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
                              TrackedFrame& out);
-    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
+    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const DenseOptions& options,
                            TrackedFrame& out);
     /// Without a guess; the target is taken to stand still during the exposure.
     void measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
                            TrackedFrame& out);
-    [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion) const;
+    [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const;
+    [[nodiscard]] std::vector<float> frame_variance(const MeasuredImage& image) const;
     /// The pose is known well enough for a render to be compared from there.
     [[nodiscard]] bool is_tracked(const Quat& q_frame_chaser) const;
     /// The chaser is the body that carries the camera, or the camera itself.
@@ -117,6 +127,9 @@ private:
     std::unique_ptr<DenseAlignment> pixels_;  ///< by method `dense`
     std::unique_ptr<PoseSearch> search_;      ///< where the options ask for it
     PoseTracker tracker_;
+    /// Of the newest measurement that the filter took: the same in all of them, so that the filter does not average
+    /// it.
+    Matrix6 covariance_of_model_ = Matrix6::Zero();
 };
 
 }  // namespace narpa

@@ -67,18 +67,19 @@ private:
     FrameSettings settings_{};
 };
 
-/// Variance of an answer over its covariance where the frame's sampling noise is not known: it is taken to be as
-/// large as that of the renders, and the scatter of fits with other samples has twice the variance of one.
+/// Variance of an answer over its covariance_of_image where the frame's sampling noise is not known: it is taken to
+/// be as large as that of the renders, and the scatter of fits with other samples has twice the variance of one.
 double with_sampling_noise(DenseAlignment& dense, const MeasuredImage& frame, const BodyPoses& at,
                            const DenseEstimate& answer, DenseOptions options, int& renders) {
     options.coarsest = options.finest, options.rivals = 0;
+    const Matrix6 of_image = answer.covariance_of_image();
     double sum = 0;
     for (int k = 0; k < kOtherSamples; ++k) {
         ++options.seed;
         const auto fit = dense.align(frame, at, answer.T_camera_body, options);
         if (!fit) return 1;
         renders += fit->renders;
-        sum += normalised_error_squared(error_between(answer.T_camera_body, fit->T_camera_body), answer.covariance);
+        sum += normalised_error_squared(error_between(answer.T_camera_body, fit->T_camera_body), of_image);
     }
     return 1 + sum / (6 * kOtherSamples);
 }
@@ -219,13 +220,16 @@ Status PoseSearch::fine_fits(const Sought& sought, std::vector<Contender>& conte
     options.rivals = sought.dense.rivals;
     auto fit = fine_fit(sought, best, options, out);
     if (!fit) return fit.error();
-    out.T_camera_target = fit->T_camera_body, out.covariance = fit->covariance;
+    out.T_camera_target = fit->T_camera_body;
+    out.covariance = fit->covariance, out.covariance_of_model = fit->covariance_of_model;
     out.pixels = fit->pixels, out.residual = fit->residual, out.answer = fit->answer;
     if (!out.answer.usable()) return Ok{};
 
     const bool noise_known = !sought.variance.empty();
     if (!noise_known)
-        out.covariance *= with_sampling_noise(dense_, sought.frame, sought.known.at, *fit, options, out.renders);
+        out.covariance +=
+            (with_sampling_noise(dense_, sought.frame, sought.known.at, *fit, options, out.renders) - 1) *
+            fit->covariance_of_image();
     Fit judged;
     observe(out.T_camera_target, out.covariance, judged);
     for (const Contender& c : contenders) {

@@ -27,7 +27,7 @@ struct SearchOptions {
 
 struct SearchEstimate {
     Rigid3 T_camera_target{};
-    Matrix6 covariance = Matrix6::Zero();  ///< DenseEstimate's
+    Matrix6 covariance = Matrix6::Zero(), covariance_of_model = Matrix6::Zero();  ///< DenseEstimate's
     Answer answer;
     int templates = 0;   ///< small renders
     int renders = 0;     ///< images that were compared by all pixels

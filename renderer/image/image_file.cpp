@@ -5,6 +5,7 @@
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
@@ -15,9 +16,12 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "renderer/scene/file_bytes.h"
 #include "renderer/scene/image_codecs.h"
+#include "renderer/scene/image_header.h"
 
 namespace narpa {
 namespace {
@@ -146,6 +150,42 @@ Status write_png(const std::string& path, const RenderedFrame& frame) {
     return narpa::write_png(path, image);
 }
 
+std::string pixels_of(int type) {
+    const std::string kind = CV_MAT_CN(type) == 1 ? "grey" : "colour";
+    return CV_MAT_DEPTH(type) == CV_8U    ? kind + " of 8 bits"
+           : CV_MAT_DEPTH(type) == CV_16U ? kind + " of 16 bits"
+                                          : kind + " of neither 8 nor 16 bits";
+}
+
+/// An image file's pixels in the camera's format.
+Result<std::vector<std::uint8_t>> decode_frame(const std::string& path, const std::string& file,
+                                               const Camera& camera) {
+    const Error no_image{"is no image that can be decoded, expected .raw, .png, .tif or .pgm", path};
+    const auto size = image_size({reinterpret_cast<const std::uint8_t*>(file.data()), file.size()});
+    if (!size) return no_image;
+    if (size->width != static_cast<std::uint64_t>(camera.width) ||
+        size->height != static_cast<std::uint64_t>(camera.height))
+        return Error{fmt::format("is {} x {}, expected {} x {} as camera \"{}\" has", size->width, size->height,
+                                 camera.width, camera.height, camera.name),
+                     path};
+    const Result<ImageCodecs> codecs = image_codecs(path);
+    if (!codecs) return codecs.error();
+    const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8U, const_cast<char*>(file.data()));
+    cv::Mat image = codecs->imdecode(bytes, cv::IMREAD_UNCHANGED);
+    if (image.cols != camera.width || image.rows != camera.height) return no_image;
+    const int expected = camera.format == PixelFormat::rgb24 ? CV_8UC3
+                         : is_16_bit(camera.format)          ? CV_16UC1
+                                                             : CV_8UC1;
+    if (image.type() != expected)
+        return Error{fmt::format("is {}, expected {}: camera \"{}\" is {}", pixels_of(image.type()),
+                                 pixels_of(expected), camera.name, name(camera.format)),
+                     path};
+    if (expected == CV_8UC3) cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+    std::vector<std::uint8_t> frame(image.total() * image.elemSize());
+    std::memcpy(frame.data(), image.data, frame.size());
+    return frame;
+}
+
 /// In lower case, with the dot.
 std::string extension_of(const std::string& path) {
     std::string extension = std::filesystem::path(path).extension().string();
@@ -176,6 +216,20 @@ Status write_image(const std::string& path, const RenderedFrame& frame) {
                      path};
     return extension == ".png" ? write_png(path, frame)
                                : write_bytes(path, "", frame.bytes.data(), frame.bytes.size());
+}
+
+Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera) {
+    const Result<std::string> file = read_file(path);
+    if (!file) return file.error();
+    if (extension_of(path) == ".raw") return std::vector<std::uint8_t>(file->begin(), file->end());
+    if (camera.format == PixelFormat::yuyv)
+        return Error{fmt::format("camera \"{}\" is YUYV: expected the device's bytes, FILE.raw", camera.name),
+                     path};
+    try {
+        return decode_frame(path, *file, camera);
+    } catch (const std::exception& e) {
+        return Error{std::string("OpenCV could not decode the image: ") + e.what(), path};
+    }
 }
 
 Status write_pfm(const std::string& path, int width, int height, std::span<const double> values) {

@@ -1,9 +1,10 @@
-/// renderer/image/image_file.h - a rendered frame as an image file.
+/// renderer/image/image_file.h - a frame as an image file.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "renderer/image/radiance_image.h"
@@ -38,6 +39,11 @@ Status check_image_name(const std::string& path);
 ///   .raw  the camera's own output, byte for byte as written to a video device
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);
+
+/// A frame as the camera puts it out, byte for byte: from .raw, or from another image (PNG, TIFF, PGM ...) that has
+/// the camera's size and the channels and bits of its format, as write_image makes it. Errors: a file that cannot
+/// be read; another size or other pixels than the camera's; YUYV, whose bytes an image does not have.
+Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera);
 
 /// Writes one 32-bit float a pixel as a grey PFM, little-endian, rows from the bottom. `values`: row by row from
 /// the top. Error: a path that cannot be written.

@@ -238,6 +238,91 @@ TEST_F(EstimateTest, FromOneFrameAndFromOneSweep) {
     EXPECT_EQ(cloud["unobserved"].get<int>(), 0);
 }
 
+/// As of a real camera: an image file, and poses that are a guess.
+TEST_F(EstimateTest, FromAnImageWithoutTruth) {
+    const std::string frame = folder_ / "frame.png", scene = kDocking;
+    ASSERT_EQ(narpa_does("render " + scene + " --pose chaser=20,0.5,-0.4,0,0,0,1 --spp 16 -o " + frame).status, 0);
+    const auto estimate = [&](const std::string& options) {
+        const Done done = narpa_does("estimate " + scene + " --pose chaser=20.3,0.6,-0.43,0,0,0,1 --frame " +
+                                     frame + " --no-truth --json " + options);
+        EXPECT_EQ(done.status, 0) << done.out;
+        return json::parse(done.out.substr(done.out.find("\n{") + 1));
+    };
+    const auto sigma_z = [](const json& told) { return std::sqrt(told["covariance"][5][5].get<double>()); };
+    const json told = estimate(""), uncertain = estimate("--uncertainty scale=0.01");
+    EXPECT_EQ(told["answer"]["class"], "good");
+    EXPECT_FALSE(told.contains("truth") || told.contains("nees") || told.contains("error_position_m"));
+    EXPECT_NEAR(told["pose"]["position_m"][0].get<double>(), -0.5, 0.01);
+    EXPECT_NEAR(told["pose"]["position_m"][1].get<double>(), -0.4, 0.01);
+    EXPECT_NEAR(told["pose"]["position_m"][2].get<double>(), 20.45, 0.05);
+    EXPECT_LT(sigma_z(told), 0.02);
+    EXPECT_NEAR(sigma_z(uncertain), 0.01 * 20.45, 0.02);
+}
+
+/// A model that is told to be uncertain makes the filter's covariance no smaller than that, however many frames.
+TEST_F(EstimateTest, UncertaintyOfTheModelIsNotAveraged) {
+    const auto world = World::create(docking());
+    ASSERT_TRUE(world) << world.error().text();
+    CameraUnit unit(**world, 0);
+    TrackerOptions options;
+    options.model.scale = 0.01;
+    const auto tracker = FrameTracker::create(**world, 0, options);
+    ASSERT_TRUE(tracker);
+    for (std::uint32_t k = 0; k < 3; ++k) {
+        const FrameLedger ledger = unit.expose(k, unit.t_mid_ns(k));
+        const TrackedFrame f = (*tracker)->take(ledger, unit.bytes(), unit.placement());
+        ASSERT_TRUE(f.measured) << f.why;
+        EXPECT_GE(std::sqrt(f.filtered_covariance(5, 5)), 0.01 * f.measured->t.z);
+        EXPECT_GE(std::sqrt(f.bound(5, 5)), 0.01 * f.measured->t.z);
+    }
+}
+
+/// A frame that is known to have no noise but the detector's, and has more, is refused.
+TEST_F(EstimateTest, NoiseThatIsStatedIsExpected) {
+    Scene s = docking();
+    s.render.spp = 16;
+    const auto world = World::create(s);
+    ASSERT_TRUE(world) << world.error().text();
+    CameraUnit unit(**world, 0);
+    const FrameLedger ledger = unit.expose(0, unit.t_mid_ns(0));
+    const auto answer = [&](std::optional<double> noise_dn) {
+        TrackerOptions options;
+        options.method = CameraMethod::dense;
+        options.frame_noise_dn = noise_dn;
+        const auto tracker = FrameTracker::create(**world, 0, options);
+        return (*tracker)->take(ledger, unit.bytes(), unit.placement());
+    };
+    const TrackedFrame known = answer(0), unknown = answer({});
+    EXPECT_EQ(known.answer.kind, AnswerKind::refused) << "a frame of sixteen samples a pixel";
+    EXPECT_NE(known.why.find("residuals"), std::string::npos) << known.why;
+    EXPECT_EQ(unknown.answer.kind, AnswerKind::good) << unknown.why;
+}
+
+TEST_F(EstimateTest, ComparesAFrameWithARender) {
+    const std::string frame = folder_ / "frame.png", scene = kDocking;
+    ASSERT_EQ(narpa_does("render " + scene + " --pose chaser=20,0.5,-0.4,0,0,0,1 --spp 64 -o " + frame).status, 0);
+    const auto compared = [&](const std::string& y, const std::string& options = "") {
+        const Done done = narpa_does("compare " + scene + " --pose chaser=20," + y + ",-0.4,0,0,0,1 --frame " +
+                                     frame + " --json " + options);
+        EXPECT_EQ(done.status, 0) << done.out;
+        return json::parse(done.out.substr(done.out.find("\n{") + 1));
+    };
+    const json right = compared("0.5", "-o " + (folder_ / "comparison.png")), aside = compared("0.6");
+    EXPECT_GT(right["overlap"].get<double>(), 0.96);
+    EXPECT_NEAR(right["gain"].get<double>(), 1, 0.01);
+    EXPECT_GT(right["correlation"].get<double>(), 0.999);
+    EXPECT_LT(right["residual_over_noise"].get<double>(), 1.2);
+    EXPECT_EQ(right["target"], "station");
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "comparison.json"));
+    EXPECT_LT(aside["overlap"].get<double>(), 0.8);
+    // The camera stands 10 cm aside: 3.8 px at 20.45 m, less for what is further off.
+    EXPECT_NEAR(std::abs(aside["shift_px"][0].get<double>()), 3.2, 0.8);
+    EXPECT_NEAR(aside["shift_px"][1].get<double>(), 0, 0.2);
+    const Done dark = narpa_does("compare " + scene + " --pose chaser=-200,0,0,0,0,0,1 --frame " + frame);
+    EXPECT_EQ(dark.status, 1) << dark.out;
+    EXPECT_NE(dark.out.find("not lit in the render"), std::string::npos) << dark.out;
+}
+
 TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     const std::string scene = kDocking;
     const auto refuses = [](const std::string& arguments, const std::string& words) {
@@ -250,6 +335,11 @@ TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     refuses(scene + " --frame " + (folder_ / "none.raw"), "none.raw");
     refuses(scene + " --sweep " + (folder_ / "short.raw"), "short.raw");
     refuses(scene, "--frame");
+    std::ofstream(folder_ / "words.png") << "words";
+    refuses(scene + " --frame " + (folder_ / "words.png"), "words.png: is no image that can be decoded");
+    refuses(scene + " --frame x --uncertainty size=1", "expected NAME=VALUE with one of scale, mesh_m");
+    refuses(scene + " --frame x --uncertainty scale=-1", "expected NAME=VALUE");
+    refuses((folder_ / "") + " --no-truth", "--no-truth goes with a scene file");
     refuses(scene + " --frame x --target moon", "expected one of: station, chaser");
     refuses(scene + " --frame x --start 5", "expected DEG,PERCENT");
     refuses(scene + " --frame x --range-guess 20", "start by search");

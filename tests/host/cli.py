@@ -19,6 +19,8 @@ SUBCOMMANDS = {
     "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o"],
     "map": ["--camera", "--of", "--body", "--interval", "--datum", "--up", "--time", "--pose", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
+    "estimate": ["--frame", "--sweep", "--no-truth", "--uncertainty", "--frame-noise", "--method", "--start"],
+    "compare": ["--frame", "--camera", "--target", "--pose", "-o"],
 }
 BUILD = Path(os.environ["NARPA_BUILD_DIR"])
 folder = support.work_folder()

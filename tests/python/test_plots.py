@@ -120,6 +120,10 @@ def replay():
             "difference": image(64, 48)}  # fmt: skip
 
 
+def comparison(width=64):
+    return {"frame": image(width, 48), "render": image(width, 48), "residual": image(width, 48), "residual_range_dn": 12.5}
+
+
 def rehearsal(lockstep=False, flown=True):
     t = np.arange(0, 100, 0.5) if flown else np.zeros(0)
     x = 30 * np.exp(-t / 30)
@@ -159,7 +163,7 @@ def surface_map(interval=1.0):
 
 DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "approach": approach,
              "approach_frames": approach_frames, "stereo": stereo, "icp": icp, "filter": filter_, "estimators": estimators,
-             "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map}  # fmt: skip
+             "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map, "comparison": comparison}  # fmt: skip
 
 
 class Plots(unittest.TestCase):
@@ -188,7 +192,7 @@ class Plots(unittest.TestCase):
 
     def test_documents_of_nothing_become_pictures_too(self):
         nothing = {"ladder": {"scenes": []}, "loop": {"runs": []}, "estimates": {"frames": []}, "campaign": campaign(0), "map": surface_map(100.0),
-                   "rehearsal": rehearsal(lockstep=True, flown=False)}  # fmt: skip
+                   "rehearsal": rehearsal(lockstep=True, flown=False), "comparison": {**comparison(48), "residual_range_dn": 0.0}}  # fmt: skip
         for kind, document in nothing.items():
             with self.subTest(kind):
                 self.assertTrue(all(file.exists() for file in self.draw(kind, document, f"{kind}-of-nothing")))

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "renderer/camera/detector.h"
 #include "tests/support/image_files.h"
@@ -173,6 +174,56 @@ TEST(ImageFile, RawIsTheBytesAsTheyAre) {
     const std::string read = read_text(path);
     EXPECT_TRUE(std::equal(read.begin(), read.end(), shot.bytes.begin(), shot.bytes.end(),
                            [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }));
+}
+
+TEST(ImageFile, FramesAreReadAsTheyWereWritten) {
+    for (const PixelFormat format : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::yuyv,
+                                     PixelFormat::gbrg8, PixelFormat::rggb16}) {
+        const Shot shot(format);
+        for (const std::string extension : {".png", ".raw"}) {
+            if (format == PixelFormat::yuyv && extension == ".png") continue;
+            const std::string path = scratch(std::string(name(format)) + "-again" + extension);
+            ASSERT_TRUE(write_image(path, shot.frame()));
+            const auto read = read_frame(path, shot.c);
+            ASSERT_TRUE(read) << read.error().text();
+            EXPECT_EQ(*read, shot.bytes) << path;
+        }
+    }
+    const Shot shot(PixelFormat::y16);
+    const cv::Mat same(8, 12, CV_16UC1, const_cast<std::uint8_t*>(shot.bytes.data()));
+    for (const char* file : {"frame.tif", "frame.pgm"}) {
+        test::write_image_file(scratch(file), same);
+        const auto read = read_frame(scratch(file), shot.c);
+        ASSERT_TRUE(read) << read.error().text();
+        EXPECT_EQ(*read, shot.bytes) << file;
+    }
+}
+
+TEST(ImageFile, FramesThatAreNotTheCamerasAreRefused) {
+    const auto refusal = [](const std::string& file, PixelFormat format) {
+        const Shot shot(format);
+        const auto read = read_frame(scratch(file), shot.c);
+        EXPECT_FALSE(read) << file;
+        EXPECT_EQ(read ? "" : read.error().file, scratch(file));
+        return read ? std::string() : read.error().what;
+    };
+    test::write_image_file(scratch("wide.png"), cv::Mat::zeros(8, 13, CV_8UC1));
+    test::write_image_file(scratch("colour.png"), cv::Mat::zeros(8, 12, CV_8UC3));
+    test::write_image_file(scratch("grey.png"), cv::Mat::zeros(8, 12, CV_8UC1));
+    std::ofstream(scratch("words.png")) << "this is no image";
+    std::ofstream(scratch("empty.png")) << "";
+    EXPECT_EQ(refusal("wide.png", PixelFormat::grey), "is 13 x 8, expected 12 x 8 as camera \"camera\" has");
+    EXPECT_EQ(refusal("colour.png", PixelFormat::grey),
+              "is colour of 8 bits, expected grey of 8 bits: camera \"camera\" is GREY");
+    EXPECT_EQ(refusal("grey.png", PixelFormat::y16),
+              "is grey of 8 bits, expected grey of 16 bits: camera \"camera\" is Y16");
+    EXPECT_EQ(refusal("grey.png", PixelFormat::rgb24),
+              "is grey of 8 bits, expected colour of 8 bits: camera \"camera\" is RGB24");
+    EXPECT_EQ(refusal("grey.png", PixelFormat::yuyv),
+              "camera \"camera\" is YUYV: expected the device's bytes, FILE.raw");
+    EXPECT_NE(refusal("words.png", PixelFormat::grey).find("no image that can be decoded"), std::string::npos);
+    EXPECT_NE(refusal("empty.png", PixelFormat::grey).find("no image that can be decoded"), std::string::npos);
+    EXPECT_EQ(refusal("nowhere.png", PixelFormat::grey), "no such file");
 }
 
 TEST(ImageFile, ErrorsNameTheFileAndTheReason) {

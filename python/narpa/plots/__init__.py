@@ -4,7 +4,8 @@ Each document names its kind under the key "plot". A kind is a function that tak
 matplotlib figure, or several by name. It stands in one of the modules of this package:
 
     bench        convergence, ladder, loop: `narpa bench render` and `narpa bench loop`
-    estimation   estimates, approach, approach_frames, stereo, icp, filter, estimators: `narpa estimate`, `bench estimate`
+    estimation   estimates, approach, approach_frames, stereo, icp, filter, estimators: `narpa estimate`, `bench estimate`;
+                 comparison: `narpa compare`
     replay       replay: `narpa replay --reference`
     rehearsal    rehearsal, campaign: the charts of a rehearsal's page
     surface      map: `narpa map`

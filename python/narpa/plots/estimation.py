@@ -91,6 +91,23 @@ def boxes(axes, points, unit):
     axes.legend()
 
 
+def comparison(document):
+    """A frame, the render scaled to its brightness, and what is left: red where the frame is brighter."""
+    frame, render, residual = (image(document[name]) for name in ("frame", "render", "residual"))
+    height, width = frame.shape
+    wide = width > 1.8 * height
+    size = (8, 0.7 + 3 * 8 * height / width) if wide else (0.9 + 3 * 5 * width / height, 5.6)
+    drawn = figure(*size, document["title"])
+    panels = drawn.subplots(3, 1) if wide else drawn.subplots(1, 3)
+    show_image(panels[0], frame, "frame", cmap="gray", vmin=0, vmax=255)
+    show_image(panels[1], render, "render, at the frame's brightness", cmap="gray", vmin=0, vmax=255)
+    most = document["residual_range_dn"]
+    left = (residual.astype(float) - 128) / 127 * most
+    show_image(panels[2], left, "frame - render, DN", cmap="RdBu_r", vmin=-most, vmax=most)
+    drawn.colorbar(panels[2].images[0], ax=panels[2], shrink=0.8).ax.grid(False)
+    return drawn
+
+
 def stereo(document):
     """Matches over the left frame, and errors of the points by whole pixels and between pixels."""
     points = document["matches"]
@@ -194,4 +211,4 @@ def label_points(axes, points):
 
 
 KINDS = {"estimates": estimates, "approach": approach, "approach_frames": approach_frames, "stereo": stereo, "icp": icp,
-         "filter": filter_nees, "estimators": estimators}  # fmt: skip
+         "filter": filter_nees, "estimators": estimators, "comparison": comparison}  # fmt: skip

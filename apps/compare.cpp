@@ -1,0 +1,166 @@
+// narpa compare - a frame of a real camera beside the render of the scene: overlap, brightness, shift, residuals.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "apps/cli.h"
+#include "apps/scene_options.h"
+#include "emulator/camera_unit.h"
+#include "emulator/frame_tracker.h"
+#include "emulator/threads.h"
+#include "emulator/world.h"
+#include "estimator/view/frame_comparison.h"
+#include "plot/plot.h"
+#include "renderer/image/image_file.h"
+
+namespace narpa::cli {
+namespace {
+
+struct CompareOptions {
+    std::string scene, frame, camera, target, out;
+    PoseOptions pose;
+    double time_s = 0;
+    int spp = 64, threads = 0;
+};
+
+nlohmann::json numbers_of(const FrameComparison& c) {
+    return {{"overlap", c.overlap()},
+            {"lit_frame_px", c.lit_frame},
+            {"lit_render_px", c.lit_render},
+            {"lit_both_px", c.lit_both},
+            {"black_dn", c.black_dn},
+            {"gain", c.gain},
+            {"correlation", c.correlation},
+            {"mean_dn", c.mean_dn},
+            {"residual_dn", c.residual_dn},
+            {"residual_over_noise", c.residual_noise ? nlohmann::json(*c.residual_noise) : nlohmann::json(nullptr)},
+            {"shift_px", {c.shift_x_px, c.shift_y_px}},
+            {"shifted_correlation", c.shifted_correlation}};
+}
+
+std::string words_of(const FrameComparison& c) {
+    const bool at_limit = std::max(std::abs(c.shift_x_px), std::abs(c.shift_y_px)) > kMostComparedShift_px - 1;
+    return fmt::format(
+        "  lit in both: {:.1f} % of the pixels lit in either ({} in the frame, {} in the render)\n"
+        "  brightness: frame = {:.6g} DN + {:.4g} x render, correlation {:.4f}\n"
+        "  residuals: {:.4g} DN RMS, {:.1f} % of the mean{}\n"
+        "  shift: the frame shows it {:.2f} px further {} and {:.2f} px further {} than the render{}, correlation "
+        "{:.4f} there",
+        100 * c.overlap(), c.lit_frame, c.lit_render, c.black_dn, c.gain, c.correlation, c.residual_dn,
+        100 * c.residual_dn / c.mean_dn,
+        c.residual_noise ? fmt::format(", {:.3g} times the sensor's noise", *c.residual_noise) : "",
+        std::abs(c.shift_x_px), c.shift_x_px < 0 ? "left" : "right", std::abs(c.shift_y_px),
+        c.shift_y_px < 0 ? "up" : "down", at_limit ? ", or more" : "", c.shifted_correlation);
+}
+
+/// The document of the picture (python/narpa/plots/estimation.py): both images at the frame's brightness, and the
+/// residuals, 128 where there is none.
+nlohmann::json picture(const std::string& title, const MeasuredImage& frame, const SensorModel& sensor,
+                       const RadianceImage& render, const FrameComparison& c) {
+    std::vector<double> signal, expected;
+    for (std::size_t p = 0; p < frame.dn.size(); ++p) {
+        signal.push_back(static_cast<double>(frame.dn[p]) - c.black_dn);
+        expected.push_back(c.gain * sensor.signal(render.pixels[p]));
+    }
+    // Glints may be white: one in a hundred of the lit pixels.
+    std::vector<double> sorted = expected;
+    const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(c.lit_render / 100);
+    std::nth_element(sorted.begin(), bright, sorted.end(), std::greater<>());
+    const double brightest = std::max(*bright, 1e-300), range = std::min(4 * c.residual_dn, brightest);
+    const auto shown = [&](const auto& byte) {
+        std::vector<std::uint8_t> bytes(signal.size());
+        for (std::size_t p = 0; p < bytes.size(); ++p) bytes[p] = byte(p);
+        return plot_image(frame.width, frame.height, 1, bytes);
+    };
+    return {{"plot", "comparison"},
+            {"title", title},
+            {"frame", shown([&](std::size_t p) { return srgb_byte(signal[p] / brightest); })},
+            {"render", shown([&](std::size_t p) { return srgb_byte(expected[p] / brightest); })},
+            {"residual_range_dn", range},
+            {"residual", shown([&](std::size_t p) {
+                 const double part = range > 0 ? (signal[p] - expected[p]) / range : 0;
+                 return static_cast<std::uint8_t>(std::lround(128 + 127 * std::clamp(part, -1.0, 1.0)));
+             })}};
+}
+
+Outcome compare(const CompareOptions& o) {
+    auto scene = load_scene(o.scene);
+    if (!scene) return scene.error();
+    const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
+    if (!index) return index.error();
+    BudgetOptions{.spp = o.spp, .budget_ms = {}, .budget_rays = {}}.override_scene(scene->render);
+    if (auto placed = o.pose.place(*scene); !placed) return placed.error();
+    auto world = World::create(*std::move(scene));
+    if (!world) return world.error();
+    const std::int64_t t_ns = std::llround(o.time_s * 1e9);
+    if (auto loaded = o.pose.load(**world, t_ns, t_ns); !loaded) return loaded.error();
+    const Camera& camera = (*world)->scene().cameras[*index];
+    const auto target = target_of(**world, camera.mount, camera.name, o.target);
+    if (!target) return target.error();
+    const auto bytes = read_frame(o.frame, camera);
+    if (!bytes) return bytes.error();
+    const auto frame = measured_image(camera, *bytes);
+    if (!frame) return Error{frame.error().what, o.frame};
+    if (!o.out.empty()) {
+        if (auto made = make_folder_of(o.out); !made) return made.error();
+        if (auto good = can_write_plot(o.out); !good) return good.error();
+    }
+
+    CameraUnit unit(**world, *index);
+    Aovs shown;
+    TracingThreads threads(o.threads);
+    {
+        const Progress progress("rendering what " + o.frame + " should show");
+        threads.arena.execute([&] { unit.expose(0, t_ns, 0, &shown); });
+    }
+    RadianceImage render = unit.radiance();
+    if (camera.embedded_line) {  // the last row holds no light
+        render.pixels.resize(frame->dn.size()), shown.body.resize(frame->dn.size());
+        --render.height;
+    }
+    const SensorModel sensor = sensor_model(camera);
+    const auto found = compare_frame(*frame, sensor, render, shown.body, *target);
+    if (!found) return Error{found.error().what, o.frame, 0, 0, ErrorKind::failed};
+    const std::string title =
+        fmt::format("{}: {} in camera {}", o.frame, (*world)->scene().bodies[*target].name, camera.name);
+    say(title + "\n" + words_of(*found));
+    nlohmann::json document = numbers_of(*found);
+    document["frame"] = o.frame, document["camera"] = camera.name;
+    document["target"] = (*world)->scene().bodies[*target].name;
+    if (o.out.empty()) return document;
+    if (auto drawn = write_plot(o.out, picture(title, *frame, sensor, render, *found)); !drawn)
+        return drawn.error();
+    say("wrote " + o.out);
+    return document;
+}
+
+}  // namespace
+
+Command add_compare(Parser app) {
+    auto o = std::make_shared<CompareOptions>();
+    const Parser c =
+        app.subcommand("compare", "Compare a frame, also of a real camera, with a render of the scene");
+    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
+    c.option("--frame", o->frame,
+             "FILE.png, .tif or .pgm in the camera's size and format, or the bytes in FILE.raw")
+        .type_name("FILE")
+        .required();
+    c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME");
+    c.option("--target", o->target,
+             "Body that is compared (default: the first with a mesh that does not carry the camera)")
+        .type_name("BODY");
+    c.option("--time", o->time_s, "Simulation time of the frame (default: 0)")
+        .type_name("SECONDS")
+        .range(-9e9, 9e9);
+    o->pose.add_to(c);
+    c.option("--spp", o->spp, "Samples per pixel of the render").range(1, 65535).shows_default();
+    c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
+    c.option("-o,--output", o->out, "Frame, render and residuals side by side").type_name("FILE.png");
+    c.group("Results");
+    c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png"});
+    return [o] { return compare(*o); };
+}
+
+}  // namespace narpa::cli

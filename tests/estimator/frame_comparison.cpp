@@ -1,0 +1,120 @@
+// A frame against a render: made-up images, of which everything is known.
+#include "estimator/view/frame_comparison.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace narpa {
+namespace {
+
+constexpr int kWidth = 120, kHeight = 90;
+
+/// A bright ball with a smooth edge, a disc of another body, and nothing else.
+class Comparison : public testing::Test {
+protected:
+    static double light(double x, double y) {
+        const double r = std::hypot(x - 60, y - 45);
+        return r > 20 ? 0 : (1 + 0.3 * std::sin(x / 3) + 0.2 * std::cos(y / 4)) * std::min(1.0, (20 - r) / 3);
+    }
+    static std::size_t at(int x, int y) { return static_cast<std::size_t>(y * kWidth + x); }
+
+    void SetUp() override {
+        sensor.dn_per_radiance = {10, 10, 10};
+        sensor.black_dn = 20, sensor.top_dn = 4095, sensor.clips_dn = 4095;
+        sensor.read_dn2 = 9;
+        body.assign(at(0, kHeight), -1);
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x) {
+                const auto L = static_cast<float>(30 * light(x, y));
+                render.pixels[at(x, y)] = {L, L, L};
+                if (L > 0) body[at(x, y)] = 1;
+            }
+    }
+    /// The same, moved, `gain` times as bright, above this black.
+    MeasuredImage frame_of(double dx, double dy, double gain, double black_dn, bool noisy = true) {
+        std::mt19937_64 random(3);
+        std::normal_distribution<double> noise(0, noisy ? 3 : 0);
+        MeasuredImage frame{kWidth, kHeight, {}};
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x)
+                frame.dn.push_back(
+                    static_cast<float>(black_dn + gain * 900 * light(x - dx, y - dy) + noise(random)));
+        return frame;
+    }
+    FrameComparison compared(const MeasuredImage& frame) {
+        const auto c = compare_frame(frame, sensor, render, body, 1);
+        EXPECT_TRUE(c) << c.error().text();
+        return c ? *c : FrameComparison{};
+    }
+
+    SensorModel sensor;
+    RadianceImage render{kWidth, kHeight};
+    std::vector<std::int32_t> body;
+};
+
+TEST_F(Comparison, TheSameFitsToItsNoise) {
+    const FrameComparison c = compared(frame_of(0, 0, 1, 20));
+    EXPECT_NEAR(c.black_dn, 20, 0.2);
+    EXPECT_NEAR(c.gain, 1, 1e-3);
+    EXPECT_GT(c.correlation, 0.9999);
+    EXPECT_GT(c.overlap(), 0.99);
+    ASSERT_TRUE(c.residual_noise);
+    EXPECT_NEAR(*c.residual_noise, 1, 0.05);
+    EXPECT_NEAR(c.residual_dn, 3, 0.15);
+    EXPECT_LT(std::hypot(c.shift_x_px, c.shift_y_px), 0.02);
+}
+
+TEST_F(Comparison, FindsBrightnessBlackAndShift) {
+    const FrameComparison c = compared(frame_of(5.3, -2.6, 1.7, 35));
+    EXPECT_NEAR(c.black_dn, 35, 0.2);
+    EXPECT_NEAR(c.shift_x_px, 5.3, 0.1);
+    EXPECT_NEAR(c.shift_y_px, -2.6, 0.1);
+    EXPECT_GT(c.shifted_correlation, 0.99) << "at the nearest whole pixel";
+    EXPECT_LT(c.overlap(), 0.8);
+    EXPECT_NEAR(compared(frame_of(0, 0, 1.7, 35)).gain, 1.7, 2e-3);
+}
+
+/// What the frame shows in front of other bodies is theirs, and clipped pixels say nothing of brightness.
+TEST_F(Comparison, LeavesOutOtherBodiesAndClippedPixels) {
+    MeasuredImage frame = frame_of(0, 0, 1, 20);
+    frame.clipped.assign(frame.dn.size(), 0);
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < 20; ++x) {
+            body[at(x, y)] = 0;
+            render.pixels[at(x, y)] = {200, 200, 200};
+            frame.dn[at(x, y)] = 3000;
+        }
+    for (int x = 55; x < 62; ++x) frame.dn[at(x, 45)] = 500, frame.clipped[at(x, 45)] = 1;
+    const FrameComparison c = compared(frame);
+    EXPECT_NEAR(c.gain, 1, 1e-3);
+    EXPECT_GT(c.correlation, 0.9999);
+    EXPECT_GT(c.overlap(), 0.99);
+}
+
+/// A camera without a detector has no noise to compare with; without background the black is the sensor's.
+TEST_F(Comparison, WithoutNoiseAndWithoutBackground) {
+    sensor.read_dn2 = 0;
+    body.assign(body.size(), 1);
+    const FrameComparison c = compared(frame_of(0, 0, 1, 20, false));
+    EXPECT_FALSE(c.residual_noise);
+    EXPECT_EQ(c.black_dn, 20);
+    EXPECT_NEAR(c.gain, 1, 1e-6);
+}
+
+TEST_F(Comparison, ErrorsSayWhatIsDark) {
+    const auto refusal = [&](const MeasuredImage& frame) {
+        const auto c = compare_frame(frame, sensor, render, body, 1);
+        return c ? std::string() : c.error().what;
+    };
+    EXPECT_NE(refusal(frame_of(0, 0, 0, 20)).find("nothing is lit in the frame"), std::string::npos);
+    MeasuredImage white = frame_of(0, 0, 1, 20);
+    white.clipped.assign(white.dn.size(), 1);
+    EXPECT_NE(refusal(white).find("expected"), std::string::npos);
+    render.pixels.assign(render.pixels.size(), Rgb{});
+    EXPECT_NE(refusal(frame_of(0, 0, 1, 20)).find("not lit in the render"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace narpa

@@ -8,7 +8,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <ranges>
 
 #include "base/nearest_name.h"
 #include "emulator/trajectory.h"
@@ -34,6 +33,12 @@ Result<Rigid3> parse_pose(const std::string& numbers, const std::string& given) 
         return Error{fmt::format("--pose \"{}\": the quaternion's norm is {:.6g}, expected 1", given,
                                  norm(Quat{v[3], v[4], v[5], v[6]}))};
     return T;
+}
+
+std::string names_of_model_errors() {
+    std::string names;
+    for (const ModelErrorName& n : kModelErrors) names += (names.empty() ? "" : ", ") + std::string(n.name);
+    return names;
 }
 
 Error no_such_body(const std::string& name, const std::string& given, const Scene& scene) {
@@ -114,10 +119,8 @@ Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::s
         const auto field = std::ranges::find(kModelErrors, name, &ModelErrorName::name);
         const bool known = field != std::end(kModelErrors) || (distortion && name == "distortion");
         if (!number || !known || (value < 0 && name != "distortion")) {
-            std::string names;
-            for (const ModelErrorName& n : kModelErrors) names += (names.empty() ? "" : ", ") + std::string(n.name);
-            return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item, names,
-                                     distortion ? ", distortion" : "")};
+            return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item,
+                                     names_of_model_errors(), distortion ? ", distortion" : "")};
         }
         if (field != std::end(kModelErrors))
             u.*(field->field) = field->unit * value;
@@ -147,8 +150,7 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
         .type_name("METRES")
         .range(1e-3, 1e9);
     app.option(dashes + "uncertainty", uncertainty,
-               "What is not exact in the scene, standard deviations: " +
-                   fmt::format("{}", fmt::join(kModelErrors | std::views::transform(&ModelErrorName::name), ", ")))
+               "What is not exact in the scene, standard deviations: " + names_of_model_errors())
         .type_name("NAME=VALUE,...");
     app.option(dashes + "frame-noise", tracker.frame_noise_dn,
                "For all pixels: noise of the frames beside the detector's, standard deviation; 0 of a real camera "

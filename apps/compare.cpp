@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
+#include <optional>
 
 #include "apps/cli.h"
 #include "apps/scene_options.h"
@@ -25,44 +27,57 @@ struct CompareOptions {
     int spp = 64, threads = 0;
 };
 
+template <class T>
+nlohmann::json or_null(const std::optional<T>& value) {
+    return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
 nlohmann::json numbers_of(const FrameComparison& c) {
-    return {{"overlap", c.overlap()},
-            {"lit_frame_px", c.lit_frame},
-            {"lit_render_px", c.lit_render},
-            {"lit_both_px", c.lit_both},
-            {"black_dn", c.black_dn},
-            {"gain", c.gain},
-            {"correlation", c.correlation},
-            {"mean_dn", c.mean_dn},
-            {"residual_dn", c.residual_dn},
-            {"residual_over_noise", c.residual_noise ? nlohmann::json(*c.residual_noise) : nlohmann::json(nullptr)},
-            {"shift_px", {c.shift_x_px, c.shift_y_px}},
-            {"shifted_correlation", c.shifted_correlation}};
+    nlohmann::json document{{"overlap", c.overlap()},
+                            {"lit_frame_px", c.lit_frame},
+                            {"lit_render_px", c.lit_render},
+                            {"lit_both_px", c.lit_both},
+                            {"black_dn", c.black_dn},
+                            {"gain", c.gain},
+                            {"correlation", or_null(c.correlation)},
+                            {"mean_dn", c.mean_dn},
+                            {"residual_dn", c.residual_dn},
+                            {"residual_over_noise", or_null(c.residual_noise)},
+                            {"shift", nullptr}};
+    if (c.shift)
+        document["shift"] = {{"x_px", c.shift->x_px},
+                             {"y_px", c.shift->y_px},
+                             {"correlation", c.shift->correlation},
+                             {"is_at_limit", c.shift->is_at_limit}};
+    return document;
 }
 
 std::string words_of(const FrameComparison& c) {
-    const bool at_limit = std::max(std::abs(c.shift_x_px), std::abs(c.shift_y_px)) > kMostComparedShift_px - 1;
-    return fmt::format(
+    std::string out = fmt::format(
         "  lit in both: {:.1f} % of the pixels lit in either ({} in the frame, {} in the render)\n"
-        "  brightness: frame = {:.6g} DN + {:.4g} x render, correlation {:.4f}\n"
-        "  residuals: {:.4g} DN RMS, {:.1f} % of the mean{}\n"
-        "  shift: the frame shows it {:.2f} px further {} and {:.2f} px further {} than the render{}, correlation "
-        "{:.4f} there",
-        100 * c.overlap(), c.lit_frame, c.lit_render, c.black_dn, c.gain, c.correlation, c.residual_dn,
+        "  brightness: frame = {:.6g} DN + {:.4g} x render{}\n"
+        "  residuals: {:.4g} DN RMS, {:.1f} % of the mean{}\n",
+        100 * c.overlap(), c.lit_frame, c.lit_render, c.black_dn, c.gain,
+        c.correlation ? fmt::format(", correlation {:.4f}", *c.correlation) : ", uniform", c.residual_dn,
         100 * c.residual_dn / c.mean_dn,
-        c.residual_noise ? fmt::format(", {:.3g} times the sensor's noise", *c.residual_noise) : "",
-        std::abs(c.shift_x_px), c.shift_x_px < 0 ? "left" : "right", std::abs(c.shift_y_px),
-        c.shift_y_px < 0 ? "up" : "down", at_limit ? ", or more" : "", c.shifted_correlation);
+        c.residual_noise ? fmt::format(", {:.3g} times the noise of detector and render", *c.residual_noise) : "");
+    if (!c.shift) return out + "  shift: not known, the render is uniform";
+    return out + fmt::format(
+                     "  shift: the frame shows it {:.2f} px further {} and {:.2f} px further {} than the render{}, "
+                     "correlation {:.4f} there",
+                     std::abs(c.shift->x_px), c.shift->x_px < 0 ? "left" : "right", std::abs(c.shift->y_px),
+                     c.shift->y_px < 0 ? "up" : "down", c.shift->is_at_limit ? ", or more" : "",
+                     c.shift->correlation);
 }
 
 /// The document of the picture (python/narpa/plots/estimation.py): both images at the frame's brightness, and the
-/// residuals, 128 where there is none.
+/// residuals of the usable pixels, 128 where there is none.
 nlohmann::json picture(const std::string& title, const MeasuredImage& frame, const SensorModel& sensor,
-                       const RadianceImage& render, const FrameComparison& c) {
+                       const ExpectedFrame& render, const FrameComparison& c) {
     std::vector<double> signal, expected;
     for (std::size_t p = 0; p < frame.dn.size(); ++p) {
         signal.push_back(static_cast<double>(frame.dn[p]) - c.black_dn);
-        expected.push_back(c.gain * sensor.signal(render.pixels[p]));
+        expected.push_back(std::min(c.gain * static_cast<double>(render.signal[p]), sensor.top_dn - c.black_dn));
     }
     // Glints may be white: one in a hundred of the lit pixels.
     std::vector<double> sorted = expected;
@@ -80,16 +95,48 @@ nlohmann::json picture(const std::string& title, const MeasuredImage& frame, con
             {"render", shown([&](std::size_t p) { return srgb_byte(expected[p] / brightest); })},
             {"residual_range_dn", range},
             {"residual", shown([&](std::size_t p) {
-                 const double part = range > 0 ? (signal[p] - expected[p]) / range : 0;
+                 const double part = range > 0 && c.usable[p] ? (signal[p] - expected[p]) / range : 0;
                  return static_cast<std::uint8_t>(std::lround(128 + 127 * std::clamp(part, -1.0, 1.0)));
              })}};
 }
 
+/// The picture, and its document beside it, replace no frame.
+Status check_output(const CompareOptions& o) {
+    namespace fs = std::filesystem;
+    if (o.out.empty()) return Ok{};
+    const fs::path out(o.out);
+    if (out.extension() != ".png" && out.extension() != ".svg" && out.extension() != ".pdf")
+        return Error{"expected the name of a picture, FILE.png, .svg or .pdf", o.out};
+    std::error_code none;
+    for (const fs::path& file : {out, fs::path(out).replace_extension(".json")})
+        if (fs::equivalent(file, o.frame, none))
+            return Error{"would replace the frame, expected another name", o.out};
+    return make_folder_of(o.out);
+}
+
+/// As `narpa render` makes it, but with samples of its own: an emulated frame may have the scene's.
+ExpectedFrame expected_frame(const CompareOptions& o, const World& world, std::size_t camera, std::int64_t t_ns) {
+    CameraUnit unit(world, camera);
+    Aovs shown;
+    TracingThreads threads(o.threads);
+    {
+        const Progress progress("rendering what " + o.frame + " should show");
+        threads.arena.execute([&] { unit.expose(0, t_ns, 0, &shown); });
+    }
+    ExpectedFrame out{expected_signal(unit.camera(), unit.radiance()), std::move(shown.variance),
+                      std::move(shown.body)};
+    const auto& [r, g, b] = sensor_model(unit.camera()).dn_per_radiance;
+    for (float& v : out.variance) v *= static_cast<float>(std::pow(r + g + b, 2));
+    return out;
+}
+
 Outcome compare(const CompareOptions& o) {
+    if (auto good = check_output(o); !good) return good.error();
     auto scene = load_scene(o.scene);
     if (!scene) return scene.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
     if (!index) return index.error();
+    scene->render.seed = ~scene->render.seed;
     BudgetOptions{.spp = o.spp, .budget_ms = {}, .budget_rays = {}}.override_scene(scene->render);
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
     auto world = World::create(*std::move(scene));
@@ -103,25 +150,9 @@ Outcome compare(const CompareOptions& o) {
     if (!bytes) return bytes.error();
     const auto frame = measured_image(camera, *bytes);
     if (!frame) return Error{frame.error().what, o.frame};
-    if (!o.out.empty()) {
-        if (auto made = make_folder_of(o.out); !made) return made.error();
-        if (auto good = can_write_plot(o.out); !good) return good.error();
-    }
-
-    CameraUnit unit(**world, *index);
-    Aovs shown;
-    TracingThreads threads(o.threads);
-    {
-        const Progress progress("rendering what " + o.frame + " should show");
-        threads.arena.execute([&] { unit.expose(0, t_ns, 0, &shown); });
-    }
-    RadianceImage render = unit.radiance();
-    if (camera.embedded_line) {  // the last row holds no light
-        render.pixels.resize(frame->dn.size()), shown.body.resize(frame->dn.size());
-        --render.height;
-    }
+    const ExpectedFrame render = expected_frame(o, **world, *index, t_ns);
     const SensorModel sensor = sensor_model(camera);
-    const auto found = compare_frame(*frame, sensor, render, shown.body, *target);
+    const auto found = compare_frame(*frame, sensor, render, *target);
     if (!found) return Error{found.error().what, o.frame, 0, 0, ErrorKind::failed};
     const std::string title =
         fmt::format("{}: {} in camera {}", o.frame, (*world)->scene().bodies[*target].name, camera.name);
@@ -157,7 +188,9 @@ Command add_compare(Parser app) {
     o->pose.add_to(c);
     c.option("--spp", o->spp, "Samples per pixel of the render").range(1, 65535).shows_default();
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
-    c.option("-o,--output", o->out, "Frame, render and residuals side by side").type_name("FILE.png");
+    c.option("-o,--output", o->out,
+             "Frame, render and residuals side by side; their numbers in FILE.json beside it")
+        .type_name("FILE.png");
     c.group("Results");
     c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png"});
     return [o] { return compare(*o); };

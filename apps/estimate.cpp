@@ -34,14 +34,15 @@ struct EstimateOptions {
     std::string scene, csv, picture;
     int every = 1;
 
-    // Of a single file. The truth is where scene, trajectory and --pose have the bodies; the guess lies off it.
-    std::string frame, sweep;  ///< FILE.raw: the device's bytes; FILE.pcap
+    // Of a single file. The truth, or with `no_truth` the guess, is where scene, trajectory and --pose have the
+    // bodies; a guess of a truth lies off it.
+    std::string frame, sweep;  ///< an image or FILE.raw; FILE.pcap
     double time_s = 0;
     double range_noise_m = 0;  ///< of the sweep, standard deviation; 0: the scene's
     bool no_truth = false;     ///< the poses are a guess
     PoseOptions pose;
 
-    std::vector<Option> only_of_files, only_of_logs;
+    std::vector<Option> only_of_files, only_of_logs, only_of_frames, only_of_sweeps;
 };
 
 /// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
@@ -120,20 +121,33 @@ Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t
     return world;
 }
 
-/// Prints an estimate beside the truth, where there is one; returns the document, which has passed where the pose
-/// is usable.
-nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
-                    const std::optional<Rigid3>& truth, const Answer& answer) {
-    const Vector6 error = truth ? error_between(T, *truth) : Vector6(Vector6::Zero());
+/// Whose pose an estimate is, and what it is compared with.
+struct Estimated {
+    std::string target, sensor, sensor_kind;  ///< the last: "camera" or "lidar"
+    Rigid3 T_world_sensor{}, known{};         ///< `known`: T_sensor_target, the truth or the guess
+    bool known_is_guess = false;
+};
+
+/// Prints an estimate beside the truth, or the guess; returns the document, which has passed where the pose is
+/// usable.
+nlohmann::json show(const Estimated& of, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
+                    const Answer& answer) {
+    const Vector6 error = error_between(T, of.known);
     const double nees = normalised_error_squared(error, covariance);
-    say(fmt::format("{}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})", what,
-                    T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z));
-    if (truth)
+    const Rigid3 in_world = of.T_world_sensor * T;
+    say(fmt::format("{} in {} {}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})",
+                    of.target, of.sensor_kind, of.sensor, T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z));
+    const std::string off =
+        fmt::format("{:.3g} deg and {:.3g} m", error.head<3>().norm() / kDegree, error.tail<3>().norm());
+    if (of.known_is_guess)
         say(fmt::format(
-            "  off the truth by {:.4f} deg and {:.3g} m; NEES {:.2f}, 6 expected, 95 % band {:g} to {:g}; {}",
-            error.head<3>().norm() / kDegree, error.tail<3>().norm(), nees, kNeesLow, kNeesHigh,
-            nees_verdict(nees, kNeesLow, kNeesHigh)));
-    say(fmt::format("  standard deviations {:.4f} deg, {:.3g} m; bound {:.4f} deg, {:.3g} m",
+            "  off the guess by {}; in the world: --pose {}={:.9g},{:.9g},{:.9g},{:.9f},{:.9f},{:.9f},{:.9f}", off,
+            of.target, in_world.t.x, in_world.t.y, in_world.t.z, in_world.q.w, in_world.q.x, in_world.q.y,
+            in_world.q.z));
+    else
+        say(fmt::format("  off the truth by {}; NEES {:.2f}, 6 expected, 95 % band {:g} to {:g}; {}", off, nees,
+                        kNeesLow, kNeesHigh, nees_verdict(nees, kNeesLow, kNeesHigh)));
+    say(fmt::format("  standard deviations {:.3g} deg, {:.3g} m; bound {:.3g} deg, {:.3g} m",
                     rotation_sigma(covariance) / kDegree, position_sigma(covariance),
                     rotation_sigma(bound) / kDegree, position_sigma(bound)));
     say(fmt::format("  {}{}{}", kAnswerKinds[static_cast<std::size_t>(answer.kind)], answer.why.empty() ? "" : ": ",
@@ -142,13 +156,16 @@ nlohmann::json show(const std::string& what, const Rigid3& T, const Matrix6& cov
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) rows[std::size_t(i)][std::size_t(j)] = covariance(i, j);
     nlohmann::json document{{"passed", answer.usable()},
+                            {"target", of.target},
+                            {of.sensor_kind, of.sensor},
                             {"answer", to_json(answer)},
                             {"pose", to_json(T)},
+                            {"pose_in_world", to_json(in_world)},
                             {"covariance", rows},
                             {"bound_rotation_rad", rotation_sigma(bound)},
-                            {"bound_position_m", position_sigma(bound)}};
-    if (!truth) return document;
-    document["truth"] = to_json(*truth);
+                            {"bound_position_m", position_sigma(bound)},
+                            {of.known_is_guess ? "guess" : "truth", to_json(of.known)}};
+    if (of.known_is_guess) return document;
     document["error_rotation_rad"] = error.head<3>().norm(), document["error_position_m"] = error.tail<3>().norm();
     document["nees"] = std::isfinite(nees) ? nlohmann::json(nees) : nlohmann::json(nullptr);
     return document;
@@ -194,39 +211,52 @@ void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, 
     });
 }
 
-Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_options) {
+/// The frame's exposure.
+FrameLedger as_the_scene_has_it(const Camera& camera, std::int64_t t_ns) {
+    FrameLedger taken;
+    taken.t_exposure_mid_ns = t_ns;
+    taken.t_exposure_start_ns = t_ns - exposure_ns(camera) / 2;
+    taken.t_exposure_end_ns = taken.t_exposure_start_ns + exposure_ns(camera);
+    taken.region_width = static_cast<std::uint16_t>(camera.width);
+    taken.region_height = static_cast<std::uint16_t>(camera.height);
+    return taken;
+}
+
+Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
     const std::int64_t t_ns = std::llround(o.time_s * 1e9);
     auto world = world_of(o, t_ns, t_ns);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
     const auto camera = sensor_named(scene.cameras, o.sensor, "camera", scene.file);
     if (!camera) return camera.error();
-    auto tracker = FrameTracker::create(**world, *camera, tracker_options);
-    if (!tracker) return tracker.error();
+    const auto target =
+        target_of(**world, scene.cameras[*camera].mount, scene.cameras[*camera].name, options.target);
+    if (!target) return target.error();
     auto bytes = read_frame(o.frame, scene.cameras[*camera]);
     if (!bytes) return bytes.error();
     if (auto image = measured_image(scene.cameras[*camera], *bytes); !image)
         return Error{image.error().what, o.frame};
     BodyPoses at(scene.bodies.size());
     (*world)->place(t_ns, scene.cameras[*camera].mount, at);
-    FrameLedger taken;  // as the scene has it
-    taken.t_exposure_mid_ns = t_ns;
-    taken.t_exposure_start_ns = t_ns - exposure_ns(scene.cameras[*camera]) / 2;
-    taken.t_exposure_end_ns = taken.t_exposure_start_ns + exposure_ns(scene.cameras[*camera]);
-    taken.region_width = static_cast<std::uint16_t>(scene.cameras[*camera].width);
-    taken.region_height = static_cast<std::uint16_t>(scene.cameras[*camera].height);
+    const Rigid3 T_world_camera = (*world)->camera_pose(scene.cameras[*camera], o.time_s, at);
+    if (o.no_truth) options.guess = inverse(T_world_camera) * at.T_world_body[*target];
     TracingThreads threads(o.threads);
     TrackedFrame tracked;
     {
         const Progress progress("estimating the pose in " + o.frame);
+        const auto take = [&] {
+            const auto tracker = FrameTracker::create(**world, *camera, options);
+            const int renders = tracked.renders;
+            tracked = (*tracker)->take(as_the_scene_has_it(scene.cameras[*camera], t_ns), *bytes, at);
+            tracked.renders += renders;
+        };
         threads.arena.execute([&] {
-            tracked = (*tracker)->take(taken, *bytes, at);
-            if (tracker_options.has_truth || tracker_options.search || !tracked.measured) return;
-            // Again from there, with the light that falls on the target in that attitude.
-            at.set((*tracker)->target(),
-                   (*world)->camera_pose(scene.cameras[*camera], o.time_s, at) * *tracked.measured);
-            tracker = FrameTracker::create(**world, *camera, tracker_options);
-            tracked = (*tracker)->take(taken, *bytes, at);
+            take();
+            if (!options.guess || !tracked.measured || options.search || options.method == CameraMethod::dense)
+                return;
+            // Features take the light that falls on the target in the attitude of the guess: now in that found.
+            at.set(*target, T_world_camera * *tracked.measured);
+            take();
         });
     }
     if (!tracked.measured) {
@@ -234,10 +264,9 @@ Outcome estimate_frame(const EstimateOptions& o, const TrackerOptions& tracker_o
                         kAnswerKinds[static_cast<std::size_t>(tracked.answer.kind)], tracked.why));
         return nlohmann::json{{"passed", false}, {"answer", to_json(tracked.answer)}};
     }
-    nlohmann::json document =
-        show(fmt::format("{} in camera {}", scene.bodies[(*tracker)->target()].name, scene.cameras[*camera].name),
-             *tracked.measured, tracked.covariance, tracked.bound,
-             o.no_truth ? std::optional<Rigid3>() : tracked.truth, tracked.answer);
+    nlohmann::json document = show({scene.bodies[*target].name, scene.cameras[*camera].name, "camera",
+                                    T_world_camera, options.guess.value_or(tracked.truth), o.no_truth},
+                                   *tracked.measured, tracked.covariance, tracked.bound, tracked.answer);
     document["matches"] = tracked.matches;
     document["renders"] = tracked.renders;
     return document;
@@ -264,10 +293,11 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
         (*world)->place(t, lidar.mount, at);
         return inverse((*world)->sensor_pose(lidar.mount, lidar.T_mount_lidar, at)) * at.T_world_body[*target];
     };
-    const Rigid3 truth = T_lidar_target_at(t_ns);
+    const Rigid3 truth = T_lidar_target_at(t_ns);  // or the guess
+    const Rigid3 T_world_lidar = (*world)->sensor_pose(lidar.mount, lidar.T_mount_lidar, then);
     const ApparentMotion motion = motion_between(truth, T_lidar_target_at(t_ns + kLater_ns), kLater_ns * 1e-9);
     std::mt19937_64 random(tracker.seed);
-    const Rigid3 guess = off_truth(truth, tracker, random);
+    const Rigid3 guess = o.no_truth ? truth : off_truth(truth, tracker, random);
     const double search_m = 0.01 * tracker.start_percent * norm(truth.t) +
                             tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;
@@ -290,8 +320,8 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
     nlohmann::json document =
-        show(fmt::format("{} in LiDAR {}", scene.bodies[*target].name, lidar.name), e.T_lidar_target, e.covariance,
-             e.bound, o.no_truth ? std::optional<Rigid3>() : truth, e.answer);
+        show({scene.bodies[*target].name, lidar.name, "lidar", T_world_lidar, truth, o.no_truth}, e.T_lidar_target,
+             e.covariance, e.bound, e.answer);
     const int unobserved = e.observability.unobserved;
     say(
         fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
@@ -309,7 +339,6 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
 Outcome estimate(EstimateOptions o) {
     auto tracker = o.tracker.options();
     if (!tracker) return tracker.error();
-    tracker->has_truth = !o.no_truth;
     std::error_code error;
     if (std::filesystem::exists(o.input + "/rehearsal.json", error)) o.input += "/emulator";
     const bool of_log = std::filesystem::is_directory(o.input, error);
@@ -330,6 +359,11 @@ Outcome estimate(EstimateOptions o) {
             o.input};
     if (o.frame.empty() == o.sweep.empty())
         return Error{"with a scene, expected one of --frame FILE and --sweep FILE.pcap", o.input};
+    for (const Option& option : o.frame.empty() ? o.only_of_frames : o.only_of_sweeps)
+        if (option.given())
+            return Error{fmt::format("{} goes with a {}, and this is a {}", option.name(),
+                                     o.frame.empty() ? "frame" : "sweep", o.frame.empty() ? "sweep" : "frame"),
+                         o.frame.empty() ? o.sweep : o.frame};
     return o.frame.empty() ? estimate_sweep(o, *tracker) : estimate_frame(o, *tracker);
 }
 
@@ -360,7 +394,8 @@ Command add_estimate(Parser app) {
         .type_name("METRES")
         .range(1e-6, 1e3);
     c.flag("--no-truth", o->no_truth,
-           "The poses are not the truth but a guess, off by up to --start: begin there, and compare with nothing");
+           "The poses are not the truth but a guess: begin there (a sweep: within --start of it), and compare with "
+           "nothing");
     o->pose.add_to(c);
     c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
     o->tracker.add_to(c, "");
@@ -372,6 +407,8 @@ Command add_estimate(Parser app) {
     for (const char* name :
          {"--frame", "--sweep", "--time", "--range-noise", "--no-truth", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
+    for (const char* name : {"--method", "--frame-noise"}) o->only_of_frames.push_back(c.find(name));
+    o->only_of_sweeps.push_back(c.find("--range-noise"));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
     c.footer("Exit status 1 if no frame gave a pose, or that of a single frame or sweep is ambiguous or refused.");
     c.group("Results");

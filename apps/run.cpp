@@ -150,7 +150,7 @@ Command add_run(Parser app) {
             .type_name("[CAMERA]");
     o->estimator.add_to(c, "estimate-");
     for (const char* name : {"--estimate-target", "--estimate-method", "--estimate-start", "--estimate-range-guess",
-                             "--estimate-seed"})
+                             "--estimate-seed", "--estimate-uncertainty", "--estimate-frame-noise"})
         c.find(name).needs(estimate);
     o->budget.add_to(c);
     c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <set>
 
 #include "base/nearest_name.h"
 #include "emulator/trajectory.h"
@@ -102,36 +103,35 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
 
 Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option, double* distortion) {
     ModelUncertainty u;
+    std::set<std::string> given;
     for (std::size_t from = 0; from < text.size();) {
         const std::size_t end = std::min(text.find(',', from), text.size());
         const std::string item = text.substr(from, end - from);
         from = end + 1;
-        const std::size_t equals = item.find('=');
+        const std::size_t equals = std::min(item.find('='), item.size());
         const std::string name = item.substr(0, equals);
-        double value = 0;
-        std::size_t read = 0;
-        try {
-            if (equals != std::string::npos) value = std::stod(item.substr(equals + 1), &read);
-        } catch (const std::exception&) {
-            read = 0;
-        }
-        const bool number = read > 0 && equals + 1 + read == item.size() && std::isfinite(value);
         const auto field = std::ranges::find(kModelErrors, name, &ModelErrorName::name);
-        const bool known = field != std::end(kModelErrors) || (distortion && name == "distortion");
-        if (!number || !known || (value < 0 && name != "distortion")) {
+        const bool is_distortion = distortion && name == "distortion";
+        if (field == std::end(kModelErrors) && !is_distortion)
             return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item,
                                      names_of_model_errors(), distortion ? ", distortion" : "")};
-        }
-        if (field != std::end(kModelErrors))
-            u.*(field->field) = field->unit * value;
-        else
+        if (!given.insert(name).second) return Error{fmt::format("{}: {} is given twice", option, name)};
+        double value = 0;
+        const char* const last = item.data() + item.size();
+        const auto [read, error] = std::from_chars(item.data() + std::min(equals + 1, item.size()), last, value);
+        if (error != std::errc{} || read != last || !std::isfinite(value) || (value < 0 && !is_distortion))
+            return Error{fmt::format("{} \"{}\": expected {}=NUMBER{}", option, item, name,
+                                     is_distortion ? "" : ", 0 or more")};
+        if (is_distortion)
             *distortion = value;
+        else
+            u.*(field->field) = field->unit * value;
     }
     return u;
 }
 
 void TrackerFlags::add_to(Parser app, const std::string& prefix) {
-    const std::string dashes = "--" + prefix;
+    dashes = "--" + prefix;
     app.option(dashes + "target", tracker.target,
                "Body whose pose is estimated (default: the first with a mesh that does not carry the camera)")
         .type_name("BODY");
@@ -140,8 +140,9 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
         .one_of({"features", "dense"})
         .shows_default();
     app.option(dashes + "start", start,
-               "Error of the first guess, in attitude and as a part of the range; search: no guess, for frames but "
-               "of the range")
+               "Error of the first guess, which is made from the truth, in attitude and as a part of the range; "
+               "search: "
+               "no guess, for frames but of the range")
         .type_name("DEG,PERCENT|search")
         .shows_default();
     app.option(dashes + "range-guess", tracker.range_guess_m,
@@ -153,8 +154,8 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "What is not exact in the scene, standard deviations: " + names_of_model_errors())
         .type_name("NAME=VALUE,...");
     app.option(dashes + "frame-noise", tracker.frame_noise_dn,
-               "For all pixels: noise of the frames beside the detector's, standard deviation; 0 of a real camera "
-               "(default: not known, so that only large residuals are refused)")
+               "With dense or search: noise of the frames beside the detector's, standard deviation; 0 of a real "
+               "camera (default: not known, so that only large residuals are refused)")
         .type_name("DN")
         .range(0.0, 1e5);
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
@@ -162,11 +163,13 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
 
 Result<TrackerOptions> TrackerFlags::options() const {
     TrackerOptions o = tracker;
-    auto model = model_uncertainty(uncertainty, "--uncertainty");
+    auto model = model_uncertainty(uncertainty, dashes + "uncertainty");
     if (!model) return model.error();
     o.model = *model;
     o.method = method == "dense" ? CameraMethod::dense : CameraMethod::features;
     o.search = start == "search";
+    if (o.frame_noise_dn && o.method != CameraMethod::dense && !o.search)
+        return Error{dashes + "frame-noise is for all pixels: expected --method dense, or --start search"};
     if (o.search) return o;
     if (o.range_guess_m > 0)
         return Error{fmt::format("a range is guessed for a start by search, not \"{}\"", start)};

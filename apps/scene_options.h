@@ -43,6 +43,7 @@ struct TrackerFlags {
     std::string method = "features";
     std::string start = "2,2";
     std::string uncertainty;
+    std::string dashes = "--";  ///< before the options' names
     TrackerOptions tracker;
 
     /// With `prefix` before each name: --target, or --estimate-target.

@@ -10,6 +10,7 @@
 
 #include "base/time.h"
 #include "bench/statistics.h"
+#include "emulator/log/estimate_report.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "renderer/camera/detector.h"
@@ -71,10 +72,11 @@ public:
         Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
         if (method_ == CameraMethod::features) {
             const FeatureEstimate e = points_->align(view.image, view.at, guess, view.motion);
-            out.claimed = e.answer.usable(), out.renders = static_cast<int>(e.rounds.size());
+            out.claimed = e.answer.usable(), out.why = e.answer.why,
+            out.renders = static_cast<int>(e.rounds.size());
             T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
         } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
-            out.claimed = e->answer.usable(), out.renders = e->renders;
+            out.claimed = e->answer.usable(), out.why = e->answer.why, out.renders = e->renders;
             T = e->T_camera_body, covariance = e->covariance;
         }
         out.ms = seconds_since(start_ns) * 1e3;
@@ -104,7 +106,7 @@ ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, do
     for (const ApproachFrame& f : frames) {
         if (f.range_m >= from_m || f.range_m < to_m) continue;
         ++b.frames;
-        b.wrong += f.claimed && !f.found;
+        b.wrong += f.claimed && !(f.nees <= kBeyondNees);
         ms.push_back(f.ms);
         renders.add(f.renders);
         if (!f.found) continue;

@@ -43,6 +43,7 @@ struct ApproachFrame {
     double range_m = 0;
     bool found = false;                       ///< claimed, and both errors are below a fifth of the start's
     bool claimed = false;                     ///< by the method
+    std::string why;                          ///< not, or not in all motions
     double rotation_rad = 0, position_m = 0;  ///< errors
     double bound_rotation_rad = 0, bound_position_m = 0;  ///< roots of the summed variances of the bound
     double nees = 0;
@@ -54,7 +55,7 @@ struct ApproachFrame {
 struct ApproachBand {
     double from_m = 0, to_m = 0;
     int frames = 0, found = 0;
-    int wrong = 0;  ///< claimed, but not found
+    int wrong = 0;  ///< claimed, and beyond their covariance: kBeyondNees
     double rotation_rms_rad = 0, position_rms_m = 0;
     double rotation_of_bound = 0, position_of_bound = 0;  ///< RMS of error over bound
     double nees_median = 0;                               ///< 5.35 for a consistent estimator

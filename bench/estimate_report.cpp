@@ -41,7 +41,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ApproachBand, from_m, to_m, frames, found, wr
                                    position_rms_m, rotation_of_bound, position_of_bound, nees_median, ms_median,
                                    renders_mean)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BasinCell, off_deg_and_percent, trials, found)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ApproachFrame, range_m, found, claimed, rotation_rad, position_m,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ApproachFrame, range_m, found, claimed, why, rotation_rad, position_m,
                                    bound_rotation_rad, bound_position_m, nees, ms, renders)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StereoCounts, accepted, cut_off, unlike, ambiguous, inconsistent, unsettled,
                                    off_line, without_depth)

@@ -63,7 +63,6 @@ Result<std::size_t> target_of(const World& world, int mount, std::string_view se
 }
 
 Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
-    if (!o.has_truth) return truth;
     return displaced(truth, random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(truth.t), random));
 }
 
@@ -157,7 +156,7 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     if (tracker_.started()) {
         out.guess = inverse(T_chaser_camera()) * tracker_.filter().pose(q_frame_chaser).T_chaser_target;
     } else if (!searches()) {
-        out.guess = off_truth(out.truth, options_, random_);
+        out.guess = options_.guess ? *options_.guess : off_truth(out.truth, options_, random_);
     }
     const ApparentMotion moving = motion(ledger, at, out.guess);
     const bool searched = searches();
@@ -166,7 +165,9 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     else
         out.why = usable.error().what;
     if (out.measured) {
-        PoseMeasurement measurement{t_ns, *out.measured, out.covariance, T_chaser_camera(), q_frame_chaser};
+        // What the model's errors do is the same in all frames.
+        PoseMeasurement measurement{t_ns, *out.measured, out.covariance - out.covariance_of_model,
+                                    T_chaser_camera(), q_frame_chaser};
         if (out.answer.kind == AnswerKind::unobservable) measurement.root_information = out.answer.root_information;
         const UpdateResult update = tracker_.update(measurement);
         out.nis = update.nis;
@@ -186,11 +187,11 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
     out.ms = seconds_since(start_ns) * 1e3;
-    if ((searched || pixels_) && out.measured) {  // at the truth: after the estimate, and not part of its time
-        const Rigid3& there = options_.has_truth ? out.truth : *out.measured;
+    if ((searched || pixels_) && out.measured) {  // after the estimate, and not part of its time
+        const Rigid3& there = options_.guess ? *out.measured : out.truth;
         const DenseOptions dense = dense_options(searched ? ApparentMotion{} : moving, T_world_camera);
-        const auto bound =
-            searched ? search_->bound(at, T_world_camera, there, dense) : pixels_->bound(at, there, dense);
+        const auto bound = searched ? search_->bound(at, T_world_camera, there, dense, frame_variance())
+                                    : pixels_->bound(at, there, dense, frame_variance());
         if (bound) out.bound = *bound;
     }
     return out;
@@ -229,7 +230,7 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
                                      TrackedFrame& out) {
     DenseOptions dense = options;
     if (out.measured) dense.coarsest = 1;
-    const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense, frame_variance(image));
+    const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense, frame_variance());
     out.measured.reset();
     if (!e) {
         out.why = e.error().what;
@@ -243,11 +244,11 @@ void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses
 void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
                                      TrackedFrame& out) {
     SearchOptions o;
-    const double most = options_.has_truth ? o.range_part : 0;
+    const double most = options_.guess ? 0 : o.range_part;
     const double off = std::uniform_real_distribution(-most, most)(random_);
     o.range_m = options_.range_guess_m > 0 ? options_.range_guess_m : norm(out.truth.t) / (1 + off);
     o.dense = dense_options({}, T_world_camera);
-    const auto e = search_->find(image, at, T_world_camera, o, frame_variance(image));
+    const auto e = search_->find(image, at, T_world_camera, o, frame_variance());
     if (!e) {
         out.why = e.error().what;
         return;
@@ -257,9 +258,11 @@ void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses
     take_answer(*e, e->T_camera_target, out);
 }
 
-std::vector<float> FrameTracker::frame_variance(const MeasuredImage& image) const {
+std::vector<float> FrameTracker::frame_variance() const {
     if (!options_.frame_noise_dn) return {};
-    return std::vector<float>(image.dn.size(), static_cast<float>(std::pow(*options_.frame_noise_dn, 2)));
+    const int rows = camera_.height - (camera_.embedded_line ? 1 : 0);
+    return std::vector<float>(static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(rows),
+                              static_cast<float>(std::pow(*options_.frame_noise_dn, 2)));
 }
 
 /// Without a truth the target's attitude in the world, and so its light, is not known but by the camera's.
@@ -267,7 +270,7 @@ DenseOptions FrameTracker::dense_options(const ApparentMotion& motion, const Rig
     DenseOptions dense;
     dense.motion = motion;
     dense.model = options_.model;
-    if (!options_.has_truth) dense.T_world_camera = T_world_camera;
+    if (options_.guess) dense.T_world_camera = T_world_camera;
     dense.seed = ~options_.seed;
     dense.method = world_.scene().render.method;
     dense.max_depth = world_.scene().render.max_depth;

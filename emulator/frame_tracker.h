@@ -34,8 +34,10 @@ struct TrackerOptions {
     CameraMethod method = CameraMethod::features;  ///< dense starts from where the features lead
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
     bool search = false;                      ///< no guess but of the range, known to 30 % (estimator/search)
-    double range_guess_m = 0;                 ///< for the search; 0: the truth, off by up to 30 % at random
-    bool has_truth = true;  ///< false: the poses of the bodies are a guess, where the estimate starts
+    double range_guess_m = 0;                 ///< for the search; 0: the truth, off by up to 30 %, or the guess
+    /// T_camera_target of the first frame, where there is no truth: the target's pose of a frame is only its light,
+    /// and the measure of a search's range. Dense and search take the light from the camera's attitude.
+    std::optional<Rigid3> guess{};
     ModelUncertainty model{};
     /// Standard deviation of the frames' noise beside the detector's, for pixels; 0: none, as of a real camera.
     /// Empty: not known, as of renders of few samples.
@@ -50,8 +52,7 @@ struct TrackerOptions {
 /// The body whose pose is estimated by a sensor on the body `mount`. Errors list the names of all bodies.
 [[nodiscard]] Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor,
                                             const std::string& name);
-/// The truth displaced by the start errors of the options, in directions drawn at random; without a truth the
-/// guess.
+/// The truth displaced by the start errors of the options, in directions drawn at random.
 [[nodiscard]] Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& options, std::mt19937_64& random);
 
 /// The result of one frame. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
@@ -112,7 +113,7 @@ private:
     void measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
                            TrackedFrame& out);
     [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const;
-    [[nodiscard]] std::vector<float> frame_variance(const MeasuredImage& image) const;
+    [[nodiscard]] std::vector<float> frame_variance() const;  ///< of each pixel; empty: not known
     /// The pose is known well enough for a render to be compared from there.
     [[nodiscard]] bool is_tracked(const Quat& q_frame_chaser) const;
     /// The chaser is the body that carries the camera, or the camera itself.

@@ -211,9 +211,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
 Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& scale,
                                    const FrameSettings& settings, const Rigid3& T_camera_target,
                                    const Matrix6& covariance, double floor_px) {
-    const CameraModelHandle model(view_.camera());
-    std::vector<Matrix26> jacobians;
-    for (const Vec3& p : points.body_m) jacobians.push_back(reprojection_jacobian(*model, T_camera_target, p));
+    const std::vector<Matrix26> jacobians = points.jacobians(*CameraModelHandle(view_.camera()), T_camera_target);
     const ByteImage here = scale.scaled(view_.radiance());
     const auto shown = [&](int, const Vector6& motion) -> Vector6 {
         double squares = 0;
@@ -224,6 +222,27 @@ Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& 
         return motion_shown(points, jacobians, floor_px, flows) / sigmas;
     };
     return response_to_weakest(observability_of(covariance, norm(T_camera_target.t)), shown);
+}
+
+PoseShifts FeatureAlignment::shifts_by_light(const ModelMatches& points, const ByteScale& scale,
+                                             const FrameSettings& settings, const Rigid3& T_camera_target,
+                                             const BodyPoses& at, const ApparentMotion& motion, double floor_px) {
+    PoseShifts shifts(6, 3);
+    const std::vector<Matrix26> jacobians = points.jacobians(*CameraModelHandle(view_.camera()), T_camera_target);
+    view_.render(T_camera_target, settings, false);
+    const ByteImage here = scale.scaled(view_.radiance());
+    for (int axis = 0; axis < 3; ++axis) {
+        Vec3 turn{};
+        turn[axis] = settings_.model.light_rad;
+        BodyPoses turned = at;
+        turned.T_world_body[view_.target()].q = normalized(at.T_world_body[view_.target()].q * exp_rotation(turn));
+        view_.begin_frame(turned, motion, times_);
+        view_.render(T_camera_target, settings, false);
+        const auto flows = track_points(here, scale.scaled(view_.radiance()), points.in_view);
+        shifts.col(axis) = motion_shown(points, jacobians, floor_px, flows);
+    }
+    view_.begin_frame(at, motion, times_);
+    return shifts;
 }
 
 /// Outlines, and edges along which a match can slide, hold answers near where they started. So a start beyond the
@@ -254,7 +273,8 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
                                  settings_.floor_most_px);
     else
         compare_with_mirrored(frame, at, guess, motion, e, fit);
-    e.covariance_of_model = covariance_by(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal));
+    e.covariance_of_model =
+        covariance_by(joined(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal), e.by_light));
     e.covariance += e.covariance_of_model, e.bound += e.covariance_of_model;
     if (e.has_pose())
         observe(e.T_camera_target, e.covariance, fit), compare_with_guess(e.T_camera_target, guess, fit);
@@ -349,6 +369,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         estimate.covariance = covariance_by_response(
             estimate.covariance,
             response(points, scale, render_settings, T_of_view, estimate.covariance, floor_px));
+    if (settings_.model.light_rad > 0)
+        estimate.by_light = shifts_by_light(points, scale, render_settings, T_of_view, at, motion, floor_px);
     const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);
     estimate.by_focal =
         shift_by_focal({model, points.body_m, points.pixels, 1, as_weighed}, estimate.T_camera_target);

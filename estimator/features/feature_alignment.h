@@ -26,9 +26,7 @@ struct FeatureSettings {
     int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
     double floor_most_px = 1;  ///< refused where matches scatter by more: the model is not what the frame shows
-    /// The albedo is not used, as views are scaled to the frame's light; nor is the light, as matches that its
-    /// direction moves scatter.
-    ModelUncertainty model{};
+    ModelUncertainty model{};  ///< albedo is not used, as views are scaled to the frame's light
 };
 
 enum class FeatureStatus : std::uint8_t {
@@ -59,6 +57,7 @@ struct FeatureEstimate {
     double floor_px = 0;                 ///< of the matches: their scatter beyond the sensor's noise
     std::vector<FeatureRound> rounds;    ///< from the guess
     Vector6 by_focal = Vector6::Zero();  ///< shift of the pose (pnp_refine.h)
+    PoseShifts by_light{6, 0};           ///< by the light's direction, turned about each of the target's axes
     Answer answer;
 
     [[nodiscard]] bool has_pose() const noexcept {
@@ -92,6 +91,10 @@ private:
     [[nodiscard]] Matrix6 response(const ModelMatches& points, const ByteScale& scale,
                                    const FrameSettings& settings, const Rigid3& T_camera_target,
                                    const Matrix6& covariance, double floor_px);
+    /// What matches show of a light that is turned by its uncertainty, against the view at this pose.
+    [[nodiscard]] PoseShifts shifts_by_light(const ModelMatches& points, const ByteScale& scale,
+                                             const FrameSettings& settings, const Rigid3& T_camera_target,
+                                             const BodyPoses& at, const ApparentMotion& motion, double floor_px);
     void compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                const ApparentMotion& motion, FeatureEstimate& e, Fit& fit);
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;

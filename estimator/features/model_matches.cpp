@@ -65,6 +65,13 @@ std::vector<PixelCovariance> ModelMatches::covariances(double floor_px) const {
     return all;
 }
 
+std::vector<Matrix26> ModelMatches::jacobians(const CameraModel& camera, const Rigid3& T) const {
+    std::vector<Matrix26> all;
+    all.reserve(size());
+    for (const Vec3& p : body_m) all.push_back(reprojection_jacobian(camera, T, p));
+    return all;
+}
+
 std::vector<double> ModelMatches::residuals_px(const CameraModel& camera, const Rigid3& T) const {
     std::vector<double> lengths;
     lengths.reserve(size());

@@ -26,6 +26,7 @@ struct ModelMatches {
     [[nodiscard]] Eigen::Matrix2d match_covariance(std::size_t i, double floor_px) const;
     [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const;
 
+    [[nodiscard]] std::vector<Matrix26> jacobians(const CameraModel& camera, const Rigid3& T) const;
     [[nodiscard]] std::vector<double> residuals_px(const CameraModel& camera, const Rigid3& T) const;
     /// How far the points' images are apart at two poses, root mean square.
     [[nodiscard]] double moved_px(const CameraModel& camera, const Rigid3& from, const Rigid3& to) const;

@@ -1,7 +1,10 @@
 #include "estimator/view/frame_comparison.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 
 namespace narpa {
@@ -11,6 +14,10 @@ namespace {
 constexpr double kLitPart = 0.1, kBrightPart = 0.01, kLitSigmas = 5;
 /// The frame's black is its own where the render shows nothing in at least this part of the pixels.
 constexpr double kEmptyPart = 0.01;
+/// Variances below this part of the squares are rounding.
+constexpr double kUniform = 1e-12;
+/// The light is compared again without what is too bright for the frame.
+constexpr int kGainRounds = 4;
 
 /// The value that this part of the largest `count` of them exceed.
 double exceeded_by(double part, std::size_t count, std::vector<double> values) {
@@ -21,25 +28,46 @@ double exceeded_by(double part, std::size_t count, std::vector<double> values) {
     return *place;
 }
 
+/// Numbers are rounded, so that their median is off by up to half a step: it only finds what is background.
+double black_of(const MeasuredImage& frame, const SensorModel& sensor, const ExpectedFrame& render) {
+    std::vector<double> background;
+    for (std::size_t p = 0; p < frame.dn.size(); ++p)
+        if (render.signal[p] == 0 && render.body[p] < 0) background.push_back(static_cast<double>(frame.dn[p]));
+    if (static_cast<double>(background.size()) < kEmptyPart * static_cast<double>(frame.dn.size()))
+        return sensor.black_dn;
+    const double median = exceeded_by(0.5, background.size(), background);
+    const double most =
+        std::sqrt(12 * sensor.rounding_dn2) + kLitSigmas * std::sqrt(sensor.variance_dn2(sensor.black_dn));
+    double sum = 0, n = 0;
+    for (const double dn : background)
+        if (std::abs(dn - median) <= most) sum += dn, n += 1;
+    return sum / n;
+}
+
 struct Signals {
     std::vector<double> frame, render;  ///< DN above black
     std::vector<std::uint8_t> lit_frame, lit_render;
 };
 
-double black_of(const MeasuredImage& frame, const SensorModel& sensor, const std::vector<double>& render,
-                std::span<const std::int32_t> body) {
-    std::vector<double> background;
-    for (std::size_t p = 0; p < render.size(); ++p)
-        if (render[p] == 0 && body[p] < 0) background.push_back(static_cast<double>(frame.dn[p]));
-    if (static_cast<double>(background.size()) < kEmptyPart * static_cast<double>(render.size()))
-        return sensor.black_dn;
-    return exceeded_by(0.5, background.size(), background);
-}
-
 std::vector<std::uint8_t> above(double least, const std::vector<double>& signal) {
     std::vector<std::uint8_t> out(signal.size());
     std::ranges::transform(signal, out.begin(), [least](double v) { return v > least; });
     return out;
+}
+
+/// Light of the frame over that of the render in the usable pixels that one of them lights, up to `most` DN.
+double light_ratio(const Signals& s, const std::vector<std::uint8_t>& usable, double most) {
+    double gain = 0, limit = INFINITY;
+    for (int round = 0; round < kGainRounds; ++round) {
+        double frame = 0, render = 0;
+        for (std::size_t p = 0; p < s.frame.size(); ++p) {
+            if (!usable[p] || !(s.render[p] > 0 || s.lit_frame[p]) || s.render[p] > limit) continue;
+            frame += s.frame[p], render += s.render[p];
+        }
+        if (!(frame > 0) || !(render > 0)) return gain;
+        gain = frame / render, limit = most / gain;
+    }
+    return gain;
 }
 
 /// The rectangle of what is lit, with a border of two pixels within the image.
@@ -62,7 +90,7 @@ double peak(double before, double at, double after) {
 }
 
 /// `most`: of the render, where the frame clips.
-void find_shift(const Signals& s, double most, int width, int height, FrameComparison& out) {
+std::optional<FrameComparison::Shift> find_shift(const Signals& s, double most, int width, int height) {
     const auto image = [&](const std::vector<double>& signal, double limit) {
         cv::Mat m(height, width, CV_32F);
         std::ranges::transform(signal, m.begin<float>(),
@@ -71,72 +99,92 @@ void find_shift(const Signals& s, double most, int width, int height, FrameCompa
     };
     constexpr int kMost = kMostComparedShift_px;
     const cv::Rect box = extent(s.lit_render, width, height);
+    const cv::Mat render = image(s.render, most)(box);
+    double low = 0, high = 0;
+    cv::minMaxLoc(render, &low, &high);
+    if (!(high - low > 1e-6 * high)) return {};
     cv::Mat wide, match;
     cv::copyMakeBorder(image(s.frame, INFINITY), wide, kMost, kMost, kMost, kMost, cv::BORDER_CONSTANT, 0);
-    cv::matchTemplate(wide({box.x, box.y, box.width + 2 * kMost, box.height + 2 * kMost}),
-                      image(s.render, most)(box), match, cv::TM_CCOEFF_NORMED);
+    cv::matchTemplate(wide({box.x, box.y, box.width + 2 * kMost, box.height + 2 * kMost}), render, match,
+                      cv::TM_CCOEFF_NORMED);
+    FrameComparison::Shift out;
     cv::Point best;
-    cv::minMaxLoc(match, nullptr, &out.shifted_correlation, nullptr, &best);
-    const auto at = [&](int x, int y) {
-        return static_cast<double>(
-            match.at<float>(std::clamp(y, 0, match.rows - 1), std::clamp(x, 0, match.cols - 1)));
-    };
-    out.shift_x_px = best.x - kMost + peak(at(best.x - 1, best.y), at(best.x, best.y), at(best.x + 1, best.y));
-    out.shift_y_px = best.y - kMost + peak(at(best.x, best.y - 1), at(best.x, best.y), at(best.x, best.y + 1));
+    cv::minMaxLoc(match, nullptr, &out.correlation, nullptr, &best);
+    out.x_px = best.x - kMost, out.y_px = best.y - kMost;
+    out.is_at_limit = std::max(std::abs(best.x - kMost), std::abs(best.y - kMost)) == kMost;
+    if (out.is_at_limit) return out;
+    const auto at = [&](int dx, int dy) { return static_cast<double>(match.at<float>(best.y + dy, best.x + dx)); };
+    out.x_px += peak(at(-1, 0), at(0, 0), at(1, 0));
+    out.y_px += peak(at(0, -1), at(0, 0), at(0, 1));
+    return out;
+}
+
+/// Of the brightness in these pixels.
+void compare_brightness(const Signals& s, const std::vector<std::size_t>& pixels, const SensorModel& sensor,
+                        const std::vector<float>& variance, FrameComparison& out) {
+    double n = 0, f = 0, r = 0, ff = 0, fr = 0, rr = 0;
+    for (const std::size_t p : pixels) {
+        n += 1, f += s.frame[p], r += s.render[p];
+        ff += s.frame[p] * s.frame[p], fr += s.frame[p] * s.render[p], rr += s.render[p] * s.render[p];
+    }
+    out.gain = f / r, out.mean_dn = f / n;
+    const double spread_f = n * ff - f * f, spread_r = n * rr - r * r;
+    if (spread_f > kUniform * n * ff && spread_r > kUniform * n * rr)
+        out.correlation = (n * fr - f * r) / std::sqrt(spread_f * spread_r);
+    double squares = 0, over_noise = 0;
+    for (const std::size_t p : pixels) {
+        const double residual = s.frame[p] - out.gain * s.render[p];
+        const double of_render = variance.empty() ? 0 : out.gain * out.gain * static_cast<double>(variance[p]);
+        squares += residual * residual;
+        over_noise +=
+            residual * residual / (sensor.variance_dn2(sensor.black_dn + out.gain * s.render[p]) + of_render);
+    }
+    out.residual_dn = std::sqrt(squares / n);
+    if (sensor.read_dn2 > 0 || sensor.shot_dn > 0) out.residual_noise = std::sqrt(over_noise / n);
 }
 
 }  // namespace
 
 Result<FrameComparison> compare_frame(const MeasuredImage& frame, const SensorModel& sensor,
-                                      const RadianceImage& render, std::span<const std::int32_t> body,
-                                      std::size_t target) {
-    const auto is_clipped = [&](std::size_t p) { return !frame.clipped.empty() && frame.clipped[p] != 0; };
+                                      const ExpectedFrame& render, std::size_t target) {
     FrameComparison out;
     Signals s;
-    for (const Rgb& L : render.pixels) s.render.push_back(sensor.signal(L));
-    out.black_dn = black_of(frame, sensor, s.render, body);
+    out.black_dn = black_of(frame, sensor, render);
     std::size_t shown = 0;
-    double light_frame = 0, light_render = 0;
     for (std::size_t p = 0; p < frame.dn.size(); ++p) {
-        const bool of_another = body[p] >= 0 && static_cast<std::size_t>(body[p]) != target;
+        const bool of_another = render.body[p] >= 0 && static_cast<std::size_t>(render.body[p]) != target;
+        const bool is_clipped = !frame.clipped.empty() && frame.clipped[p] != 0;
         s.frame.push_back(of_another ? 0 : static_cast<double>(frame.dn[p]) - out.black_dn);
-        if (of_another) s.render[p] = 0;
-        shown += s.render[p] > 0;
-        if (is_clipped(p)) continue;
-        light_frame += s.frame[p], light_render += s.render[p];
+        s.render.push_back(of_another ? 0 : static_cast<double>(render.signal[p]));
+        out.usable.push_back(!of_another && !is_clipped);
+        shown += s.render.back() > 0;
     }
-    if (!(light_render > 0)) return Error{"the target is not lit in the render, expected a pose in view and light"};
+    if (shown < kFewestLit)
+        return Error{
+            fmt::format("the render shows the target lit in {} pixels, expected at least {}: see the poses "
+                        "and the light",
+                        shown, kFewestLit)};
     const double least = std::max(kLitPart * exceeded_by(kBrightPart, shown, s.frame),
                                   kLitSigmas * std::sqrt(sensor.variance_dn2(sensor.black_dn)));
     s.lit_frame = above(least, s.frame);
-    if (std::ranges::count(s.lit_frame, 1) == 0 || !(light_frame > 0))
-        return Error{"nothing is lit in the frame, expected the target"};
-    s.lit_render = above(least * light_render / light_frame, s.render);
-
-    double n = 0, f = 0, r = 0, ff = 0, fr = 0, rr = 0;
+    out.lit_frame = static_cast<std::size_t>(std::ranges::count(s.lit_frame, 1));
+    if (out.lit_frame == 0) return Error{"nothing in it is brighter than its background, expected the target"};
+    const double brightest = sensor.top_dn - out.black_dn, gain = light_ratio(s, out.usable, brightest);
+    s.lit_render = above(gain > 0 ? least / gain : 0, s.render);
     std::vector<std::size_t> counted;
     for (std::size_t p = 0; p < s.frame.size(); ++p) {
-        out.lit_frame += s.lit_frame[p], out.lit_render += s.lit_render[p];
-        out.lit_both += s.lit_frame[p] && s.lit_render[p];
-        if (is_clipped(p) || !(s.lit_frame[p] || s.lit_render[p])) continue;
-        counted.push_back(p);
-        n += 1, f += s.frame[p], r += s.render[p];
-        ff += s.frame[p] * s.frame[p], fr += s.frame[p] * s.render[p], rr += s.render[p] * s.render[p];
+        out.lit_render += s.lit_render[p], out.lit_both += s.lit_frame[p] && s.lit_render[p];
+        if (gain * s.render[p] > brightest) out.usable[p] = 0;
+        if (out.usable[p] && (s.lit_frame[p] || s.lit_render[p])) counted.push_back(p);
     }
-    if (!(rr > 0) || !(n > 1)) return Error{"all lit pixels of the frame are clipped, expected a shorter exposure"};
-    out.gain = fr / rr;
-    if (!(out.gain > 0)) return Error{"the frame is dark where the render is lit, expected the target nearer by"};
-    out.mean_dn = f / n;
-    out.correlation = (n * fr - f * r) / std::sqrt(std::max((n * ff - f * f) * (n * rr - r * r), 1e-300));
-    double squares = 0, over_noise = 0;
-    for (const std::size_t p : counted) {
-        const double residual = s.frame[p] - out.gain * s.render[p];
-        squares += residual * residual;
-        over_noise += residual * residual / sensor.variance_dn2(sensor.black_dn + out.gain * s.render[p]);
-    }
-    out.residual_dn = std::sqrt(squares / n);
-    if (sensor.read_dn2 > 0 || sensor.shot_dn > 0) out.residual_noise = std::sqrt(over_noise / n);
-    find_shift(s, (sensor.top_dn - out.black_dn) / out.gain, frame.width, frame.height, out);
+    if (counted.size() < kFewestLit)
+        return Error{fmt::format("{} of its lit pixels are not clipped, expected at least {}: a shorter exposure",
+                                 counted.size(), kFewestLit)};
+    compare_brightness(s, counted, sensor, render.variance, out);
+    if (out.lit_render == 0 || !(out.gain > 0) || !std::isfinite(out.gain))
+        return Error{
+            "it is dark where the render is lit, or lit where the render is dark: expected the target there"};
+    out.shift = find_shift(s, brightest / out.gain, frame.width, frame.height);
     return out;
 }
 

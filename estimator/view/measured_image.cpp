@@ -148,6 +148,25 @@ Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::
     return image;
 }
 
+std::vector<float> expected_signal(const Camera& camera, const RadianceImage& radiance) {
+    const SensorModel sensor = sensor_model(camera);
+    MeasuredImage image{camera.width, camera.height - (camera.embedded_line ? 1 : 0), {}};
+    image.dn.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+    for (std::size_t i = 0; i < image.dn.size(); ++i)
+        image.dn[i] = static_cast<float>(sensor.signal(radiance.pixels[i]));
+    if (!is_bayer(camera.format)) return image.dn;
+    const auto weights = band_weights(camera.format);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const std::size_t b = bayer_band(camera.format, x, y), i = image.index(x, y);
+            image.dn[i] = static_cast<float>(sensor.dn_per_radiance[b] / weights[b] *
+                                             static_cast<double>(radiance.pixels[i][static_cast<int>(b)]));
+        }
+    image.clipped.assign(image.dn.size(), 0);
+    without_mosaic(image);
+    return image.dn;
+}
+
 Status check_image(const Camera& camera, const MeasuredImage& image, const std::string& what) {
     const int height = camera.height - (camera.embedded_line ? 1 : 0);
     const auto size = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };

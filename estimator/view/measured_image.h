@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "renderer/image/radiance_image.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -54,6 +55,10 @@ struct SensorModel {
 /// YUYV those whose luma is. Of a camera with an embedded line the image has one row fewer: the last holds no
 /// light. Errors: the number of bytes is not the format's.
 [[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);
+
+/// What measured_image would read of this radiance, DN above black, without noise and not clipped; without the
+/// embedded line.
+[[nodiscard]] std::vector<float> expected_signal(const Camera& camera, const RadianceImage& radiance);
 
 /// An Error where the image has not the camera's size, less the embedded line, or a pixel that is not finite.
 /// `what` it is, for the message.

@@ -151,7 +151,7 @@ Status write_png(const std::string& path, const RenderedFrame& frame) {
 }
 
 std::string pixels_of(int type) {
-    const std::string kind = CV_MAT_CN(type) == 1 ? "grey" : "colour";
+    const std::string kind = CV_MAT_CN(type) == 1 ? "grey" : CV_MAT_CN(type) == 3 ? "colour" : "colour with alpha";
     return CV_MAT_DEPTH(type) == CV_8U    ? kind + " of 8 bits"
            : CV_MAT_DEPTH(type) == CV_16U ? kind + " of 16 bits"
                                           : kind + " of neither 8 nor 16 bits";
@@ -171,8 +171,13 @@ Result<std::vector<std::uint8_t>> decode_frame(const std::string& path, const st
     const Result<ImageCodecs> codecs = image_codecs(path);
     if (!codecs) return codecs.error();
     const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8U, const_cast<char*>(file.data()));
-    cv::Mat image = codecs->imdecode(bytes, cv::IMREAD_UNCHANGED);
-    if (image.cols != camera.width || image.rows != camera.height) return no_image;
+    cv::Mat image;
+    try {
+        image = codecs->imdecode(bytes, cv::IMREAD_UNCHANGED);
+    } catch (const std::exception&) {  // of a damaged file too
+    }
+    if (image.cols != camera.width || image.rows != camera.height)
+        return Error{"cannot be decoded: it is damaged, or cut short", path};
     const int expected = camera.format == PixelFormat::rgb24 ? CV_8UC3
                          : is_16_bit(camera.format)          ? CV_16UC1
                                                              : CV_8UC1;
@@ -180,6 +185,16 @@ Result<std::vector<std::uint8_t>> decode_frame(const std::string& path, const st
         return Error{fmt::format("is {}, expected {}: camera \"{}\" is {}", pixels_of(image.type()),
                                  pixels_of(expected), camera.name, name(camera.format)),
                      path};
+    if (expected == CV_16UC1 && camera.detector && camera.detector->bits < 16) {
+        const int unused = (1 << (16 - camera.detector->bits)) - 1;
+        if (std::any_of(image.begin<std::uint16_t>(), image.end<std::uint16_t>(),
+                        [unused](std::uint16_t v) { return (v & unused) != 0; }))
+            return Error{
+                fmt::format("has numbers of more than the {} bits of camera \"{}\": expected them in the upper "
+                            "bits of 16, that is multiplied by {}",
+                            camera.detector->bits, camera.name, unused + 1),
+                path};
+    }
     if (expected == CV_8UC3) cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
     std::vector<std::uint8_t> frame(image.total() * image.elemSize());
     std::memcpy(frame.data(), image.data, frame.size());
@@ -225,11 +240,7 @@ Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Came
     if (camera.format == PixelFormat::yuyv)
         return Error{fmt::format("camera \"{}\" is YUYV: expected the device's bytes, FILE.raw", camera.name),
                      path};
-    try {
-        return decode_frame(path, *file, camera);
-    } catch (const std::exception& e) {
-        return Error{std::string("OpenCV could not decode the image: ") + e.what(), path};
-    }
+    return decode_frame(path, *file, camera);
 }
 
 Status write_pfm(const std::string& path, int width, int height, std::span<const double> values) {

@@ -41,8 +41,9 @@ Status check_image_name(const std::string& path);
 Status write_image(const std::string& path, const RenderedFrame& frame);
 
 /// A frame as the camera puts it out, byte for byte: from .raw, or from another image (PNG, TIFF, PGM ...) that has
-/// the camera's size and the channels and bits of its format, as write_image makes it. Errors: a file that cannot
-/// be read; another size or other pixels than the camera's; YUYV, whose bytes an image does not have.
+/// the camera's size and the channels and bits of its format, as write_image makes it: numbers of 9 to 15 bits in
+/// the upper bits of 16. Errors: a file that cannot be read; another size or other pixels than the camera's; YUYV,
+/// whose bytes an image does not have.
 Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera);
 
 /// Writes one 32-bit float a pixel as a grey PFM, little-endian, rows from the bottom. `values`: row by row from

@@ -7,6 +7,9 @@
 namespace narpa {
 namespace {
 
+/// Shorter sums, of faces that are back to back, have no direction.
+constexpr double kCancelled = 1e-6;
+
 struct FlatCorner {
     Vec3 normal{};     ///< of the triangle, unit length
     double angle = 0;  ///< 0: without area, or not finite
@@ -64,6 +67,7 @@ void add_smooth_normals(TriangleSoup& soup, double crease_rad) {
             for (auto other = first; other != end; ++other)
                 if (*other == *k || dot(flat[*k].normal, flat[*other].normal) > least_cosine)
                     sum = sum + flat[*other].angle * flat[*other].normal;
+            if (!(norm(sum) > kCancelled)) continue;
             corner(*k).normal = static_cast<std::uint32_t>(soup.normals.size());
             soup.normals.push_back(vec_cast<float>(sum));
         }

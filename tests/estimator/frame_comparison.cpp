@@ -24,12 +24,13 @@ protected:
         sensor.dn_per_radiance = {10, 10, 10};
         sensor.black_dn = 20, sensor.top_dn = 4095, sensor.clips_dn = 4095;
         sensor.read_dn2 = 9;
-        body.assign(at(0, kHeight), -1);
+        render.signal.assign(at(0, kHeight), 0);
+        render.body.assign(at(0, kHeight), -1);
         for (int y = 0; y < kHeight; ++y)
             for (int x = 0; x < kWidth; ++x) {
                 const auto L = static_cast<float>(30 * light(x, y));
-                render.pixels[at(x, y)] = {L, L, L};
-                if (L > 0) body[at(x, y)] = 1;
+                render.signal[at(x, y)] = 30 * L;
+                if (L > 0) render.body[at(x, y)] = 1;
             }
     }
     /// The same, moved, `gain` times as bright, above this black.
@@ -44,34 +45,38 @@ protected:
         return frame;
     }
     FrameComparison compared(const MeasuredImage& frame) {
-        const auto c = compare_frame(frame, sensor, render, body, 1);
+        const auto c = compare_frame(frame, sensor, render, 1);
         EXPECT_TRUE(c) << c.error().text();
         return c ? *c : FrameComparison{};
     }
 
     SensorModel sensor;
-    RadianceImage render{kWidth, kHeight};
-    std::vector<std::int32_t> body;
+    ExpectedFrame render;
 };
 
 TEST_F(Comparison, TheSameFitsToItsNoise) {
     const FrameComparison c = compared(frame_of(0, 0, 1, 20));
     EXPECT_NEAR(c.black_dn, 20, 0.2);
     EXPECT_NEAR(c.gain, 1, 1e-3);
-    EXPECT_GT(c.correlation, 0.9999);
+    ASSERT_TRUE(c.correlation);
+    EXPECT_GT(*c.correlation, 0.9999);
     EXPECT_GT(c.overlap(), 0.99);
     ASSERT_TRUE(c.residual_noise);
     EXPECT_NEAR(*c.residual_noise, 1, 0.05);
     EXPECT_NEAR(c.residual_dn, 3, 0.15);
-    EXPECT_LT(std::hypot(c.shift_x_px, c.shift_y_px), 0.02);
+    ASSERT_TRUE(c.shift);
+    EXPECT_LT(std::hypot(c.shift->x_px, c.shift->y_px), 0.02);
 }
 
 TEST_F(Comparison, FindsBrightnessBlackAndShift) {
     const FrameComparison c = compared(frame_of(5.3, -2.6, 1.7, 35));
     EXPECT_NEAR(c.black_dn, 35, 0.2);
-    EXPECT_NEAR(c.shift_x_px, 5.3, 0.1);
-    EXPECT_NEAR(c.shift_y_px, -2.6, 0.1);
-    EXPECT_GT(c.shifted_correlation, 0.99) << "at the nearest whole pixel";
+    ASSERT_TRUE(c.shift);
+    EXPECT_NEAR(c.shift->x_px, 5.3, 0.1);
+    EXPECT_NEAR(c.shift->y_px, -2.6, 0.1);
+    EXPECT_FALSE(c.shift->is_at_limit);
+    EXPECT_GT(c.shift->correlation, 0.99) << "at the nearest whole pixel";
+    EXPECT_NEAR(c.gain, 1.7, 0.02) << "of a frame that is displaced too";
     EXPECT_LT(c.overlap(), 0.8);
     EXPECT_NEAR(compared(frame_of(0, 0, 1.7, 35)).gain, 1.7, 2e-3);
 }
@@ -82,21 +87,68 @@ TEST_F(Comparison, LeavesOutOtherBodiesAndClippedPixels) {
     frame.clipped.assign(frame.dn.size(), 0);
     for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < 20; ++x) {
-            body[at(x, y)] = 0;
-            render.pixels[at(x, y)] = {200, 200, 200};
+            render.body[at(x, y)] = 0;
+            render.signal[at(x, y)] = 6000;
             frame.dn[at(x, y)] = 3000;
         }
     for (int x = 55; x < 62; ++x) frame.dn[at(x, 45)] = 500, frame.clipped[at(x, 45)] = 1;
     const FrameComparison c = compared(frame);
     EXPECT_NEAR(c.gain, 1, 1e-3);
-    EXPECT_GT(c.correlation, 0.9999);
+    ASSERT_TRUE(c.correlation);
+    EXPECT_GT(*c.correlation, 0.9999);
     EXPECT_GT(c.overlap(), 0.99);
+}
+
+/// Bytes of a converter of twelve bits: their background is a number on an edge between two of them.
+TEST_F(Comparison, KnowsTheBlackOfTruncatedNumbers) {
+    sensor.black_dn = 64, sensor.rounding_dn2 = 16.0 * 16.0 / 12;
+    for (int y = 0; y < kHeight; ++y)  // a small target
+        for (int x = 0; x < kWidth; ++x)
+            if (std::hypot(x - 60, y - 45) > 4) render.signal[at(x, y)] = 0, render.body[at(x, y)] = -1;
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> noise(0, 3);
+    MeasuredImage frame{kWidth, kHeight, {}};
+    for (const float signal : render.signal)
+        frame.dn.push_back(
+            static_cast<float>(16 * std::floor((64 + static_cast<double>(signal) + noise(random)) / 16) + 7.5));
+    const FrameComparison c = compared(frame);
+    EXPECT_NEAR(c.black_dn, 64, 1);
+    EXPECT_NEAR(c.gain, 1, 0.01);
+    EXPECT_GT(c.overlap(), 0.97);
+}
+
+/// A few pixels that a glint saturates, and read noise takes below what counts as clipped.
+TEST_F(Comparison, GlintsDoNotCount) {
+    MeasuredImage frame = frame_of(0, 0, 1, 20);
+    for (int x = 58; x < 62; ++x) render.signal[at(x, 45)] = 400'000, frame.dn[at(x, 45)] = 4094;
+    const FrameComparison c = compared(frame);
+    EXPECT_NEAR(c.gain, 1, 2e-3);
+    ASSERT_TRUE(c.correlation);
+    EXPECT_GT(*c.correlation, 0.999);
+}
+
+/// A wall that fills the view has neither correlation nor shift.
+TEST_F(Comparison, OfAUniformView) {
+    render.signal.assign(render.signal.size(), 500);
+    render.body.assign(render.body.size(), 1);
+    MeasuredImage frame{kWidth, kHeight, std::vector<float>(render.signal.size(), 520)};
+    const FrameComparison c = compared(frame);
+    EXPECT_NEAR(c.gain, 1, 1e-6);
+    EXPECT_FALSE(c.correlation);
+    EXPECT_FALSE(c.shift);
+}
+
+/// The render's own sampling noise is noise too.
+TEST_F(Comparison, CountsTheNoiseOfTheRender) {
+    render.variance.assign(render.signal.size(), 27);  // three times the sensor's
+    const FrameComparison c = compared(frame_of(0, 0, 1, 20));
+    EXPECT_NEAR(*c.residual_noise, 0.5, 0.03);
 }
 
 /// A camera without a detector has no noise to compare with; without background the black is the sensor's.
 TEST_F(Comparison, WithoutNoiseAndWithoutBackground) {
     sensor.read_dn2 = 0;
-    body.assign(body.size(), 1);
+    render.body.assign(render.body.size(), 1);
     const FrameComparison c = compared(frame_of(0, 0, 1, 20, false));
     EXPECT_FALSE(c.residual_noise);
     EXPECT_EQ(c.black_dn, 20);
@@ -105,15 +157,17 @@ TEST_F(Comparison, WithoutNoiseAndWithoutBackground) {
 
 TEST_F(Comparison, ErrorsSayWhatIsDark) {
     const auto refusal = [&](const MeasuredImage& frame) {
-        const auto c = compare_frame(frame, sensor, render, body, 1);
+        const auto c = compare_frame(frame, sensor, render, 1);
         return c ? std::string() : c.error().what;
     };
-    EXPECT_NE(refusal(frame_of(0, 0, 0, 20)).find("nothing is lit in the frame"), std::string::npos);
+    EXPECT_NE(refusal(frame_of(0, 0, 0, 20)).find("nothing in it is brighter than its background"),
+              std::string::npos);
     MeasuredImage white = frame_of(0, 0, 1, 20);
     white.clipped.assign(white.dn.size(), 1);
-    EXPECT_NE(refusal(white).find("expected"), std::string::npos);
-    render.pixels.assign(render.pixels.size(), Rgb{});
-    EXPECT_NE(refusal(frame_of(0, 0, 1, 20)).find("not lit in the render"), std::string::npos);
+    EXPECT_NE(refusal(white).find("0 of its lit pixels are not clipped"), std::string::npos);
+    render.signal.assign(render.signal.size(), 0);
+    EXPECT_NE(refusal(frame_of(0, 0, 1, 20)).find("the render shows the target lit in 0 pixels"),
+              std::string::npos);
 }
 
 }  // namespace

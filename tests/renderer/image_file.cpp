@@ -221,6 +221,18 @@ TEST(ImageFile, FramesThatAreNotTheCamerasAreRefused) {
               "is grey of 8 bits, expected colour of 8 bits: camera \"camera\" is RGB24");
     EXPECT_EQ(refusal("grey.png", PixelFormat::yuyv),
               "camera \"camera\" is YUYV: expected the device's bytes, FILE.raw");
+    test::write_image_file(scratch("alpha.png"), cv::Mat::zeros(8, 12, CV_8UC4));
+    EXPECT_EQ(refusal("alpha.png", PixelFormat::rgb24),
+              "is colour with alpha of 8 bits, expected colour of 8 bits: camera \"camera\" is RGB24");
+    test::write_image_file(scratch("short.png"), cv::Mat::zeros(8, 12, CV_8UC1));
+    std::filesystem::resize_file(scratch("short.png"), 50);
+    EXPECT_EQ(refusal("short.png", PixelFormat::grey), "cannot be decoded: it is damaged, or cut short");
+    Shot twelve_bits(PixelFormat::y16);
+    twelve_bits.c.detector = Detector{.bits = 12};
+    test::write_image_file(scratch("right.png"), cv::Mat(8, 12, CV_16UC1, cv::Scalar(4095)));
+    const auto right = read_frame(scratch("right.png"), twelve_bits.c);
+    ASSERT_FALSE(right);
+    EXPECT_NE(right.error().what.find("more than the 12 bits of camera"), std::string::npos) << right.error().what;
     EXPECT_NE(refusal("words.png", PixelFormat::grey).find("no image that can be decoded"), std::string::npos);
     EXPECT_NE(refusal("empty.png", PixelFormat::grey).find("no image that can be decoded"), std::string::npos);
     EXPECT_EQ(refusal("nowhere.png", PixelFormat::grey), "no such file");

@@ -12,6 +12,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
                        : bytes.starts_with("<")    ? "m.dae"
                        : bytes.starts_with("MM")   ? "m.3ds"
                                                    : "m.stl";
-    fuzz::check(read_mesh(folder.write(name, bytes), 1, {.memory_bytes = std::uint64_t{1} << 30, .seconds = 10}));
+    fuzz::check(
+        read_mesh(folder.write(name, bytes), 1, 0.5, {.memory_bytes = std::uint64_t{1} << 30, .seconds = 10}));
     return 0;
 }

@@ -79,7 +79,7 @@ public:
         if (auto ready = synchronise(); !ready) return ready;
         std::size_t k = 0;
         for (const TrajectoryRow& row : rows) {
-            if (stop_flag()) break;
+            if (stop_flag() || emulator_stops()) break;
             progress.show(static_cast<double>(k) / static_cast<double>(rows.size()),
                           fmt::format("row {} of {}", k + 1, rows.size()));
             ++k;
@@ -87,14 +87,21 @@ public:
             if (!options_.lockstep)
                 if (auto waited = wait_for(t - std::llround(options_.lead_s * 1e9)); !waited) return waited;
             if (auto fits = check_run(); !fits) return fits;
+            if (emulator_stops()) break;
             if (auto sent = send(row, t); !sent) return sent;
+            ++rows_sent;
             if (options_.lockstep)
                 if (auto reached = wait_in_lockstep(); !reached) return reached;
         }
         return Ok{};
     }
 
+    /// The emulator's run has ended, before the trajectory has.
+    [[nodiscard]] bool emulator_stops() const {
+        return clock_.synchronized() && clock_.newest().state == RunState::stopping;
+    }
     std::uint64_t commands = 0, frames_dropped = 0;
+    std::size_t rows_sent = 0;
     std::int64_t start_ns() const { return start_ns_; }
 
 private:
@@ -143,7 +150,7 @@ private:
     }
 
     Status wait_for(std::int64_t t_ns) {
-        for (std::int64_t left; (left = t_ns - clock_.now_ns()) > 0 && !stop_flag();) {
+        for (std::int64_t left; (left = t_ns - clock_.now_ns()) > 0 && !stop_flag() && !emulator_stops();) {
             bus_.wait(std::min<std::int64_t>(left, 100 * kMs));
             clock_.listen(bus_);
             if (auto fits = check_run(); !fits) return fits;
@@ -176,7 +183,7 @@ private:
             clock_.listen(bus_);
             if (auto fits = check_run(); !fits) return fits;
             if (clock_.reached(granted)) break;
-            if (stop_flag()) return Ok{};
+            if (stop_flag() || emulator_stops()) return Ok{};
             if (monotonic_ns() > deadline)
                 return Error{
                     fmt::format(
@@ -217,6 +224,8 @@ Outcome fly(const FlyOptions& o) {
     Player player(o, **bus, *bodies);
     if (auto played = player.play(*rows); !played) return played.error();
 
+    if (player.emulator_stops() && player.rows_sent < rows->size())
+        say(fmt::format("the emulator stopped: {} of {} rows were sent", player.rows_sent, rows->size()));
     const CanCounters& c = (*bus)->counters();
     say(fmt::format("{} commands sent from {:.3f} s on, {} frames dropped, {} frames received", player.commands,
                     static_cast<double>(player.start_ns()) * 1e-9, player.frames_dropped, c.received));
@@ -226,7 +235,7 @@ Outcome fly(const FlyOptions& o) {
     return nlohmann::json{{"commands", player.commands},   {"start_ns", player.start_ns()},
                           {"frames_sent", c.sent},         {"frames_dropped", player.frames_dropped},
                           {"frames_received", c.received}, {"rows", rows->size()},
-                          {"stopped", stop_flag().load()}};
+                          {"rows_sent", player.rows_sent}, {"stopped", stop_flag().load()}};
 }
 
 }  // namespace

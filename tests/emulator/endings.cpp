@@ -91,6 +91,28 @@ TEST_F(Ending, ARunWhoseMessagesNobodyTakesKeepsItsFiles) {
     }
 }
 
+TEST_F(Ending, ATrajectoryEndsWhenTheEmulatorStops) {
+    const auto hub = open_or_fail("slcan:0", CanRole::hub);
+    ASSERT_TRUE(hub);
+    std::ofstream file(folder_ / "long.csv");
+    file << kTrajectoryHeader << "\n";
+    for (int t = 0; t < 100; ++t) file << t << ",chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n";
+    file.close();
+    const std::string command = std::string(kTimeLimit) + NARPA_BIN " fly " + (folder_ / "long.csv") +
+                                " --can slcan:" + std::to_string(hub_port(*hub));
+    auto flight = std::async(std::launch::async, [&] { return run_command(command + " 2>&1"); });
+    const std::int64_t start_ns = monotonic_ns();
+    bool commanded = false;
+    while (flight.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready) {
+        for (ReceivedFrame out; hub->receive(out);) commanded = true;
+        hub->send(encode(Heartbeat{.t_ns = monotonic_ns() - start_ns,
+                                   .state = commanded ? RunState::stopping : RunState::running}));
+    }
+    const auto [status, said] = flight.get();
+    EXPECT_EQ(status, 0) << said;
+    EXPECT_NE(said.find("the emulator stopped: 1 of 100 rows were sent"), std::string::npos) << said;
+}
+
 TEST_F(Ending, ATrajectoryEndsWithTheRunThatItWasFlownFor) {
     const auto hub = open_or_fail("slcan:0", CanRole::hub);
     ASSERT_TRUE(hub);

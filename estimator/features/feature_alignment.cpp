@@ -267,7 +267,8 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     FeatureEstimate e = estimate(frame, at, guess, motion);
     Fit fit;
     if (!e.has_pose())
-        fit.failed = fmt::format("{} in {} renders", name(e.status), e.rounds.size());
+        fit.failed =
+            fmt::format("{} in {} render{}", name(e.status), e.rounds.size(), e.rounds.size() == 1 ? "" : "s");
     else if (e.floor_px > settings_.floor_most_px)
         fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
                                  settings_.floor_most_px);

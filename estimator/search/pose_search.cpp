@@ -149,7 +149,9 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
         sought.dense.finest *= 2;
     std::vector<Contender> contenders = coarse_fits(sought, out);
     if (contenders.empty()) {
-        out.answer.why = fmt::format("none of {} hypotheses leads to a pose", sought.hypotheses.size());
+        out.answer.why = sought.hypotheses.empty()
+                             ? "no attitude of the target looks like what stands out in the frame"
+                             : fmt::format("none of {} hypotheses leads to a pose", sought.hypotheses.size());
         return out;
     }
     if (auto good = fine_fits(sought, contenders, out); !good) return good.error();

@@ -211,8 +211,8 @@ void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, 
     });
 }
 
-/// The frame's exposure.
-FrameLedger as_the_scene_has_it(const Camera& camera, std::int64_t t_ns) {
+/// With the exposure that the scene states.
+FrameLedger nominal_ledger(const Camera& camera, std::int64_t t_ns) {
     FrameLedger taken;
     taken.t_exposure_mid_ns = t_ns;
     taken.t_exposure_start_ns = t_ns - exposure_ns(camera) / 2;
@@ -247,7 +247,7 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
         const auto take = [&] {
             const auto tracker = FrameTracker::create(**world, *camera, options);
             const int renders = tracked.renders;
-            tracked = (*tracker)->take(as_the_scene_has_it(scene.cameras[*camera], t_ns), *bytes, at);
+            tracked = (*tracker)->take(nominal_ledger(scene.cameras[*camera], t_ns), *bytes, at);
             tracked.renders += renders;
         };
         threads.arena.execute([&] {

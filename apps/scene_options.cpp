@@ -1,7 +1,6 @@
 #include "apps/scene_options.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -139,10 +138,10 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
         .one_of({"features", "dense"})
         .shows_default();
-    app.option(dashes + "start", start,
-               "Error of the first guess, which is made from the truth, in attitude and as a part of the range; "
-               "search: "
-               "no guess, for frames but of the range")
+    app.option(
+           dashes + "start", start,
+           "Error of the first guess, made from the truth: attitude, and part of the range; search: no guess, for "
+           "frames but of the range")
         .type_name("DEG,PERCENT|search")
         .shows_default();
     app.option(dashes + "range-guess", tracker.range_guess_m,

@@ -60,9 +60,9 @@ struct TrackedFrame {
     std::uint32_t frame = 0;
     std::int64_t t_ns = 0;
     EstimateState state = EstimateState::lost;
-    std::string why;  ///< why the frame gave no pose
-    Answer answer;    ///< of this frame alone
-    Rigid3 truth{};
+    std::string why;                                ///< why the frame gave no pose
+    Answer answer;                                  ///< of this frame alone
+    Rigid3 truth{};                                 ///< with TrackerOptions::guess: the given pose
     Rigid3 guess{};                                 ///< the pose of the first render
     std::optional<Rigid3> measured;                 ///< by this frame alone, where the answer is usable
     Matrix6 covariance = Matrix6::Zero();           ///< of `measured`

@@ -150,7 +150,7 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
     std::vector<Contender> contenders = coarse_fits(sought, out);
     if (contenders.empty()) {
         out.answer.why = sought.hypotheses.empty()
-                             ? "no attitude of the target looks like what stands out in the frame"
+                             ? "no attitude hypothesis matches the bright region of the frame"
                              : fmt::format("none of {} hypotheses leads to a pose", sought.hypotheses.size());
         return out;
     }

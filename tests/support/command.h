@@ -14,8 +14,8 @@ struct Done {
     std::string out;  ///< what it wrote on standard output
 };
 
-/// Before a program that could hang: exit status 124 after this time, which a sanitizer's build on a busy machine
-/// does not need.
+/// Prefix of a program that could hang: exit status 124 after this time. No build needs as long, even a sanitizer's
+/// on a busy machine.
 inline constexpr const char* kTimeLimit = "timeout 120 ";
 
 /// A command of the shell, which can send standard error elsewhere.

@@ -57,6 +57,21 @@ TEST(Honesty, DenseAnswersWhereTheSizeIsUncertain) {
     EXPECT_EQ(beyond, 0);
 }
 
+/// A cylinder's matches turn with the light: untold, its roll is wrong by far more than is said; told, it is not
+/// observed.
+TEST(Honesty, FeaturesKnowWhatTheLightMoves) {
+    HonestyOptions o;
+    o.methods = {"features"}, o.conditions = {"plain"};
+    o.size = 240, o.trials = 1;
+    o.world.light_rad = 2 * kDegree;
+    constexpr int kTrial = 415;
+    const HonestyRow untold = run(o, kTrial).front();
+    EXPECT_EQ(untold.beyond, 1) << untold.target;
+    o.told = o.world;
+    const HonestyRow told = run(o, kTrial).front();
+    EXPECT_EQ(told.answers[static_cast<std::size_t>(AnswerKind::unobservable)], 1) << told.target;
+}
+
 /// The third start is held against the answer where the second has left the view of another window, without a
 /// Jacobian (it crashed).
 TEST(Honesty, DenseThirdStartAfterAWholeSecondDescent) {

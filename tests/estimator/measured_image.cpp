@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "renderer/camera/detector.h"
 
 namespace narpa {
@@ -75,6 +78,33 @@ TEST_P(EveryFormat, MeanAndVarianceAreTheDetectors) {
 INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat,
                          testing::Values(PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv, PixelFormat::rgb24,
                                          PixelFormat::gbrg8, PixelFormat::rggb16));
+
+/// Of an uneven image in colour: what a frame without noise reads, within the rounding of its numbers. A mosaic's
+/// means are of neighbours.
+TEST_P(EveryFormat, ExpectedSignalIsThatOfAFrameWithoutNoise) {
+    Camera camera = camera_with(GetParam(), true);
+    camera.detector->read_noise_e = 0, camera.detector->shot_noise = false;
+    camera.embedded_line = true;
+    RadianceImage light(camera.width, camera.height);
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x)
+            light.pixels[static_cast<std::size_t>(y * kWidth + x)] = {
+                static_cast<float>(20 + 15 * std::sin(x)), static_cast<float>(30 + 10 * std::cos(y)),
+                static_cast<float>(25 + 20 * std::sin(x + 2 * y))};
+    std::vector<std::uint8_t> bytes(frame_bytes({kWidth, kHeight, camera.format, camera.period_ns}));
+    expose(camera, light, 5, 3, bytes);
+    const auto frame = measured_image(camera, bytes);
+    ASSERT_TRUE(frame);
+    const SensorModel sensor = sensor_model(camera);
+    const std::vector<float> expected = expected_signal(camera, light);
+    ASSERT_EQ(expected.size(), frame->dn.size());
+    const double step = std::sqrt(12 * sensor.rounding_dn2);
+    double largest = 0;
+    for (std::size_t i = 0; i < expected.size(); ++i)
+        largest = std::max(largest, std::abs(static_cast<double>(frame->dn[i]) - sensor.black_dn -
+                                             static_cast<double>(expected[i])));
+    EXPECT_LE(largest, 1.5 * step + 1) << name(GetParam());
+}
 
 TEST(MeasuredImage, NoiseModelHasDarkCurrentPrnuAndDsnu) {
     Camera camera = camera_with(PixelFormat::y16, true);

@@ -57,8 +57,8 @@ TEST(Honesty, DenseAnswersWhereTheSizeIsUncertain) {
     EXPECT_EQ(beyond, 0);
 }
 
-/// A cylinder's matches turn with the light: untold, its roll is wrong by far more than is said; told, it is not
-/// observed.
+/// A cylinder's matches turn with the light: untold, its roll is wrong by far more than is said; told, it
+/// is held to be unobserved.
 TEST(Honesty, FeaturesKnowWhatTheLightMoves) {
     HonestyOptions o;
     o.methods = {"features"}, o.conditions = {"plain"};
@@ -69,7 +69,8 @@ TEST(Honesty, FeaturesKnowWhatTheLightMoves) {
     EXPECT_EQ(untold.beyond, 1) << untold.target;
     o.told = o.world;
     const HonestyRow told = run(o, kTrial).front();
-    EXPECT_EQ(told.answers[static_cast<std::size_t>(AnswerKind::unobservable)], 1) << told.target;
+    EXPECT_EQ(told.beyond, 0) << told.target;
+    EXPECT_EQ(told.answers[static_cast<std::size_t>(AnswerKind::refused)], 0) << "it is answered";
 }
 
 /// The third start is held against the answer where the second has left the view of another window, without a

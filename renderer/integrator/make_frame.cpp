@@ -30,8 +30,7 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const bool reuse = on.path_reuse && !(over_time && at.moving());
     const bool small_bodies = !direct && on.small_body_sampling && SmallBodySampling::may_help(tracer, at);
     const bool sun_only = direct && SunDirectLighting::suffices(render_scene);
-    const bool separate_sun =
-        !direct && on.separate_sun && sun_alone_lights_first_surfaces(render_scene) && !small_bodies;
+    const bool separate_sun = !direct && on.separate_sun && sun_alone_lights_first_surfaces(render_scene);
     const Integrator& by_waves = direct ? static_cast<const Integrator&>(kDirectIntegrator) : kPathIntegrator;
     const CameraModelHandle model(camera);
     return {render_scene,

@@ -61,7 +61,7 @@ FirstVertices::Block& FirstVertices::next_block() noexcept {
     return b;
 }
 
-int FirstVertices::add(const BodyPoses& at, const PathStart& start, std::size_t ray, float survival) noexcept {
+int FirstVertices::add(const BodyPoses& at, const PathStart& start, const Path& path, float survival) noexcept {
     Block& b = next_block();
     const std::size_t i = n_ % kLanes, from = start.lane;
     const HitBatch& hits = *start.hits;
@@ -70,11 +70,8 @@ int FirstVertices::add(const BodyPoses& at, const PathStart& start, std::size_t 
                         hits.departure_body[from]);
     b.plane.put(i, hits.geometric_normal[from]);
     b.diffuse.put(i, kInvPi * start.surfaces->diffuse[from]);
-    b.survival[i] = survival;
     if (start.surfaces->specular[from] != Rgb{}) b.special |= 1u << i;
-    ray_[n_] = static_cast<std::uint32_t>(ray);
-    lit_[n_] = &start;
-    return static_cast<int>(n_++);
+    return add_to(b, path, survival, &start);
 }
 
 int FirstVertices::add(const BodyPoses& at, const Hit& hit, const PathVertex& vertex, const Path& path,
@@ -85,22 +82,26 @@ int FirstVertices::add(const BodyPoses& at, const Hit& hit, const PathVertex& ve
     b.origin.put(i, at.T_world_body_at(static_cast<std::size_t>(hit.body), hit.time) * hit.departure_body);
     b.plane.put(i, vertex.plane());
     b.diffuse.put(i, kInvPi * vertex.surface().diffuse);
+    if (!vertex.plain()) b.special |= 1u << i;
+    const int number = add_to(b, path, survival, nullptr);
+    if (is_set(b.special, i)) vertices_[static_cast<std::size_t>(number)] = vertex;
+    return number;
+}
+
+int FirstVertices::add_to(Block& b, const Path& path, float survival, const PathStart* lit) noexcept {
+    const std::size_t i = n_ % kLanes;
     b.survival[i] = survival;
     ray_[n_] = path.ray;
-    lit_[n_] = nullptr;
-    const bool small_bodies = path.small_bodies.share() > 0;
-    if (small_bodies) {
+    lit_[n_] = lit;
+    if (path.small_bodies.share() > 0) {
+        b.special |= 1u << i;
         b.small_bodies |= 1u << i;
         paths_[n_] = path;
-    }
-    if (!vertex.plain() || small_bodies) {
-        b.special |= 1u << i;
-        vertices_[n_] = vertex;
     }
     return static_cast<int>(n_++);
 }
 
-/// Of those whose direct light is known and that have a lobe.
+/// Of those whose direct light is known and that have a lobe, or sample small bodies.
 void FirstVertices::make_vertices(const Tracer& tracer, const BodyPoses& at, double pixel_angle_rad) noexcept {
     for (std::size_t k = 0; k < n_; ++k) {
         if (lit_[k] == nullptr || !is_set(block_[k / kLanes].special, k % kLanes)) continue;

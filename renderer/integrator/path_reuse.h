@@ -48,9 +48,9 @@ struct SecondVertex {
 class FirstVertices {
 public:
     void clear() noexcept { n_ = 0; }
-    /// One whose direct light is known. `ray`: to whose radiance it adds; `survival`: probability with which the
-    /// path leaves it. Returns its number.
-    int add(const BodyPoses& at, const PathStart& start, std::size_t ray, float survival) noexcept;
+    /// One whose direct light is known. `path`: its ray, to whose radiance it adds, and its small bodies;
+    /// `survival`: probability with which the path leaves it. Returns its number.
+    int add(const BodyPoses& at, const PathStart& start, const Path& path, float survival) noexcept;
     /// Any other.
     int add(const BodyPoses& at, const Hit& hit, const PathVertex& vertex, const Path& path,
             float survival) noexcept;
@@ -79,6 +79,7 @@ private:
     };
 
     [[nodiscard]] Block& next_block() noexcept;
+    int add_to(Block& b, const Path& path, float survival, const PathStart* lit) noexcept;
     void make_vertices(const Tracer& tracer, const BodyPoses& at, double pixel_angle_rad) noexcept;
     [[nodiscard]] std::size_t blocks() const noexcept { return (n_ + kLanes - 1) / kLanes; }
     static void join(const Block& b, const SecondVertex& second, Join& j) noexcept;

@@ -295,30 +295,35 @@ void Wavefront::begin_reused(std::span<const PathStart> starts) {
             const std::size_t ray = from + k;
             const PathStart& s = batch[k];
             radiance_[ray] = {};
-            float probability = 1;
-            int number = -1;
-            if (s.lit()) {
-                if (!grouped_) continue;
-                const Rgb albedo = s.surfaces->diffuse[s.lane] + s.surfaces->specular[s.lane];
-                probability = first_survival(albedo, !s.sunlit);
-                if (reuse_) number = first_.add(at_, s, ray, probability);
-                if (probability < 1 && roulette[roulette_dimension(0)][k] >= static_cast<double>(probability))
-                    continue;
-            }
             Path& path = paths_[n_];
             path = Path{};
             path.ray = static_cast<std::uint32_t>(ray);
             path.to = &radiance_[ray];
-            path.first_vertex = number;
-            path.lit = path.sun_sampled = s.lit();
-            path.sunlit = s.lit() && s.sunlit;
-            path.throughput = Rgb{1, 1, 1} / probability;
+            if (s.lit()) {
+                if (!grouped_) continue;
+                if (small_bodies_ && !s.sunlit) sample_small_bodies(path, s);
+                const Rgb albedo = s.surfaces->diffuse[s.lane] + s.surfaces->specular[s.lane];
+                const float probability = first_survival(albedo, !s.sunlit);
+                if (reuse_) path.first_vertex = first_.add(at_, s, path, probability);
+                if (probability < 1 && roulette[roulette_dimension(0)][k] >= static_cast<double>(probability))
+                    continue;
+                path.throughput = Rgb{1, 1, 1} / probability;
+                path.lit = path.sun_sampled = true;
+                path.sunlit = s.sunlit;
+            }
             if (receivers_) path.start = {.anchor = s.rays->origin[s.lane], .time = s.rays->time[s.lane]};
             assign(hits_[n_], [&] { return (*s.hits)[s.lane]; });
             directions_[n_] = s.rays->direction[s.lane];
             ++n_;
         }
     }
+}
+
+/// Where sunlight outshines them, rays by the BSDF alone meet them often enough.
+void Wavefront::sample_small_bodies(Path& path, const PathStart& unlit) const {
+    const Hit hit = (*unlit.hits)[unlit.lane];
+    path.start = receiver_at(at_, hit, hit.geometric_normal);
+    path.small_bodies = SmallBodySampling(tracer_, at_, path.start);
 }
 
 void Wavefront::collect_second_vertices() {

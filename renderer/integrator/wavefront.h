@@ -84,6 +84,7 @@ private:
 
     // Path reuse.
     void begin_reused(std::span<const PathStart> starts);
+    void sample_small_bodies(Path& path, const PathStart& unlit) const;
     void collect_second_vertices();
     [[nodiscard]] SecondVertex* second_vertex(const Path& path, int vertex);
     void reuse();

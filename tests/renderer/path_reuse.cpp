@@ -176,7 +176,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return test.param.name; });
 
 /// Of camera frames, in the first band.
-Picture frames(const Scene& s, int spp) {
+Picture frames(const Scene& s, int spp, const Mechanisms& mechanisms = {}) {
     const auto render_scene = RenderScene::create(s, 1);
     EXPECT_TRUE(render_scene);
     const Camera c = camera(static_cast<int>(kSide), static_cast<int>(kSide), 40);
@@ -185,6 +185,7 @@ Picture frames(const Scene& s, int spp) {
     settings.spp = spp;
     settings.method = RenderSettings::Method::path;
     settings.max_depth = 5;
+    settings.mechanisms = mechanisms;
     Picture p;
     std::array<double, kPixels> squares{};
     for (int k = 0; k < kPictures; ++k) {
@@ -217,6 +218,28 @@ TEST(ReusedPaths, ReceiveDirectSunlightAsInDirectLighting) {
         lit += slow.mean[i];
     }
     EXPECT_GT(lit, 100 * static_cast<double>(kPixels));
+}
+
+TEST(ReusedPaths, SampleSmallBodiesWhereDirectSunlightIsApart) {
+    // A ball in the Sun lights a Lambert and a Phong plate whose backs are to it.
+    Scene s;
+    s.materials = {lambert(0.9f), phong(0.3f, 0.4f, 30)};
+    add_mesh(s, plate(4, 4));
+    Mesh glossy = plate(1, 3);
+    glossy.face_material.assign(glossy.faces.size(), 1);
+    add_mesh(s, std::move(glossy), {{}, {-0.5, 0, 0.1}});
+    add_sphere(s, 0.1, {0.9, 0, 0.7});
+    add_sun(s, {-1, 0, -0.1});
+    Mechanisms together, by_chance;
+    together.separate_sun = by_chance.small_body_sampling = false;
+    const Picture apart = frames(s, 64), whole = frames(s, 64, together), chance = frames(s, 64, by_chance);
+    for (std::size_t i = 0; i < kPixels; ++i)
+        EXPECT_NEAR(apart.mean[i], whole.mean[i],
+                    kSigmas * std::hypot(apart.error[i], whole.error[i]) + 1e-5 * whole.mean[i])
+            << i;
+    // Half of the samples are followed by paths.
+    EXPECT_LT(apart.mean_variance(), 3 * whole.mean_variance());
+    EXPECT_GT(chance.mean_variance(), 3 * apart.mean_variance());
 }
 
 TEST(ReusedPaths, AllocateNothing) {

@@ -40,9 +40,11 @@ requires std::is_enum_v<Named>
 void format_cell(RowBuffer& row, const LedgerField& field, Named value) noexcept {
     row.add("{}", field.signal.choices[static_cast<std::size_t>(value)].name);
 }
-/// "307200;614400"
+/// "307200;614400", up to the last that is not 0
 void format_cell(RowBuffer& row, const LedgerField&, const FrameLedger::Passes& passes) noexcept {
-    for (std::size_t i = 0; i < passes.size() && passes[i] > 0; ++i) row.add("{}{}", i > 0 ? ";" : "", passes[i]);
+    const auto last = std::find_if(passes.rbegin(), passes.rend(), [](std::uint32_t n) { return n > 0; });
+    const auto n = static_cast<std::size_t>(passes.rend() - last);
+    for (std::size_t i = 0; i < n; ++i) row.add("{}{}", i > 0 ? ";" : "", passes[i]);
 }
 
 // Each reads a cell and returns what was expected where it is bad, else nothing.
@@ -85,8 +87,8 @@ std::string read_cell(std::string_view text, const LedgerField&, FrameLedger::Pa
     const std::vector<std::string_view> cells = cells_of(text, ';');
     if (cells.size() > passes.size()) return expected;
     for (std::size_t i = 0; i < cells.size(); ++i)
-        if (!read_number(cells[i], passes[i]) || passes[i] == 0) return expected;
-    return "";
+        if (!read_number(cells[i], passes[i])) return expected;
+    return passes[cells.size() - 1] > 0 ? "" : expected;
 }
 
 /// What a column must be beside those before it.

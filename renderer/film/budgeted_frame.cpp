@@ -29,8 +29,15 @@ constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
 constexpr double kSure = 0.85;
 /// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
 constexpr std::uint64_t kPixelsOfACoarseRay = 4;
+/// Direct sunlight that is apart gets samples of its own, with this part of the budget, where that is enough for so
+/// many rays or samples for each pixel.
+constexpr double kSunlightPart = 0.22;
+constexpr double kRaysForSunlight = 20, kSamplesForSunlight = 6;
+constexpr double kMostRaysOfSunlight = 2;  ///< of a sample: the camera's and the Sun's
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
+/// Of a pass: what the account can hold.
+constexpr double kMostSamples = std::numeric_limits<std::uint32_t>::max();
 
 /// Doubt lowers an estimate by this factor, to no less than that part of the last measurement.
 constexpr double kDoubt = 0.95, kLeastBelieved = 0.25;
@@ -39,7 +46,8 @@ constexpr std::uint64_t kLeastPieces = 1000;
 
 /// A frame begins with one sample for each pixel. Sun-only direct lighting takes the pixels' centres, plans from
 /// them and discards them where there are samples; all other light takes the first sample of each pixel's sequence
-/// and keeps it.
+/// and keeps it. Where direct sunlight is apart, further samples of it are planned from centres that were
+/// discarded.
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
@@ -56,12 +64,14 @@ public:
           sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
           has_indirect_(settings.method == RenderSettings::Method::path),
           adaptive_(sample_.sun_only && settings.mechanisms.sample_plan),
+          sunlight_apart_(sample_.separate_sun && settings.mechanisms.sample_plan),
           out_(out),
           variance_(variance) {}
 
     FrameAccount make() {
         account_.step = FrameStep::nothing;
         begin(adaptive_ ? centre_ : sample_);
+        if (sunlight_apart_ && worth_sunlight()) plan_sunlight();
         take_first_image();
         if (account_.step == FrameStep::nothing) {  // the pilot is no part of an image
             account_.rays_discarded += account_.rays;
@@ -162,6 +172,26 @@ private:
         return adaptive_ ? take_centres(1, 0, FrameStep::one_sample, l) : take_first_samples(l);
     }
 
+    [[nodiscard]] bool worth_sunlight() const {
+        const auto pixels = static_cast<double>(passes_.pixels());
+        switch (budget_.kind) {
+            case Kind::samples: return false;
+            case Kind::passes: return budget_.passes[kSunlightPass] > 0;
+            case Kind::rays: return static_cast<double>(budget_.rays) >= kRaysForSunlight * pixels;
+            case Kind::time:
+                return costs_.known(Of::samples) &&
+                       static_cast<double>(costs_.fitting(Of::samples, ns_left())) >= kSamplesForSunlight * pixels;
+        }
+        return false;
+    }
+    void plan_sunlight() {
+        if (!take_centres(1, 0, FrameStep::no_indirect)) return;
+        const std::int64_t start = now_ns();
+        passes_.plan_sunlight(centre_);
+        costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
+        sunlight_planned_ = true;
+    }
+
     void take_first_image() {
         switch (budget_.kind) {
             case Kind::samples: break;
@@ -249,11 +279,12 @@ private:
             costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
             account_.standard_error = passes_.standard_error();
         }
-        for (std::size_t i = 0; i < kMaxPasses; ++i) {
+        const std::size_t passes = sunlight_apart_ ? kSunlightPass : kMaxPasses;
+        for (std::size_t i = 0; i < passes; ++i) {
             const Stage next = wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
             if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.doubt(Of::samples);
-            if (samples == 0) return;
+            if (samples == 0) break;
             if (to_show_ == ToShow::means) show();  // a pass that is given up spoils the means
             const PassLimit l = limit();
             const PassCount pass = passes_.refine(sample_, stage_, next, l);
@@ -265,6 +296,29 @@ private:
             stage_ = next;
             each_ = rays_each(pass);
         }
+        if (sunlight_planned_ && SamplePlan::reaches(stage_, 2)) refine_sunlight();
+    }
+
+    /// With what the uniform passes have left.
+    void refine_sunlight() {
+        const std::uint32_t each = SamplePlan::most(stage_);
+        const SamplePlan& plan = passes_.sunlight_plan();
+        const Stage to = plan.reach_beyond(each, sunlight_samples());
+        const std::uint64_t samples = plan.total_beyond(each, to);
+        if (samples == 0) return;
+        if (to_show_ == ToShow::means) show();
+        const PassLimit l = limit();
+        const PassCount pass = passes_.refine_sunlight(sample_, each, to, l);
+        costs_.note(Of::sunlight, pass.samples, pass.wall_ns);
+        if (!book(pass, l, false)) return;
+        account_.passes[kSunlightPass] = static_cast<std::uint32_t>(samples);
+        to_show_ = ToShow::means;
+    }
+    [[nodiscard]] double sunlight_samples() const {
+        if (budget_.kind == Kind::passes) return budget_.passes[kSunlightPass];
+        if (budget_.kind == Kind::rays)
+            return std::min(static_cast<double>(rays_left()) / kMostRaysOfSunlight, kMostSamples);
+        return std::min(kNextPart * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())), kMostSamples);
     }
 
     struct RaysEach {
@@ -278,22 +332,29 @@ private:
     }
     /// Where the next pass shall lead; no further than the last: there is none.
     [[nodiscard]] Stage wanted(std::size_t pass) const {
-        constexpr double kMost = std::numeric_limits<std::uint32_t>::max();  // what the account can hold
         const SamplePlan& plan = passes_.plan();
         if (budget_.kind == Kind::passes)
             return recorded_step() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
         if (budget_.kind == Kind::rays) {
-            const auto left = static_cast<double>(rays_left());
+            const double left = static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays));
             if (left < kRest * static_cast<double>(budget_.rays)) return stage_;
             const double part = adaptive_ ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
-            return plan.reach(stage_, std::min(part * left, kMost), each_.sample, each_.path);
+            return plan.reach(stage_, std::min(part * left, kMostSamples), each_.sample, each_.path);
         }
         if (!worth_a_pass()) return stage_;
-        const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_left()));
-        return plan.reach(stage_, std::min(std::floor((pass == 0 ? kFirstPart : kNextPart) * fitting), kMost));
+        const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_for_samples()));
+        return plan.reach(stage_,
+                          std::min(std::floor((pass == 0 ? kFirstPart : kNextPart) * fitting), kMostSamples));
     }
     [[nodiscard]] bool worth_a_pass() const {
-        return static_cast<double>(ns_left()) >= kRest * static_cast<double>(time_given());
+        return static_cast<double>(ns_for_samples()) >= kRest * static_cast<double>(time_given());
+    }
+    [[nodiscard]] std::int64_t ns_for_samples() const {
+        return ns_left() - static_cast<std::int64_t>(for_sunlight(static_cast<double>(time_given())));
+    }
+    /// The part of the budget that uniform passes leave.
+    [[nodiscard]] double for_sunlight(double budget) const {
+        return sunlight_planned_ ? kSunlightPart * budget : 0;
     }
 
     /// A plan is made to its end, whatever the time: it is begun only where it leaves some for samples.
@@ -321,7 +382,7 @@ private:
     const std::int64_t start_ns_, slack_ns_;
     const FrameSettings centre_settings_, sample_settings_;
     const Frame centre_, sample_;
-    const bool has_indirect_, adaptive_;
+    const bool has_indirect_, adaptive_, sunlight_apart_;
     RadianceImage& out_;
     std::vector<float>* const variance_;
 
@@ -329,6 +390,7 @@ private:
     const Frame* frame_ = nullptr;  ///< whose tiles and G-buffer the passes hold
     std::uint64_t rays_ = 0;        ///< that the budget is charged
     RaysEach each_;                 ///< of the last pass of samples
+    bool sunlight_planned_ = false;
     ToShow to_show_ = ToShow::nothing;
     int stride_ = 1;  ///< of the centres
     Stage stage_ = SamplePlan::none();

@@ -12,7 +12,7 @@ namespace narpa {
 /// Wall time of passes with all threads at work. It decides which passes begin, never what they hold.
 class PassCosts {
 public:
-    enum class Of : std::uint8_t { centres, plan, samples, show };
+    enum class Of : std::uint8_t { centres, plan, samples, sunlight, show };
 
     void note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept;
     /// A pass was expected to take too long, and so was not measured: lowers the estimate a little, so that one bad
@@ -28,9 +28,9 @@ public:
 
 private:
     static constexpr std::size_t index(Of what) noexcept { return static_cast<std::size_t>(what); }
-    std::array<double, 4> ns_{100, 30, 200, 10};  ///< each; guesses at first
-    std::array<double, 4> least_ns_{};            ///< lower bound of what doubt leaves
-    std::array<std::uint8_t, 4> measurements_{};  ///< so far; 2: two or more
+    std::array<double, 5> ns_{100, 30, 200, 100, 10};  ///< each; guesses at first
+    std::array<double, 5> least_ns_{};                 ///< lower bound of what doubt leaves
+    std::array<std::uint8_t, 5> measurements_{};       ///< so far; 2: two or more
 };
 
 /// Makes the frame; its settings' budget is of any kind but `samples`. `variance` may be null.

@@ -292,6 +292,7 @@ void FramePasses::show_centres(const Frame& f, int stride, RadianceImage& out) {
 void FramePasses::make_plan(const Frame& f, bool adaptive) {
     if (!plan_) plan_.emplace(g_buffer_.tiles());
     if (means_.empty()) means_.resize(g_buffer_.tiles());
+    if (f.separate_sun && !sunlight_plan_) sunlight_plan_.emplace(g_buffer_.tiles());
     if (!adaptive) return plan_->make_uniform(f, tiles_);
     plan_->weigh(f, g_buffer_, tiles_);
     over_tiles(f, Sums::errors, {},
@@ -316,6 +317,25 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
                   [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& light) {
                       add_samples(b, light, means);
                       if (fill) g_buffer_.store(f, p, light, b.place, t.index);
+                  });
+    });
+}
+
+void FramePasses::plan_sunlight(const Frame& f) {
+    if (!sunlight_plan_) sunlight_plan_.emplace(g_buffer_.tiles());
+    sunlight_plan_->weigh(f, g_buffer_, tiles_);
+}
+
+PassCount FramePasses::refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to,
+                                       const PassLimit& limit) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        w.with_paths = false;
+        const auto begin = [&](std::size_t) { return each; };
+        const auto end = [&](std::size_t at) { return std::max(each, sunlight_plan_->count(t.index, at, to)); };
+        PerPixel<PixelMeans>& means = means_[t.index];
+        w.samples(t, camera_.width, begin, end,
+                  [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
+                      add_samples(b, light, means);
                   });
     });
 }

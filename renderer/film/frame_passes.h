@@ -62,7 +62,15 @@ public:
     /// The samples that stage `to` has beyond stage `from`.
     PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
                      Tiles which = Tiles::all);
-    /// Shows the pixels' means at a stage.
+
+    /// Where direct sunlight is apart: plans further samples of it from the contrasts of the centres, which belong
+    /// to a frame by direct light.
+    void plan_sunlight(const Frame& f);
+    [[nodiscard]] const SamplePlan& sunlight_plan() const noexcept { return *sunlight_plan_; }
+    /// Of each pixel, samples of direct sunlight alone from `each` up to what that plan has at the stage `to`.
+    PassCount refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to, const PassLimit& limit);
+
+    /// Shows the pixels' means at a stage of the plan.
     void show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out, std::vector<float>* variance);
 
     /// Of the image that `uniform` or `show_means` has shown last, or of the centres that were planned from.
@@ -95,7 +103,7 @@ private:
     Rgb background_{};                ///< of the others
     std::vector<FrameError> errors_;  ///< of each chunk of tiles
 
-    std::optional<SamplePlan> plan_;  ///< made when a frame first needs it, as are:
+    std::optional<SamplePlan> plan_, sunlight_plan_;  ///< made when a frame first needs them, as are:
     std::vector<PerPixel<PixelMeans>> means_;
 
     // Tiles that still have the background in the image that was last written, and which that was.

@@ -119,6 +119,8 @@ SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), 
 
 void SamplePlan::weigh(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
     uniform_ = false;
+    if (tiles.size() < weights_.size())
+        for (PerPixel<Weight>& w : weights_) w.fill(-1);
     over_tiles(tiles, [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) contrast_tile(f, g_buffer, tiles[i]);
     });
@@ -205,6 +207,23 @@ std::uint64_t SamplePlan::total_paths(Stage stage) const noexcept {
     for (int rank = 0; rank < kRanks; ++rank)
         sum += pixels_of_rank_[static_cast<std::size_t>(rank)] * paths_of(of_rank(rank, stage));
     return sum;
+}
+
+std::uint64_t SamplePlan::total_beyond(std::uint32_t each, Stage stage) const noexcept {
+    std::uint64_t sum = 0;
+    for (int w = 0; w < kWeights; ++w)
+        sum += std::uint64_t{histogram_[static_cast<std::size_t>(w)].load(std::memory_order_relaxed)} *
+               (std::max(count(static_cast<Weight>(w), stage), each) - each);
+    return sum;
+}
+
+SamplePlan::Stage SamplePlan::reach_beyond(std::uint32_t each, double samples) const noexcept {
+    int within = -kWeights, beyond = kFull + 1;
+    while (within + 1 < beyond) {
+        const int middle = within + (beyond - within) / 2;
+        (static_cast<double>(total_beyond(each, {middle})) <= samples ? within : beyond) = middle;
+    }
+    return {within};
 }
 
 SamplePlan::Stage SamplePlan::reach(Stage from, double rays, double each_sample, double each_path) const noexcept {

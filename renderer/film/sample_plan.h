@@ -13,7 +13,8 @@
 ///
 /// Uniform sampling, for all other frames: every pixel gets the same number, those of the tiles of a fixed pattern
 /// one more; whole tiles, as their paths are reused together. With paths, noise is everywhere, and an adaptive plan
-/// measured no better at equal error (docs/performance.md).
+/// measured no better at equal error (docs/performance.md). But where direct sunlight is apart, it gets samples of
+/// its own by an adaptive plan beside the uniform one.
 #pragma once
 
 #include <algorithm>
@@ -65,6 +66,13 @@ public:
     /// The furthest stage that takes no more than this many rays beyond those of `from`, so many for each sample
     /// and each path.
     [[nodiscard]] Stage reach(Stage from, double rays, double each_sample = 1, double each_path = 0) const noexcept;
+
+    /// Uniform: the most samples of any pixel.
+    [[nodiscard]] static std::uint32_t most(Stage stage) noexcept { return of_rank(0, stage); }
+    /// Adaptive: samples of all pixels beyond so many for each.
+    [[nodiscard]] std::uint64_t total_beyond(std::uint32_t each, Stage stage) const noexcept;
+    /// The furthest stage with no more than so many of these.
+    [[nodiscard]] Stage reach_beyond(std::uint32_t each, double samples) const noexcept;
 
     [[nodiscard]] const TileContrast& contrast(std::size_t tile) const noexcept { return contrasts_[tile]; }
 

@@ -71,6 +71,7 @@ public:
 
     const Frame& f;
     FrameError error;
+    bool with_paths = true;  ///< false: the direct light of a frame in two parts alone (BatchRadiance)
 
     [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
     [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
@@ -90,7 +91,7 @@ public:
     template <class Begin, class End, class Sink>
     void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
         set_centres(false);
-        const std::uint32_t most = f.sun_only ? PixelRange::kAll : kMaxPixelSamples;
+        const std::uint32_t most = f.sun_only || !with_paths ? PixelRange::kAll : kMaxPixelSamples;
         bool left = true;
         for (std::uint32_t done = 0; left; done += most) {
             left = false;
@@ -163,8 +164,8 @@ private:
         trace_rays(f, b.samples, tile.bodies, p);
         const std::uint32_t all = lanes_below(b.samples.n);
         b.direct_lanes = f.sun_only || f.separate_sun ? all : 0;
-        b.path_lanes = f.sun_only ? 0 : all;
-        if (f.separate_sun)
+        b.path_lanes = f.sun_only || !with_paths ? 0 : all;
+        if (f.separate_sun && with_paths)
             for_each_lane(all, [&](std::size_t i) {
                 if (!has_path(b.samples.sample[i])) b.path_lanes &= ~(1u << i);
                 p.sample[i] = paths_of(b.samples.sample[i]);

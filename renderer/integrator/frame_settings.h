@@ -5,9 +5,11 @@
 /// light the first samples are the pixels' centres. Their contrasts decide where further samples go, and they are
 /// discarded there: numbers of samples that depend on these samples bias the mean (D. Kirk, J. Arvo, "Unbiased
 /// sampling techniques for image synthesis", SIGGRAPH 1991). All other light gets uniform passes, of which all
-/// samples count. The number of samples of a pass is fixed before it begins, and a pass that does not end in time
-/// is discarded whole. So a frame follows from the scene, the poses, its number, the seed and the sizes of its
-/// passes: the clock only chooses these.
+/// samples count. Where paths only add to direct sunlight, and there is enough for many samples, the centres come
+/// first here too; after the uniform passes their contrasts decide where further samples of that sunlight go. The
+/// number of samples of a pass is fixed before it begins, and a pass that does not end in time is discarded whole.
+/// So a frame follows from the scene, the poses, its number, the seed and the sizes of its passes: the clock only
+/// chooses these.
 #pragma once
 
 #include <array>
@@ -20,6 +22,8 @@
 namespace narpa {
 
 inline constexpr std::size_t kMaxPasses = 8;  ///< after the first
+/// Frames by paths with direct sunlight apart: the pass of samples of that alone.
+inline constexpr std::size_t kSunlightPass = kMaxPasses - 1;
 
 /// How far a frame got, best first. Stated in its ledger.
 enum class FrameStep : std::uint8_t {
@@ -55,7 +59,7 @@ struct FrameAccount {
     std::uint64_t samples = 0;  ///< through the camera, of the passes that count
     std::uint64_t rays = 0;     ///< of all kinds but subpixel bodies', of the passes that count
     std::uint64_t rays_discarded = 0;
-    std::array<std::uint32_t, kMaxPasses> passes{};  ///< camera samples of each pass after the first, then 0
+    std::array<std::uint32_t, kMaxPasses> passes{};  ///< camera samples of each pass after the first; 0: none
     /// Root mean square over the pixels of the standard error of a pixel's mean band, W m^-2 sr^-1; negative: not
     /// estimated.
     double standard_error = -1;

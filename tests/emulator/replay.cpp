@@ -204,20 +204,23 @@ TEST_F(ReplayTest, ARowOfTheLedgerReadsBackBitForBit) {
     l.budget = 60'000'000;
     l.samples = 400;
     l.rays = 1'000'000'000'007;
-    l.passes = {300, 99};
     l.samples_per_pixel = 0.1F;
     l.expected_error = 1.0F / 3;
     l.t_pose_ns = -5;
     l.t_hand_over_ns = 700'000'000'123;
     std::array<char, 512> row;
-    const std::size_t size = format_ledger_row(row, l, 0x00C0FFEE);
-    ASSERT_GT(size, 0U);
-    std::ofstream(folder_ / "l.csv") << ledger_header() << "\n" << std::string_view(row.data(), size);
-    const auto frames = read_ledger_log(folder_ / "l.csv");
-    ASSERT_TRUE(frames) << frames.error().text();
-    ASSERT_EQ(frames->size(), 1U);
-    EXPECT_TRUE(frames->front().ledger == l);
-    EXPECT_EQ(frames->front().image_crc32, 0x00C0FFEEU);
+    for (const FrameLedger::Passes& passes :
+         {FrameLedger::Passes{}, FrameLedger::Passes{300, 99}, FrameLedger::Passes{300, 0, 0, 0, 0, 0, 0, 99}}) {
+        l.passes = passes;
+        const std::size_t size = format_ledger_row(row, l, 0x00C0FFEE);
+        ASSERT_GT(size, 0U);
+        std::ofstream(folder_ / "l.csv") << ledger_header() << "\n" << std::string_view(row.data(), size);
+        const auto frames = read_ledger_log(folder_ / "l.csv");
+        ASSERT_TRUE(frames) << frames.error().text();
+        ASSERT_EQ(frames->size(), 1U);
+        EXPECT_TRUE(frames->front().ledger == l);
+        EXPECT_EQ(frames->front().image_crc32, 0x00C0FFEEU);
+    }
     EXPECT_EQ(format_ledger_row(std::span(row).first(20), l, 0), 0U);
 }
 
@@ -278,6 +281,7 @@ TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     bad_cell("frame", "1x", "nav.ledger.csv:3:1: frame: \"1x\", expected a whole number");
     bad_cell("step", "6", "step: \"6\", expected a step, 0 to 5");
     bad_cell("passes", "5;;7", "passes: \"5;;7\", expected at most 8 numbers of samples");
+    bad_cell("passes", "5;0", "passes: \"5;0\", expected at most 8 numbers of samples");
     bad_cell("passes", "4000000000", "together at most as many as the frame's");
     bad_cell("budget_kind", "money", "budget_kind: \"money\", expected samples, rays or time");
     bad_cell("deadline_met", "yes", "deadline_met: \"yes\", expected 0 or 1");

@@ -119,6 +119,22 @@ TEST(BudgetError, EstimateIsHonestWherePathsMakeNoise) {
     }
 }
 
+TEST(BudgetError, SamplesOfSunlightAloneReduceItWherePathsOnlyAddToSunlight) {
+    const BudgetView v = craft_over_a_globe();
+    const std::vector<double> truth = truth_of(v, 1024, Method::path);
+    for (const double rays : {8.0, 32.0}) {
+        FrameSettings with = rays_a_pixel(v, rays, 0, Method::path), without = with;
+        without.mechanisms.sample_plan = false;
+        const bool planned = render(v, with).account.passes[kSunlightPass] > 0;
+        EXPECT_EQ(planned, rays > 20);
+        EXPECT_EQ(render(v, without).account.passes[kSunlightPass], 0u);
+        if (!planned) continue;
+        const Errors e = errors_of(v, truth, with, 6);
+        expect_honest(e);
+        EXPECT_LT(e.measured, 0.95 * errors_of(v, truth, without, 6).measured);
+    }
+}
+
 TEST(BudgetError, IsNotEstimatedWhereLightIsLeftOutOrPixelsAreCoarse) {
     const BudgetView v = craft_over_a_globe();
     for (const FrameStep step :

@@ -54,8 +54,8 @@ void expect_the_same(const Shown& a, const Shown& b) {
 
 TEST(BudgetFrame, RaysGiveTheSameBytesTwentyTimesOnAnyThreadsUnderAnyLoad) {
     const BudgetView v = craft_over_a_globe(48, 35);
-    for (const Method method : {Method::direct, Method::path}) {
-        const FrameSettings s = rays_a_pixel(v, method == Method::direct ? 5 : 12, 3, method);
+    for (const auto& [method, rays] : {std::pair{Method::direct, 5}, {Method::path, 12}, {Method::path, 40}}) {
+        const FrameSettings s = rays_a_pixel(v, rays, 3, method);
         const Shown first = render_on(1, v, s);
         EXPECT_EQ(first.account.step, FrameStep::refined);
         for (int run = 0; run < 20; ++run) {
@@ -220,6 +220,22 @@ TEST(BudgetFrame, WhatTheClockCutsOffLeavesNoTrace) {
     EXPECT_GT(cut, 0);
 }
 
+TEST(BudgetFrame, HasSamplesOfSunlightAloneWhereTimeAllowsAndIsMadeAnewWithThem) {
+    const BudgetView v = craft_over_a_globe();
+    CameraRenderer renderer(v.render_scene, v.camera);
+    bool any = false;
+    // A busy machine may leave too little time: more each time.
+    for (std::uint32_t frame = 0; frame < 12 && !any; ++frame) {
+        FrameSettings s = rays_a_pixel(v, 0, frame, Method::path);
+        s.budget.kind = Kind::time;
+        s.budget.deadline_ns = now_ns() + 200'000'000 * (1 + std::int64_t{frame});
+        const Shown shown = render(renderer, v, s);
+        any = shown.account.passes[kSunlightPass] > 0;
+        EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(s, shown.account)).image)) << frame;
+    }
+    EXPECT_TRUE(any);
+}
+
 TEST(BudgetFrame, AllocatesNothingAfterTheFirstFrame) {
     if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer has the heap";
     const BudgetView v = craft_over_a_globe();
@@ -228,7 +244,7 @@ TEST(BudgetFrame, AllocatesNothingAfterTheFirstFrame) {
     const auto frames = [&](std::uint32_t n) {
         for (std::uint32_t i = 0; i < n; ++i)
             for (const Method method : {Method::direct, Method::path})
-                for (const double rays : {0.1, 2.0, 8.0})
+                for (const double rays : {0.1, 2.0, 8.0, 30.0})
                     renderer.render(v.at, v.pose, rays_a_pixel(v, rays, i, method), image);
     };
     tbb::task_arena arena(2);

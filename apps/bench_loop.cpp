@@ -67,7 +67,7 @@ Outcome bench_loop(LoopBenchOptions o) {
         if (!cpus) return cpus.error();
         o.run.cpus = *std::move(cpus);
     }
-    if (auto made = make_folder_of(o.plot); !made) return made.error();
+    if (auto made = make_folder_of_picture(o.plot); !made) return made.error();
     keep_heap();
     auto scene = scene_or_shipped(o.scene, "docking/docking.toml");
     if (!scene) return scene.error();

@@ -78,7 +78,7 @@ void print_table(const Ladder& ladder, const Camera& c) {
 Outcome bench_render(RenderBenchOptions o) {
     if (o.ladder.ablation && o.ladder.scenes.empty()) o.ladder.scenes = {"all"};
     if (o.ladder.quick && o.ladder.scenes.empty()) return Error{"--quick needs --scenes or --ablation"};
-    if (auto made = make_folder_of(o.plot); !made) return made.error();
+    if (auto made = make_folder_of_picture(o.plot); !made) return made.error();
     if (!o.ladder.scenes.empty()) {
         o.ladder.threads = o.threads;
         o.ladder.plot = o.plot;

@@ -48,6 +48,8 @@ nlohmann::json to_json(const Error& e);
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
 /// Makes the folder of a file that is to be written; nothing where `file` is empty.
 Status make_folder_of(const std::string& file);
+/// The same of a picture that narpa-plot draws; an Error where its extension is none that it knows.
+Status make_folder_of_picture(const std::string& file);
 /// "NAME=VALUE" -> {NAME, VALUE}; an Error that names what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);
 

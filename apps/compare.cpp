@@ -25,7 +25,27 @@ struct CompareOptions {
     PoseOptions pose;
     double time_s = 0;
     int spp = 64, threads = 0;
+    std::optional<double> least_overlap, least_correlation, most_shift_px;
 };
+
+/// The limits that the comparison misses, a sentence each.
+std::vector<std::string> faults_of(const FrameComparison& c, const CompareOptions& o) {
+    std::vector<std::string> faults;
+    if (o.least_overlap && c.overlap() < *o.least_overlap)
+        faults.push_back(fmt::format("overlap {:.4f}, expected at least {:g}", c.overlap(), *o.least_overlap));
+    if (o.least_correlation && c.correlation.value_or(-1) < *o.least_correlation)
+        faults.push_back(fmt::format("correlation {}, expected at least {:g}",
+                                     c.correlation ? fmt::format("{:.4f}", *c.correlation) : "not known",
+                                     *o.least_correlation));
+    if (!o.most_shift_px) return faults;
+    const double shift_px = c.shift ? std::hypot(c.shift->x_px, c.shift->y_px) : 0;
+    if (!c.shift || c.shift->is_at_limit || shift_px > *o.most_shift_px)
+        faults.push_back(fmt::format(
+            "shift {}, expected at most {:g} px",
+            c.shift ? fmt::format("{:.2f} px{}", shift_px, c.shift->is_at_limit ? " or more" : "") : "not known",
+            *o.most_shift_px));
+    return faults;
+}
 
 template <class T>
 nlohmann::json or_null(const std::optional<T>& value) {
@@ -105,13 +125,11 @@ Status check_output(const CompareOptions& o) {
     namespace fs = std::filesystem;
     if (o.out.empty()) return Ok{};
     const fs::path out(o.out);
-    if (out.extension() != ".png" && out.extension() != ".svg" && out.extension() != ".pdf")
-        return Error{"expected the name of a picture, FILE.png, .svg or .pdf", o.out};
     std::error_code none;
     for (const fs::path& file : {out, fs::path(out).replace_extension(".json")})
         if (fs::equivalent(file, o.frame, none))
             return Error{"would replace the frame, expected another name", o.out};
-    return make_folder_of(o.out);
+    return make_folder_of_picture(o.out);
 }
 
 /// As `narpa render` makes it, but with samples of its own: an emulated frame may have the scene's.
@@ -157,7 +175,10 @@ Outcome compare(const CompareOptions& o) {
     const std::string title =
         fmt::format("{}: {} in camera {}", o.frame, (*world)->scene().bodies[*target].name, camera.name);
     say(title + "\n" + words_of(*found));
+    const std::vector<std::string> faults = faults_of(*found, o);
+    for (const std::string& fault : faults) say("failed: " + fault);
     nlohmann::json document = numbers_of(*found);
+    document["passed"] = faults.empty(), document["faults"] = faults;
     document["frame"] = o.frame, document["camera"] = camera.name;
     document["target"] = (*world)->scene().bodies[*target].name;
     if (o.out.empty()) return document;
@@ -192,7 +213,13 @@ Command add_compare(Parser app) {
              "Frame, render and residuals side by side; their numbers in FILE.json beside it")
         .type_name("FILE.png");
     c.group("Results");
-    c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png"});
+    for (const Option& option :
+         {c.option("--min-overlap", o->least_overlap, "Of the lit pixels, lit in both").range(0.0, 1.0),
+          c.option("--min-correlation", o->least_correlation, "Of their brightness").range(-1.0, 1.0),
+          c.option("--max-shift", o->most_shift_px, "Of the target").type_name("PX").range(0.0, 32.0)})
+        (void)option.group("Limits: exit status 1 where one is missed");
+    c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png",
+                "narpa compare docking --frame out/frame.png --min-overlap 0.95 --max-shift 0.5"});
     return [o] { return compare(*o); };
 }
 

@@ -347,8 +347,8 @@ Outcome estimate(EstimateOptions o) {
             return Error{fmt::format("{} goes with {}", option.name(),
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
-    for (const std::string& file : {o.csv, o.picture})
-        if (auto made = make_folder_of(file); !made) return made.error();
+    if (auto made = make_folder_of(o.csv); !made) return made.error();
+    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
     if (of_log) return estimate_log(o, *tracker);
     if (tracker->range_guess_m > 0 && !o.sweep.empty())
         return Error{"a range is guessed for frames, not for a sweep, which measures it"};

@@ -39,6 +39,13 @@ Status make_folder_of(const std::string& file) {
     return Ok{};
 }
 
+Status make_folder_of_picture(const std::string& file) {
+    const auto extension = std::filesystem::path(file).extension();
+    if (!file.empty() && extension != ".png" && extension != ".svg" && extension != ".pdf")
+        return Error{"expected the name of a picture, FILE.png, .svg or .pdf", file};
+    return make_folder_of(file);
+}
+
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected) {
     const std::size_t at = text.find('=');
     if (at == std::string::npos || at == 0 || at + 1 == text.size())

@@ -100,7 +100,7 @@ Outcome replay(const ReplayOptions& o) {
     if (!o.picture.empty() && o.reference == 0)
         return Error{
             fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
-    if (auto made = make_folder_of(o.picture); !made) return made.error();
+    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
     auto run = Replay::open(o.folder, o.camera, o.scene);
     if (!run) return run.error();
     const std::string& camera = (*run)->camera().name;

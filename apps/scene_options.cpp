@@ -97,6 +97,14 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
     if (trajectory.empty()) return Ok{};
     auto rows = read_trajectory(trajectory);
     if (!rows) return rows.error();
+    for (const std::string& text : poses) {
+        const std::string body = text.substr(0, text.find('='));
+        const auto row = std::ranges::find(*rows, body, &TrajectoryRow::body);
+        if (row != rows->end())
+            return Error{
+                fmt::format("has poses of body \"{}\", and --pose has another, expected one of both", body),
+                trajectory, row->line};
+    }
     return world.load(*rows, t_from_ns, t_to_ns);
 }
 

@@ -34,21 +34,23 @@ Status check_budget(const Scene& scene, const RunOptions& options) {
     return Ok{};
 }
 
-/// Two writers of one file or device would overwrite each other's items.
-Status check_files(const RunOptions& options) {
+/// Two writers of one file or device would overwrite each other's items; packets of two LiDARs to one port could
+/// not be told apart, as they come from one address.
+Status check_destinations(const RunOptions& options) {
     namespace fs = std::filesystem;
     std::set<fs::path> taken;
     for (const auto& [flag, outputs] : {std::pair{"--video", &options.video}, {"--lidar", &options.lidar}}) {
         for (const auto& [name, sink] : *outputs) {
             std::error_code unknown;
+            const bool is_udp = sink.starts_with("udp:");
             const bool is_device_or_fifo = fs::is_other(sink, unknown);
-            if (!is_device_or_fifo && !sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
-            const fs::path file = fs::weakly_canonical(fs::absolute(sink, unknown), unknown);
-            if (!unknown && !taken.insert(file).second)
+            if (!is_udp && !is_device_or_fifo && !sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
+            const fs::path place = is_udp ? fs::path(sink.substr(0, sink.find(',')))
+                                          : fs::weakly_canonical(fs::absolute(sink, unknown), unknown);
+            if ((is_udp || !unknown) && !taken.insert(place).second)
                 return Error{
-                    fmt::format("{} {}={}: another output goes there too, expected a file or device of its "
-                                "own for each",
-                                flag, name, sink)};
+                    fmt::format("{} {}={}: another output goes there too, expected a {} of its own for each", flag,
+                                name, sink, is_udp ? "port" : "file or device")};
         }
     }
     return Ok{};
@@ -193,7 +195,7 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
     if (options.lockstep && options.bus.empty())
         return Error{"--lockstep needs --can BUS: the clock advances only with commands"};
     if (auto good = check_budget(scene, options); !good) return good.error();
-    if (auto good = check_files(options); !good) return good.error();
+    if (auto good = check_destinations(options); !good) return good.error();
     auto world = World::create(std::move(scene));
     if (!world) return world.error();
     if (options.lockstep && !(*world)->has_commanded_bodies())

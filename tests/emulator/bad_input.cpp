@@ -48,6 +48,11 @@ constexpr const char* kHeader =
     "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n0,b,0,0,x,1,0,0,0,0,0,0,0,0,"
     "0\n";
 
+constexpr const char* kFlight =
+    "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n0,chaser,0,0,1,1,0,0,0,0,0,"
+    "0,0,0,"
+    "0\n";
+
 INSTANTIATE_TEST_SUITE_P(
     All, BadInput,
     ::testing::Values(
@@ -91,12 +96,19 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"OneCaptureTwice",
                 "run SCENE --duration 0.1 --lidar top=FOLDERz.pcap --lidar top=none --lidar top=FOLDERz.pcap",
                 nullptr, 2, "z.pcap: another output goes there too"},
+        Mistake{"OneUdpPortTwice",
+                "run SCENE --duration 0.1 --lidar top=udp:127.0.0.1:2368 --lidar top=udp:127.0.0.1:2368,ttl=2",
+                nullptr, 2, "udp:127.0.0.1:2368,ttl=2: another output goes there too, expected a port"},
         Mistake{"NothingToPutOut", "run SCENE", nullptr, 2, "--video"},
         Mistake{"ProcessorsInLockstep", "run SCENE --lockstep --cpus 0 --can log:none --video nav=none", nullptr, 2,
                 "--lockstep excludes --cpus"},
         Mistake{"LockstepWithoutABus", "run SCENE --lockstep --video nav=none", nullptr, 2, "--can"},
         // Pictures and scans
         Mistake{"UnknownImageKind", "render SCENE -o FOLDERa.gif", nullptr, 2, "a.gif"},
+        Mistake{"UnknownPlotKind", "bench loop -o FOLDERa.gif", nullptr, 2,
+                "a.gif: expected the name of a picture"},
+        Mistake{"PoseBesideATrajectory", "render SCENE --trajectory BAD --pose chaser=0,0,0,1,0,0,0 -o FOLDERa.png",
+                kFlight, 2, "bad.toml:2: has poses of body \"chaser\", and --pose has another"},
         Mistake{"FolderThatCannotBeMade", "render SCENE -o /proc/nowhere/a.png", nullptr, 2, "/proc/nowhere/a.png"},
         Mistake{"DepthWithoutPaths", "render SCENE --max-depth 3 -o FOLDERa.png", nullptr, 2, "--max-depth"},
         Mistake{"OutputsThatAPngCannotHold", "render SCENE --aov depth -o FOLDERa.png", nullptr, 2, "FILE.exr"},

@@ -309,10 +309,10 @@ TEST_F(EstimateTest, ComparesAFrameWithARender) {
     ASSERT_EQ(
         narpa_does("render " + scene + " --pose chaser=20,0.5,-0.4,0,0,0,1 --spp 64 --seed 7 -o " + frame).status,
         0);
-    const auto compared = [&](const std::string& y, const std::string& options = "") {
+    const auto compared = [&](const std::string& y, const std::string& options = "", int status = 0) {
         const Done done = narpa_does("compare " + scene + " --pose chaser=20," + y + ",-0.4,0,0,0,1 --frame " +
                                      frame + " --json " + options);
-        EXPECT_EQ(done.status, 0) << done.out;
+        EXPECT_EQ(done.status, status) << done.out;
         return json::parse(done.out.substr(done.out.find("\n{") + 1));
     };
     const json right = compared("0.5", "-o " + (folder_ / "comparison.png")), aside = compared("0.6");
@@ -327,6 +327,9 @@ TEST_F(EstimateTest, ComparesAFrameWithARender) {
     EXPECT_NEAR(std::abs(aside["shift"]["x_px"].get<double>()), 3.2, 0.8);
     EXPECT_NEAR(aside["shift"]["y_px"].get<double>(), 0, 0.2);
     EXPECT_NEAR(aside["gain"].get<double>(), 1, 0.03);
+    const std::string limits = "--min-overlap 0.9 --min-correlation 0.99 --max-shift 0.5";
+    EXPECT_TRUE(compared("0.5", limits)["faults"].empty());
+    EXPECT_EQ(compared("0.6", limits, 1)["faults"].size(), 3U);
     const Done dark = narpa_does("compare " + scene + " --pose chaser=-200,0,0,0,0,0,1 --frame " + frame);
     EXPECT_EQ(dark.status, 1) << dark.out;
     EXPECT_NE(dark.out.find("shows the target lit in 0 pixels"), std::string::npos) << dark.out;

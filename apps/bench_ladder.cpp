@@ -80,10 +80,13 @@ Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingTh
     settings.frames = o.quick ? kQuick : kLadderFrames;
     if (o.ablation) {
         settings.loop_spp.clear();
-        if (s.method == Method::path)
-            settings.spp = {8, 16, 32}, settings.rays_per_pixel.clear();
+        settings.spp.clear(), settings.rays_per_pixel.clear();
+        if (s.method == Method::direct)
+            settings.rays_per_pixel = {4, 8, 16};
+        else if ((*world)->scene().sun)
+            settings.rays_per_pixel = {8, 16, 32};
         else
-            settings.rays_per_pixel = {4, 8, 16}, settings.spp.clear();
+            settings.spp = {8, 16, 32};
         settings.ablation = true;
     } else if (s.far && !o.quick) {
         settings.spp.push_back(64);

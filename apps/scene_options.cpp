@@ -102,7 +102,7 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
         const auto row = std::ranges::find(*rows, body, &TrajectoryRow::body);
         if (row != rows->end())
             return Error{
-                fmt::format("has poses of body \"{}\", and --pose has another, expected one of both", body),
+                fmt::format("has poses of body \"{}\", and --pose has another, expected only one of the two", body),
                 trajectory, row->line};
     }
     return world.load(*rows, t_from_ns, t_to_ns);

@@ -88,7 +88,7 @@ void CameraUnit::warm_up() {
     if (all.kind != FrameBudget::Kind::samples) {
         all.kind = FrameBudget::Kind::passes;
         all.step = static_cast<std::uint8_t>(FrameStep::refined);
-        all.passes[0] = static_cast<std::uint32_t>(radiance_.pixels.size());
+        all.passes[0] = all.passes[kSunlightPass] = static_cast<std::uint32_t>(radiance_.pixels.size());
     }
     embed(expose(0, 0, all, nullptr, nullptr));
 }

@@ -51,8 +51,8 @@ struct FrameLedger {
     std::uint64_t budget = 0;     ///< in the units of its kind
     std::uint64_t samples = 0;    ///< through the camera
     std::uint64_t rays = 0;       ///< of all kinds
-    Passes passes{};              ///< camera samples of each pass after the first; of frames by
-                                  ///< paths, the last are of direct sunlight alone
+    Passes passes{};              ///< camera samples of each pass after the first; by paths in
+                                  ///< sunlight alone, the last are of direct sunlight
     float samples_per_pixel = 0;  ///< mean over the image
     float expected_error = -1;    ///< standard error of a pixel, root mean square over the image,
                                   ///< as a fraction of full scale; negative: not estimated

@@ -29,10 +29,11 @@ constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
 constexpr double kSure = 0.85;
 /// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
 constexpr std::uint64_t kPixelsOfACoarseRay = 4;
-/// Direct sunlight that is apart gets samples of its own, with this part of the budget, where that is enough for so
-/// many rays or samples for each pixel.
+/// Direct sunlight that is apart gets samples of its own, with this part of the budget: where that has so many rays
+/// or samples for each pixel, and on this part of the surfaces the sunlight is apart.
 constexpr double kSunlightPart = 0.22;
 constexpr double kRaysForSunlight = 20, kSamplesForSunlight = 6;
+constexpr double kMostlyApart = 0.5;
 constexpr double kMostRaysOfSunlight = 2;  ///< of a sample: the camera's and the Sun's
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
@@ -70,9 +71,11 @@ public:
 
     FrameAccount make() {
         account_.step = FrameStep::nothing;
-        begin(adaptive_ ? centre_ : sample_);
-        if (sunlight_apart_ && worth_sunlight()) plan_sunlight();
-        take_first_image();
+        begin(adaptive_ || sunlight_apart_ ? centre_ : sample_);
+        if (sunlight_apart_ && worth_sunlight() && plan_sunlight())
+            take_first_samples(limit());
+        else
+            take_first_image();
         if (account_.step == FrameStep::nothing) {  // the pilot is no part of an image
             account_.rays_discarded += account_.rays;
             account_.rays = account_.samples = 0;
@@ -101,7 +104,7 @@ private:
     void begin(const Frame& f) {
         frame_ = &f;
         passes_.begin(f, sample_.lens);
-        if (&f == &sample_ && !adaptive_) passes_.make_plan(f, false);
+        if (!adaptive_) passes_.make_plan(sample_, false);
     }
 
     // What is left.
@@ -162,6 +165,7 @@ private:
         if (which == Tiles::all) costs_.note(Of::samples, pass.samples, pass.wall_ns);
         if (!book(pass, l, which != Tiles::the_others)) return false;
         each_ = rays_each(pass);
+        mostly_apart_ = static_cast<double>(pass.apart) > kMostlyApart * static_cast<double>(pass.met);
         if (which == Tiles::a_sixteenth) return true;
         account_.step = FrameStep::one_sample;
         to_show_ = ToShow::means;
@@ -179,17 +183,31 @@ private:
             case Kind::passes: return budget_.passes[kSunlightPass] > 0;
             case Kind::rays: return static_cast<double>(budget_.rays) >= kRaysForSunlight * pixels;
             case Kind::time:
-                return costs_.known(Of::samples) &&
+                return costs_.known(Of::samples) && worth_planning() &&
                        static_cast<double>(costs_.fitting(Of::samples, ns_left())) >= kSamplesForSunlight * pixels;
         }
         return false;
     }
-    void plan_sunlight() {
-        if (!take_centres(1, 0, FrameStep::no_indirect)) return;
+    /// Leaves an image to show, by direct light.
+    bool plan_sunlight() {
+        if (!take_centres(1, 0, FrameStep::no_indirect)) return false;
         const std::int64_t start = now_ns();
         passes_.plan_sunlight(centre_);
         costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
-        sunlight_planned_ = true;
+        return sunlight_planned_ = true;
+    }
+    /// The uniform passes must have two samples for each pixel, or the error of paths is not known.
+    [[nodiscard]] bool two_samples_fit() const {
+        const auto pixels = static_cast<double>(passes_.pixels());
+        switch (budget_.kind) {
+            case Kind::rays:
+                return (each_.sample + each_.path) * pixels <
+                       kFirstRays *
+                           (static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays)));
+            case Kind::time:
+                return static_cast<double>(costs_.fitting(Of::samples, ns_for_samples())) * kFirstPart >= pixels;
+            default: return true;
+        }
     }
 
     void take_first_image() {
@@ -279,9 +297,10 @@ private:
             costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
             account_.standard_error = passes_.standard_error();
         }
+        if (sunlight_planned_) sunlight_planned_ = mostly_apart_ && two_samples_fit();
         const std::size_t passes = sunlight_apart_ ? kSunlightPass : kMaxPasses;
         for (std::size_t i = 0; i < passes; ++i) {
-            const Stage next = wanted(i);
+            const Stage next = sunlight_planned_ ? SamplePlan::whole(wanted(i)) : wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
             if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.doubt(Of::samples);
             if (samples == 0) break;
@@ -301,7 +320,7 @@ private:
 
     /// With what the uniform passes have left.
     void refine_sunlight() {
-        const std::uint32_t each = SamplePlan::most(stage_);
+        const std::uint32_t each = SamplePlan::samples_of(stage_);
         const SamplePlan& plan = passes_.sunlight_plan();
         const Stage to = plan.reach_beyond(each, sunlight_samples());
         const std::uint64_t samples = plan.total_beyond(each, to);
@@ -390,7 +409,7 @@ private:
     const Frame* frame_ = nullptr;  ///< whose tiles and G-buffer the passes hold
     std::uint64_t rays_ = 0;        ///< that the budget is charged
     RaysEach each_;                 ///< of the last pass of samples
-    bool sunlight_planned_ = false;
+    bool sunlight_planned_ = false, mostly_apart_ = false;
     ToShow to_show_ = ToShow::nothing;
     int stride_ = 1;  ///< of the centres
     Stage stage_ = SamplePlan::none();

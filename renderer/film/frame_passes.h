@@ -29,6 +29,7 @@ struct PassCount {
     bool complete = true;
     std::uint64_t samples = 0, rays = 0;
     std::uint64_t paths = 0, path_rays = 0;  ///< samples of these that paths follow; rays beyond first surfaces
+    std::uint64_t met = 0, apart = 0;        ///< samples that meet a surface; those whose direct sunlight is apart
     std::int64_t wall_ns = 0;
 };
 
@@ -67,7 +68,8 @@ public:
     /// to a frame by direct light.
     void plan_sunlight(const Frame& f);
     [[nodiscard]] const SamplePlan& sunlight_plan() const noexcept { return *sunlight_plan_; }
-    /// Of each pixel, samples of direct sunlight alone from `each` up to what that plan has at the stage `to`.
+    /// Of each pixel, samples of direct sunlight alone beyond the first `each`, up to what that plan has at the
+    /// stage `to`.
     PassCount refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to, const PassLimit& limit);
 
     /// Shows the pixels' means at a stage of the plan.

@@ -119,8 +119,6 @@ SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), 
 
 void SamplePlan::weigh(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
     uniform_ = false;
-    if (tiles.size() < weights_.size())
-        for (PerPixel<Weight>& w : weights_) w.fill(-1);
     over_tiles(tiles, [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) contrast_tile(f, g_buffer, tiles[i]);
     });
@@ -138,6 +136,10 @@ void SamplePlan::weigh(const Frame& f, const GBuffer& g_buffer, std::span<const 
         for (std::size_t w = 0; w < histogram.size(); ++w)
             if (histogram[w] > 0) histogram_[w].fetch_add(histogram[w], std::memory_order_relaxed);
     });
+}
+
+void SamplePlan::clear() noexcept {
+    for (PerPixel<Weight>& w : weights_) w.fill(-1);
 }
 
 void SamplePlan::contrast_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile) noexcept {

@@ -39,6 +39,8 @@ public:
 
     /// Adaptive: weighs the pixels of these tiles by the G-buffer, in parallel. No pixel has samples yet.
     void weigh(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles);
+    /// No pixel gets samples by `weigh`, but for those of the tiles that are given to it from now on.
+    void clear() noexcept;
     /// Uniform, over these tiles of the frame's image.
     void make_uniform(const Frame& f, std::span<const std::uint32_t> tiles);
     [[nodiscard]] bool is_uniform() const noexcept { return uniform_; }
@@ -67,9 +69,12 @@ public:
     /// and each path.
     [[nodiscard]] Stage reach(Stage from, double rays, double each_sample = 1, double each_path = 0) const noexcept;
 
-    /// Uniform: the most samples of any pixel.
-    [[nodiscard]] static std::uint32_t most(Stage stage) noexcept { return of_rank(0, stage); }
-    /// Adaptive: samples of all pixels beyond so many for each.
+    /// Uniform: the stage nearest to this one at which all pixels have equally many samples, and their number.
+    [[nodiscard]] static Stage whole(Stage stage) noexcept {
+        return samples_each((std::max(stage.level, 0) + kRanks / 2) / kRanks);
+    }
+    [[nodiscard]] static std::uint32_t samples_of(Stage whole) noexcept { return of_rank(0, whole); }
+    /// Adaptive: samples beyond the first `each` of every pixel, of all pixels.
     [[nodiscard]] std::uint64_t total_beyond(std::uint32_t each, Stage stage) const noexcept;
     /// The furthest stage with no more than so many of these.
     [[nodiscard]] Stage reach_beyond(std::uint32_t each, double samples) const noexcept;

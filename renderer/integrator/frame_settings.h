@@ -5,7 +5,7 @@
 /// light the first samples are the pixels' centres. Their contrasts decide where further samples go, and they are
 /// discarded there: numbers of samples that depend on these samples bias the mean (D. Kirk, J. Arvo, "Unbiased
 /// sampling techniques for image synthesis", SIGGRAPH 1991). All other light gets uniform passes, of which all
-/// samples count. Where paths only add to direct sunlight, and there is enough for many samples, the centres come
+/// samples count. Where the Sun is the only source of direct light and the budget is large enough, the centres come
 /// first here too; after the uniform passes their contrasts decide where further samples of that sunlight go. The
 /// number of samples of a pass is fixed before it begins, and a pass that does not end in time is discarded whole.
 /// So a frame follows from the scene, the poses, its number, the seed and the sizes of its passes: the clock only

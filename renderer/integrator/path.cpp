@@ -1,6 +1,8 @@
 #include "renderer/integrator/path.h"
 
+#include <algorithm>
 #include <array>
+#include <variant>
 
 #include "renderer/integrator/wavefront.h"
 
@@ -39,6 +41,12 @@ bool sun_alone_lights_first_surfaces(const RenderScene& render_scene) noexcept {
     const Lights& lights = render_scene.lights();
     if (lights.any(Lights::Group::all) || lights.any_with_extent() || !lights.sun()) return false;
     if (render_scene.medium() != nullptr || render_scene.background().is_sampled()) return false;
+    const Scene& scene = render_scene.scene();
+    const auto is_flat = [&](const Body& b) {
+        const int* const mesh = std::get_if<int>(&b.shape);
+        return mesh == nullptr || scene.meshes[static_cast<std::size_t>(*mesh)].normals.empty();
+    };
+    if (std::ranges::none_of(scene.bodies, is_flat)) return false;
     return lights.sun()->is_point() || render_scene.scene().sun->angular_diameter_rad < kNarrowSun_rad;
 }
 

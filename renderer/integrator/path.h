@@ -81,7 +81,7 @@ inline constexpr double kNarrowSun_rad = 0.2;
 /// A lobe with a greater exponent finds a narrow Sun better than the Sun's points find the lobe.
 inline constexpr float kSharpLobe = 1000;
 /// True where the direct light of first surfaces may be added apart (Frame::separate_sun): The Sun is narrow,
-/// nothing else emits, and there is no medium.
+/// nothing else emits, there is no medium, and some body is shaded flat.
 [[nodiscard]] bool sun_alone_lights_first_surfaces(const RenderScene& render_scene) noexcept;
 /// Radiance along a camera ray that escapes, without a medium: the background and the Sun's disc.
 [[nodiscard]] Rgb escaped_radiance(const RenderScene& render_scene, const Vec3& direction) noexcept;

@@ -319,7 +319,7 @@ void Wavefront::begin_reused(std::span<const PathStart> starts) {
     }
 }
 
-/// Where sunlight outshines them, rays by the BSDF alone meet them often enough.
+/// Of unlit first surfaces only: on sunlit ones the light of small bodies is a small part, and so is its noise.
 void Wavefront::sample_small_bodies(Path& path, const PathStart& unlit) const {
     const Hit hit = (*unlit.hits)[unlit.lane];
     path.start = receiver_at(at_, hit, hit.geometric_normal);

@@ -3,7 +3,8 @@
 /// BSDF sampling alone would send one ray of a thousand to the Earth in the Moon's sky. So in scenes with a Sun a
 /// part of the rays is sent, uniformly, into the cones about the bounding spheres of other bodies; the density is
 /// that of the mixture, so the estimate is unbiased. Where other bodies fill much of the sky, and on meshes, which
-/// may light themselves, that part is smaller.
+/// may light themselves, that part is smaller; first surfaces whose sunlight is separate (Frame::separate_sun) and
+/// not zero send none.
 #pragma once
 
 #include "renderer/geometry/tracer.h"

@@ -109,6 +109,14 @@ TEST_F(ReplayTest, ARunWithABudgetInRaysRepeatsBitForBit) {
     EXPECT_GT((*frames)[2].ledger.passes[0], 0U);  // it had samples of its own to repeat
 }
 
+TEST_F(ReplayTest, SamplesOfSunlightAloneRepeatBitForBit) {
+    const std::string log = run(scene_with("method = \"path\"\nbudget_rays = 100000", kDetector), 2);
+    EXPECT_EQ(expect_repeats(log), 2U);
+    const auto frames = read_ledger_log(log + "/nav.ledger.csv");
+    ASSERT_TRUE(frames);
+    EXPECT_GT((*frames)[1].ledger.passes[kSunlightPass], 0U);
+}
+
 TEST_F(ReplayTest, ARunWithFixedSamplesRepeatsBitForBit) {
     EXPECT_EQ(expect_repeats(run(scene_with("spp = 3", kDetector))), 5U);
 }

@@ -211,6 +211,19 @@ TEST(BudgetError, FramesOfPathsHaveTheMeanOfTheReference) {
     }
 }
 
+TEST(BudgetError, FramesWithSamplesOfSunlightAloneHaveTheMeanOfTheReference) {
+    const BudgetView v = craft_over_a_globe(36, 26);
+    const std::vector<double> truth = truth_of(v, 2048, Method::path);
+    CameraRenderer renderer(v.render_scene, v.camera);
+    Bias bias;
+    for (std::uint32_t k = 0; k < 80; ++k) {
+        const Shown shown = render(renderer, v, rays_a_pixel(v, 30, k, Method::path));
+        ASSERT_GT(shown.account.passes[kSunlightPass], 0u);
+        bias.add(misses_of(shown.image, truth).mean);
+    }
+    EXPECT_LT(std::abs(bias.mean()), 4 * 1.12 * bias.sigma());
+}
+
 TEST(BudgetError, FramesThatTheClockEndsHaveTheMeanOfTheReference) {
     const BudgetView v = slatted_court();
     const std::vector<double> truth = truth_of(v, 512, Method::path);

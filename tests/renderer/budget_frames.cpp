@@ -156,7 +156,7 @@ TEST(BudgetFrame, WhatABodyHasLeftShowsTheBackground) {
     CameraRenderer renderer(v.render_scene, v.camera);
     RadianceImage image(v.camera.width, v.camera.height);
     for (const Method method : {Method::direct, Method::path})
-        for (const double rays : {0.1, 0.4, 2.0, 4.0, 16.0}) {
+        for (const double rays : {0.1, 0.4, 2.0, 4.0, 16.0, 40.0}) {
             v.at = placed(*v.scene);
             renderer.render(v.at, v.pose, rays_a_pixel(v, 4), image);
             v.at = placed(*v.scene, {0, 3, 9});
@@ -218,6 +218,36 @@ TEST(BudgetFrame, WhatTheClockCutsOffLeavesNoTrace) {
             EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(s, shown.account)).image)) << run;
         }
     EXPECT_GT(cut, 0);
+}
+
+TEST(BudgetFrame, HasNoSamplesOfSunlightAloneInTilesThatShowTheSunsDiscOnly) {
+    BudgetView v = craft_over_a_globe();
+    CameraRenderer kept(v.render_scene, v.camera);
+    const FrameSettings s = rays_a_pixel(v, 60, 1, Method::path);
+    EXPECT_GT(render(kept, v, s).account.passes[kSunlightPass], 0u);  // of other tiles
+    const Vec3 to_sun = v.scene->sun->direction;
+    const Vec3 eye = -8 * to_sun + 3.5 * normalized(cross(to_sun, {0, 0, 1}));
+    v.pose = looking(eye, eye + to_sun);
+    const Shown shown = render(kept, v, s);
+    EXPECT_GT(shown.account.passes[kSunlightPass], 0u);
+    EXPECT_GT(std::ranges::max(shown.image.pixels, {}, &Rgb::x).x, 1e5f) << "the Sun's disc";
+    expect_the_same(shown, render(v, s));
+    EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(s, shown.account)).image));
+}
+
+TEST(BudgetFrame, HasNoSamplesOfSunlightAloneWherePathsFindIt) {
+    // Surfaces of smooth shading, whose sunlight is not apart, beside one that is flat and out of view.
+    Scene s;
+    s.materials.push_back(lambert(0.5f));
+    add_mesh(s, icosphere(3, 2, true));
+    add_sphere(s, 1, {0, 0, -90});
+    add_sun(s, {0.5, -0.3, 1});
+    const BudgetView v{std::move(s), 32, 24, 40, looking({7, 3, 5}, {0, 0, 0})};
+    const FrameSettings settings = rays_a_pixel(v, 40, 1, Method::path);
+    const Shown shown = render(v, settings);
+    EXPECT_EQ(shown.account.passes[kSunlightPass], 0u);
+    EXPECT_GE(static_cast<double>(shown.account.rays), 0.85 * static_cast<double>(settings.budget.rays));
+    EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(settings, shown.account)).image));
 }
 
 TEST(BudgetFrame, HasSamplesOfSunlightAloneWhereTimeAllowsAndIsMadeAnewWithThem) {

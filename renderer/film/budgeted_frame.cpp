@@ -21,6 +21,8 @@ constexpr std::int64_t kSlackPart = 40;
 /// Of the time left, the part of the first pass of samples beyond those of all pixels, so that there soon is an
 /// image to show, and that of each of the next.
 constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
+/// The same of the samples of sunlight, whose cost varies more: should the pass be given up, all of that is lost.
+constexpr double kSunlightTimePart = 0.7;
 /// Of the rays left. Their number follows nearly exactly from that of the samples by Sun-only direct lighting; of
 /// paths it varies by a tenth from one pass to the next.
 constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
@@ -337,7 +339,8 @@ private:
         if (budget_.kind == Kind::passes) return budget_.passes[kSunlightPass];
         if (budget_.kind == Kind::rays)
             return std::min(static_cast<double>(rays_left()) / kMostRaysOfSunlight, kMostSamples);
-        return std::min(kNextPart * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())), kMostSamples);
+        return std::min(kSunlightTimePart * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())),
+                        kMostSamples);
     }
 
     struct RaysEach {

@@ -253,12 +253,13 @@ TEST(BudgetFrame, HasNoSamplesOfSunlightAloneWherePathsFindIt) {
 TEST(BudgetFrame, HasSamplesOfSunlightAloneWhereTimeAllowsAndIsMadeAnewWithThem) {
     const BudgetView v = craft_over_a_globe();
     CameraRenderer renderer(v.render_scene, v.camera);
+    const std::int64_t two_ns = ns_of_two_samples(renderer, v);
     bool any = false;
     // A busy machine may leave too little time: more each time.
     for (std::uint32_t frame = 0; frame < 12 && !any; ++frame) {
         FrameSettings s = rays_a_pixel(v, 0, frame, Method::path);
         s.budget.kind = Kind::time;
-        s.budget.deadline_ns = now_ns() + 200'000'000 * (1 + std::int64_t{frame});
+        s.budget.deadline_ns = now_ns() + 8 * two_ns * (1 + std::int64_t{frame});
         const Shown shown = render(renderer, v, s);
         any = shown.account.passes[kSunlightPass] > 0;
         EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(s, shown.account)).image)) << frame;

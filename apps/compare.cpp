@@ -214,9 +214,13 @@ Command add_compare(Parser app) {
         .type_name("FILE.png");
     c.group("Results");
     for (const Option& option :
-         {c.option("--min-overlap", o->least_overlap, "Of the lit pixels, lit in both").range(0.0, 1.0),
-          c.option("--min-correlation", o->least_correlation, "Of their brightness").range(-1.0, 1.0),
-          c.option("--max-shift", o->most_shift_px, "Of the target").type_name("PX").range(0.0, 32.0)})
+         {c.option("--min-overlap", o->least_overlap, "Least part of the pixels lit in either that is lit in both")
+              .range(0.0, 1.0),
+          c.option("--min-correlation", o->least_correlation, "Least correlation of their brightness")
+              .range(-1.0, 1.0),
+          c.option("--max-shift", o->most_shift_px, "Largest shift of the target")
+              .type_name("PX")
+              .range(0.0, 32.0)})
         (void)option.group("Limits: exit status 1 where one is missed");
     c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png",
                 "narpa compare docking --frame out/frame.png --min-overlap 0.95 --max-shift 0.5"});

@@ -31,16 +31,16 @@ constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
 constexpr double kSure = 0.85;
 /// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
 constexpr std::uint64_t kPixelsOfACoarseRay = 4;
-/// Direct sunlight that is apart gets samples of its own, with this part of the budget: where that has so many rays
-/// or samples for each pixel, and on this part of the surfaces the sunlight is apart.
+/// Separate direct sunlight gets samples of its own, with this part of the budget: where the budget has so many
+/// rays or samples for each pixel, and the sunlight of this part of the surfaces is separate.
 constexpr double kSunlightPart = 0.22;
 constexpr double kRaysForSunlight = 20, kSamplesForSunlight = 6;
-constexpr double kMostlyApart = 0.5;
+constexpr double kMostlySeparate = 0.5;
 constexpr double kMostRaysOfSunlight = 2;  ///< of a sample: the camera's and the Sun's
 /// Less than this part of the budget is not worth another pass.
 constexpr double kRest = 0.05;
-/// Of a pass: what the account can hold.
-constexpr double kMostSamples = std::numeric_limits<std::uint32_t>::max();
+/// Of a pass: what the account can hold, 2^32, less half a sample of each pixel (SamplePlan::whole).
+constexpr double kMostSamples = 4e9;
 
 /// Doubt lowers an estimate by this factor, to no less than that part of the last measurement.
 constexpr double kDoubt = 0.95, kLeastBelieved = 0.25;
@@ -49,8 +49,8 @@ constexpr std::uint64_t kLeastPieces = 1000;
 
 /// A frame begins with one sample for each pixel. Sun-only direct lighting takes the pixels' centres, plans from
 /// them and discards them where there are samples; all other light takes the first sample of each pixel's sequence
-/// and keeps it. Where direct sunlight is apart, further samples of it are planned from centres that were
-/// discarded.
+/// and keeps it. Where direct sunlight is separate, further samples of it are planned from centres that
+/// were discarded.
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
@@ -67,14 +67,14 @@ public:
           sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
           has_indirect_(settings.method == RenderSettings::Method::path),
           adaptive_(sample_.sun_only && settings.mechanisms.sample_plan),
-          sunlight_apart_(sample_.separate_sun && settings.mechanisms.sample_plan),
+          separate_sunlight_(sample_.separate_sun && settings.mechanisms.sample_plan),
           out_(out),
           variance_(variance) {}
 
     FrameAccount make() {
         account_.step = FrameStep::nothing;
-        begin(adaptive_ || sunlight_apart_ ? centre_ : sample_);
-        if (sunlight_apart_ && worth_sunlight() && plan_sunlight())
+        begin(adaptive_ || separate_sunlight_ ? centre_ : sample_);
+        if (separate_sunlight_ && worth_sunlight() && plan_sunlight())
             take_first_samples(limit());
         else
             take_first_image();
@@ -167,7 +167,7 @@ private:
         if (which == Tiles::all) costs_.note(Of::samples, pass.samples, pass.wall_ns);
         if (!book(pass, l, which != Tiles::the_others)) return false;
         each_ = rays_each(pass);
-        mostly_apart_ = static_cast<double>(pass.apart) > kMostlyApart * static_cast<double>(pass.met);
+        mostly_separate_ = static_cast<double>(pass.separate) > kMostlySeparate * static_cast<double>(pass.met);
         if (which == Tiles::a_sixteenth) return true;
         account_.step = FrameStep::one_sample;
         to_show_ = ToShow::means;
@@ -299,8 +299,8 @@ private:
             costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
             account_.standard_error = passes_.standard_error();
         }
-        if (sunlight_planned_) sunlight_planned_ = mostly_apart_ && two_samples_fit();
-        const std::size_t passes = sunlight_apart_ ? kSunlightPass : kMaxPasses;
+        if (sunlight_planned_) sunlight_planned_ = mostly_separate_ && two_samples_fit();
+        const std::size_t passes = separate_sunlight_ ? kSunlightPass : kMaxPasses;
         for (std::size_t i = 0; i < passes; ++i) {
             const Stage next = sunlight_planned_ ? SamplePlan::whole(wanted(i)) : wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
@@ -404,7 +404,7 @@ private:
     const std::int64_t start_ns_, slack_ns_;
     const FrameSettings centre_settings_, sample_settings_;
     const Frame centre_, sample_;
-    const bool has_indirect_, adaptive_, sunlight_apart_;
+    const bool has_indirect_, adaptive_, separate_sunlight_;
     RadianceImage& out_;
     std::vector<float>* const variance_;
 
@@ -412,7 +412,7 @@ private:
     const Frame* frame_ = nullptr;  ///< whose tiles and G-buffer the passes hold
     std::uint64_t rays_ = 0;        ///< that the budget is charged
     RaysEach each_;                 ///< of the last pass of samples
-    bool sunlight_planned_ = false, mostly_apart_ = false;
+    bool sunlight_planned_ = false, mostly_separate_ = false;
     ToShow to_show_ = ToShow::nothing;
     int stride_ = 1;  ///< of the centres
     Stage stage_ = SamplePlan::none();

@@ -85,7 +85,7 @@ template <class Work>
 PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work) {
     const std::int64_t start = now_ns();
     std::atomic<bool> stop{false};
-    std::atomic<std::uint64_t> samples{0}, rays{0}, paths{0}, path_rays{0}, met{0}, apart{0};
+    std::atomic<std::uint64_t> samples{0}, rays{0}, paths{0}, path_rays{0}, met{0}, separate{0};
     const auto over_chunk = [&](std::size_t chunk, auto&& storage) {
         const std::int64_t chunk_start = f.settings.times ? now_ns() : 0;
         PhaseTimes times{};
@@ -99,7 +99,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
         samples.fetch_add(w.samples_traced(), std::memory_order_relaxed);
         paths.fetch_add(w.paths_traced(), std::memory_order_relaxed);
         met.fetch_add(w.met(), std::memory_order_relaxed);
-        apart.fetch_add(w.apart(), std::memory_order_relaxed);
+        separate.fetch_add(w.separate(), std::memory_order_relaxed);
         path_rays.fetch_add(w.rays_traced(&CameraBatch::path_rays), std::memory_order_relaxed);
         if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
             stop.store(true, std::memory_order_relaxed);
@@ -122,7 +122,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
                 over_chunk(one.begin(), Worker::Storage<kMaxBatches>());
         },
         tbb::simple_partitioner());
-    return {!stop, samples, rays, paths, path_rays, met, apart, now_ns() - start};
+    return {!stop, samples, rays, paths, path_rays, met, separate, now_ns() - start};
 }
 
 void FramePasses::begin(const Frame& f, const Lens* lens) {
@@ -324,7 +324,6 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
 }
 
 void FramePasses::plan_sunlight(const Frame& f) {
-    if (!sunlight_plan_) sunlight_plan_.emplace(g_buffer_.tiles());
     if (tiles_.size() < g_buffer_.tiles()) sunlight_plan_->clear();
     sunlight_plan_->weigh(f, g_buffer_, tiles_);
 }

@@ -29,7 +29,7 @@ struct PassCount {
     bool complete = true;
     std::uint64_t samples = 0, rays = 0;
     std::uint64_t paths = 0, path_rays = 0;  ///< samples of these that paths follow; rays beyond first surfaces
-    std::uint64_t met = 0, apart = 0;        ///< samples that meet a surface; those whose direct sunlight is apart
+    std::uint64_t met = 0, separate = 0;  ///< samples that meet a surface; those whose direct sunlight is separate
     std::int64_t wall_ns = 0;
 };
 
@@ -64,8 +64,8 @@ public:
     PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
                      Tiles which = Tiles::all);
 
-    /// Where direct sunlight is apart: plans further samples of it from the contrasts of the centres, which belong
-    /// to a frame by direct light.
+    /// Where direct sunlight is separate: plans further samples of it from the contrasts of the centres, which
+    /// belong to a frame by direct light.
     void plan_sunlight(const Frame& f);
     [[nodiscard]] const SamplePlan& sunlight_plan() const noexcept { return *sunlight_plan_; }
     /// Of each pixel, samples of direct sunlight alone beyond the first `each`, up to what that plan has at the

@@ -13,8 +13,8 @@
 ///
 /// Uniform sampling, for all other frames: every pixel gets the same number, those of the tiles of a fixed pattern
 /// one more; whole tiles, as their paths are reused together. With paths, noise is everywhere, and an adaptive plan
-/// measured no better at equal error (docs/performance.md). But where direct sunlight is apart, it gets samples of
-/// its own by an adaptive plan beside the uniform one.
+/// measured no better at equal error (docs/performance.md). But where direct sunlight is separate, it gets samples
+/// of its own by an adaptive plan beside the uniform one.
 #pragma once
 
 #include <algorithm>

@@ -76,7 +76,7 @@ public:
     [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
     [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
     [[nodiscard]] std::uint64_t met() const { return met_; }
-    [[nodiscard]] std::uint64_t apart() const { return apart_; }
+    [[nodiscard]] std::uint64_t separate() const { return separate_; }
     [[nodiscard]] std::uint64_t rays_traced(std::uint64_t CameraBatch::*of = &CameraBatch::rays_traced) const {
         std::uint64_t sum = 0;
         for (const CameraBatch& p : traced_) sum += p.*of;
@@ -183,7 +183,7 @@ private:
             samples_ += batches_[k].samples.n;
             if (f.separate_sun) {
                 met_ += static_cast<std::uint64_t>(std::popcount(traced_[k].hits.met));
-                apart_ += static_cast<std::uint64_t>(std::popcount(traced_[k].first.lanes));
+                separate_ += static_cast<std::uint64_t>(std::popcount(traced_[k].first.lanes));
             }
             if (!f.sun_only) paths_ += static_cast<std::uint64_t>(std::popcount(batches_[k].path_lanes));
             batches_[k].samples.n = 0;
@@ -218,7 +218,7 @@ private:
     const std::span<CameraBatch> traced_;
     const std::span<SampleBatch> batches_;
     std::size_t full_ = 0;  ///< of these
-    std::uint64_t samples_ = 0, paths_ = 0, met_ = 0, apart_ = 0;
+    std::uint64_t samples_ = 0, paths_ = 0, met_ = 0, separate_ = 0;
     std::uint32_t lit_ = 0;  ///< batches
 };
 

@@ -22,7 +22,7 @@
 namespace narpa {
 
 inline constexpr std::size_t kMaxPasses = 8;  ///< after the first
-/// Frames by paths with direct sunlight apart: the pass of samples of that alone.
+/// Frames by paths with separate direct sunlight: the pass of samples of that alone.
 inline constexpr std::size_t kSunlightPass = kMaxPasses - 1;
 
 /// How far a frame got, best first. Stated in its ledger.

@@ -250,6 +250,21 @@ TEST(BudgetFrame, HasNoSamplesOfSunlightAloneWherePathsFindIt) {
     EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(settings, shown.account)).image));
 }
 
+TEST(BudgetFrame, HasNoSamplesOfSunlightAloneWherePathsTakeTheBudget) {
+    // Within a box paths are long.
+    Scene s;
+    s.materials.push_back(lambert(0.9f));
+    add_mesh(s, box(10, 10, 10));
+    add_sun(s, {0.5, -0.3, 1});
+    const BudgetView v{std::move(s), 32, 24, 40, looking({-4, 0.3, 0.2}, {0, 0, 0})};
+    FrameSettings settings = rays_a_pixel(v, 20, 1, Method::path);
+    settings.max_depth = 8;
+    const Shown shown = render(v, settings);
+    EXPECT_EQ(shown.account.passes[kSunlightPass], 0u);
+    EXPECT_GE(static_cast<double>(shown.account.rays), 0.8 * static_cast<double>(settings.budget.rays));
+    EXPECT_TRUE(same_bytes(shown.image, render(v, replay_of(settings, shown.account)).image));
+}
+
 TEST(BudgetFrame, HasSamplesOfSunlightAloneWhereTimeAllowsAndIsMadeAnewWithThem) {
     const BudgetView v = craft_over_a_globe();
     CameraRenderer renderer(v.render_scene, v.camera);

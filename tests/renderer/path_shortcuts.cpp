@@ -69,6 +69,18 @@ TEST(PathShortcuts, SamplingASmallBodyFromAMeshKeepsTheMean) {
     EXPECT_NEAR(with.mean.x, without.mean.x, kSigmas * std::hypot(with.error, without.error));
 }
 
+TEST(PathShortcuts, SunlightIsSeparateOnlyWhereSomeBodyIsShadedFlat) {
+    for (const bool smooth : {false, true}) {
+        Scene s;
+        s.materials = {lambert(0.9f)};
+        add_mesh(s, icosphere(2, 1, smooth));
+        add_sun(s, {0, 0, 1});
+        EXPECT_EQ(sun_alone_lights_first_surfaces(*RenderScene::create(s, 1)), !smooth);
+        add_sphere(s, 1, {0, 0, 5});
+        EXPECT_TRUE(sun_alone_lights_first_surfaces(*RenderScene::create(s, 1)));
+    }
+}
+
 TEST(PathShortcuts, SmallBodiesAreNotSampledWhereThereAreNone) {
     Scene s;
     s.materials = {lambert(0.9f)};

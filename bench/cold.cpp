@@ -99,15 +99,12 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
     FrameSettings settings;
     settings.seed = d.random();
     settings.spp = kFrameSpp;
-    view.render(truth, settings, true);
+    view.render(truth, settings, false);
     std::vector<std::uint8_t> bytes(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
     expose(camera, view.radiance(), d.random(), 0, bytes);
     const auto image = measured_image(camera, bytes);
-    const auto& [r, g, b] = sensor_model(camera).dn_per_radiance;
-    const auto dn_per_mean = static_cast<float>(r + g + b);
     std::vector<float> variance;
-    if (o.noise_known)
-        for (const float v : view.aovs().variance) variance.push_back(v * dn_per_mean * dn_per_mean);
+    if (o.noise_known) variance = sampling_variance(view, truth, settings, d.random);
 
     SearchOptions search;
     // What is off the truth by this part of it has the truth off by more.

@@ -218,8 +218,7 @@ private:
             const FeatureEstimate e = target.features->align(*image, at, guess, moving);
             return {e.answer, e.T_camera_target, e.covariance};
         }
-        const auto& [r, g, b] = sensor_model(camera).dn_per_radiance;
-        const std::vector<float> variance = sampling_variance(view, world.seen(truth, moving), s, r + g + b, d);
+        const std::vector<float> variance = sampling_variance(view, world.seen(truth, moving), s, d.random);
         DenseOptions dense;
         dense.samples_per_pixel = 32, dense.fineness = 4;
         dense.model = o_.told;
@@ -228,22 +227,6 @@ private:
         target.dense->set_detector(*camera.detector);
         const auto e = target.dense->align(*image, at, guess, dense, variance);
         return {e->answer, e->T_camera_body, e->covariance};
-    }
-
-    /// Of the sampling noise of such frames, DN^2, by frames of other seeds. What a frame says of itself is too
-    /// little where its samples happened to miss the light, so that errors to one side would have the larger
-    /// weights.
-    static std::vector<float> sampling_variance(ModelView& view, const Rigid3& pose, FrameSettings s,
-                                                double dn_per_mean, Draw& d) {
-        constexpr int kFrames = 4;
-        std::vector<float> sum(view.radiance().pixels.size(), 0);
-        for (int k = 0; k < kFrames; ++k) {
-            s.seed = d.random();
-            view.render_with_variance(pose, s);
-            for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += view.aovs().variance[i];
-        }
-        for (float& v : sum) v *= static_cast<float>(dn_per_mean * dn_per_mean / kFrames);
-        return sum;
     }
 
     /// A VLP-16 at 10 turns a second. `bright`: a tenth of the points are of something else in front; `dark`: most

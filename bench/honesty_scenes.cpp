@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "estimator/view/measured_image.h"
 #include "renderer/scene/scene_file.h"
 
 namespace narpa {
@@ -202,6 +203,21 @@ Result<Scene> honesty_scene(std::string_view target, int size) {
                           .bits = 12};
     s->cameras = {std::move(c)};
     return s;
+}
+
+std::vector<float> sampling_variance(ModelView& view, const Rigid3& T_camera_target, FrameSettings settings,
+                                     std::mt19937_64& random) {
+    constexpr int kFrames = 4;
+    const auto& [r, g, b] = sensor_model(view.camera()).dn_per_radiance;
+    const double dn_per_mean = r + g + b;
+    std::vector<float> sum(view.radiance().pixels.size(), 0);
+    for (int k = 0; k < kFrames; ++k) {
+        settings.seed = random();
+        view.render_with_variance(T_camera_target, settings);
+        for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += view.aovs().variance[i];
+    }
+    for (float& v : sum) v *= static_cast<float>(dn_per_mean * dn_per_mean / kFrames);
+    return sum;
 }
 
 }  // namespace narpa

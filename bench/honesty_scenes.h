@@ -1,11 +1,13 @@
 /// bench/honesty_scenes.h - targets made in code for the campaign of honesty.h: with and without symmetries.
 #pragma once
 
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "base/result.h"
+#include "estimator/view/model_view.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -18,5 +20,11 @@ namespace narpa {
 /// scene file (.toml), whose first body and light it takes. Errors: no target of this name, or a file that has
 /// none.
 [[nodiscard]] Result<Scene> honesty_scene(std::string_view target, int size);
+
+/// Of the sampling noise of such frames of the view, DN^2, by frames of other seeds. What a frame says of itself is
+/// too little where its samples happened to miss the light, so that errors to one side would have the larger
+/// weights.
+[[nodiscard]] std::vector<float> sampling_variance(ModelView& view, const Rigid3& T_camera_target,
+                                                   FrameSettings settings, std::mt19937_64& random);
 
 }  // namespace narpa

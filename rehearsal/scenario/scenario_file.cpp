@@ -9,12 +9,15 @@
 #include "rehearsal/scenario/scenario_tables.h"
 #include "renderer/scene/based_on.h"
 #include "renderer/scene/scene_file.h"
+#include "renderer/scene/scene_parts.h"
 #include "renderer/scene/toml_reader.h"
 
 namespace narpa::rehearsal {
 namespace {
 
 constexpr double kLongest_s = 1e6;
+/// Twice that of an orbit just above a body of 22 g/cm^3, denser than any.
+constexpr double kFastestOrbit_rad_s = 5e-3;
 constexpr Range kAngle_deg{.low = -360, .high = 360};
 
 const Body* body_named(const Scene& scene, const std::string& name) {
@@ -57,6 +60,9 @@ void read_orbit(TableReader& root, Orbit& orbit) {
     }
     if (orbit.model != Orbit::Model::surface && std::abs(dot(orbit.up, orbit.along)) > 1e-6)
         table->fail("along", "expected a direction at right angles to `up`: the orbit is circular");
+    if (!(orbit.rate_rad_s() <= kFastestOrbit_rad_s))
+        table->fail("radius_m", fmt::format("with mu_m3_s2 = {:g} it turns at {:.3g} rad/s, expected at most {:g}",
+                                            orbit.mu_m3_s2, orbit.rate_rad_s(), kFastestOrbit_rad_s));
     table->finish();
 }
 
@@ -119,6 +125,9 @@ void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
         table->fail("body", "[orbit] has model \"free\", expected none: nothing attracts");
     if (s.orbit.model == Orbit::Model::surface)
         table->fail("body", "[orbit] has model \"surface\", expected none: the target is the attractor's ground");
+    if (s.attractor && s.orbit.model != Orbit::Model::surface && (name == s.target.body || name == s.chaser.body))
+        table->fail("body", fmt::format("is the {} too, expected another body",
+                                        name == s.target.body ? "target" : "chaser"));
     table->finish();
 }
 
@@ -198,9 +207,12 @@ template <class Sensor>
 std::vector<std::string> read_sensors(TableReader& table, const char* key, const std::vector<Sensor>& sensors,
                                       const Scene& scene, const std::string& chaser) {
     std::vector<std::string> names = table.texts(key).value_or(std::vector<std::string>{});
-    for (const std::string& name : names) {
+    for (auto at = names.begin(); at != names.end(); ++at) {
+        const std::string& name = *at;
         const auto found = std::ranges::find(sensors, name, &Sensor::name);
-        if (found == sensors.end())
+        if (std::find(names.begin(), at, name) != at)
+            table.fail(key, fmt::format("has \"{}\" twice", name));
+        else if (found == sensors.end())
             table.fail(key, fmt::format("\"{}\" is not in {}", name, scene.file));
         else if (found->mount < 0 || scene.bodies[static_cast<std::size_t>(found->mount)].name != chaser)
             table.fail(key, fmt::format("\"{}\" is not mounted on the chaser, \"{}\"", name, chaser));
@@ -252,7 +264,8 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     n.velocimeters = read_velocimeters(*table, scene, s.chaser.body);
     const bool over_ground = s.orbit.model == Orbit::Model::surface && !n.velocimeters.empty();
     if (n.cameras.empty() && n.lidars.empty() && !over_ground)
-        table->require("cameras", "`cameras` or `lidars`: what it navigates by");
+        table->fail(table->has("lidars") ? "lidars" : "cameras",
+                    "no sensor, expected a camera or a LiDAR to navigate by");
     n.scene = read_map(*table, scene);
     read(*table, "map_sigma_m", n.map_sigma_m, kNotNegative);
     read(*table, "map_correlation_m", n.map_correlation_m, kNotNegative);
@@ -262,6 +275,10 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     read(*table, "abort_sigma_m", n.abort_sigma_m, kPositive);
     read(*table, "abort_lost_s", n.abort_lost_s, kPositive);
     read(*table, "abort_off_m", n.abort_off_m, kPositive);
+    if (s.thrusters.min_on_s > n.period_s)
+        table->fail("period_s", fmt::format("is {:g}, expected at least min_on_s of [thrusters], {:g}: no pulse is "
+                                            "longer than a period",
+                                            n.period_s, s.thrusters.min_on_s));
     const double poses = n.period_s * s.pose_rate_hz;
     if (std::abs(poses - std::round(poses)) > 1e-9 || poses < 1)
         table->fail("period_s", fmt::format("is {} pose commands at {} a second, expected a whole number of them",
@@ -292,7 +309,7 @@ void read_control(TableReader& root, Control& c) {
     table->finish();
 }
 
-void read_faults(TableReader& root, bool has_engine, std::vector<Fault>& faults) {
+void read_faults(TableReader& root, bool has_engine, double duration_s, std::vector<Fault>& faults) {
     static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 6> kKinds{
         {{"thruster_off", Fault::Kind::thruster_off},
          {"thruster_stuck", Fault::Kind::thruster_stuck},
@@ -306,6 +323,12 @@ void read_faults(TableReader& root, bool has_engine, std::vector<Fault>& faults)
         fault.kind = table.choice<Fault::Kind>("kind", kKinds).value_or(fault.kind);
         read(table, "from_s", fault.from_s, kNotNegative);
         read(table, "until_s", fault.until_s, kPositive);
+        if (!(fault.from_s < duration_s))
+            table.fail("from_s", fmt::format("is {:g}, expected less than duration_s of [scenario], {:g}",
+                                             fault.from_s, duration_s));
+        if (!(fault.until_s > fault.from_s))
+            table.fail("until_s",
+                       fmt::format("is {:g}, expected more than from_s, {:g}", fault.until_s, fault.from_s));
         const bool thruster = fault.kind == Fault::Kind::thruster_off || fault.kind == Fault::Kind::thruster_stuck;
         const bool turns = fault.kind == Fault::Kind::attitude_bias || fault.kind == Fault::Kind::target_rate;
         if (fault.kind == Fault::Kind::throttle_stuck && !has_engine)
@@ -331,6 +354,9 @@ void read_contact(TableReader& gates, Gates& out) {
     CaptureEnvelope c;
     read(*table, "closing_min_m_s", c.closing_min_m_s, kNotNegative);
     read(*table, "closing_max_m_s", c.closing_max_m_s, kNotNegative);
+    if (!(c.closing_min_m_s < c.closing_max_m_s))
+        table->fail("closing_min_m_s", fmt::format("is {:g}, expected less than closing_max_m_s, {:g}",
+                                                   c.closing_min_m_s, c.closing_max_m_s));
     read(*table, "lateral_rate_m_s", c.lateral_rate_m_s, kNotNegative);
     read(*table, "lateral_m", c.lateral_m, kNotNegative);
     read(*table, "pitch_yaw_deg", c.pitch_yaw_deg, kNotNegative);
@@ -384,8 +410,9 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
     auto table = root.table("scenario");
     if (!table) return std::nullopt;
     (void)table->has("based_on");
-    table->require("name", "a text");
-    s.name = table->text("name").value_or("");
+    std::vector<std::string> names;
+    s.name = read_name(*table, names);
+    if (s.name.starts_with('.')) table->fail("name", "is that of the results' folder, expected no '.' in front");
     s.title = table->text("title").value_or(s.name);
     read(*table, "duration_s", s.duration_s, {.low = 0, .high = kLongest_s, .low_open = true});
     read(*table, "pose_rate_hz", s.pose_rate_hz, {.low = 0.1, .high = 1000});
@@ -420,7 +447,7 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
     read_navigation(root, s, *scene);
     read_model_error(root, s.model_error);
     read_control(root, s.control);
-    read_faults(root, s.engine.has_value(), s.faults);
+    read_faults(root, s.engine.has_value(), s.duration_s, s.faults);
     if (!s.legs.empty()) read_gates(root, s);
     root.finish();
 }

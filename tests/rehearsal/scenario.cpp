@@ -159,6 +159,13 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"cameras = [\"nav\"]", "cameras = [\"left\"]", "\"left\" is not in"},
         Bad{"cameras = [\"nav\"]", "cameras = [\"nav\"]\ncamera_method = \"sparse\"",
             "one of \"features\", \"dense\""},
+        Bad{"cameras = [\"nav\"]\nlidars = [\"top\"]", "cameras = []", "expected a camera or a LiDAR"},
+        Bad{"cameras = [\"nav\"]", "cameras = [\"nav\", \"nav\"]", "has \"nav\" twice"},
+        Bad{"name = \"docking\"", "name = \"../docking\"", "expected 1 to 64 letters"},
+        Bad{"name = \"docking\"", "name = \"..\"", "expected no '.' in front"},
+        Bad{"radius_m = 6778137.0", "radius_m = 6778.137", "it turns at 35.8 rad/s, expected at most 0.005"},
+        Bad{"body = \"earth\"", "body = \"station\"", "is the target too"},
+        Bad{"min_on_s = 0.02", "min_on_s = 5.0", "expected at least min_on_s of [thrusters], 5"},
         Bad{"period_s = 1.0", "period_s = 0.33", "a whole number of them"},
         Bad{"to_m = [12.0, 0.0, 0.0]", "", "`arc_deg`"},
         Bad{"hold_s = 10.0", "contact = true", "only the last leg"},
@@ -167,6 +174,11 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"[control]", "[[fault]]\nkind = \"thruster_off\"\naxis = \"up\"\n[control]", "no group of thrusters"},
         Bad{"[control]", "[[fault]]\nkind = \"attitude_bias\"\n[control]", "value"},
         Bad{"[control]", "[[fault]]\nkind = \"gremlin\"\n[control]", "expected one of"},
+        Bad{"[control]", "[[fault]]\nkind = \"commands_lost\"\nfrom_s = 4\nuntil_s = 2\n[control]",
+            "is 2, expected more than from_s, 4"},
+        Bad{"[control]", "[[fault]]\nkind = \"commands_lost\"\nfrom_s = 400\n[control]",
+            "expected less than duration_s of [scenario], 400"},
+        Bad{"contact = {}", "contact = { closing_min_m_s = 1.0 }", "expected less than closing_max_m_s"},
         Bad{"force_n = 400.0", "force_n = \"much\"", "force_n"}));
 
 }  // namespace

@@ -33,6 +33,11 @@ std::string percent(double share) {
 }
 
 std::string exposure_advice(const Camera& camera, const SignalLevels& levels) {
+    if (levels.is_filled_by_dark_current())
+        return fmt::format(
+            "dark current fills {} of full scale, expected a shorter exposure_s or a smaller "
+            "dark_current_e_s in [camera.detector]",
+            percent(levels.dark));
     if (!(levels.brightest > 0)) return {};
     if (levels.is_black())
         return fmt::format("the image is black: its brightest pixel has {} of full scale; {}",

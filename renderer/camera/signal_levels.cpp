@@ -68,9 +68,10 @@ SignalLevels signal_levels(const Camera& camera, const RadianceImage& radiance) 
     std::vector<double> all = signals(camera, radiance);
     if (all.empty()) return levels;
     const auto pixels = static_cast<double>(all.size());
+    if (camera.detector) levels.dark = dark_electrons(*camera.detector) / full_electrons(*camera.detector);
     levels.brightest = *std::ranges::max_element(all);
     levels.saturated_share =
-        static_cast<double>(std::ranges::count_if(all, [](double s) { return s >= 1; })) / pixels;
+        static_cast<double>(std::ranges::count_if(all, [&](double s) { return s + levels.dark >= 1; })) / pixels;
     if (levels.brightest <= 0) return levels;
     const double lit = SignalLevels::kLit * std::min(1.0, levels.brightest);
     std::erase_if(all, [&](double s) { return s <= lit; });

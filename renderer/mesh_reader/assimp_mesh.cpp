@@ -10,32 +10,10 @@
 
 #include "renderer/mesh_reader/assimp_reader.h"
 #include "renderer/scene/file_bytes.h"
-#include "renderer/scene/text_cursor.h"
 
 namespace narpa {
 
 namespace {
-
-/// Assimp 5.2 searches for the end of a PLY header for ever where there is none, and for elements that a header
-/// promises and no file of this size can hold.
-Status check_ply_header(const std::string& path) {
-    if (extension_of(path) != ".ply") return Ok{};
-    const Result<std::string> bytes = read_file(path);
-    if (!bytes) return bytes.error();
-    const std::size_t end = std::min(bytes->find("\nend_header\n"), bytes->find("\nend_header\r"));
-    if (end == bytes->npos) return Error{.what = "no \"end_header\" line, expected a PLY header", .file = path};
-    TextCursor header(bytes->substr(0, end), path);
-    while (header.next_line()) {
-        if (header.token() != "element") continue;
-        header.token();  // its name
-        const std::string_view count = header.token();
-        const std::optional<double> number = number_from(count);
-        if (!number || !(*number >= 0 && *number <= static_cast<double>(bytes->size())))
-            return header.error(count,
-                                fmt::format("\"{}\" is not a number of elements that this file can hold", count));
-    }
-    return Ok{};
-}
 
 class Walk {
 public:
@@ -156,8 +134,8 @@ MeshMessage read_with_assimp(const std::string& path) {
         return MeshMessage{.error = fmt::format("not a mesh that can be read: {}", why)};
     };
     try {
-        if (const Status header = check_ply_header(path); !header)
-            return {.error = header.error().what, .line = header.error().line, .column = header.error().column};
+        if (const Status ply = extension_of(path) == ".ply" ? check_ply(path) : Ok{}; !ply)
+            return {.error = ply.error().what, .line = ply.error().line, .column = ply.error().column};
         Assimp::Importer importer;
         keep_importer_of(path, importer);
         const aiScene* scene = importer.ReadFile(path, 0);

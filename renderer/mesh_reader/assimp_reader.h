@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/result.h"
 #include "renderer/scene/mesh_message.h"
 
 struct aiMaterial;
@@ -14,6 +15,11 @@ namespace narpa {
 
 /// Node transforms are applied. Only the importer of the file's extension is used, whatever the file begins with.
 MeshMessage read_with_assimp(const std::string& path);
+
+/// What Assimp 5.2 does not notice: it searches for the end of a PLY header for ever where there is none, and for
+/// elements that a header promises and no file of this size can hold; in a text file it takes the numbers of other
+/// lines for those that are missing.
+Status check_ply(const std::string& path);
 
 /// A material that Assimp read from the file `path`. `warnings` gets what is left out.
 PlainMaterial from_assimp(const aiScene& scene, const aiMaterial& m, const std::string& path,

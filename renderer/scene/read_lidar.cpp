@@ -151,6 +151,12 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
                             .value_or(make.range_m_default);
     lidar.receiver = read_receiver(table);
     lidar.receiver.range_min_m = table.number("range_min_m", {.low = 0, .high = range_m_most}).value_or(0);
+    if (!(lidar.receiver.range_min_m < lidar.range_max_m))
+        table.fail("range_min_m", fmt::format("is {:g}, expected less than the largest range, {:g}",
+                                              lidar.receiver.range_min_m, lidar.range_max_m));
+    if (!lidar.model->spec().measures_velocity)
+        for (const char* key : {"velocity_noise_m_s", "velocity_ambiguity_m_s"})
+            table.refuse(key, fmt::format("a {} measures no velocity", make.name));
     if (lidar.receiver.multipath == LidarReceiverModel::Multipath::diffuse && !lights_an_area(lidar))
         table.fail("multipath",
                    "\"diffuse\" is of beams that light an area: expected a beam_divergence_rad, or a model whose "

@@ -195,6 +195,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     read_optics(table, camera, scene.sun.has_value(), folder);
     camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
     refuse_keys_of_detector(table);
+    if (camera.detector) table.refuse("white_radiance", "belongs to cameras without a [camera.detector]");
     if (!camera.detector && !(camera.white_radiance > 0))
         table.require("white_radiance", "a number > 0, as there is neither [sun] nor [ambient] to take it from");
     table.finish();

@@ -85,6 +85,17 @@ Result<Texture> from_image(const std::string& name, const cv::Mat& bgr, const Te
     return texture;
 }
 
+/// The decoder makes the missing part grey. Segments (ITU-T T.81, B.1) up to the first scan have their length, and
+/// may hold a thumbnail; in scans no end of image is but the file's.
+bool is_jpeg_cut_short(std::span<const std::uint8_t> bytes) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (!text.starts_with("\xFF\xD8\xFF")) return false;
+    std::size_t at = 2;
+    while (at + 4 <= text.size() && text[at] == '\xFF' && text[at + 1] != '\xDA')
+        at += 2 + 256U * bytes[at + 2] + bytes[at + 3];
+    return text.find("\xFF\xD9", at) == text.npos;
+}
+
 }  // namespace
 
 Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,
@@ -99,6 +110,7 @@ Result<Texture> decode_texture(const std::string& name, std::span<const std::uin
             return Error{.what = fmt::format("an image of {} x {} pixels, expected at most {} of them", size->width,
                                              size->height, kMostPixels),
                          .file = name};
+        if (is_jpeg_cut_short(bytes)) return Error{.what = "a JPEG without an end: it is cut short", .file = name};
         const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
         const Result<ImageCodecs> codecs = image_codecs(name);
         if (!codecs) return codecs.error();

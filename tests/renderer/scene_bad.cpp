@@ -278,6 +278,12 @@ const BadFile kBad[] = {
      "expected a beam_divergence_rad, or a model whose [grid] is a flash"},
     {"LidarNoise", LIDAR "model = \"VLP-16\"\nrange_noise_m = -0.1\n", 4, 17, "expected a number in [0, 1000]"},
     {"LidarTooFar", LIDAR "model = \"VLP-16\"\nrange_max_m = 200\n", 4, 15, "expected a number in (0, 131.07]"},
+    {"LidarRangesCrossed", LIDAR "model = \"VLP-16\"\nrange_max_m = 20\nrange_min_m = 50\n", 5, 15,
+     "is 50, expected less than the largest range, 20"},
+    {"LidarVelocityOfRanges", LIDAR "model = \"VLP-16\"\nvelocity_noise_m_s = 0.1\n", 4, 22,
+     "a VLP-16 measures no velocity"},
+    {"WhiteOfADetector", CAMERA FIELD "white_radiance = 3\ndetector = {bits = 8}\n", 5, 18,
+     "belongs to cameras without a [camera.detector]"},
     {"FirstInTheFileIsTold", "[render]\nspp = 0\n[sun]\ndirection = [0, 0, 0]\n", 2, 7, "spp: got 0"},
 };
 

@@ -349,6 +349,24 @@ TEST(MeshFile, PlyHeaderPromisesNoMoreThanTheFileHolds) {
               path + ":3:16: \"49999999999999999999\" is not a number of elements that this file can hold");
 }
 
+TEST(MeshFile, PlyTextHasTheValuesThatItsHeaderPromises) {
+    const MemoryFolder folder;
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+    const auto error_of = [&](const std::string& body) {
+        const Result<MeshFile> m = read_mesh(folder.write("m.ply", header + body), 1);
+        return m ? "" : m.error().text().substr((folder / "m.ply").size());
+    };
+    EXPECT_EQ(error_of("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1 0\n"), "");
+    EXPECT_EQ(error_of("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+              ":14:1: expected \"face\" 2 of 2, with the values of its properties");
+    EXPECT_EQ(error_of("0 0 0\n1 0\n0 1 0\n3 0 1 2\n3 2 1 0\n"),
+              ":11:4: expected \"vertex\" 2 of 3, with the values of its properties");
+    EXPECT_EQ(error_of("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1\n"),
+              ":14:6: expected \"face\" 2 of 2, with the values of its properties");
+}
+
 double area(std::span<const Vec3> p, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
     double sum = 0;
     for (const auto& t : triangles) sum += 0.5 * cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]]).z;

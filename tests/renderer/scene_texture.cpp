@@ -184,6 +184,20 @@ TEST(TextureFile, FormatsOfTheManualAreRead) {
     }
 }
 
+TEST(TextureFile, AJpegThatIsCutShortIsRefused) {
+    const MemoryFolder folder;
+    cv::Mat noise(64, 64, CV_8UC3);
+    cv::randu(noise, 0, 255);
+    test::write_image_file(folder / "t.jpg", noise);
+    const std::string whole = test::read_text(folder / "t.jpg");
+    EXPECT_TRUE(read_texture(folder.write("more.jpg", whole + "\xFF\xDA trailer")));
+    for (const std::size_t part : {whole.size() / 3, whole.size() - 2}) {
+        const Result<Texture> cut = read_texture(folder.write("cut.jpg", whole.substr(0, part)));
+        ASSERT_FALSE(cut);
+        EXPECT_EQ(cut.error().what, "a JPEG without an end: it is cut short");
+    }
+}
+
 TEST(TextureFile, OtherFormatsAndTooManyPixelsAreRefusedBeforeTheyAreDecoded) {
     const MemoryFolder folder;
     const auto error_of = [&](const std::string& path) {

@@ -69,7 +69,8 @@ double pixel_share(bool spread, double distance_px) {
 /// Sums the samples' light in the pixels of a block.
 class Collector {
 public:
-    Collector(const Frame& f, const PixelBlock& block) : f_(f), block_(block) {}
+    Collector(const Frame& f, const PixelBlock& block)
+        : f_(f), block_(block), pixel_angle_rad_(f.path.pixel_angle_rad) {}
 
     void sample(const SubpixelDisc& disc);
     void put_into(RadianceImage& out, std::vector<float>* variance) const;
@@ -80,8 +81,9 @@ private:
     bool share_out(const ImagePoint& p, std::size_t i);
     void trace(std::size_t body);
 
-    const Frame& f_;
+    Frame f_;  ///< with the width of a body's samples
     const PixelBlock& block_;
+    double pixel_angle_rad_;
     CameraBatch batch_;
     Lanes<Lanes<double>> columns_{}, rows_{};  ///< of each ray: shares of the block's columns and rows
     Lanes<double> area_px2_{};                 ///< of the image, that each ray stands for
@@ -94,6 +96,8 @@ void Collector::sample(const SubpixelDisc& disc) {
     body_sum_.fill(0);
     body_squares_.fill(0);
     const std::uint32_t samples = samples_of(disc, f_.settings.spp);
+    const double area_m2 = std::numbers::pi * norm(cross(disc.right, disc.up));
+    f_.path.pixel_angle_rad = std::min(pixel_angle_rad_, std::sqrt(area_m2 / samples) / norm(disc.centre));
     for (std::uint32_t s = 0; s < samples; ++s) {
         add(disc, s, samples);
         if (batch_.rays.n == kLanes) trace(disc.body);

@@ -242,6 +242,8 @@ NARPA_EACH_ISA void MeshShape::lift(const SurfacePoints& points, std::uint32_t w
                 const Triangle t = triangle(points.face[i]);
                 const Vec3 p = points.departure_body[i];
                 const Departure d = departure_from(t, p, p - vertex_origin_);
+                // Above the face it is clear of the edges, and may lie beside it (SurfacePoints::departure_body).
+                if (std::abs(dot(d.normal, p - t.a)) > d.clearance_m) continue;
                 starts.put(
                     i, away_from_edges(t, p, d) + (is_set(points.outside, i) ? d.lift_m : -d.lift_m) * d.normal);
             }

@@ -60,9 +60,15 @@ double SubpixelBodies::reach_px(const Vec3& centre, double radius_m) const noexc
     return radius_m * largest_stretch(model_->jacobian(centre));
 }
 
+bool SubpixelBodies::has_air(std::size_t body) const noexcept {
+    const auto& air = tracer_.scene().atmosphere;
+    return air && air->body == static_cast<int>(body);
+}
+
 bool SubpixelBodies::contains(int body) const noexcept {
     const std::size_t i = static_cast<std::size_t>(body);
-    return 2 * reach_px(centre_camera(i), largest(tracer_.bounds(i).semi_axes_m)) < kSubpixelWidth_px;
+    return !has_air(i) &&
+           2 * reach_px(centre_camera(i), largest(tracer_.bounds(i).semi_axes_m)) < kSubpixelWidth_px;
 }
 
 std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, int y_first, int x_last,
@@ -71,7 +77,7 @@ std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, i
     disc.body = static_cast<std::size_t>(body);
     const Vec3 centre = centre_camera(disc.body);
     disc.radius_px = reach_px(centre, largest(tracer_.bounds(disc.body).semi_axes_m));
-    if (!(2 * disc.radius_px < kSubpixelWidth_px)) return std::nullopt;
+    if (has_air(disc.body) || !(2 * disc.radius_px < kSubpixelWidth_px)) return std::nullopt;
     if (lens_ != nullptr) {
         auto [x, y] = model_->jacobian(centre / centre.z);
         x.z = y.z = 0;  // the aperture is a disc across the axis

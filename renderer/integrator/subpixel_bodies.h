@@ -36,8 +36,8 @@ struct SubpixelDisc {
 
 class SubpixelBodies {
 public:
-    /// `lens` is null where all is in focus. Finds none where the camera or bodies move within the exposure: the
-    /// camera's regular rays then sample all. Tracer and poses outlive this.
+    /// `lens` is null where all is in focus. Finds none where the camera or bodies move within the exposure, and no
+    /// body with an atmosphere: the camera's regular rays then sample them. Tracer and poses outlive this.
     SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const CameraModelHandle& model,
                    const Rigid3& T_world_camera, const Lens* lens, bool moving);
 
@@ -52,6 +52,8 @@ public:
     [[nodiscard]] Hit beyond(const Ray& ray, Hit hit) const noexcept;
 
 private:
+    /// The atmosphere of a body that rays pass as if it were not there would have no ground.
+    [[nodiscard]] bool has_air(std::size_t body) const noexcept;
     [[nodiscard]] Vec3 centre_camera(std::size_t body) const noexcept;
     /// Half the width of the image of a ball of this radius, at its longest, px; infinite where its centre has
     /// none.

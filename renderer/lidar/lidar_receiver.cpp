@@ -11,7 +11,7 @@ namespace narpa {
 namespace {
 
 /// Sub-rays whose ranges are farther apart than so many times their mean distance are of different surfaces.
-constexpr double kMeanSpacings = 4;
+constexpr double kMeanSpacings = 6;
 /// Random numbers: c2 of the counters, above those of a camera (SensorDraw). One block for each echo of a shot.
 constexpr std::uint32_t kStream = 0x4c000000u, kEchoStream = 0x10000u;
 

@@ -25,6 +25,14 @@ ObserverPlace read_place(TableReader& table) {
     return place;
 }
 
+/// An observer on the ellipsoid of the Earth is above its surface in spite of rounding, which is nanometres.
+void stand_on_earth(TableReader& table, ObserverPlace& place) {
+    constexpr double kAbove_m = 1e-3;
+    if (!table.has("earth")) return;
+    if (place.height_m < 0) table.fail("height_m", "is below the surface of `earth`, expected at least 0");
+    place.height_m = std::max(place.height_m, kAbove_m);
+}
+
 /// The Earth's ellipsoid turns with it.
 void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<Body>& bodies) {
     const auto name = table.text("earth");
@@ -66,7 +74,8 @@ void read_observer(TableReader& root, SceneReading& reading) {
     auto table = root.table("observer");
     if (!table) return;
     Scene& scene = reading.scene;
-    const ObserverPlace place = read_place(*table);
+    ObserverPlace place = read_place(*table);
+    stand_on_earth(*table, place);
     const bool refracted = table->boolean("refraction").value_or(true);
     if (scene.epoch_unix_ns == 0) root.fail("observer", "the time is not known, expected an \"epoch\" in [scene]");
     const Observing observing{GroundObserver(place, scene.epoch_unix_ns), refracted};

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "renderer/camera/scene_camera.h"
 #include "renderer/scene/scene_parts.h"
 
 namespace narpa {
@@ -169,6 +170,18 @@ void refuse_tables_of_camera(TableReader& root) {
         root.refuse(key, fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key));
 }
 
+/// A thin lens has a plane of focus, which rays at right angles to its axis do not meet.
+void refuse_wide_field(TableReader& table, const Camera& camera) {
+    constexpr double kWidest_deg = 80;
+    const DirectionCone field =
+        CameraModelHandle(camera)->bounds({-0.5, -0.5, camera.width - 0.5, camera.height - 0.5});
+    const double off_axis_deg = (std::acos(std::clamp(field.axis.z, -1.0, 1.0)) + field.half_angle_rad) * 180 / kPi;
+    if (off_axis_deg > kWidest_deg)
+        table.fail("lens", fmt::format("the image reaches {:.0f} degrees off the axis, expected at most {:g} for a "
+                                       "thin lens",
+                                       off_axis_deg, kWidest_deg));
+}
+
 Camera read_camera(TableReader& table, std::vector<std::string>& names, const SceneReading& reading) {
     const Scene& scene = reading.scene;
     const std::filesystem::path& folder = reading.folder;
@@ -193,6 +206,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.shutter = read_shutter(table, camera);
     camera.control = read_control(table, camera);
     read_optics(table, camera, scene.sun.has_value(), folder);
+    if (camera.lens) refuse_wide_field(table, camera);
     camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
     refuse_keys_of_detector(table);
     if (camera.detector) table.refuse("white_radiance", "belongs to cameras without a [camera.detector]");

@@ -56,6 +56,11 @@ Option Option::finite() const {
         return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
     });
 }
+Option Option::above_zero(double most) const {
+    return range(0.0, most).check([](const std::string& text) {
+        return std::strtod(text.c_str(), nullptr) > 0 ? "" : text + ", expected a number greater than 0";
+    });
+}
 Option Option::one_of(const std::vector<std::string>& values) const {
     std::string names;
     for (const std::string& value : values) names += (names.empty() ? "" : "|") + value;

@@ -133,7 +133,7 @@ Command add_run(Parser app) {
     c.option("--seed", o->seed, "Seed of the sensors' noise and of the renders, instead of the scene's");
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         .type_name("SECONDS")
-        .range(0.0, 9e9);
+        .above_zero(9e9);
     const Option log =
         c.option("--log", o->run.log_folder,
                  "Folder for run.json, truth, ledger, CAN log and contact sheet; replaces an earlier run in it")

@@ -146,7 +146,7 @@ Command add_scan(Parser app) {
         .type_name("SECONDS")
         .range(0.0, 9e9)
         .shows_default();
-    c.option("--duration", o->duration_s, "How long (default: one turn)").type_name("SECONDS").range(0.0, 3600.0);
+    c.option("--duration", o->duration_s, "How long (default: one turn)").type_name("SECONDS").above_zero(3600.0);
     o->pose.add_to(c);
     c.option("-o,--output", o->out,
              "FILE.ply or .pcd (the returns as points), .csv (a row for each shot: the truth, and what is reported "

@@ -120,6 +120,10 @@ INSTANTIATE_TEST_SUITE_P(
                 "norm"},
         Mistake{"UnknownCloudKind", "scan SCENE -o FOLDERa.xyz", nullptr, 2, "expected .ply, .pcd, .csv or .pcap"},
         // Command lines
+        Mistake{"RunOfNoDuration", "run SCENE --video nav=none --duration 0", nullptr, 2,
+                "--duration: 0, expected a number greater than 0"},
+        Mistake{"ScanOfNoDuration", "scan SCENE --duration 0 -o FOLDERa.csv", nullptr, 2,
+                "--duration: 0, expected a number greater than 0"},
         Mistake{"EmptyTrajectory", "render SCENE --trajectory '' -o FOLDERa.png", nullptr, 2,
                 "narpa render: --trajectory has an empty value"},
         Mistake{"EmptyCamera", "render SCENE --camera= -o FOLDERa.png", nullptr, 2, "--camera has an empty value"},

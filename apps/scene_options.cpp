@@ -80,6 +80,7 @@ void PoseOptions::add_to(Parser app) {
 }
 
 Status PoseOptions::place(Scene& scene) const {
+    std::set<std::string> placed;
     for (const std::string& text : poses) {
         auto pair = split_pair(text, "BODY=x,y,z,qw,qx,qy,qz");
         if (!pair) return pair.error();
@@ -88,6 +89,9 @@ Status PoseOptions::place(Scene& scene) const {
         const auto body = std::find_if(scene.bodies.begin(), scene.bodies.end(),
                                        [&](const Body& b) { return b.name == pair->first; });
         if (body == scene.bodies.end()) return no_such_body(pair->first, text, scene);
+        if (!placed.insert(pair->first).second)
+            return Error{
+                fmt::format("--pose \"{}\": body \"{}\" has a pose already, expected one", text, pair->first)};
         body->initial = {*T, {}, {}};
     }
     return Ok{};

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/cli.h"
+#include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "base/base64.h"
 #include "base/nearest_name.h"
@@ -79,9 +80,16 @@ struct View {
     std::size_t pixels = 0;  ///< with a surface
 };
 
+/// A picture has its document beside it.
+std::vector<std::string> outputs_of(const MapOptions& o) {
+    if (o.out.ends_with(".pfm") || o.out.ends_with(".json")) return {o.out};
+    return {o.out, document_beside(o.out)};
+}
+
 Result<View> map_view(const MapOptions& o) {
     auto scene = load_scene(o.scene);
     if (!scene) return scene.error();
+    if (auto kept = keep_inputs(outputs_of(o), *scene, {o.pose.trajectory}); !kept) return kept.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
     if (!index) return index.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();

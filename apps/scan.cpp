@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/cli.h"
+#include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
@@ -89,6 +90,12 @@ Status write_capture(const std::string& path, const LidarUnit& of, std::int64_t 
     return Ok{};
 }
 
+/// A capture has the LiDAR's metadata beside it, where it has some.
+std::vector<std::string> outputs_of(const ScanOptions& o, const Lidar& lidar) {
+    if (!o.out.ends_with(".pcap") || lidar.model->metadata().empty()) return {o.out};
+    return {o.out, document_beside(o.out)};
+}
+
 Outcome scan(const ScanOptions& o) {
     const std::string extension = std::filesystem::path(o.out).extension();
     if (extension != ".csv" && extension != ".ply" && extension != ".pcd" && extension != ".pcap")
@@ -97,6 +104,8 @@ Outcome scan(const ScanOptions& o) {
     if (!scene) return scene.error();
     auto index = sensor_named(scene->lidars, o.lidar, "LiDAR", scene->file);
     if (!index) return index.error();
+    if (auto kept = keep_inputs(outputs_of(o, scene->lidars[*index]), *scene, {o.pose.trajectory}); !kept)
+        return kept.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();

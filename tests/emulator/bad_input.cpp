@@ -1,10 +1,13 @@
 // What a user can get wrong, and the sentence and exit status that answer it: the program itself is run.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
+#include "tests/support/read_file.h"
 
 namespace narpa::test {
 namespace {
@@ -145,6 +148,53 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoSubcommand", "", nullptr, 2, "Usage: narpa COMMAND"},
         Mistake{"UnknownOption", "check SCENE --colour", nullptr, 2, "--colour"}),
     [](const auto& mistake) { return std::string(mistake.param.name); });
+
+/// Each command is given one of its inputs as an output, by another path.
+class InputsAreKept : public ::testing::TestWithParam<std::pair<const char*, const char*>> {
+protected:
+    void SetUp() override {
+        std::ofstream(folder_ / "base.csv") << small_scene();
+        std::ofstream(folder_ / "mesh.ply") << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                                               "property float y\nproperty float z\nproperty float s\n"
+                                               "property float t\nelement face 1\n"
+                                               "property list uchar int vertex_indices\nend_header\n"
+                                               "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n";
+        std::ofstream(folder_ / "flight.csv") << kFlight;
+        std::ofstream(folder_ / "scene.toml") << "[scene]\nbased_on = \"base.csv\"\n";
+        ASSERT_EQ(narpa("render scene.toml -o image.png").status, 0);
+        std::filesystem::copy(folder_ / "image.png", folder_ / "picture.json");
+        std::ofstream(folder_ / "textured.toml")
+            << small_scene() +
+                   "[[body]]\nname = \"a\"\nmesh = \"mesh.ply\"\nmaterial = {kind = \"lambert\", texture "
+                   "= \"image.png\"}\n[[body]]\nname = \"b\"\nmesh = \"mesh.ply\"\nmaterial = {kind "
+                   "= \"lambert\", texture = \"picture.json\"}\n";
+        std::filesystem::create_directory(folder_ / "sub");
+    }
+    [[nodiscard]] Done narpa(const std::string& arguments) const {
+        return run_command("cd " + (folder_ / "") + " && " + kTimeLimit + NARPA_BIN + " " + arguments + " 2>&1");
+    }
+    TemporaryFolder folder_;
+};
+
+TEST_P(InputsAreKept, WhereAnOutputHasTheirName) {
+    const auto& [arguments, input] = GetParam();
+    const std::string before = read_text(folder_ / input);
+    const auto [status, said] = narpa(arguments);
+    EXPECT_EQ(status, 2) << said;
+    EXPECT_NE(said.find(std::string(input) + ": would be replaced, but this command reads it"), std::string::npos)
+        << said;
+    EXPECT_EQ(read_text(folder_ / input), before);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, InputsAreKept,
+    ::testing::Values(std::pair("scan scene.toml -o sub/../base.csv", "base.csv"),
+                      std::pair("scan textured.toml -o ./mesh.ply", "mesh.ply"),
+                      std::pair("render textured.toml -o sub/../image.png", "image.png"),
+                      std::pair("map textured.toml -o picture.png", "picture.json"),
+                      std::pair("scan scene.toml --trajectory flight.csv -o ./flight.csv", "flight.csv"),
+                      std::pair("compare textured.toml --frame image.png -o picture.svg", "picture.json"),
+                      std::pair("fly flight.csv --can log:sub/../flight.csv", "flight.csv")));
 
 }  // namespace
 }  // namespace narpa::test

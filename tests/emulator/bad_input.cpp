@@ -153,6 +153,17 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"UnknownOption", "check SCENE --colour", nullptr, 2, "--colour"}),
     [](const auto& mistake) { return std::string(mistake.param.name); });
 
+TEST(RunCommand, MakesFoldersOfItsFiles) {
+    const TemporaryFolder folder;
+    std::ofstream(folder / "scene.toml") << small_scene();
+    const Done done = run_command(std::string(kTimeLimit) + NARPA_BIN + " run " + (folder / "scene.toml") +
+                                  " --duration 0.2 --video nav=" + (folder / "new/a/x.y4m") +
+                                  " --lidar top=" + (folder / "new/b/x.pcap") + " 2>&1 >/dev/null");
+    EXPECT_EQ(done.status, 0) << done.out;
+    EXPECT_TRUE(std::filesystem::exists(folder / "new/a/x.y4m"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "new/b/x.pcap"));
+}
+
 /// Each command is given one of its inputs as an output, by another path.
 class InputsAreKept : public ::testing::TestWithParam<std::pair<const char*, const char*>> {
 protected:

@@ -11,6 +11,7 @@
 #include "apps/cli.h"
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
+#include "base/write_file.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
 #include "emulator/log/sweep_log.h"
@@ -55,7 +56,7 @@ using FireAll = std::function<void(const Writer&)>;
 
 Status write_text(const std::string& path, const std::string& extension, const FireAll& fire_all) {
     std::ofstream out(path);
-    if (!out) return Error{"cannot be written", path};
+    if (!out) return cannot_open_to_write(path);
     if (extension == ".csv") {
         out << kShotHeader;
         std::array<char, RowLog::kMaxLine> row;

@@ -116,6 +116,13 @@ INSTANTIATE_TEST_SUITE_P(
                 "bad.toml: has poses of body \"chaser\" from 0 to 0 s, not at 100 s; there it rests near the last"},
         Mistake{"TimeBeforeTheTrajectory", "map SCENE --trajectory BAD --time -3 -o FOLDERa.json", kFlight, 0,
                 "from 0 to 0 s, not at -3 s; there it rests near the first"},
+        // Nobody, not even root, can make a file in /proc.
+        Mistake{"ScanThatCannotBeWritten", "scan SCENE -o /proc/a.csv", nullptr, 3,
+                "/proc/a.csv: cannot be written: "},
+        Mistake{"MapThatCannotBeWritten", "map SCENE -o /proc/a.png", nullptr, 3,
+                "/proc/a.json: cannot be written: "},
+        Mistake{"DbcThatCannotBeWritten", "check SCENE --dbc /proc/a.dbc", nullptr, 3,
+                "/proc/a.dbc: cannot be written: "},
         Mistake{"FolderThatCannotBeMade", "render SCENE -o /proc/nowhere/a.png", nullptr, 2, "/proc/nowhere/a.png"},
         Mistake{"DepthWithoutPaths", "render SCENE --max-depth 3 -o FOLDERa.png", nullptr, 2, "--max-depth"},
         Mistake{"OutputsThatAPngCannotHold", "render SCENE --aov depth -o FOLDERa.png", nullptr, 2, "FILE.exr"},

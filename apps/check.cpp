@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 
 #include "apps/calibration.h"
@@ -18,6 +17,7 @@
 #include "apps/exposure_advice.h"
 #include "apps/shipped.h"
 #include "base/constants.h"
+#include "base/write_file.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/can/usb_adapters.h"
 #include "drivers/video/bulk_bridges.h"
@@ -229,10 +229,7 @@ Status save_dbc(const Scene& scene, const std::string& path) {
     std::vector<CanBody> bodies;
     for (const Body& b : scene.bodies)
         if (b.can_id) bodies.push_back({b.name, *b.can_id});
-    std::ofstream out(path, std::ios::binary);
-    out << write_dbc(bodies, static_cast<int>(scene.cameras.size()));
-    if (!out.flush()) return Error{"cannot be written", path};
-    return Ok{};
+    return write_file(path, write_dbc(bodies, static_cast<int>(scene.cameras.size())));
 }
 
 /// How many of a sensor's rays meet the body that carries it first.

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <optional>
 
 #include "apps/cli.h"
+#include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "emulator/camera_unit.h"
 #include "emulator/frame_tracker.h"
@@ -120,15 +120,11 @@ nlohmann::json picture(const std::string& title, const MeasuredImage& frame, con
              })}};
 }
 
-/// The picture, and its document beside it, replace no frame.
-Status check_output(const CompareOptions& o) {
-    namespace fs = std::filesystem;
+/// The picture, and its document beside it, replace no input.
+Status check_output(const CompareOptions& o, const Scene& scene) {
     if (o.out.empty()) return Ok{};
-    const fs::path out(o.out);
-    std::error_code none;
-    for (const fs::path& file : {out, fs::path(out).replace_extension(".json")})
-        if (fs::equivalent(file, o.frame, none))
-            return Error{"would replace the frame, expected another name", o.out};
+    if (auto kept = keep_inputs({o.out, document_beside(o.out)}, scene, {o.frame, o.pose.trajectory}); !kept)
+        return kept;
     return make_folder_of_picture(o.out);
 }
 
@@ -149,9 +145,9 @@ ExpectedFrame expected_frame(const CompareOptions& o, const World& world, std::s
 }
 
 Outcome compare(const CompareOptions& o) {
-    if (auto good = check_output(o); !good) return good.error();
     auto scene = load_scene(o.scene);
     if (!scene) return scene.error();
+    if (auto good = check_output(o, *scene); !good) return good.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
     if (!index) return index.error();
     scene->render.seed = ~scene->render.seed;

@@ -11,6 +11,7 @@
 #include "apps/cli.h"
 #include "apps/scene_options.h"
 #include "apps/shipped.h"
+#include "base/write_file.h"
 #include "drivers/lidar/packet_source.h"
 #include "emulator/log/estimate_report.h"
 #include "emulator/replay/replay.h"
@@ -72,10 +73,11 @@ Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, F
 
 Status write_rows(const std::string& path, const std::vector<TrackedFrame>& tracked) {
     std::ofstream file(path);
+    if (!file) return cannot_open_to_write(path);
     file << kEstimateHeader << '\n';
     for (const TrackedFrame& f : tracked) file << estimate_row(f);
     file.flush();
-    if (!file) return Error{"cannot be written", path};
+    if (!file) return Error{"cannot be written to the end", path, 0, 0, ErrorKind::failed};
     return Ok{};
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "apps/cli.h"
+#include "apps/outputs.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/can/remote_clock.h"
 #include "emulator/clock.h"
@@ -204,7 +205,15 @@ private:
     std::int64_t start_ns_ = 0, last_granted_ = std::numeric_limits<std::int64_t>::min();
 };
 
+/// A log is the one bus that is a file.
+Status check_log(const FlyOptions& o) {
+    constexpr std::string_view kLog = "log:";
+    if (!o.bus.starts_with(kLog)) return Ok{};
+    return keep_inputs({o.bus.substr(kLog.size())}, {o.trajectory});
+}
+
 Outcome fly(const FlyOptions& o) {
+    if (auto good = check_log(o); !good) return good.error();
     auto rows = read_trajectory(o.trajectory);
     if (!rows) return rows.error();
     auto bodies = commanders(o, *rows);

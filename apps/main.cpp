@@ -35,7 +35,11 @@ Status make_folder_of(const std::string& file) {
     const auto folder = std::filesystem::path(file).parent_path();
     std::error_code failed;
     if (!folder.empty()) std::filesystem::create_directories(folder, failed);
-    if (failed) return Error{"its folder cannot be made: " + failed.message(), file};
+    if (failed)
+        return Error{"its folder cannot be made: " + failed.message(), file, 0, 0,
+                     failed == std::errc::permission_denied || failed == std::errc::read_only_file_system
+                         ? ErrorKind::missing
+                         : ErrorKind::bad_input};
     return Ok{};
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/cli.h"
+#include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "base/base64.h"
 #include "base/nearest_name.h"
@@ -25,7 +26,7 @@ struct MapOptions {
     std::string scene, camera, out, body, of = "depth";
     PoseOptions pose;
     double time_s = 0, datum_m = 0;
-    std::vector<double> up{0, 0, 1};
+    std::vector<double> up;  ///< empty: along z
     std::optional<double> interval_m;
 };
 
@@ -35,12 +36,25 @@ constexpr std::array<std::pair<std::string_view, MapQuantity::Kind>, 4> kQuantit
      {"height", MapQuantity::Kind::height},
      {"radius", MapQuantity::Kind::radius}}};
 
+Vec3 direction_of_height(const MapOptions& o) {
+    return o.up.empty() ? Vec3{0, 0, 1} : Vec3{o.up[0], o.up[1], o.up[2]};
+}
+
+/// Refuses options that would have no effect.
+Status check_options(const MapOptions& o, std::string_view extension) {
+    if (!o.up.empty() && o.of != "height")
+        return Error{fmt::format("--up is the direction of height, expected --of height, not {}", o.of)};
+    if (o.interval_m && extension == ".pfm")
+        return Error{"a PFM file holds no contour lines, expected no --interval, or another kind of file", o.out};
+    return Ok{};
+}
+
 Result<MapQuantity> read_quantity(const MapOptions& o, const Scene& scene) {
     MapQuantity q;
     for (const auto& [name, kind] : kQuantities)
         if (name == o.of) q.kind = kind;
     q.datum_m = o.datum_m;
-    const Vec3 up{o.up[0], o.up[1], o.up[2]};
+    const Vec3 up = direction_of_height(o);
     if (!(norm(up) > 0)) return Error{fmt::format("--up {:g},{:g},{:g}, expected a direction", up.x, up.y, up.z)};
     q.up = normalized(up);
     if (o.body.empty()) return q;
@@ -66,9 +80,16 @@ struct View {
     std::size_t pixels = 0;  ///< with a surface
 };
 
+/// A picture has its document beside it.
+std::vector<std::string> outputs_of(const MapOptions& o) {
+    if (o.out.ends_with(".pfm") || o.out.ends_with(".json")) return {o.out};
+    return {o.out, document_beside(o.out)};
+}
+
 Result<View> map_view(const MapOptions& o) {
     auto scene = load_scene(o.scene);
     if (!scene) return scene.error();
+    if (auto kept = keep_inputs(outputs_of(o), *scene, {o.pose.trajectory}); !kept) return kept.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
     if (!index) return index.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
@@ -149,7 +170,8 @@ nlohmann::json to_json(const MapOptions& o, const View& view) {
         {"shade", plot_image(field.width, field.height, 1, shade)},
         {"levels_m", view.levels_m},
         {"lines", std::move(lines)}};
-    if (o.of == "height") document["up"] = o.up;
+    const Vec3 up = direction_of_height(o);
+    if (o.of == "height") document["up"] = {up.x, up.y, up.z};
     if (o.interval_m) document["interval_m"] = *o.interval_m;
     return document;
 }
@@ -172,6 +194,7 @@ Outcome map(const MapOptions& o) {
         return Error{
             fmt::format("unknown kind of file \"{}\", expected {}", extension, fmt::join(kExtensions, ", ")),
             o.out};
+    if (auto good = check_options(o, extension); !good) return good.error();
     if (auto made = make_folder_of(o.out); !made) return made.error();
     const auto view = map_view(o);
     if (!view) return view.error();
@@ -220,7 +243,10 @@ Command add_map(Parser app) {
         .type_name("METRES")
         .finite()
         .shows_default();
-    c.option("--up", o->up, "Direction of height").type_name("X,Y,Z").comma_separated().values(3, 3);
+    c.option("--up", o->up, "With --of height: its direction (default: 0,0,1)")
+        .type_name("X,Y,Z")
+        .comma_separated()
+        .values(3, 3);
     c.option("--time", o->time_s, "Simulation time").type_name("SECONDS").range(-9e9, 9e9).shows_default();
     o->pose.add_to(c);
     c.option(

@@ -56,6 +56,11 @@ Option Option::finite() const {
         return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
     });
 }
+Option Option::above_zero(double most) const {
+    return range(0.0, most).check([](const std::string& text) {
+        return std::strtod(text.c_str(), nullptr) > 0 ? "" : text + ", expected a number greater than 0";
+    });
+}
 Option Option::one_of(const std::vector<std::string>& values) const {
     std::string names;
     for (const std::string& value : values) names += (names.empty() ? "" : "|") + value;
@@ -300,6 +305,24 @@ std::string option_meant(const std::string& option, const std::vector<std::strin
     return did_you_mean(option, known);
 }
 
+/// "narpa run: --can has an empty value ...": that of an unset variable of a shell, which would count as an option
+/// that was left out. Empty: there is none.
+std::string empty_value(const CLI::App& app, std::span<char* const> words) {
+    const CLI::App& command = chosen(app);
+    std::string option;  // whose value comes next
+    for (const std::string word : words) {
+        const bool is_long = word.starts_with("--");
+        if (is_long && word.find('=') + 1 == word.size()) option = word.substr(0, word.size() - 1);
+        if (word.empty() || option + "=" == word)
+            return full_name(command) + ": " +
+                   (option.empty() ? "an argument is empty, expected a value or no argument"
+                                   : option + " has an empty value, expected a value or no " + option);
+        const CLI::Option* const named = word.starts_with("-") ? command.get_option_no_throw(word) : nullptr;
+        option = named && named->get_items_expected_max() > 0 ? word : "";
+    }
+    return {};
+}
+
 std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<char* const> words) {
     const CLI::App& command = chosen(app);
     const std::string name = full_name(command), help = "\n" + name + " --help has all options, and examples";
@@ -319,6 +342,7 @@ std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<
         for (const CLI::App* c : commands) names += (names.empty() ? "" : ", ") + c->get_name();
         return name + ": expected one of the commands " + names + help;
     }
+    if (const std::string empty = empty_value(app, words); !empty.empty()) return empty + help;
     return name + ": " + e.what() + help;
 }
 
@@ -351,6 +375,10 @@ int parse_and_run(int argc, char** argv, const ProgramTexts& texts, const std::f
     } catch (const CLI::ParseError& e) {
         if (e.get_exit_code() == 0) return app.exit(e, std::cout, std::cerr);  // --help, --version
         std::cerr << (words.empty() ? app.help() : line_error(app, e, words) + "\n");
+        return exit_status(ErrorKind::bad_input);
+    }
+    if (const std::string empty = empty_value(app, words); !empty.empty()) {
+        std::cerr << empty << "\n";
         return exit_status(ErrorKind::bad_input);
     }
     return run();

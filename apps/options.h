@@ -24,6 +24,8 @@ public:
     Option range(int least, int most) const;
     Option range(double least, double most) const;
     Option range(std::uint64_t least, std::uint64_t most) const;
+    /// 0 < value <= most.
+    Option above_zero(double most) const;
     /// Refuses NaN and infinity.
     Option finite() const;
     Option one_of(const std::vector<std::string>& values) const;

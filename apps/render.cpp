@@ -9,6 +9,7 @@
 
 #include "apps/cli.h"
 #include "apps/exposure_advice.h"
+#include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "emulator/camera_unit.h"
 #include "emulator/clock.h"
@@ -104,6 +105,7 @@ Outcome render(const RenderOptions& o) {
     const auto frame =
         o.frame.value_or(static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period_ns / 2) / period_ns)));
 
+    if (auto kept = keep_inputs({o.out}, *scene, {o.pose.trajectory}); !kept) return kept.error();
     if (auto made = make_folder_of(o.out); !made) return made.error();
     TracingThreads threads(o.threads);
     auto world = World::create(*std::move(scene));

@@ -37,6 +37,15 @@ Status split_outputs(const std::vector<std::string>& texts, std::string_view exp
     return Ok{};
 }
 
+/// Of outputs that are files.
+Status make_folders(const std::vector<std::pair<std::string, std::string>>& outputs) {
+    for (const auto& [sensor, sink] : outputs) {
+        if (!sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
+        if (auto made = make_folder_of(sink); !made) return made;
+    }
+    return Ok{};
+}
+
 /// Lines for whoever waits on --ready-fd.
 std::string addresses(const std::string& bus, CanNode* can) {
     if (!can) return {};
@@ -85,6 +94,8 @@ Outcome run(const RunCommandOptions& options) {
     if (!scene) return scene.error();
     options.budget.override_scene(scene->render);
     if (options.seed) scene->render.seed = *options.seed;
+    for (const auto* outputs : {&o.video, &o.lidar})
+        if (auto made = make_folders(*outputs); !made) return made.error();
     auto emulator = Emulator::create(*std::move(scene), o);
     if (!emulator) return emulator.error();
 
@@ -133,7 +144,7 @@ Command add_run(Parser app) {
     c.option("--seed", o->seed, "Seed of the sensors' noise and of the renders, instead of the scene's");
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         .type_name("SECONDS")
-        .range(0.0, 9e9);
+        .above_zero(9e9);
     const Option log =
         c.option("--log", o->run.log_folder,
                  "Folder for run.json, truth, ledger, CAN log and contact sheet; replaces an earlier run in it")

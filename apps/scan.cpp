@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "apps/cli.h"
+#include "apps/outputs.h"
 #include "apps/scene_options.h"
+#include "base/write_file.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar_unit.h"
 #include "emulator/log/sweep_log.h"
@@ -54,7 +56,7 @@ using FireAll = std::function<void(const Writer&)>;
 
 Status write_text(const std::string& path, const std::string& extension, const FireAll& fire_all) {
     std::ofstream out(path);
-    if (!out) return Error{"cannot be written", path};
+    if (!out) return cannot_open_to_write(path);
     if (extension == ".csv") {
         out << kShotHeader;
         std::array<char, RowLog::kMaxLine> row;
@@ -89,6 +91,12 @@ Status write_capture(const std::string& path, const LidarUnit& of, std::int64_t 
     return Ok{};
 }
 
+/// A capture has the LiDAR's metadata beside it, where it has some.
+std::vector<std::string> outputs_of(const ScanOptions& o, const Lidar& lidar) {
+    if (!o.out.ends_with(".pcap") || lidar.model->metadata().empty()) return {o.out};
+    return {o.out, document_beside(o.out)};
+}
+
 Outcome scan(const ScanOptions& o) {
     const std::string extension = std::filesystem::path(o.out).extension();
     if (extension != ".csv" && extension != ".ply" && extension != ".pcd" && extension != ".pcap")
@@ -97,6 +105,8 @@ Outcome scan(const ScanOptions& o) {
     if (!scene) return scene.error();
     auto index = sensor_named(scene->lidars, o.lidar, "LiDAR", scene->file);
     if (!index) return index.error();
+    if (auto kept = keep_inputs(outputs_of(o, scene->lidars[*index]), *scene, {o.pose.trajectory}); !kept)
+        return kept.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
@@ -146,7 +156,7 @@ Command add_scan(Parser app) {
         .type_name("SECONDS")
         .range(0.0, 9e9)
         .shows_default();
-    c.option("--duration", o->duration_s, "How long (default: one turn)").type_name("SECONDS").range(0.0, 3600.0);
+    c.option("--duration", o->duration_s, "How long (default: one turn)").type_name("SECONDS").above_zero(3600.0);
     o->pose.add_to(c);
     c.option("-o,--output", o->out,
              "FILE.ply or .pcd (the returns as points), .csv (a row for each shot: the truth, and what is reported "

@@ -7,7 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "base/nearest_name.h"
 #include "emulator/trajectory.h"
@@ -49,6 +51,28 @@ Error no_such_body(const std::string& name, const std::string& given, const Scen
             scene.file};
 }
 
+/// Warns of bodies without a pose at a time that is wanted, or so near it that `run` would not report them as
+/// stale.
+void warn_of_missing_times(const std::vector<TrajectoryRow>& rows, const std::string& file, std::int64_t t_from_ns,
+                           std::int64_t t_to_ns, double stale_after_s) {
+    std::map<std::string, std::pair<std::int64_t, std::int64_t>> times_ns;  // first and last, by body
+    for (const TrajectoryRow& row : rows) {
+        auto& [first, last] = times_ns.try_emplace(row.body, row.t_ns, row.t_ns).first->second;
+        first = std::min(first, row.t_ns), last = std::max(last, row.t_ns);
+    }
+    const std::int64_t stale_after_ns = std::llround(stale_after_s * 1e9);
+    for (const auto& [body, times] : times_ns) {
+        const auto [first, last] = times;
+        const bool is_early = t_from_ns < first - stale_after_ns;
+        if (!is_early && t_to_ns <= last + stale_after_ns) continue;
+        say(
+            fmt::format("warning: {}: has poses of body \"{}\" from {:g} to {:g} s, not at {:g} s; there it rests "
+                        "near the {} of them",
+                        file, body, static_cast<double>(first) * 1e-9, static_cast<double>(last) * 1e-9,
+                        static_cast<double>(is_early ? t_from_ns : t_to_ns) * 1e-9, is_early ? "first" : "last"));
+    }
+}
+
 }  // namespace
 
 void BudgetOptions::add_to(Parser app) {
@@ -80,6 +104,7 @@ void PoseOptions::add_to(Parser app) {
 }
 
 Status PoseOptions::place(Scene& scene) const {
+    std::set<std::string> placed;
     for (const std::string& text : poses) {
         auto pair = split_pair(text, "BODY=x,y,z,qw,qx,qy,qz");
         if (!pair) return pair.error();
@@ -88,6 +113,9 @@ Status PoseOptions::place(Scene& scene) const {
         const auto body = std::find_if(scene.bodies.begin(), scene.bodies.end(),
                                        [&](const Body& b) { return b.name == pair->first; });
         if (body == scene.bodies.end()) return no_such_body(pair->first, text, scene);
+        if (!placed.insert(pair->first).second)
+            return Error{
+                fmt::format("--pose \"{}\": body \"{}\" has a pose already, expected one", text, pair->first)};
         body->initial = {*T, {}, {}};
     }
     return Ok{};
@@ -105,7 +133,9 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
                 fmt::format("has poses of body \"{}\", and --pose has another, expected only one of the two", body),
                 trajectory, row->line};
     }
-    return world.load(*rows, t_from_ns, t_to_ns);
+    if (auto loaded = world.load(*rows, t_from_ns, t_to_ns); !loaded) return loaded;
+    warn_of_missing_times(*rows, trajectory, t_from_ns, t_to_ns, world.scene().render.stale_after_s);
+    return Ok{};
 }
 
 Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option, double* distortion) {

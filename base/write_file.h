@@ -1,6 +1,8 @@
 /// base/write_file.h - a whole file at once.
 #pragma once
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -9,8 +11,15 @@
 
 namespace narpa {
 
+/// Of a file that could not be opened for writing, with the system's reason: call it before errno changes.
+[[nodiscard]] inline Error cannot_open_to_write(const std::string& path) {
+    return {std::string("cannot be written: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
+}
+
+/// Errors: cannot be opened (`missing`), cannot be written to the end (`failed`).
 [[nodiscard]] inline Status write_file(const std::string& path, std::string_view text) {
     std::ofstream out(path, std::ios::binary);
+    if (!out) return cannot_open_to_write(path);
     out << text;
     if (!out.flush()) return Error{"cannot be written", path, 0, 0, ErrorKind::failed};
     return Ok{};

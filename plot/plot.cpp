@@ -18,6 +18,7 @@
 
 #include "base/base64.h"
 #include "base/program_beside.h"
+#include "base/write_file.h"
 
 namespace narpa {
 namespace {
@@ -77,10 +78,8 @@ Error cannot_write(const std::string& picture) {
 Status write_plot(const std::string& picture, const nlohmann::json& document) {
     const std::string json_file = document_beside(picture);
     if (json_file == picture) return cannot_write(picture);
-    std::ofstream out(json_file);
-    out << document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-    out.close();
-    if (!out) return cannot_write(picture);
+    const std::string text = document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
+    if (Status written = write_file(json_file, text); !written) return written;
     const int status = run_program({plot_program(), json_file, "-o", picture});
     if (status == 0 || status == kMatplotlibMissing) return Ok{};
     if (status != kNotStarted) return cannot_write(picture);
@@ -91,7 +90,8 @@ Status write_plot(const std::string& picture, const nlohmann::json& document) {
 
 Status can_write_plot(const std::string& picture) {
     const std::string json_file = document_beside(picture);
-    if (json_file == picture || !std::ofstream(json_file, std::ios::app)) return cannot_write(picture);
+    if (json_file == picture) return cannot_write(picture);
+    if (!std::ofstream(json_file, std::ios::app)) return cannot_open_to_write(json_file);
     return Ok{};
 }
 

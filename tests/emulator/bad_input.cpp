@@ -1,10 +1,13 @@
 // What a user can get wrong, and the sentence and exit status that answer it: the program itself is run.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
+#include "tests/support/read_file.h"
 
 namespace narpa::test {
 namespace {
@@ -109,6 +112,17 @@ INSTANTIATE_TEST_SUITE_P(
                 "a.gif: expected the name of a picture"},
         Mistake{"PoseBesideATrajectory", "render SCENE --trajectory BAD --pose chaser=0,0,0,1,0,0,0 -o FOLDERa.png",
                 kFlight, 2, "bad.toml:2: has poses of body \"chaser\", and --pose has another"},
+        Mistake{"TimeAfterTheTrajectory", "render SCENE --trajectory BAD --time 100 -o FOLDERa.png", kFlight, 0,
+                "bad.toml: has poses of body \"chaser\" from 0 to 0 s, not at 100 s; there it rests near the last"},
+        Mistake{"TimeBeforeTheTrajectory", "map SCENE --trajectory BAD --time -3 -o FOLDERa.json", kFlight, 0,
+                "from 0 to 0 s, not at -3 s; there it rests near the first"},
+        // Nobody, not even root, can make a file in /proc.
+        Mistake{"ScanThatCannotBeWritten", "scan SCENE -o /proc/a.csv", nullptr, 3,
+                "/proc/a.csv: cannot be written: "},
+        Mistake{"MapThatCannotBeWritten", "map SCENE -o /proc/a.png", nullptr, 3,
+                "/proc/a.json: cannot be written: "},
+        Mistake{"DbcThatCannotBeWritten", "check SCENE --dbc /proc/a.dbc", nullptr, 3,
+                "/proc/a.dbc: cannot be written: "},
         Mistake{"FolderThatCannotBeMade", "render SCENE -o /proc/nowhere/a.png", nullptr, 2, "/proc/nowhere/a.png"},
         Mistake{"DepthWithoutPaths", "render SCENE --max-depth 3 -o FOLDERa.png", nullptr, 2, "--max-depth"},
         Mistake{"OutputsThatAPngCannotHold", "render SCENE --aov depth -o FOLDERa.png", nullptr, 2, "FILE.exr"},
@@ -116,12 +130,93 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"UnknownFormat", "render SCENE --format NV12 -o FOLDERa.png", nullptr, 2, "NV12"},
         Mistake{"PoseOfNobody", "render SCENE --pose x=0,0,0,1,0,0,0 -o FOLDERa.png", nullptr, 2,
                 "no body named \"x\""},
+        Mistake{"TwoPosesOfOneBody",
+                "render SCENE --pose chaser=0,0,0,1,0,0,0 --pose chaser=1,0,0,1,0,0,0 -o FOLDERa.png", nullptr, 2,
+                "body \"chaser\" has a pose already"},
+        Mistake{"UpWithoutHeight", "map SCENE --up 0,1,0 -o FOLDERa.json", nullptr, 2, "expected --of height"},
+        Mistake{"ContourLinesInPfm", "map SCENE --interval 1 -o FOLDERa.pfm", nullptr, 2,
+                "a.pfm: a PFM file holds no contour lines"},
         Mistake{"PoseThatIsNoRotation", "render SCENE --pose chaser=0,0,0,1,1,0,0 -o FOLDERa.png", nullptr, 2,
                 "norm"},
         Mistake{"UnknownCloudKind", "scan SCENE -o FOLDERa.xyz", nullptr, 2, "expected .ply, .pcd, .csv or .pcap"},
+        // Command lines
+        Mistake{"RunOfNoDuration", "run SCENE --video nav=none --duration 0", nullptr, 2,
+                "--duration: 0, expected a number greater than 0"},
+        Mistake{"ScanOfNoDuration", "scan SCENE --duration 0 -o FOLDERa.csv", nullptr, 2,
+                "--duration: 0, expected a number greater than 0"},
+        Mistake{"EmptyTrajectory", "render SCENE --trajectory '' -o FOLDERa.png", nullptr, 2,
+                "narpa render: --trajectory has an empty value"},
+        Mistake{"EmptyCamera", "render SCENE --camera= -o FOLDERa.png", nullptr, 2, "--camera has an empty value"},
+        Mistake{"EmptyBus", "run SCENE --can '' --video nav=none --duration 0.1", nullptr, 2,
+                "--can has an empty value"},
+        Mistake{"EmptyLog", "run SCENE --video nav=none --duration 0.1 --log ''", nullptr, 2,
+                "--log has an empty value"},
+        Mistake{"EmptyEstimate", "run SCENE --video nav=none --duration 0.1 --estimate ''", nullptr, 2,
+                "--estimate has an empty value"},
+        Mistake{"EmptyDbc", "check SCENE --dbc ''", nullptr, 2, "--dbc has an empty value"},
+        Mistake{"EmptyNumber", "render SCENE --time '' -o FOLDERa.png", nullptr, 2, "--time has an empty value"},
+        Mistake{"EmptyScenario", "rehearse ''", nullptr, 2, "narpa rehearse: an argument is empty"},
         Mistake{"NoSubcommand", "", nullptr, 2, "Usage: narpa COMMAND"},
         Mistake{"UnknownOption", "check SCENE --colour", nullptr, 2, "--colour"}),
     [](const auto& mistake) { return std::string(mistake.param.name); });
+
+TEST(RunCommand, MakesFoldersOfItsFiles) {
+    const TemporaryFolder folder;
+    std::ofstream(folder / "scene.toml") << small_scene();
+    const Done done = run_command(std::string(kTimeLimit) + NARPA_BIN + " run " + (folder / "scene.toml") +
+                                  " --duration 0.2 --video nav=" + (folder / "new/a/x.y4m") +
+                                  " --lidar top=" + (folder / "new/b/x.pcap") + " 2>&1 >/dev/null");
+    EXPECT_EQ(done.status, 0) << done.out;
+    EXPECT_TRUE(std::filesystem::exists(folder / "new/a/x.y4m"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "new/b/x.pcap"));
+}
+
+/// Each command is given one of its inputs as an output, by another path.
+class InputsAreKept : public ::testing::TestWithParam<std::pair<const char*, const char*>> {
+protected:
+    void SetUp() override {
+        std::ofstream(folder_ / "base.csv") << small_scene();
+        std::ofstream(folder_ / "mesh.ply") << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                                               "property float y\nproperty float z\nproperty float s\n"
+                                               "property float t\nelement face 1\n"
+                                               "property list uchar int vertex_indices\nend_header\n"
+                                               "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n";
+        std::ofstream(folder_ / "flight.csv") << kFlight;
+        std::ofstream(folder_ / "scene.toml") << "[scene]\nbased_on = \"base.csv\"\n";
+        ASSERT_EQ(narpa("render scene.toml -o image.png").status, 0);
+        std::filesystem::copy(folder_ / "image.png", folder_ / "picture.json");
+        std::ofstream(folder_ / "textured.toml")
+            << small_scene() +
+                   "[[body]]\nname = \"a\"\nmesh = \"mesh.ply\"\nmaterial = {kind = \"lambert\", texture "
+                   "= \"image.png\"}\n[[body]]\nname = \"b\"\nmesh = \"mesh.ply\"\nmaterial = {kind "
+                   "= \"lambert\", texture = \"picture.json\"}\n";
+        std::filesystem::create_directory(folder_ / "sub");
+    }
+    [[nodiscard]] Done narpa(const std::string& arguments) const {
+        return run_command("cd " + (folder_ / "") + " && " + kTimeLimit + NARPA_BIN + " " + arguments + " 2>&1");
+    }
+    TemporaryFolder folder_;
+};
+
+TEST_P(InputsAreKept, WhereAnOutputHasTheirName) {
+    const auto& [arguments, input] = GetParam();
+    const std::string before = read_text(folder_ / input);
+    const auto [status, said] = narpa(arguments);
+    EXPECT_EQ(status, 2) << said;
+    EXPECT_NE(said.find(std::string(input) + ": would be replaced, but this command reads it"), std::string::npos)
+        << said;
+    EXPECT_EQ(read_text(folder_ / input), before);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, InputsAreKept,
+    ::testing::Values(std::pair("scan scene.toml -o sub/../base.csv", "base.csv"),
+                      std::pair("scan textured.toml -o ./mesh.ply", "mesh.ply"),
+                      std::pair("render textured.toml -o sub/../image.png", "image.png"),
+                      std::pair("map textured.toml -o picture.png", "picture.json"),
+                      std::pair("scan scene.toml --trajectory flight.csv -o ./flight.csv", "flight.csv"),
+                      std::pair("compare textured.toml --frame image.png -o picture.svg", "picture.json"),
+                      std::pair("fly flight.csv --can log:sub/../flight.csv", "flight.csv")));
 
 }  // namespace
 }  // namespace narpa::test

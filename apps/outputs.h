@@ -1,0 +1,20 @@
+/// apps/outputs.h - outputs of a command that would replace its inputs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa::cli {
+
+/// FILE.json for FILE.png: the document that is written beside a picture or a capture.
+[[nodiscard]] std::string document_beside(const std::string& file);
+/// An Error that names the first output that is one of the inputs, by whatever path.
+[[nodiscard]] Status keep_inputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
+/// The same of the files that a scene was read from, and `others`, where empty names are none.
+[[nodiscard]] Status keep_inputs(const std::vector<std::string>& outputs, const Scene& scene,
+                                 std::vector<std::string> others);
+
+}  // namespace narpa::cli

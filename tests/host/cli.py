@@ -7,6 +7,7 @@ import re
 import socketserver
 import subprocess
 import threading
+import time
 from pathlib import Path
 
 import support
@@ -261,6 +262,28 @@ def check_modes():
         expect(True, "--wait 0 plays without heartbeats")
 
 
+def check_gone():
+    """`fly` fails where the emulator is gone before the end of the trajectory, and not where it has stopped."""
+    flight = folder / "gone.csv"
+    flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
+                      + "".join(f"{0.1 * k:.1f},chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(40)))  # fmt: skip
+    long = folder / "long.csv"
+    long.write_text(flight.read_text() + "3600,chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n")
+    for mode, file, kill, status, words in (
+        (["--lockstep"], long, True, 1, "the connection to the emulator was lost"),
+        ([], flight, True, 1, "no heartbeat of the emulator for 10 s"),
+        ([], flight, False, 0, r"the emulator stopped: \d+ of 40 rows were sent"),
+    ):
+        bus = f"slcan:{support.free_port()}"
+        with support.Run(support.SCENE, "--can", bus, "--video", f"{support.CAMERA}=none", *mode) as run:
+            run.wait_for("commands: ")
+            fly = subprocess.Popen([support.NARPA, "fly", str(file), "--can", bus, *mode], stderr=subprocess.PIPE, text=True)
+            time.sleep(1.5)
+            run.process.kill() if kill else run.stop()
+            said = fly.communicate(timeout=60)[1]
+        expect(fly.returncode == status and re.search(words, said), f"fly {mode}, emulator {'killed' if kill else 'stopped'}: status {fly.returncode}, {said[-300:]}")
+
+
 @contextlib.contextmanager
 def silent_hub():
     """An slcan hub that answers requests and sends no frame."""
@@ -286,5 +309,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_folders):
     check()

@@ -11,9 +11,11 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "base/base64.h"
@@ -68,22 +70,30 @@ std::string document_beside(const std::string& picture) {
     return fs::path(picture).replace_extension(".json").string();
 }
 
-Error cannot_write(const std::string& picture) {
-    return {"cannot be written, expected a PNG file in a folder that exists", picture, 0, 0, ErrorKind::failed};
+Error failed(std::string what, const std::string& picture) {
+    return {std::move(what), picture, 0, 0, ErrorKind::failed};
+}
+Error no_picture_name(const std::string& picture) {
+    return failed("cannot be written, expected the name of a picture, like FILE.png", picture);
+}
+/// With the reason in errno.
+Error cannot_write(const std::string& picture, const std::string& json_file) {
+    return failed("its data cannot be written to " + json_file + ": " + std::strerror(errno), picture);
 }
 
 }  // namespace
 
 Status write_plot(const std::string& picture, const nlohmann::json& document) {
     const std::string json_file = document_beside(picture);
-    if (json_file == picture) return cannot_write(picture);
+    if (json_file == picture) return no_picture_name(picture);
+    errno = 0;
     std::ofstream out(json_file);
     out << document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
     out.close();
-    if (!out) return cannot_write(picture);
+    if (!out) return cannot_write(picture, json_file);
     const int status = run_program({plot_program(), json_file, "-o", picture});
     if (status == 0 || status == kMatplotlibMissing) return Ok{};
-    if (status != kNotStarted) return cannot_write(picture);
+    if (status != kNotStarted) return failed("is not drawn: narpa-plot has said why", picture);
     std::fprintf(stderr, "%s is not drawn: narpa-plot is not installed beside narpa; %s has the data\n",
                  picture.c_str(), json_file.c_str());
     return Ok{};
@@ -91,7 +101,9 @@ Status write_plot(const std::string& picture, const nlohmann::json& document) {
 
 Status can_write_plot(const std::string& picture) {
     const std::string json_file = document_beside(picture);
-    if (json_file == picture || !std::ofstream(json_file, std::ios::app)) return cannot_write(picture);
+    if (json_file == picture) return no_picture_name(picture);
+    errno = 0;
+    if (!std::ofstream(json_file, std::ios::app)) return cannot_write(picture, json_file);
     return Ok{};
 }
 

@@ -108,6 +108,13 @@ TEST_F(Whole, EndsAfterTooLongWithoutProgress) {
     EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics sent nothing"), std::string::npos);
 }
 
+TEST_F(Whole, AStatusOfTheUsersNavigationIsNoneOfOurs) {
+    o.navigation = "exit 3";
+    const auto done = run_rehearsal(o, kSilent, stop);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().kind, ErrorKind::failed) << done.error().text();
+}
+
 TEST_F(Whole, BadInputOfTheEmulatorIsBadInput) {
     o.bus = "slcan:notaport";
     const auto done = run_rehearsal(o, kSilent, stop);

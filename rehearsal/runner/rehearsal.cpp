@@ -254,7 +254,10 @@ private:
             return good;
         const bool command = navigation_.command.ready == Ready::variable;
         const auto began = Clock::now();
-        while (!navigation_is_ready(seconds_since(began))) {
+        for (;;) {
+            const Result<bool> ready = navigation_is_ready(seconds_since(began));
+            if (!ready) return ready.error();
+            if (*ready) break;
             receive();
             if (stop_) return interrupted();
             if (!navigation_.child) continue;
@@ -269,9 +272,9 @@ private:
     }
 
     /// A command of the user's may print the line "ready" instead of writing to READY_FD.
-    bool navigation_is_ready(double waited_s) {
-        if (!navigation_.child)
-            return console_.navigation_ready ? console_.navigation_ready() : waited_s > kCommandPatience_s;
+    Result<bool> navigation_is_ready(double waited_s) {
+        if (!navigation_.child && console_.navigation_ready) return console_.navigation_ready();
+        if (!navigation_.child) return waited_s > kCommandPatience_s;
         if (navigation_.child->ready()) return true;
         return navigation_.command.ready == Ready::variable &&
                ("\n" + read_text(navigation_.command.out)).find("\nready") != std::string::npos;

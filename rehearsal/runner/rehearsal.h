@@ -44,8 +44,9 @@ struct Console {
     /// How far it is: the share of the whole that is done, the seconds of wall time left (each negative where it is
     /// not known), and a text.
     std::function<void(double share, double left_s, std::string_view)> progress;
-    /// Polled where the user starts the navigation ("none"): whether it is ready. Empty: it is after ten seconds.
-    std::function<bool()> navigation_ready{};
+    /// Polled where the user starts the navigation ("none"): whether it is ready; an Error where nobody can say so.
+    /// Empty: it is after ten seconds.
+    std::function<Result<bool>()> navigation_ready{};
 };
 
 /// Errors: bad input (status 2), a missing device or program (3), programs that did not get ready; an earlier run's

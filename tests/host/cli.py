@@ -142,6 +142,9 @@ def check_errors():
     done = narpa("rehearse", "docking", "--can", "can77", "-o", folder / "can77", status=3)
     said = done.stderr.decode()
     expect(re.search(r"ended with status 3: can77: .+\n +try: ", said), f"rehearse names its child's reason: {said[-300:]}")
+    command = [support.NARPA, "rehearse", "docking", "--navigation", "none", "-o", str(folder / "nobody")]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+    expect(done.returncode == 2 and "standard input has ended, expected Enter" in done.stderr, f"the end of standard input is no Enter: {done.stderr[-300:]}")
     done = narpa("rehearse", "docking", "--runs", "1", "--can", "can77", "-o", folder / "runs", status=1)
     said = done.stderr.decode()
     expect(re.search(r"run 1 failed: .*can77: ", said), f"a campaign names the reason of a run that left no result: {said[-300:]}")

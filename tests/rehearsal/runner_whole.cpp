@@ -115,6 +115,15 @@ TEST_F(Whole, AStatusOfTheUsersNavigationIsNoneOfOurs) {
     EXPECT_EQ(done.error().kind, ErrorKind::failed) << done.error().text();
 }
 
+TEST_F(Whole, FailsWhereNobodyCanSayThatTheNavigationIsReady) {
+    o.navigation = "none";
+    Console console = kSilent;
+    console.navigation_ready = [] { return Error{"nobody is there"}; };
+    const auto done = run_rehearsal(o, console, stop);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().what, "nobody is there");
+}
+
 TEST_F(Whole, BadInputOfTheEmulatorIsBadInput) {
     o.bus = "slcan:notaport";
     const auto done = run_rehearsal(o, kSilent, stop);

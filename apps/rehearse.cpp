@@ -49,7 +49,11 @@ Outcome one(const rehearsal::RehearsalOptions& options) {
                         g.reason));
     say(done->verdict.headline);
     if (!done->page.empty()) say("wrote " + done->page);
-    return done->result;
+    if (done->written) return done->result;
+    say("narpa: " + done->written.error().text());
+    nlohmann::json document = done->result;
+    document.update(cli::to_json(done->written.error()));
+    return document;
 }
 
 Outcome many(const rehearsal::CampaignOptions& options) {

@@ -36,6 +36,7 @@ struct RehearsalResult {
     std::string page;  ///< empty: none
     double wall_s = 0;
     nlohmann::json result;  ///< as in result.json
+    Status written{Ok{}};   ///< the first file of the report that could not be written
 };
 
 /// Where messages for people go.

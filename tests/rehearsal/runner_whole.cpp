@@ -124,6 +124,22 @@ TEST_F(Whole, FailsWhereNobodyCanSayThatTheNavigationIsReady) {
     EXPECT_EQ(done.error().what, "nobody is there");
 }
 
+TEST_F(Whole, KeepsTheVerdictWhereThePageCannotBeWritten) {
+    o.dynamics = "sleep 100";
+    o.patience_s = 0.3;
+    Console console = kSilent;
+    console.print = [&](std::string_view text) {
+        if (text.starts_with("dynamics: "))
+            for (const char* file : {"charts.json", "index.html"}) fs::create_directory(o.folder + "/" + file);
+    };
+    const auto done = run_rehearsal(o, console, stop);
+    ASSERT_TRUE(done) << done.error().text();
+    EXPECT_FALSE(done->verdict.gates.empty());
+    ASSERT_FALSE(done->written);
+    EXPECT_NE(done->written.error().what.find("Is a directory"), std::string::npos) << done->written.error().text();
+    EXPECT_TRUE(fs::exists(o.folder + "/result.json"));
+}
+
 TEST_F(Whole, BadInputOfTheEmulatorIsBadInput) {
     o.bus = "slcan:notaport";
     const auto done = run_rehearsal(o, kSilent, stop);

@@ -238,7 +238,17 @@ TEST_F(Whole, AReplayNeverRunsACommandOfTheLog) {
             EXPECT_FALSE(fs::exists(proof)) << hostile;
         }
 
-    // Named by the caller, it is run.
+    // Named by the caller, it is run, if the log is whole.
+    log.navigation = "touch " + proof;
+    const auto partial = rerun(log, kSilent, stop);
+    ASSERT_FALSE(partial);
+    EXPECT_EQ(partial.error().file, log.folder + "/emulator/can.log");
+    EXPECT_FALSE(fs::exists(proof));
+    for (const char* part : {"emulator", "dynamics"}) fs::create_directory(log.folder + "/" + part);
+    for (const char* file : {"can.log", "nav.ledger.csv", "nav.truth.csv", "top.sweeps.csv"})
+        std::ofstream(log.folder + "/emulator/" + file) << '\n';
+    EXPECT_EQ(rerun(log, kSilent, stop).error().file, log.folder + "/dynamics/truth.csv");
+    std::ofstream(log.folder + "/dynamics/truth.csv") << '\n';
     log.navigation = "touch " + proof + "; exit 9";
     EXPECT_FALSE(rerun(log, kSilent, stop));
     EXPECT_TRUE(fs::exists(proof));

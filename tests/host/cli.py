@@ -303,6 +303,27 @@ def silent_hub():
         server.shutdown()
 
 
+def check_replay():
+    """Every camera of the log is replayed, also where the scene's first is not in it; a log of sweeps alone is not."""
+    scene = folder / "two.toml"
+    scene.write_text('[scene]\nname = "two"\n[sun]\ndirection = [1.0, 0.0, 0.0]\n[[body]]\nname = "craft"\nsphere = {radius_m = 1.0}\n'
+                     + "".join(f'[[camera]]\nname = "{name}"\nposition_m = [{x}, 0.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 5.0\n'
+                               for name, x in (("nav", 5.0), ("aft", 6.0)))
+                     + '[[lidar]]\nname = "top"\nmodel = "VLP-16"\nposition_m = [5.0, 0.0, 0.0]\n')  # fmt: skip
+    for cameras in (["nav", "aft"], ["aft"], []):
+        log = folder / ("log-" + "-".join(cameras))
+        video = [word for name in cameras for word in ("--video", f"{name}=none")]
+        narpa("run", scene, *video, "--lidar", "top=none", "--duration", "1", "--log", log)
+        if not cameras:
+            expect_refusal(2, "has no log of a camera, .*sweeps of LiDARs are not replayed", "replay", log)
+            continue
+        done = narpa("replay", log, "--json")
+        said, document = done.stderr.decode(), json.loads(done.stdout)
+        expect(all(f"camera {name}: " in said for name in cameras) and "sweeps are not compared" in said, f"replay of {cameras}: {said}")
+        replayed = [d["camera"] for d in document.get("cameras", [document])]
+        expect(document["passed"] and sorted(replayed) == sorted(cameras), f"--json has {replayed}")
+
+
 def check_folders():
     """One run to a folder at a time."""
     log = folder / "one-log"
@@ -312,5 +333,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_replay, check_folders):
     check()

@@ -27,6 +27,8 @@ struct FlyOptions {
 };
 
 constexpr std::int64_t kMs = 1'000'000;
+/// Of ten heartbeats a second; after so long without one the emulator may be gone.
+constexpr std::int64_t kDoubtfulSilence_ns = 1000 * kMs;
 
 /// One body's commands on the wire.
 struct Commander {
@@ -94,13 +96,11 @@ public:
             if (options_.lockstep)
                 if (auto reached = wait_in_lockstep(); !reached) return reached;
         }
-        return Ok{};
+        return arrived();
     }
 
     /// The emulator's run has ended, before the trajectory has.
-    [[nodiscard]] bool emulator_stops() const {
-        return clock_.synchronized() && clock_.newest().state == RunState::stopping;
-    }
+    [[nodiscard]] bool emulator_stops() const { return clock_.stopping(); }
     std::uint64_t commands = 0, frames_dropped = 0;
     std::size_t rows_sent = 0;
     std::int64_t start_ns() const { return start_ns_; }
@@ -153,10 +153,34 @@ private:
     Status wait_for(std::int64_t t_ns) {
         for (std::int64_t left; (left = t_ns - clock_.now_ns()) > 0 && !stop_flag() && !emulator_stops();) {
             bus_.wait(std::min<std::int64_t>(left, 100 * kMs));
-            clock_.listen(bus_);
-            if (auto fits = check_run(); !fits) return fits;
+            if (auto there = listen(); !there) return there;
         }
         return Ok{};
+    }
+
+    /// In real time: reads heartbeats, and expects one in kHeartbeatSilence_s.
+    Status listen() {
+        clock_.listen(bus_);
+        if (auto fits = check_run(); !fits) return fits;
+        if (emulator_stops() || static_cast<double>(clock_.silence_ns()) <= 1e9 * kHeartbeatSilence_s) return Ok{};
+        return failed(fmt::format("no heartbeat of the emulator for {:g} s", kHeartbeatSilence_s));
+    }
+
+    /// At the end: whether the emulator was there for all that was sent.
+    Status arrived() {
+        if (stop_flag() || bus_.ended()) return Ok{};
+        while (!options_.lockstep && !emulator_stops() && clock_.silence_ns() > kDoubtfulSilence_ns) {
+            bus_.wait(100 * kMs);
+            if (auto there = listen(); !there) return there;
+            if (stop_flag()) return Ok{};
+        }
+        if (frames_dropped == 0 || emulator_stops()) return Ok{};
+        return failed(fmt::format("{} frames of the commands could not be sent", frames_dropped));
+    }
+
+    Error failed(const std::string& what) const {
+        return {fmt::format("{} ({} commands sent, {} frames dropped)", what, commands, frames_dropped),
+                options_.bus, 0, 0, ErrorKind::failed};
     }
 
     Status send(const TrajectoryRow& row, std::int64_t t_ns) {
@@ -185,6 +209,7 @@ private:
             if (auto fits = check_run(); !fits) return fits;
             if (clock_.reached(granted)) break;
             if (stop_flag() || emulator_stops()) return Ok{};
+            if (bus_.counters().interface_down > 0) return failed("the connection to the emulator was lost");
             if (monotonic_ns() > deadline)
                 return Error{
                     fmt::format(

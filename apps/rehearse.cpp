@@ -3,8 +3,6 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include <chrono>
-
 #include "apps/cli.h"
 #include "apps/shipped.h"
 #include "rehearsal/runner/campaign.h"
@@ -20,14 +18,15 @@ struct RehearseOptions {
     int jobs = 1;
 };
 
-/// Whether a line has come on standard input; after its end, ten seconds after the first call.
-bool line_on_stdin() {
-    using Clock = std::chrono::steady_clock;
-    static const Clock::time_point first = Clock::now();
+/// Whether a line has come on standard input.
+Result<bool> line_on_stdin() {
     pollfd input{STDIN_FILENO, POLLIN, 0};
     if (::poll(&input, 1, 0) <= 0) return false;
     char c = 0;
-    return ::read(STDIN_FILENO, &c, 1) == 1 ? c == '\n' : Clock::now() - first > std::chrono::seconds(10);
+    if (::read(STDIN_FILENO, &c, 1) == 1) return c == '\n';
+    return Error{
+        "--navigation none: standard input has ended, expected Enter on it once your navigation listens; "
+        "--navigation COMMAND needs no input"};
 }
 
 rehearsal::Console console(Progress& progress) {
@@ -50,7 +49,11 @@ Outcome one(const rehearsal::RehearsalOptions& options) {
                         g.reason));
     say(done->verdict.headline);
     if (!done->page.empty()) say("wrote " + done->page);
-    return done->result;
+    if (done->written) return done->result;
+    say("narpa: " + done->written.error().text());
+    nlohmann::json document = done->result;
+    document.update(cli::to_json(done->written.error()));
+    return document;
 }
 
 Outcome many(const rehearsal::CampaignOptions& options) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <string_view>
 
 #include "apps/cli.h"
 #include "emulator/replay/replay_report.h"
@@ -96,11 +97,26 @@ std::string differences_in_words(const Replayed& done, const std::string& log) {
     return out;
 }
 
-Outcome replay(const ReplayOptions& o) {
-    if (!o.picture.empty() && o.reference == 0)
-        return Error{
-            fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
-    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
+struct LoggedSensors {
+    std::vector<std::string> cameras;
+    bool lidars = false;
+};
+
+/// By the names of the log's files: NAME.ledger.csv, NAME.sweeps.csv.
+LoggedSensors sensors_in(const std::string& folder) {
+    constexpr std::string_view kLedger = ".ledger.csv";
+    LoggedSensors found;
+    std::error_code failed;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+        const std::string name = entry.path().filename().string();
+        if (name.ends_with(kLedger)) found.cameras.push_back(name.substr(0, name.size() - kLedger.size()));
+        found.lidars |= name.ends_with(".sweeps.csv");
+    }
+    std::sort(found.cameras.begin(), found.cameras.end());
+    return found;
+}
+
+Outcome replay_camera(const ReplayOptions& o) {
     auto run = Replay::open(o.folder, o.camera, o.scene);
     if (!run) return run.error();
     const std::string& camera = (*run)->camera().name;
@@ -145,6 +161,40 @@ Outcome replay(const ReplayOptions& o) {
     return document;
 }
 
+/// Of several cameras: `cameras` has the document of each.
+Outcome replay_cameras(ReplayOptions o, const std::vector<std::string>& cameras) {
+    bool passed = true;
+    nlohmann::json documents = nlohmann::json::array();
+    for (const std::string& camera : cameras) {
+        o.camera = camera;
+        auto document = replay_camera(o);
+        if (!document) return document;
+        passed = passed && document->value("passed", false);
+        documents.push_back(*std::move(document));
+    }
+    if (documents.size() == 1) return documents[0];
+    return nlohmann::json{{"passed", passed}, {"log", o.folder}, {"cameras", documents}};
+}
+
+Outcome replay(const ReplayOptions& o) {
+    if (!o.picture.empty() && o.reference == 0)
+        return Error{
+            fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
+    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
+    const LoggedSensors logged = sensors_in(o.folder);
+    if (logged.cameras.empty() && logged.lidars)
+        return Error{"has no log of a camera, NAME.ledger.csv, expected one: sweeps of LiDARs are not replayed",
+                     o.folder};
+    const std::vector<std::string> cameras =
+        o.camera.empty() && !logged.cameras.empty() ? logged.cameras : std::vector{o.camera};
+    if (!o.picture.empty() && cameras.size() > 1)
+        return Error{fmt::format("-o {} shows frames of one camera, expected --camera {} too", o.picture,
+                                 fmt::join(cameras, " or "))};
+    Outcome outcome = replay_cameras(o, cameras);
+    if (outcome && logged.lidars) say(o.folder + ": sweeps are not compared");
+    return outcome;
+}
+
 /// In lockstep all of it can be run again; what was run in real time has the emulator's frames to repeat.
 Outcome replay_any(const ReplayOptions& o) {
     const bool commands = !o.dynamics.empty() || !o.navigation.empty();
@@ -184,7 +234,7 @@ Command add_replay(Parser app) {
         "replay",
         "Render the frames of a logged run again, bit for bit, and report the error that their budget left");
     c.option("DIR", o->folder, "Folder that `run --log` or `rehearse` has written").required();
-    c.option("--camera", o->camera, "Name of the camera (default: the first of the scene)").type_name("NAME");
+    c.option("--camera", o->camera, "Name of the camera (default: each that is in the log)").type_name("NAME");
     c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
     c.option("--reference", o->reference,
              "Compare with this number of samples per pixel: error, similarity, shifts of bodies and edges")

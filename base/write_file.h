@@ -21,7 +21,8 @@ namespace narpa {
     std::ofstream out(path, std::ios::binary);
     if (!out) return cannot_open_to_write(path);
     out << text;
-    if (!out.flush()) return Error{"cannot be written", path, 0, 0, ErrorKind::failed};
+    if (!out.flush())
+        return Error{std::string("cannot be written: ") + std::strerror(errno), path, 0, 0, ErrorKind::failed};
     return Ok{};
 }
 

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "base/base64.h"
@@ -69,20 +70,23 @@ std::string document_beside(const std::string& picture) {
     return fs::path(picture).replace_extension(".json").string();
 }
 
-Error cannot_write(const std::string& picture) {
-    return {"cannot be written, expected a PNG file in a folder that exists", picture, 0, 0, ErrorKind::failed};
+Error failed(std::string what, const std::string& picture) {
+    return {std::move(what), picture, 0, 0, ErrorKind::failed};
+}
+Error no_picture_name(const std::string& picture) {
+    return failed("cannot be written, expected the name of a picture, like FILE.png", picture);
 }
 
 }  // namespace
 
 Status write_plot(const std::string& picture, const nlohmann::json& document) {
     const std::string json_file = document_beside(picture);
-    if (json_file == picture) return cannot_write(picture);
+    if (json_file == picture) return no_picture_name(picture);
     const std::string text = document.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
     if (Status written = write_file(json_file, text); !written) return written;
     const int status = run_program({plot_program(), json_file, "-o", picture});
     if (status == 0 || status == kMatplotlibMissing) return Ok{};
-    if (status != kNotStarted) return cannot_write(picture);
+    if (status != kNotStarted) return failed("is not drawn: narpa-plot has said why", picture);
     std::fprintf(stderr, "%s is not drawn: narpa-plot is not installed beside narpa; %s has the data\n",
                  picture.c_str(), json_file.c_str());
     return Ok{};
@@ -90,7 +94,7 @@ Status write_plot(const std::string& picture, const nlohmann::json& document) {
 
 Status can_write_plot(const std::string& picture) {
     const std::string json_file = document_beside(picture);
-    if (json_file == picture) return cannot_write(picture);
+    if (json_file == picture) return no_picture_name(picture);
     if (!std::ofstream(json_file, std::ios::app)) return cannot_open_to_write(json_file);
     return Ok{};
 }

@@ -16,6 +16,7 @@ bool RemoteClock::accept(const ReceivedFrame& received) noexcept {
     // The heartbeat with the least delay is the most accurate, of the run that goes on.
     const std::int64_t offset_ns = newest_.t_ns - received.t_received_ns;
     offset_ns_ = synchronized_ && !restarted ? std::max(offset_ns_, offset_ns) : offset_ns;
+    t_received_ns_ = received.t_received_ns;
     synchronized_ = true;
     restarted_ = restarted_ || restarted;
     return true;
@@ -32,6 +33,10 @@ void RemoteClock::start_here() noexcept {
 
 std::int64_t RemoteClock::now_ns() const noexcept {
     return monotonic_ns() + offset_ns_;
+}
+
+std::int64_t RemoteClock::silence_ns() const noexcept {
+    return synchronized_ ? monotonic_ns() - t_received_ns_ : 0;
 }
 
 Result<std::unique_ptr<CanBus>> join_can_bus(std::string_view spec, double wait_s, const StopFlag& stop) {

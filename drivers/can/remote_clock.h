@@ -12,6 +12,9 @@
 
 namespace narpa {
 
+/// In real time the emulator sends ten heartbeats a second: after so long without one it is gone.
+inline constexpr double kHeartbeatSilence_s = 10;
+
 /// The simulation clock of `narpa run`, synchronised by its heartbeats. Allocates nothing.
 class RemoteClock {
 public:
@@ -27,6 +30,10 @@ public:
     [[nodiscard]] bool restarted() const noexcept { return restarted_; }
     /// In real time: the emulator's time now. Heartbeats carry whole microseconds.
     [[nodiscard]] std::int64_t now_ns() const noexcept;
+    /// CLOCK_MONOTONIC since the last heartbeat; 0 before the first.
+    [[nodiscard]] std::int64_t silence_ns() const noexcept;
+    /// The last heartbeat says that the emulator's run has ended.
+    [[nodiscard]] bool stopping() const noexcept { return synchronized_ && newest_.state == RunState::stopping; }
     /// The last heartbeat; in lockstep its time is the simulation time.
     [[nodiscard]] const Heartbeat& newest() const noexcept { return newest_; }
     /// In lockstep: everything due up to t_ns has been sent. Heartbeats in state `starting` do not count.
@@ -37,7 +44,7 @@ public:
 
 private:
     Heartbeat newest_{};
-    std::int64_t offset_ns_ = 0;
+    std::int64_t offset_ns_ = 0, t_received_ns_ = 0;
     bool synchronized_ = false, restarted_ = false;
 };
 

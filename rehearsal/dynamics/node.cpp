@@ -24,6 +24,7 @@ constexpr std::int64_t kShortWaitNs = 20'000'000;
 /// In real time poses are sent so long before their time of validity: a frame of that time then has that pose.
 constexpr std::int64_t kLeadNs = 5'000'000;
 constexpr double kSiteOff_m = 0.5;
+constexpr const char* kConnectionLost = "the connection to the emulator was lost";
 constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
 
 /// A body's pose commands.
@@ -94,7 +95,8 @@ private:
         for (;;) {
             if (auto received = receive(); !received) return received;
             if (done() || stop_) return Ok{};
-            if (emulator_has_stopped()) return failed(what() + ": the emulator has stopped");
+            if (clock_.stopping()) return failed(what() + ": the emulator has stopped");
+            if (connection_lost()) return failed(what() + ": " + kConnectionLost);
             if (monotonic_ns() > deadline_ns) return failed(what() + fmt::format(" in {} s", options_.patience_s));
             bus_.wait(kShortWaitNs);
         }
@@ -129,10 +131,13 @@ private:
     Status wait_until(std::int64_t t_ns) {
         for (;;) {
             if (auto received = receive(); !received) return received;
+            if (stop_) return Ok{};
+            if (clock_.stopping()) return failed(fmt::format("at {:.3f} s: the emulator has stopped", now_s()));
+            if (static_cast<double>(clock_.silence_ns()) > 1e9 * options_.silence_s)
+                return failed(fmt::format("at {:.3f} s: no heartbeat of the emulator for {:g} s", now_s(),
+                                          options_.silence_s));
             const std::int64_t left_ns = t_ns - clock_.now_ns();
-            if (left_ns <= 0 || stop_) return Ok{};
-            if (emulator_has_stopped())
-                return failed(fmt::format("at {:.3f} s: the emulator has stopped", now_s()));
+            if (left_ns <= 0) return Ok{};
             bus_.wait(std::min(left_ns, 5 * kShortWaitNs));
         }
     }
@@ -178,9 +183,8 @@ private:
         return t_ns >= t_start_ns_ && t_ns <= now_ns + scenario_.period_ns();
     }
 
-    bool emulator_has_stopped() const {
-        return clock_.synchronized() && clock_.newest().state == RunState::stopping;
-    }
+    /// In lockstep nothing goes on after that, even if the bus comes back: messages are missing.
+    bool connection_lost() const { return bus_.counters().interface_down > 0; }
 
     // --- Motion and its messages ---
     std::int64_t next_pose_ns() const {
@@ -253,6 +257,7 @@ private:
                     return failed(fmt::format("the bus takes no frame for {} s", options_.patience_s));
                 bus_.wait(kShortWaitNs);
                 if (auto received = receive(); !received) return received;
+                if (connection_lost()) return failed(fmt::format("at {:.3f} s: {}", now_s(), kConnectionLost));
             }
         return Ok{};
     }

@@ -44,10 +44,15 @@ private:
             loop_.link.receive(kSecond_ns / 50);
             if (auto read = read_frames(); !read) return read;
             read_packets();
+            if (met() || loop_.over()) break;
+            if (loop_.link.dynamics() && loop_.link.clock().stopping())  // else of an earlier run
+                return loop_.failed(fmt::format("the emulator has stopped, expected {}", what));
+            if (loop_.link.counters().interface_down > 0)
+                return loop_.failed(fmt::format("the connection to the emulator was lost, expected {}", what));
             if (monotonic_ns() > deadline)
-                return Error{fmt::format("no {} in {} s: are `narpa run --lockstep` and the dynamics there?", what,
-                                         kEmulatorPatience_ns / kSecond_ns),
-                             loop_.link.description(), 0, 0, ErrorKind::failed};
+                return loop_.failed(fmt::format(
+                    "nothing in {1} s, expected {0}: are `narpa run --lockstep` and the dynamics there?", what,
+                    kEmulatorPatience_ns / kSecond_ns));
         }
         return Ok{};
     }

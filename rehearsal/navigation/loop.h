@@ -16,10 +16,14 @@ struct Loop {
     NavigationLog* log;  ///< null: none
     const StopFlag& stop;
     NodeCounts& counts;
+    double silence_s;  ///< real time: longest time between heartbeats
 
     [[nodiscard]] bool over() const {
         const auto& dynamics = link.dynamics();
         return stop.load(std::memory_order_relaxed) || (dynamics && dynamics->phase == DynamicsPhase::finished);
+    }
+    [[nodiscard]] Error failed(std::string what) const {
+        return {std::move(what), link.description(), 0, 0, ErrorKind::failed};
     }
     /// `i`: index in the scenario's list.
     void take_frame(std::size_t i, std::int64_t t_mid_ns, std::span<const std::uint8_t> bytes) const {
@@ -39,13 +43,14 @@ struct Loop {
     }
 };
 
-/// On simulation time alone. Errors: no messages on the bus for too long, a video source that has failed.
+/// On simulation time alone. Errors: no messages on the bus for too long, an emulator that has stopped, a lost
+/// connection to the bus, a video source that has failed.
 Status fly_in_lockstep(const Loop& loop);
 
 /// On the emulator's clock. The calling thread receives from the bus and runs a cycle each period. Each source has
 /// a thread that reads it. One more thread measures: once the chaser's attitude at t_k has come, from the newest
 /// frame of each camera and the newest sweep of each LiDAR that end by t_k. Errors: no heartbeat, at the start or
-/// for too long.
+/// for too long, an emulator that has stopped.
 Status fly_in_real_time(const Loop& loop);
 
 }  // namespace narpa::rehearsal

@@ -22,7 +22,7 @@ Status navigate(const Scenario& scenario, const NodeOptions& options, const Stop
     ready();
 
     NodeCounts counts;
-    const Loop loop{**autopilot, *inputs, link, log.get(), stop, counts};
+    const Loop loop{**autopilot, *inputs, link, log.get(), stop, counts, options.silence_s};
     Status flown = options.lockstep ? fly_in_lockstep(loop) : fly_in_real_time(loop);
     counts.bad_messages = link.bad_messages();
     counts.send_drops = link.counters().send_drops;

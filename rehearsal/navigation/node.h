@@ -13,6 +13,7 @@
 
 #include "base/result.h"
 #include "base/stop.h"
+#include "drivers/can/remote_clock.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
@@ -25,13 +26,15 @@ struct NodeOptions {
     SourceList video, lidar;
     bool lockstep = false;
     std::uint64_t seed = 1;
-    double wait_s = 30;  ///< for the bus
-    std::string log;     ///< folder; empty: none
+    double wait_s = 30;                      ///< for the bus
+    double silence_s = kHeartbeatSilence_s;  ///< real time: longest time between heartbeats
+    std::string log;                         ///< folder; empty: none
     std::string version;
 };
 
 /// Runs until the dynamics report the end, or until stopped. `ready` is called once all inputs and the bus are
-/// open. Errors: of scenario, scene, sources, bus; a bus without messages for too long (failed).
+/// open. Errors: of scenario, scene, sources, bus; a bus without messages for too long, an emulator that has
+/// stopped or gone (failed).
 Status navigate(const Scenario& scenario, const NodeOptions& options, const StopFlag& stop,
                 const std::function<void()>& ready);
 

@@ -160,13 +160,13 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     summary["scenario_hash"] = texts->hash;
     summary["version"] = o.run.version;
     const std::string page = o.run.folder + "/index.html";
-    if (Status good = draw_charts(o.run.folder, campaign_plot(*scenario, contacts_of(runs))); !good)
-        return good.error();
-    if (Status good = write_file(page, campaign_page(*scenario, summary, o.run.folder)); !good) return good.error();
     if (Status good = write_junit(o.run.folder + "/junit.xml", campaign_junit(scenario->name, runs)); !good)
         return good.error();
     if (Status good = write_file(o.run.folder + "/summary.json", summary.dump(2) + "\n"); !good)
         return good.error();
+    if (Status good = draw_charts(o.run.folder, campaign_plot(*scenario, contacts_of(runs))); !good)
+        return good.error();
+    if (Status good = write_file(page, campaign_page(*scenario, summary, o.run.folder)); !good) return good.error();
     return summary;
 }
 

@@ -203,7 +203,8 @@ std::string Program::failure() {
 }
 
 Error Program::start_error(const std::string& what) {
-    const int status = child ? child->status().value_or(1) : 1;
+    const bool ours = command.ready != ChildProcess::Ready::variable;
+    const int status = child && ours ? child->status().value_or(1) : 1;
     const ErrorKind kind = status == 2   ? ErrorKind::bad_input
                            : status == 3 ? ErrorKind::missing
                                          : ErrorKind::failed;

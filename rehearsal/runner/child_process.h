@@ -73,7 +73,7 @@ struct Program {
     [[nodiscard]] bool ended() { return child && child->status(); }
     /// "the navigation ended with status 7: its error"; empty while it runs and after status 0.
     [[nodiscard]] std::string failure();
-    /// An Error of the kind that its exit status stands for.
+    /// An Error of the kind that its exit status stands for; failed, where it is a program of the user's.
     [[nodiscard]] Error start_error(const std::string& what);
 };
 

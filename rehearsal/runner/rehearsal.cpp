@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <ctime>
@@ -44,6 +45,18 @@ std::string utc_now() {
     ::gmtime_r(&now, &utc);
     std::array<char, 32> text{};
     return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc)};
+}
+
+/// write_file, with the system's reason in the Error.
+Status write_whole(const std::string& file, const std::string& text) {
+    errno = 0;
+    Status written = write_file(file, text);
+    if (written || errno == 0) return written;
+    return Error{fmt::format("cannot be written: {}", std::strerror(errno)), file, 0, 0, ErrorKind::failed};
+}
+
+void keep_first(Status& first, const Status& next) {
+    if (first && !next) first = next;
 }
 
 class Rehearsal {
@@ -254,7 +267,10 @@ private:
             return good;
         const bool command = navigation_.command.ready == Ready::variable;
         const auto began = Clock::now();
-        while (!navigation_is_ready(seconds_since(began))) {
+        for (;;) {
+            const Result<bool> ready = navigation_is_ready(seconds_since(began));
+            if (!ready) return ready.error();
+            if (*ready) break;
             receive();
             if (stop_) return interrupted();
             if (!navigation_.child) continue;
@@ -269,9 +285,9 @@ private:
     }
 
     /// A command of the user's may print the line "ready" instead of writing to READY_FD.
-    bool navigation_is_ready(double waited_s) {
-        if (!navigation_.child)
-            return console_.navigation_ready ? console_.navigation_ready() : waited_s > kCommandPatience_s;
+    Result<bool> navigation_is_ready(double waited_s) {
+        if (!navigation_.child && console_.navigation_ready) return console_.navigation_ready();
+        if (!navigation_.child) return waited_s > kCommandPatience_s;
         if (navigation_.child->ready()) return true;
         return navigation_.command.ready == Ready::variable &&
                ("\n" + read_text(navigation_.command.out)).find("\nready") != std::string::npos;
@@ -399,19 +415,17 @@ private:
                             {"seed", seed()},
                             {"version", options_.version},
                             {"trouble", trouble_}});
-        if (options_.page) {
-            record_["wall_s"] = done.wall_s;
-            done.page = in_folder("index.html");
-            if (Status good = draw_charts(options_.folder, rehearsal_plot(scenario_, judge_.bus(), v)); !good)
-                return good.error();
-            const std::string page = rehearsal_page(scenario_, judge_.bus(), v, record_, options_.folder);
-            if (Status good = write_file(done.page, page); !good) return good.error();
-        }
-        if (Status good = write_junit(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)); !good)
-            return good.error();
-        // Last: a folder with result.json is complete.
-        if (Status good = write_file(in_folder("result.json"), done.result.dump(2) + "\n"); !good)
-            return good.error();
+        // The verdict first: on a full disk the rest may have no room.
+        keep_first(done.written, write_whole(in_folder("result.json"), done.result.dump(2) + "\n"));
+        keep_first(done.written, write_junit(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)));
+        if (!options_.page) return done;
+        record_["wall_s"] = done.wall_s;
+        keep_first(done.written, draw_charts(options_.folder, rehearsal_plot(scenario_, judge_.bus(), v)));
+        const std::string page = in_folder("index.html");
+        const Status paged =
+            write_whole(page, rehearsal_page(scenario_, judge_.bus(), v, record_, options_.folder));
+        if (paged) done.page = page;
+        keep_first(done.written, paged);
         return done;
     }
 

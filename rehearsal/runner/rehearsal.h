@@ -36,6 +36,7 @@ struct RehearsalResult {
     std::string page;  ///< empty: none
     double wall_s = 0;
     nlohmann::json result;  ///< as in result.json
+    Status written{Ok{}};   ///< the first file of the report that could not be written
 };
 
 /// Where messages for people go.
@@ -44,8 +45,9 @@ struct Console {
     /// How far it is: the share of the whole that is done, the seconds of wall time left (each negative where it is
     /// not known), and a text.
     std::function<void(double share, double left_s, std::string_view)> progress;
-    /// Polled where the user starts the navigation ("none"): whether it is ready. Empty: it is after ten seconds.
-    std::function<bool()> navigation_ready{};
+    /// Polled where the user starts the navigation ("none"): whether it is ready; an Error where nobody can say so.
+    /// Empty: it is after ten seconds.
+    std::function<Result<bool>()> navigation_ready{};
 };
 
 /// Errors: bad input (status 2), a missing device or program (3), programs that did not get ready; an earlier run's

@@ -55,6 +55,24 @@ bool next_line(std::ifstream& file, bool sweeps, std::string& line) {
     return false;
 }
 
+/// What each rehearsal in lockstep leaves: without one of them not all of it is compared.
+Status check_logs(const std::string& folder, const Scenario& scenario, const json& record) {
+    std::vector<std::string> files{"emulator/can.log"};
+    for (const std::string& camera : scenario.navigation.cameras)
+        for (const char* log : {".ledger.csv", ".truth.csv"}) files.push_back("emulator/" + camera + log);
+    for (const std::string& lidar : scenario.navigation.lidars)
+        files.push_back("emulator/" + lidar + ".sweeps.csv");
+    if (record["dynamics"] == "") files.emplace_back("dynamics/truth.csv");
+    if (record["navigation"] == "") files.emplace_back("navigation/navigation.csv");
+    for (const std::string& name : files) {
+        std::error_code unknown;
+        const std::string file = folder + "/" + name;
+        if (!fs::is_regular_file(file, unknown))
+            return Error{"no such file, expected the log of the rehearsal to be whole", file};
+    }
+    return Ok{};
+}
+
 /// Files that do not depend on wall time.
 std::vector<std::string> comparable(const std::string& folder) {
     std::vector<std::string> files{"emulator/can.log"};
@@ -149,6 +167,7 @@ Result<json> rerun(const RerunOptions& options, const Console& console, const St
                         "and scene.toml",
                         folder),
             scenario->file, 0, 0, ErrorKind::failed};
+    if (const Status whole = check_logs(folder, *scenario, *record); !whole) return whole.error();
     const TemporaryFolder again;
     RehearsalOptions o;
     o.scenario = scenario->file;
@@ -162,6 +181,7 @@ Result<json> rerun(const RerunOptions& options, const Console& console, const St
     o.programs = options.programs;
     const auto done = run_rehearsal(o, console, stop);
     if (!done) return done.error();
+    if (!done->written) return done->written.error();
 
     json files = json::array();
     bool same = true;

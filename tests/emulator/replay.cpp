@@ -246,6 +246,8 @@ TEST_F(ReplayTest, FindsARowThatIsNotAsTheFrameWas) {
         {"rays", std::to_string(second.rays + 1), fmt::format("rays: {}, logged {}", second.rays, second.rays + 1)},
         {"step", "1", "samples: "},
         {"expected_error", "0.5", "expected_error: "},
+        {"expected_error", "nan", "expected_error: "},
+        {"expected_error", "-1", "expected_error: "},
         {"t_exposure_mid_ns", "200000000", "image_crc32: "},
         {"frame", "9", "image_crc32: "},
     };

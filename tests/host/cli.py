@@ -7,6 +7,7 @@ import re
 import socketserver
 import subprocess
 import threading
+import time
 from pathlib import Path
 
 import support
@@ -141,6 +142,9 @@ def check_errors():
     done = narpa("rehearse", "docking", "--can", "can77", "-o", folder / "can77", status=3)
     said = done.stderr.decode()
     expect(re.search(r"ended with status 3: can77: .+\n +try: ", said), f"rehearse names its child's reason: {said[-300:]}")
+    command = [support.NARPA, "rehearse", "docking", "--navigation", "none", "-o", str(folder / "nobody")]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+    expect(done.returncode == 2 and "standard input has ended, expected Enter" in done.stderr, f"the end of standard input is no Enter: {done.stderr[-300:]}")
     done = narpa("rehearse", "docking", "--runs", "1", "--can", "can77", "-o", folder / "runs", status=1)
     said = done.stderr.decode()
     expect(re.search(r"run 1 failed: .*can77: ", said), f"a campaign names the reason of a run that left no result: {said[-300:]}")
@@ -261,6 +265,28 @@ def check_modes():
         expect(True, "--wait 0 plays without heartbeats")
 
 
+def check_gone():
+    """`fly` fails where the emulator is gone before the end of the trajectory, and not where it has stopped."""
+    flight = folder / "gone.csv"
+    flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
+                      + "".join(f"{0.1 * k:.1f},chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(40)))  # fmt: skip
+    long = folder / "long.csv"
+    long.write_text(flight.read_text() + "3600,chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n")
+    for mode, file, kill, status, words in (
+        (["--lockstep"], long, True, 1, "the connection to the emulator was lost"),
+        ([], flight, True, 1, "no heartbeat of the emulator for 10 s"),
+        ([], flight, False, 0, r"the emulator stopped: \d+ of 40 rows were sent"),
+    ):
+        bus = f"slcan:{support.free_port()}"
+        with support.Run(support.SCENE, "--can", bus, "--video", f"{support.CAMERA}=none", *mode) as run:
+            run.wait_for("commands: ")
+            fly = subprocess.Popen([support.NARPA, "fly", str(file), "--can", bus, *mode], stderr=subprocess.PIPE, text=True)
+            time.sleep(1.5)
+            run.process.kill() if kill else run.stop()
+            said = fly.communicate(timeout=60)[1]
+        expect(fly.returncode == status and re.search(words, said), f"fly {mode}, emulator {'killed' if kill else 'stopped'}: status {fly.returncode}, {said[-300:]}")
+
+
 @contextlib.contextmanager
 def silent_hub():
     """An slcan hub that answers requests and sends no frame."""
@@ -277,6 +303,27 @@ def silent_hub():
         server.shutdown()
 
 
+def check_replay():
+    """Every camera of the log is replayed, also where the scene's first is not in it; a log of sweeps alone is not."""
+    scene = folder / "two.toml"
+    scene.write_text('[scene]\nname = "two"\n[sun]\ndirection = [1.0, 0.0, 0.0]\n[[body]]\nname = "craft"\nsphere = {radius_m = 1.0}\n'
+                     + "".join(f'[[camera]]\nname = "{name}"\nposition_m = [{x}, 0.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 5.0\n'
+                               for name, x in (("nav", 5.0), ("aft", 6.0)))
+                     + '[[lidar]]\nname = "top"\nmodel = "VLP-16"\nposition_m = [5.0, 0.0, 0.0]\n')  # fmt: skip
+    for cameras in (["nav", "aft"], ["aft"], []):
+        log = folder / ("log-" + "-".join(cameras))
+        video = [word for name in cameras for word in ("--video", f"{name}=none")]
+        narpa("run", scene, *video, "--lidar", "top=none", "--duration", "1", "--log", log)
+        if not cameras:
+            expect_refusal(2, "has no log of a camera, .*sweeps of LiDARs are not replayed", "replay", log)
+            continue
+        done = narpa("replay", log, "--json")
+        said, document = done.stderr.decode(), json.loads(done.stdout)
+        expect(all(f"camera {name}: " in said for name in cameras) and "sweeps are not compared" in said, f"replay of {cameras}: {said}")
+        replayed = [d["camera"] for d in document.get("cameras", [document])]
+        expect(document["passed"] and sorted(replayed) == sorted(cameras), f"--json has {replayed}")
+
+
 def check_folders():
     """One run to a folder at a time."""
     log = folder / "one-log"
@@ -286,5 +333,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_replay, check_folders):
     check()

@@ -71,9 +71,15 @@ TEST(Plot, ErrorNamesAPictureThatCannotBeWritten) {
     for (const std::string& path : {std::string("/nowhere/at/all.png"), folder / "loop.json"}) {
         for (const Status& status : {write_plot(path, kDocument), can_write_plot(path)}) {
             ASSERT_FALSE(status);
-            EXPECT_EQ(status.error().file, path);
+            EXPECT_EQ(status.error().file, std::filesystem::path(path).replace_extension(".json"));
         }
     }
+    EXPECT_NE(write_plot("/nowhere/at/all.png", kDocument).error().what.find("No such file or directory"),
+              std::string::npos);
+    std::filesystem::create_symlink("/dev/full", folder / "full.json");
+    const Status full = write_plot(folder / "full.png", kDocument);
+    ASSERT_FALSE(full);
+    EXPECT_NE(full.error().what.find("No space left on device"), std::string::npos) << full.error().text();
     EXPECT_TRUE(can_write_plot(folder / "loop.png"));
     if (!matplotlib_is_installed()) GTEST_SKIP() << "python3-matplotlib is not installed";
     EXPECT_FALSE(write_plot(folder / "loop.nothing", kDocument)) << "no picture format";

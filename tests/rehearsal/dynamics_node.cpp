@@ -442,6 +442,37 @@ TEST_F(DynamicsOnSlcan, InRealTimeAllCommandsThatComeEarlyAct) {
     EXPECT_EQ((*flown)["actuator_commands"]["refused"], 0);
 }
 
+TEST_F(DynamicsOnSlcan, InRealTimeTheyEndWithoutHeartbeats) {
+    const Scenario s = quiet();
+    Partner partner(*hub, s);
+    partner.run_clock(0);
+    partner.on_period = [&](std::int64_t) { partner.on_turn = nullptr; };
+    DynamicsOptions options;
+    options.silence_s = 0.5;
+    const auto flown = fly(s, options, bus, partner);
+    ASSERT_FALSE(flown);
+    EXPECT_NE(flown.error().what.find("no heartbeat of the emulator for 0.5 s"), std::string::npos)
+        << flown.error().text();
+    EXPECT_EQ(flown.error().kind, ErrorKind::failed);
+}
+
+TEST_F(DynamicsOnSlcan, InLockstepTheyEndWithTheConnection) {
+    const Scenario s = quiet();
+    Result<nlohmann::json> flown = Error{"not flown"};
+    std::thread dynamics([&] {
+        const StopFlag stop{false};
+        if (const auto client = open_or_fail(bus, CanRole::client))
+            flown = run_dynamics(s, lockstep(), *client, stop);
+    });
+    Partner partner(*hub, s);
+    while (partner.poses.empty()) partner.listen();
+    hub.reset();
+    dynamics.join();
+    ASSERT_FALSE(flown);
+    EXPECT_NE(flown.error().what.find("the connection to the emulator was lost"), std::string::npos)
+        << flown.error().text();
+}
+
 TEST(DynamicsOnUdp, TheSameRunInCanFd) {
     const std::string bus = "udp:" + own_group();
     const auto hub = open_or_fail(bus, CanRole::hub);

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <memory>
 #include <thread>
 
 #include "drivers/video/video_sink.h"
@@ -127,6 +129,51 @@ TEST(NavigationNode, AnswersEachPeriodAndRepeatsItself) {
     const Sent again = fly(other / "", 3);
     ASSERT_EQ(again.frames.size(), one.frames.size());
     for (std::size_t i = 0; i < one.frames.size(); ++i) EXPECT_TRUE(same(one.frames[i], again.frames[i])) << i;
+}
+
+/// How the navigation ends where the emulator leaves so after the first messages of a flight.
+std::string end_after(bool lockstep, const std::function<void(std::unique_ptr<CanBus>&)>& leave) {
+    const test::TemporaryFolder folder;
+    const std::string fifo = folder / "nav.y4m";
+    ::mkfifo(fifo.c_str(), 0600);
+    auto hub = open_or_fail("slcan:0", CanRole::hub);
+    NodeOptions options;
+    options.bus = "slcan:" + std::to_string(hub_port(*hub));
+    options.video = {{"nav", fifo}};
+    options.lockstep = lockstep;
+    options.silence_s = 0.5;
+    const StopFlag stop{false};
+    StopFlag ready{false};
+    Status ended{Ok{}};
+    std::thread navigation([&] { ended = navigate(by_camera_alone(), options, stop, [&] { ready = true; }); });
+    ReceivedFrame received;
+    EXPECT_TRUE(turn_until(*hub, [&] {
+        static_cast<void>(hub->receive(received));
+        return ready.load();
+    }));
+    const std::int64_t t_start_ns = lockstep ? 0 : kSecond_ns;
+    hub->send(encode(Heartbeat{0, lockstep ? RunState::lockstep : RunState::running}));
+    for (const CanFrame& f : encode_classic(DynamicsReport{0, t_start_ns, t_start_ns, DynamicsPhase::flying}))
+        hub->send(f);
+    for (const CanFrame& f : encode_classic(AttitudeReport{0, t_start_ns, {1, 0, 0, 0}, {}})) hub->send(f);
+    static_cast<void>(hub->receive(received));  // what waits in the hub goes out
+    leave(hub);
+    navigation.join();
+    EXPECT_FALSE(ended);
+    return ended ? "no error" : ended.error().what;
+}
+
+TEST(NavigationNode, EndsWithTheEmulator) {
+    const auto stops = [](RunState state) {
+        return [state](std::unique_ptr<CanBus>& hub) { hub->send(encode(Heartbeat{1'000'000, state})); };
+    };
+    EXPECT_EQ(end_after(false, stops(RunState::running)), "no heartbeat of the emulator for 0.5 s");
+    EXPECT_EQ(end_after(false, stops(RunState::stopping)),
+              "the emulator has stopped before the dynamics reported the end");
+    EXPECT_EQ(end_after(true, stops(RunState::stopping)),
+              "the emulator has stopped, expected a heartbeat of 1.000 s");
+    EXPECT_EQ(end_after(true, [](std::unique_ptr<CanBus>& hub) { hub.reset(); }),
+              "the connection to the emulator was lost, expected a heartbeat of 1.000 s");
 }
 
 TEST(NavigationNode, NamesWhatIsWrongWithItsSources) {

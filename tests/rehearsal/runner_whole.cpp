@@ -108,6 +108,38 @@ TEST_F(Whole, EndsAfterTooLongWithoutProgress) {
     EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics sent nothing"), std::string::npos);
 }
 
+TEST_F(Whole, AStatusOfTheUsersNavigationIsNoneOfOurs) {
+    o.navigation = "exit 3";
+    const auto done = run_rehearsal(o, kSilent, stop);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().kind, ErrorKind::failed) << done.error().text();
+}
+
+TEST_F(Whole, FailsWhereNobodyCanSayThatTheNavigationIsReady) {
+    o.navigation = "none";
+    Console console = kSilent;
+    console.navigation_ready = [] { return Error{"nobody is there"}; };
+    const auto done = run_rehearsal(o, console, stop);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().what, "nobody is there");
+}
+
+TEST_F(Whole, KeepsTheVerdictWhereThePageCannotBeWritten) {
+    o.dynamics = "sleep 100";
+    o.patience_s = 0.3;
+    Console console = kSilent;
+    console.print = [&](std::string_view text) {
+        if (text.starts_with("dynamics: "))
+            for (const char* file : {"charts.json", "index.html"}) fs::create_directory(o.folder + "/" + file);
+    };
+    const auto done = run_rehearsal(o, console, stop);
+    ASSERT_TRUE(done) << done.error().text();
+    EXPECT_FALSE(done->verdict.gates.empty());
+    ASSERT_FALSE(done->written);
+    EXPECT_NE(done->written.error().what.find("Is a directory"), std::string::npos) << done->written.error().text();
+    EXPECT_TRUE(fs::exists(o.folder + "/result.json"));
+}
+
 TEST_F(Whole, BadInputOfTheEmulatorIsBadInput) {
     o.bus = "slcan:notaport";
     const auto done = run_rehearsal(o, kSilent, stop);
@@ -206,7 +238,17 @@ TEST_F(Whole, AReplayNeverRunsACommandOfTheLog) {
             EXPECT_FALSE(fs::exists(proof)) << hostile;
         }
 
-    // Named by the caller, it is run.
+    // Named by the caller, it is run, if the log is whole.
+    log.navigation = "touch " + proof;
+    const auto partial = rerun(log, kSilent, stop);
+    ASSERT_FALSE(partial);
+    EXPECT_EQ(partial.error().file, log.folder + "/emulator/can.log");
+    EXPECT_FALSE(fs::exists(proof));
+    for (const char* part : {"emulator", "dynamics"}) fs::create_directory(log.folder + "/" + part);
+    for (const char* file : {"can.log", "nav.ledger.csv", "nav.truth.csv", "top.sweeps.csv"})
+        std::ofstream(log.folder + "/emulator/" + file) << '\n';
+    EXPECT_EQ(rerun(log, kSilent, stop).error().file, log.folder + "/dynamics/truth.csv");
+    std::ofstream(log.folder + "/dynamics/truth.csv") << '\n';
     log.navigation = "touch " + proof + "; exit 9";
     EXPECT_FALSE(rerun(log, kSilent, stop));
     EXPECT_TRUE(fs::exists(proof));

@@ -172,7 +172,7 @@ EncodeStatus encode(const PoseCommand& command, std::uint32_t base_id, bool fd, 
 PoseDecoder::PoseDecoder(std::uint32_t base_id) noexcept : set_(kPoseLayout, base_id, check<kPoseLayout>) {}
 
 PoseStatus PoseDecoder::accept(const CanFrame& frame, std::int64_t t_reference_ns, PoseCommand& out) noexcept {
-    const DecodeStatus status = set_.accept(frame);
+    const DecodeStatus status = set_.accept(frame, t_reference_ns);
     if (status != DecodeStatus::complete) return status;
     RawReader reader{kPoseSignals, set_.raw(), t_reference_ns};
     out.counter = set_.counter();
@@ -192,7 +192,7 @@ CanFrame encode(const Heartbeat& h) noexcept {
 
 DecodeStatus decode(const CanFrame& frame, std::int64_t t_reference_ns, Heartbeat& out) noexcept {
     SetDecoder set(kHeartbeatLayout, kHeartbeatId, check<kHeartbeatLayout>);
-    const DecodeStatus status = set.accept(frame);
+    const DecodeStatus status = set.accept(frame, t_reference_ns);
     if (status != DecodeStatus::complete) return status;
     RawReader r{kHeartbeatSignals, set.raw()};
     out.t_ns =
@@ -494,7 +494,7 @@ MessageDecoder<Message>::MessageDecoder(std::uint8_t camera) noexcept
 template <class Message>
 DecodeStatus MessageDecoder<Message>::accept(const CanFrame& frame, std::int64_t t_reference_ns,
                                              Message& out) noexcept {
-    const DecodeStatus status = set_.accept(frame);
+    const DecodeStatus status = set_.accept(frame, t_reference_ns);
     if (status == DecodeStatus::complete) Codec<Message>::read(set_.raw(), set_.counter(), t_reference_ns, out);
     return status;
 }

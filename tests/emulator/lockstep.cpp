@@ -87,10 +87,10 @@ TEST_F(Lockstep, DropsAndCountsWhatIsWrongOnTheBus) {
         };
         const auto unchanged = [](CanFrame&) {};
         send(pose(0), unchanged);
+        send(pose(0), unchanged);                               // duplicated
         send(pose(1), [](CanFrame& f) { f.data[9] ^= 0x40; });  // corrupt
         send(pose(2), [](CanFrame& f) { f.size = 48; });        // short
         send(pose(3), unchanged);
-        send(pose(3), unchanged);                          // duplicated
         send(pose(2), unchanged);                          // from the past
         send(pose(4), [](CanFrame& f) { f.id = 0x333; });  // foreign
         send(pose(5), unchanged);

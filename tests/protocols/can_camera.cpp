@@ -87,6 +87,24 @@ TYPED_TEST(CanCamera, ComesBackInBothForms) {
     }
 }
 
+TYPED_TEST(CanCamera, TheSameSetIsARepeatForAShortTimeOnly) {
+    RandomCamera random;
+    TypeParam sent, out;
+    random.fill(sent);
+    MessageDecoder<TypeParam> classic, fd;
+    const auto send = [&](std::int64_t t_ns) {
+        DecodeStatus status = DecodeStatus::not_mine;
+        for (const CanFrame& f : encode_classic(sent)) status = classic.accept(f, t_ns, out);
+        EXPECT_EQ(fd.accept(encode_fd(sent), t_ns, out), status);
+        return status;
+    };
+    EXPECT_EQ(send(0), DecodeStatus::complete);
+    EXPECT_EQ(send(kRepeat_ns), DecodeStatus::duplicate);
+    EXPECT_EQ(send(2 * kRepeat_ns), DecodeStatus::duplicate) << "of the repeat";
+    EXPECT_EQ(send(3 * kRepeat_ns + 1), DecodeStatus::complete) << "the first of a sender that was restarted";
+    EXPECT_EQ(classic.count(DecodeStatus::incomplete_set), 0u);
+}
+
 TYPED_TEST(CanCamera, EveryFlippedBitIsFound) {
     RandomCamera random;
     TypeParam sent, out;

@@ -89,11 +89,14 @@ DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_
     CameraCommand c;
     if (const auto status = camera_commands_.accept(frame, t_now_ns, c); status != DecodeStatus::not_mine) {
         if (status == DecodeStatus::complete) command(c, t_now_ns);
+        if (status == DecodeStatus::not_a_number) refuse(c.counter, c.camera, false, t_now_ns);
         return status;
     }
     CameraTrigger t;
     const auto status = camera_triggers_.accept(frame, t_now_ns, t);
     if (status == DecodeStatus::complete) trigger(t, t_now_ns);
+    for (std::uint8_t i = 0; status == DecodeStatus::not_a_number && i < 16; ++i)
+        if ((t.cameras >> i & 1) != 0) refuse(t.counter, i, true, t_now_ns);
     return status;
 }
 
@@ -101,6 +104,12 @@ void CanNode::command(const CameraCommand& command, std::int64_t t_now_ns) noexc
     for (CameraControl* camera : cameras_)
         if (camera->camera() == command.camera) return send(camera->command(command, t_now_ns), t_now_ns);
     send(CameraReply{command.counter, command.camera, false, CameraAnswer::not_controllable, t_now_ns}, t_now_ns);
+}
+
+void CanNode::refuse(std::uint8_t counter, std::uint8_t camera, bool to_trigger, std::int64_t t_now_ns) noexcept {
+    const bool operated = std::ranges::find(cameras_, camera, &CameraControl::camera) != cameras_.end();
+    const CameraAnswer answer = operated ? CameraAnswer::wrong_mode : CameraAnswer::not_controllable;
+    send(CameraReply{counter, camera, to_trigger, answer, t_now_ns}, t_now_ns);
 }
 
 /// All cameras that it names start at the same time.

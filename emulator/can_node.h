@@ -89,6 +89,8 @@ private:
     PoseStatus take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept;
     DecodeStatus take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
     void trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept;
+    /// Answers a command or trigger that has an unknown choice.
+    void refuse(std::uint8_t counter, std::uint8_t camera, bool to_trigger, std::int64_t t_now_ns) noexcept;
     void sync(std::int64_t t_now_ns) noexcept;
     void send(const CameraReply& reply, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] std::int64_t latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept;

@@ -138,7 +138,7 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         if (clock.end_ns() == Clock::kNever && can_->ended()) clock.end_at(now);
         if (now >= next_heartbeat) {
             send_heartbeat(now, RunState::running);
-            next_heartbeat += kHeartbeatPeriodNs;
+            next_heartbeat = next_due_ns(next_heartbeat, kHeartbeatPeriodNs, now);
         }
     }
     send_telemetry(clock.now_ns());

@@ -203,6 +203,13 @@ TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
               static_cast<std::ptrdiff_t>(c.not_taken));
 }
 
+TEST_F(RealTime, WhatWasMissedIsNotMadeUpFor) {
+    EXPECT_EQ(next_due_ns(300, 100, 300), 400);
+    EXPECT_EQ(next_due_ns(300, 100, 399), 400);
+    EXPECT_EQ(next_due_ns(300, 100, 400), 500);
+    EXPECT_EQ(next_due_ns(300, 100, 3'350), 3'400);
+}
+
 TEST_F(RealTime, ABudgetLongerThanAPeriodIsRefused) {
     RunOptions o;
     o.video = {{"nav", "none"}};

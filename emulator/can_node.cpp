@@ -20,7 +20,7 @@ CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep)
       ahead_max_ns_(std::llround(world.scene().render.command_ahead_max_s * 1e9)) {
     for (std::size_t i = 0; i < world.scene().bodies.size(); ++i)
         if (PoseTrack* track = world.track(i))
-            listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id), -1});
+            listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id)});
 }
 
 void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
@@ -63,11 +63,11 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
             ++counters_.too_far_ahead;
             return status;
         }
-        switch (l.track->push(command, t_now_ns)) {
-            case TrackStatus::past: ++counters_.past; return status;
-            case TrackStatus::overrun: ++counters_.overrun; return status;
-            case TrackStatus::taken: break;
+        if (const TrackStatus pushed = l.track->push(command, t_now_ns); pushed != TrackStatus::taken) {
+            note_refusal(l, pushed);
+            return status;
         }
+        l.refused_in_a_row = 0;
         if (l.last_counter >= 0)
             counters_.missed += static_cast<std::uint8_t>(command.counter - l.last_counter - 1);
         l.last_counter = command.counter;
@@ -78,6 +78,24 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
     }
     ++counters_.foreign;
     return PoseStatus::not_mine;
+}
+
+void CanNode::note_refusal(Listener& l, TrackStatus status) noexcept {
+    const bool past = status == TrackStatus::past;
+    ++(past ? counters_.past : counters_.overrun);
+    ++(past ? l.refused.past : l.refused.overrun);
+    if (++l.refused_in_a_row >= kManyRefused) l.many_refused = many_refused_ = true;
+}
+
+std::vector<RefusedPoses> CanNode::refused_poses() const {
+    std::vector<RefusedPoses> bodies;
+    for (const Listener& l : listeners_) {
+        if (!l.many_refused) continue;
+        bodies.push_back(l.refused);
+        bodies.back().can_id = l.decoder.base_id();
+        bodies.back().newest_ns = l.track->newest_ns();
+    }
+    return bodies;
 }
 
 DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept {

@@ -13,15 +13,15 @@ namespace narpa {
 
 using StopFlag = std::atomic<bool>;
 
-/// The program's flag, set by SIGINT and SIGTERM.
+/// The program's flag, set by SIGINT, SIGTERM and SIGHUP.
 inline StopFlag& stop_flag() noexcept {
     static StopFlag flag{false};
     return flag;
 }
 
-/// SIGINT and SIGTERM set the flag; another one after two seconds or more exits at once with status 130.
-/// (timeout(1) and others signal a process and then its process group: that is one request. Real-time threads may
-/// delay the second signal by nearly two seconds.)
+/// SIGINT, SIGTERM and SIGHUP (unless it is ignored, as under nohup(1)) set the flag; another one after two seconds
+/// or more exits at once with status 130. (timeout(1) and others signal a process and then its process group: that
+/// is one request. Real-time threads may delay the second signal by nearly two seconds.)
 inline void stop_on_signals() noexcept {
     struct sigaction action {};
     action.sa_handler = [](int) {
@@ -35,6 +35,9 @@ inline void stop_on_signals() noexcept {
     };
     ::sigaction(SIGINT, &action, nullptr);
     ::sigaction(SIGTERM, &action, nullptr);
+    struct sigaction hang_up {};
+    if (::sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN)
+        ::sigaction(SIGHUP, &action, nullptr);
     struct sigaction ignore {};
     ignore.sa_handler = SIG_IGN;  // a reader that closes a FIFO or a socket is an error code
     ::sigaction(SIGPIPE, &ignore, nullptr);

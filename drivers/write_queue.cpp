@@ -78,6 +78,7 @@ int WriteQueue::time_left_ms() const noexcept {
 
 void WriteQueue::run() noexcept {
     for (std::uint64_t next = 0;;) {
+        sync_if_due();
         if (next == pushed_.load(std::memory_order_acquire)) {
             if (ending_.load(std::memory_order_acquire)) return;
             wait_for_work();
@@ -89,14 +90,23 @@ void WriteQueue::run() noexcept {
             writer_.abandon(item);
         } else {
             writer_.write(item, *this);
+            if (sync_due_ns_ == 0) sync_due_ns_ = monotonic_ns() + kSync_ns;
         }
         sem_post(&free_slots_);
     }
 }
 
+void WriteQueue::sync_if_due() noexcept {
+    if (sync_due_ns_ == 0 || monotonic_ns() < sync_due_ns_) return;
+    writer_.sync();
+    sync_due_ns_ = 0;
+}
+
 void WriteQueue::wait_for_work() noexcept {
     pollfd fds[] = {{wake_fd_, POLLIN, 0}, {writer_.watched(), 0, 0}};
-    if (::poll(fds, 2, -1) < 0) return;
+    const std::int64_t left_ns = std::max<std::int64_t>(0, sync_due_ns_ - monotonic_ns());
+    const int timeout_ms = sync_due_ns_ == 0 ? -1 : static_cast<int>(left_ns / 1'000'000) + 1;
+    if (::poll(fds, 2, timeout_ms) < 0) return;
     if (fds[1].revents & (POLLERR | POLLHUP)) writer_.lost();
     eventfd_t count = 0;
     if (fds[0].revents & POLLIN) ::eventfd_read(wake_fd_, &count);

@@ -28,6 +28,8 @@ public:
     virtual void write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept = 0;
     /// The item is dropped unwritten: a flush ran out of time.
     virtual void abandon(std::span<const std::uint8_t> item) noexcept = 0;
+    /// Passes what was written on to the system: within about kSync_ns of each write.
+    virtual void sync() noexcept {}
     /// Descriptor that is polled for hang-up and errors while the ring is empty; `lost` is then called. -1: none.
     [[nodiscard]] virtual int watched() const noexcept { return -1; }
     virtual void lost() noexcept {}
@@ -53,11 +55,14 @@ public:
     [[nodiscard]] bool crowded() noexcept;
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
+    static constexpr std::int64_t kSync_ns = 1'000'000'000;
+
     /// For the writer: how long it may still block. -1: without limit; then it should call this repeatedly.
     [[nodiscard]] int time_left_ms() const noexcept;
 
 private:
     void run() noexcept;
+    void sync_if_due() noexcept;
     void wait_for_work() noexcept;
 
     QueueWriter& writer_;
@@ -65,7 +70,8 @@ private:
     const bool wait_when_full_;
     std::vector<std::uint8_t> ring_;
     std::vector<std::size_t> sizes_;
-    std::uint64_t next_push_ = 0;  // touched by the pusher only
+    std::uint64_t next_push_ = 0;   // touched by the pusher only
+    std::int64_t sync_due_ns_ = 0;  // CLOCK_MONOTONIC; 0: nothing written since the last; the queue's thread only
     std::atomic<std::uint64_t> pushed_{0}, dropped_{0};
     std::atomic<std::int64_t> flush_deadline_ns_{0};  // CLOCK_MONOTONIC; 0: not flushing
     std::atomic<bool> ending_{false};

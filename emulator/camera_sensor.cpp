@@ -114,18 +114,18 @@ void CameraSensor::hand_over(FrameLedger& ledger, const Clock& clock) noexcept {
 Delivery CameraSensor::deliver(const FrameLedger& ledger) noexcept {
     const LatePolicy late = unit_.camera().late;
     const FrameStamp stamp{ledger.t_exposure_mid_ns, ledger.frame};
-    if (ledger.deadline_met || late == LatePolicy::late) {
-        send(unit_.bytes(), stamp);
-        return Delivery::frame;
-    }
+    if (ledger.deadline_met || late == LatePolicy::late)
+        return send(unit_.bytes(), stamp) ? Delivery::frame : Delivery::nothing;
     if (late == LatePolicy::drop) return Delivery::nothing;
-    send(spare_, stamp);
+    if (!send(spare_, stamp)) return Delivery::nothing;
     return late == LatePolicy::repeat ? Delivery::repeated : Delivery::blank;
 }
 
-void CameraSensor::send(std::span<const std::uint8_t> bytes, const FrameStamp& stamp) noexcept {
-    for (const auto& sink : sinks_) sink->send(bytes, stamp);
-    ++stats_.handed_over;
+bool CameraSensor::send(std::span<const std::uint8_t> bytes, const FrameStamp& stamp) noexcept {
+    bool taken = false;
+    for (const auto& sink : sinks_) taken |= sink->send(bytes, stamp);
+    ++(taken ? stats_.handed_over : stats_.not_taken);
+    return taken;
 }
 
 void CameraSensor::account(const FrameLedger& ledger) noexcept {

@@ -22,7 +22,8 @@ namespace narpa {
 
 struct CameraStats {
     std::uint64_t frames = 0;       ///< exposed
-    std::uint64_t handed_over = 0;  ///< given to the sinks
+    std::uint64_t handed_over = 0;  ///< taken by a sink
+    std::uint64_t not_taken = 0;    ///< dropped by all sinks at once, counted there
     std::uint64_t skipped = 0;      ///< never exposed: the one before took too long
     std::uint64_t deadline_missed = 0;
     std::uint64_t stale = 0;                               ///< frames that show a body without a fresh command
@@ -89,7 +90,8 @@ private:
     /// The next frame was exposed or skipped. `level`: CameraControl::advance.
     void advance(std::optional<double> level) noexcept;
     [[nodiscard]] Delivery deliver(const FrameLedger& ledger) noexcept;
-    void send(std::span<const std::uint8_t> bytes, const FrameStamp& stamp) noexcept;
+    /// False: no sink took it.
+    bool send(std::span<const std::uint8_t> bytes, const FrameStamp& stamp) noexcept;
     void take_requests(CanNode& can, std::int64_t t_ns) noexcept;
     void account(const FrameLedger& ledger) noexcept;
     /// Skips the frames whose successors are due already: the stream keeps step with the clock.

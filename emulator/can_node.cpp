@@ -20,7 +20,7 @@ CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep)
       ahead_max_ns_(std::llround(world.scene().render.command_ahead_max_s * 1e9)) {
     for (std::size_t i = 0; i < world.scene().bodies.size(); ++i)
         if (PoseTrack* track = world.track(i))
-            listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id), -1});
+            listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id)});
 }
 
 void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
@@ -63,11 +63,11 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
             ++counters_.too_far_ahead;
             return status;
         }
-        switch (l.track->push(command, t_now_ns)) {
-            case TrackStatus::past: ++counters_.past; return status;
-            case TrackStatus::overrun: ++counters_.overrun; return status;
-            case TrackStatus::taken: break;
+        if (const TrackStatus pushed = l.track->push(command, t_now_ns); pushed != TrackStatus::taken) {
+            note_refusal(l, pushed);
+            return status;
         }
+        l.refused_in_a_row = 0;
         if (l.last_counter >= 0)
             counters_.missed += static_cast<std::uint8_t>(command.counter - l.last_counter - 1);
         l.last_counter = command.counter;
@@ -80,6 +80,24 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
     return PoseStatus::not_mine;
 }
 
+void CanNode::note_refusal(Listener& l, TrackStatus status) noexcept {
+    const bool past = status == TrackStatus::past;
+    ++(past ? counters_.past : counters_.overrun);
+    ++(past ? l.refused.past : l.refused.overrun);
+    if (++l.refused_in_a_row >= kManyRefused) l.many_refused = many_refused_ = true;
+}
+
+std::vector<RefusedPoses> CanNode::refused_poses() const {
+    std::vector<RefusedPoses> bodies;
+    for (const Listener& l : listeners_) {
+        if (!l.many_refused) continue;
+        bodies.push_back(l.refused);
+        bodies.back().can_id = l.decoder.base_id();
+        bodies.back().newest_ns = l.track->newest_ns();
+    }
+    return bodies;
+}
+
 DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
     const bool plain = !frame.extended && !frame.remote && !frame.error && !frame.fd;
     if (frame.id == kSyncId && plain && frame.size <= 1) {  // CiA 301: empty, or a counter
@@ -89,11 +107,14 @@ DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_
     CameraCommand c;
     if (const auto status = camera_commands_.accept(frame, t_now_ns, c); status != DecodeStatus::not_mine) {
         if (status == DecodeStatus::complete) command(c, t_now_ns);
+        if (status == DecodeStatus::not_a_number) refuse(c.counter, c.camera, false, t_now_ns);
         return status;
     }
     CameraTrigger t;
     const auto status = camera_triggers_.accept(frame, t_now_ns, t);
     if (status == DecodeStatus::complete) trigger(t, t_now_ns);
+    for (std::uint8_t i = 0; status == DecodeStatus::not_a_number && i < 16; ++i)
+        if ((t.cameras >> i & 1) != 0) refuse(t.counter, i, true, t_now_ns);
     return status;
 }
 
@@ -101,6 +122,12 @@ void CanNode::command(const CameraCommand& command, std::int64_t t_now_ns) noexc
     for (CameraControl* camera : cameras_)
         if (camera->camera() == command.camera) return send(camera->command(command, t_now_ns), t_now_ns);
     send(CameraReply{command.counter, command.camera, false, CameraAnswer::not_controllable, t_now_ns}, t_now_ns);
+}
+
+void CanNode::refuse(std::uint8_t counter, std::uint8_t camera, bool to_trigger, std::int64_t t_now_ns) noexcept {
+    const bool operated = std::ranges::find(cameras_, camera, &CameraControl::camera) != cameras_.end();
+    const CameraAnswer answer = operated ? CameraAnswer::wrong_mode : CameraAnswer::not_controllable;
+    send(CameraReply{counter, camera, to_trigger, answer, t_now_ns}, t_now_ns);
 }
 
 /// All cameras that it names start at the same time.

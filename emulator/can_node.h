@@ -32,6 +32,13 @@ struct CommandCounters {
     [[nodiscard]] std::vector<std::pair<std::string_view, std::uint64_t>> rejected() const;
 };
 
+/// Pose commands of one body that its track refused.
+struct RefusedPoses {
+    std::uint32_t can_id = 0;
+    std::uint64_t past = 0, overrun = 0;
+    std::int64_t newest_ns = 0;  ///< time of validity of the newest one that was accepted
+};
+
 /// The log has every command, every message of a closed loop and everything that narpa sends. Of other frames it
 /// has at most kOtherFramesPerSecond of the simulation clock (a full bus of 1 Mbit/s carries about 8000), and fewer
 /// where the disk is slow; the others are counted, and a line of the log states how many: protocols/can/README.md.
@@ -39,6 +46,8 @@ class CanNode {
 public:
     static constexpr std::uint64_t kOtherFramesPerSecond = 10'000;
     static constexpr std::size_t kLogLines = 16'384;
+    /// So many commands of a body refused in a row are no repeats of a bus: the sender's clock or rate is wrong.
+    static constexpr std::uint32_t kManyRefused = 10;
 
     /// `log` may be null. All outlive the node. In real time frames of a recorded bus wait for their time; in
     /// lockstep they are received at once.
@@ -78,17 +87,27 @@ public:
     [[nodiscard]] CommandCounters counters() const noexcept;
     /// Commands refused for that so far.
     [[nodiscard]] std::uint64_t too_far_ahead() const noexcept { return counters_.too_far_ahead; }
+    /// The bodies of which kManyRefused commands in a row were refused as past or overrun.
+    [[nodiscard]] std::vector<RefusedPoses> refused_poses() const;
+    /// One of these two was worth a notice.
+    [[nodiscard]] bool refuses_poses() const noexcept { return many_refused_ || counters_.too_far_ahead > 0; }
 
 private:
     struct Listener {
         PoseTrack* track;
         PoseDecoder decoder;
         int last_counter = -1;
+        RefusedPoses refused{};
+        std::uint32_t refused_in_a_row = 0;
+        bool many_refused = false;
     };
     bool next_frame(std::int64_t t_now_ns) noexcept;
+    void note_refusal(Listener& listener, TrackStatus status) noexcept;
     PoseStatus take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept;
     DecodeStatus take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
     void trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept;
+    /// Answers a command or trigger that has an unknown choice.
+    void refuse(std::uint8_t counter, std::uint8_t camera, bool to_trigger, std::int64_t t_now_ns) noexcept;
     void sync(std::int64_t t_now_ns) noexcept;
     void send(const CameraReply& reply, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] std::int64_t latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept;
@@ -109,6 +128,7 @@ private:
     MessageDecoder<CameraCommand> camera_commands_;
     MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
+    bool many_refused_ = false;  ///< of any body
     std::uint8_t heartbeat_counter_ = 0, beam_counter_ = 0;
     CanFrame heartbeat_{};         ///< the last
     std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged

@@ -56,6 +56,12 @@ private:
     std::int64_t start_ns_ = 0;
 };
 
+/// The first time after `now_ns` of those that follow `due_ns` in steps of the period: missed ones are skipped.
+[[nodiscard]] constexpr std::int64_t next_due_ns(std::int64_t due_ns, std::int64_t period_ns,
+                                                 std::int64_t now_ns) noexcept {
+    return due_ns + ((now_ns - due_ns) / period_ns + 1) * period_ns;
+}
+
 /// Stands still while a sensor works: everything takes no time, so no wall time enters any result.
 class LockstepClock final : public Clock {
 public:

@@ -255,10 +255,22 @@ Status Emulator::open_logs() {
     return Ok{};
 }
 
-std::string Emulator::refusal() const {
-    return fmt::format(
-        "pose commands refused because they are for more than {:g} s ahead (command_ahead_max_s in [render]): {}",
-        world_->scene().render.command_ahead_max_s, can_->too_far_ahead());
+std::vector<std::string> Emulator::refusals() const {
+    std::vector<std::string> notices;
+    if (can_->too_far_ahead() > 0)
+        notices.push_back(
+            fmt::format("pose commands refused because they are for more than {:g} s ahead (command_ahead_max_s in "
+                        "[render]): {}",
+                        world_->scene().render.command_ahead_max_s, can_->too_far_ahead()));
+    for (const RefusedPoses& r : can_->refused_poses()) {
+        const auto body = std::ranges::find(world_->scene().bodies, r.can_id, &Body::can_id);
+        notices.push_back(
+            fmt::format("pose commands of \"{}\" (can_id {:#x}) refused: {} as past (not newer than its newest, "
+                        "for {:.3f} s), {} "
+                        "as overrun (more than are kept); check the sender's clock and rate",
+                        body->name, r.can_id, r.past, static_cast<double>(r.newest_ns) * 1e-9, r.overrun));
+    }
+    return notices;
 }
 
 std::string Emulator::bodies_without_a_pose() const {
@@ -276,7 +288,7 @@ void Emulator::note_losses() {
     if (const std::string bodies = bodies_without_a_pose(); !bodies.empty() && !options_.lockstep)
         notices_.push_back(
             fmt::format("no pose command was accepted for {}; such a body moves as the scene states", bodies));
-    if (can_->too_far_ahead() > 0) notices_.push_back(refusal());
+    for (std::string& what : refusals()) notices_.push_back(std::move(what));
     if (const std::uint64_t n = can_->counters().not_logged; n > 0)
         notices_.push_back(
             fmt::format("frames of others that are not in can.log, because there were more than {} a second or the "

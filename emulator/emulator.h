@@ -31,7 +31,7 @@ struct RunOptions {
     std::vector<int> cpus;   ///< processors that tracing threads are bound to in real time; empty: any
     std::optional<TrackerOptions> estimate{};              ///< estimate a target's pose during the run
     std::string estimate_camera;                           ///< empty: the first camera with a sink
-    std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, at the first command too far ahead
+    std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, once, when CanNode::refuses_poses
 };
 
 class Emulator {
@@ -93,7 +93,8 @@ private:
     void send_telemetry(std::int64_t t_ns) noexcept;
     void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
 
-    [[nodiscard]] std::string refusal() const;
+    /// Why pose commands were refused, as notices.
+    [[nodiscard]] std::vector<std::string> refusals() const;
     void note_losses();
 
     void run_lockstep(const StopFlag& stop);

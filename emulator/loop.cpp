@@ -138,7 +138,7 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         if (clock.end_ns() == Clock::kNever && can_->ended()) clock.end_at(now);
         if (now >= next_heartbeat) {
             send_heartbeat(now, RunState::running);
-            next_heartbeat += kHeartbeatPeriodNs;
+            next_heartbeat = next_due_ns(next_heartbeat, kHeartbeatPeriodNs, now);
         }
     }
     send_telemetry(clock.now_ns());
@@ -178,8 +178,8 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             can_->bus().wait(kLockstepWaitNs);
             continue;
         }
-        if (can_->too_far_ahead() > 0 && !std::exchange(refused, true) && options_.on_refusal)
-            options_.on_refusal(refusal());
+        if (can_->refuses_poses() && !std::exchange(refused, true) && options_.on_refusal)
+            for (const std::string& what : refusals()) options_.on_refusal(what);
         if (!moved || !can_->commanded()) continue;
         if (!std::exchange(started, true))
             for (const auto& sensor : sensors_) sensor->start_at(can_->first_ns());

@@ -55,13 +55,21 @@ TrackStatus PoseTrack::push(const PoseCommand& command, std::int64_t t_now_ns) n
 /// `before`: the newest sample at or before t. `after`: the one that follows it, or the oldest of all.
 PoseTrack::Found PoseTrack::bracket(std::int64_t t_ns, Sample& before, Sample& after) const noexcept {
     const std::uint64_t count = count_.load(std::memory_order_acquire);
-    const std::uint64_t kept = std::min<std::uint64_t>(count, kDepth - 1);
-    for (std::uint64_t i = 1; i <= kept; ++i) {
-        if (!slots_[(count - i) % kDepth].load(before)) return Found::torn;
-        if (before.t_ns <= t_ns) return i == 1 ? Found::after_newest : Found::between;
-        after = before;
+    if (count == 0) return Found::nothing;
+    if (!slot(count - 1).load(before)) return Found::torn;
+    if (before.t_ns <= t_ns) return Found::after_newest;
+    // Invariant: the sample at `high` is after t; those before `low` are not.
+    std::uint64_t low = count - std::min<std::uint64_t>(count, kDepth - 1), high = count - 1;
+    const std::uint64_t oldest = low;
+    while (low < high) {
+        const std::uint64_t middle = low + (high - low) / 2;
+        slot(middle).t_ns() > t_ns ? high = middle : low = middle + 1;
     }
-    return kept == 0 ? Found::nothing : Found::before_oldest;
+    // `after` first: while the slot of `before` has not been rewritten, the one that follows has not been either.
+    if (!slot(high).load(after) || after.t_ns <= t_ns) return Found::torn;
+    if (high == oldest) return Found::before_oldest;
+    if (!slot(high - 1).load(before) || before.t_ns > t_ns) return Found::torn;
+    return Found::between;
 }
 
 Motion PoseTrack::interpolate(const Sample& a, const Sample& b, std::int64_t t_ns) const noexcept {

@@ -26,7 +26,7 @@ struct TrackedPose {
 enum class TrackStatus : std::uint8_t {
     taken,
     past,     ///< time of validity not after the newest: late, repeated or out of order
-    overrun,  ///< so far ahead that it would overwrite commands still in use
+    overrun,  ///< it would overwrite a command that is ahead or of the last second
 };
 
 class PoseTrack {
@@ -43,7 +43,8 @@ public:
     [[nodiscard]] std::int64_t first_ns() const noexcept { return first_ns_.load(std::memory_order_acquire); }
     [[nodiscard]] std::int64_t newest_ns() const noexcept { return newest_ns_.load(std::memory_order_acquire); }
 
-    static constexpr std::size_t kDepth = 256;  ///< commands kept
+    /// Commands kept, less one: at 1000 a second those of the last second and another second ahead.
+    static constexpr std::size_t kDepth = 2048;
 
 private:
     struct Sample {
@@ -51,16 +52,20 @@ private:
         std::uint64_t counter = 0;
         Motion motion{};
     };
-    /// A seqlock, rewritten only after kDepth - 1 others; a reader that meets a write repeats.
+    /// A seqlock, rewritten only after kDepth - 1 others; a reader that meets a write repeats. Word 0 is the time.
     struct Slot {
         std::atomic<std::uint64_t> version{0};  ///< odd during a write
         std::array<std::atomic<std::uint64_t>, sizeof(Sample) / 8> words{};
         void store(const Sample&) noexcept;
         [[nodiscard]] bool load(Sample&) const noexcept;
+        [[nodiscard]] std::int64_t t_ns() const noexcept {
+            return static_cast<std::int64_t>(words[0].load(std::memory_order_acquire));
+        }
     };
     static_assert(sizeof(Sample) % 8 == 0);
 
     enum class Found : std::uint8_t { between, after_newest, before_oldest, nothing, torn };
+    [[nodiscard]] const Slot& slot(std::uint64_t index) const noexcept { return slots_[index % kDepth]; }
     [[nodiscard]] Found bracket(std::int64_t t_ns, Sample& before, Sample& after) const noexcept;
     [[nodiscard]] Motion interpolate(const Sample& a, const Sample& b, std::int64_t t_ns) const noexcept;
 

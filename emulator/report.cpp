@@ -94,6 +94,7 @@ json CameraSensor::report() const {
             {"control", control},
             {"frames", s.frames},
             {"handed_over", s.handed_over},
+            {"not_taken", s.not_taken},
             {"skipped", s.skipped},
             {"deadlines_missed", s.deadline_missed},
             {"stale", s.stale},
@@ -235,9 +236,10 @@ std::string CameraSensor::in_words(bool lockstep) const {
     const auto late = [&](double p) { return against_deadline(s.late.percentile_ns(p) * 1e-6); };
     Counts steps;
     for (std::size_t i = 0; i < kStepNames.size(); ++i) steps.emplace_back(kStepNames[i], s.steps[i]);
-    std::string out = fmt::format("  camera {}: {} frames, {} handed over, {} skipped, {}{} stale\n", name(),
-                                  s.frames, s.handed_over, s.skipped,
-                                  lockstep ? "" : fmt::format("{} deadlines missed, ", s.deadline_missed), s.stale);
+    std::string out =
+        fmt::format("  camera {}: {} frames, {} handed over, {}{} skipped, {}{} stale\n", name(), s.frames,
+                    s.handed_over, s.not_taken > 0 ? fmt::format("{} taken by no sink, ", s.not_taken) : "",
+                    s.skipped, lockstep ? "" : fmt::format("{} deadlines missed, ", s.deadline_missed), s.stale);
     out += fmt::format("    p50 / p99 / max: render {}", latency(s.render));
     if (!lockstep) {  // where no time is the wall's there are no deadlines
         out += fmt::format("; mid-exposure to hand-over {}; wake-up latency {}", latency(s.hand_over),

@@ -1,4 +1,5 @@
-/// emulator/log/row_log.h - writes lines from the loop to a file without ever waiting for the disk.
+/// emulator/log/row_log.h - writes lines from the loop to a file without ever waiting for the disk. Whole lines
+/// reach the file, within about a second: a process that is killed leaves those before.
 #pragma once
 
 #include <cstdint>
@@ -30,14 +31,19 @@ public:
     static constexpr std::size_t kMaxLine = 512;
 
 private:
-    RowLog(std::string path, std::FILE* file, bool wait_when_full, std::size_t lines);
+    RowLog(std::string path, std::FILE* file, std::string_view header, bool wait_when_full, std::size_t lines);
     void write(std::span<const std::uint8_t> item, const WriteQueue&) noexcept override;
+    void sync() noexcept override;
     void abandon(std::span<const std::uint8_t>) noexcept override { ++lost_; }
 
+    static constexpr std::size_t kBuffer = 64 * 1024;
+
     std::string path_;
+    std::unique_ptr<char[]> buffer_ = std::make_unique<char[]>(kBuffer);
     std::FILE* file_;
-    std::uint64_t lost_ = 0;  // the queue's thread only, until it has ended
-    int reason_ = 0;          ///< errno of the first line that the file did not take
+    std::size_t buffered_ = 0;  // the queue's thread only, from here on, until it has ended
+    std::uint64_t lost_ = 0;
+    int reason_ = 0;  ///< errno of the first line that the file did not take
     std::unique_ptr<WriteQueue> queue_;
 };
 

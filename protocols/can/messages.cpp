@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 namespace narpa {
 namespace {
@@ -172,7 +173,7 @@ EncodeStatus encode(const PoseCommand& command, std::uint32_t base_id, bool fd, 
 PoseDecoder::PoseDecoder(std::uint32_t base_id) noexcept : set_(kPoseLayout, base_id, check<kPoseLayout>) {}
 
 PoseStatus PoseDecoder::accept(const CanFrame& frame, std::int64_t t_reference_ns, PoseCommand& out) noexcept {
-    const DecodeStatus status = set_.accept(frame);
+    const DecodeStatus status = set_.accept(frame, t_reference_ns);
     if (status != DecodeStatus::complete) return status;
     RawReader reader{kPoseSignals, set_.raw(), t_reference_ns};
     out.counter = set_.counter();
@@ -192,7 +193,7 @@ CanFrame encode(const Heartbeat& h) noexcept {
 
 DecodeStatus decode(const CanFrame& frame, std::int64_t t_reference_ns, Heartbeat& out) noexcept {
     SetDecoder set(kHeartbeatLayout, kHeartbeatId, check<kHeartbeatLayout>);
-    const DecodeStatus status = set.accept(frame);
+    const DecodeStatus status = set.accept(frame, t_reference_ns);
     if (status != DecodeStatus::complete) return status;
     RawReader r{kHeartbeatSignals, set.raw()};
     out.t_ns =
@@ -295,20 +296,33 @@ struct GetSetting {
         if (reader.raw[reader.i] != kNotAvailable) return (*this)(value.emplace());
         ++reader.i;
     }
+    /// What the member cannot hold becomes its largest value, which no camera accepts.
     template <class Value>
     void operator()(Value& value) const noexcept {
-        value = static_cast<Value>(reader.raw[reader.i++]);
+        const std::int64_t raw = reader.raw[reader.i++];
+        if constexpr (std::is_integral_v<Value>)
+            value = std::in_range<Value>(raw) ? static_cast<Value>(raw) : std::numeric_limits<Value>::max();
+        else
+            value = static_cast<Value>(raw);
     }
+    void operator()(bool& value) const noexcept { value = reader.raw[reader.i++] != 0; }
 };
 
+/// No choice is negative or unknown. Whether a camera can be set so is for the camera to decide.
+DecodeStatus check_command(const RawSignals& raw, SignalTable signals) noexcept {
+    const auto is_negative = [&](std::size_t i) { return raw[i] < 0 && raw[i] != kNotAvailable; };
+    for (std::size_t i = 0; i < signals.size(); ++i)
+        if (!signals[i].choices.empty() && is_negative(i)) return DecodeStatus::not_a_number;
+    return has_known_choices(raw, signals) ? DecodeStatus::complete : DecodeStatus::not_a_number;
+}
+
 /// No value is negative but the gain, every choice is a known one, and every value fits its member.
-DecodeStatus check_settings(const RawSignals& raw, SignalTable signals, bool absent_allowed) noexcept {
+DecodeStatus check_settings(const RawSignals& raw, SignalTable signals) noexcept {
     if (!has_known_choices(raw, signals)) return DecodeStatus::not_a_number;
     for (std::size_t i = 0; i < signals.size(); ++i) {
         const bool gain = signals[i].unit == "dB", pixels = signals[i].unit == "px";
         const std::int64_t most = signals[i].name == "Binning" ? 255 : pixels ? 65535 : raw_max(true, 62);
-        const bool absent = raw[i] == kNotAvailable;
-        if (absent ? !absent_allowed : (raw[i] < 0 && !gain) || raw[i] > most) return DecodeStatus::not_a_number;
+        if (raw[i] == kNotAvailable || (raw[i] < 0 && !gain) || raw[i] > most) return DecodeStatus::not_a_number;
     }
     return DecodeStatus::complete;
 }
@@ -325,12 +339,16 @@ struct Codec<CameraCommand> {
         for_each_setting(c, PutSetting{writer});
         return writer.raw;
     }
-    static DecodeStatus check(const RawSignals& raw) noexcept { return check_settings(raw, layout.signals, true); }
+    static DecodeStatus check(const RawSignals& raw) noexcept { return check_command(raw, layout.signals); }
     static void read(const RawSignals& raw, std::uint8_t counter, std::int64_t, CameraCommand& out) noexcept {
         RawReader reader{layout.signals, raw};
         out.counter = counter;
         reader.get(out.camera);
         for_each_setting(out, GetSetting{reader});
+    }
+    static void read_refused(const RawSignals& raw, std::uint8_t counter, CameraCommand& out) noexcept {
+        out.counter = counter;
+        RawReader{layout.signals, raw}.get(out.camera);
     }
 };
 
@@ -346,7 +364,7 @@ struct Codec<CameraState> {
         for_each_setting(s.settings, PutSetting{writer});
         return writer.raw;
     }
-    static DecodeStatus check(const RawSignals& raw) noexcept { return check_settings(raw, layout.signals, false); }
+    static DecodeStatus check(const RawSignals& raw) noexcept { return check_settings(raw, layout.signals); }
     static void read(const RawSignals& raw, std::uint8_t, std::int64_t, CameraState& out) noexcept {
         RawReader reader{layout.signals, raw};
         reader.get(out.frame), reader.get(out.camera), reader.get(out.command_counter);
@@ -357,7 +375,12 @@ struct Codec<CameraState> {
 template <>
 struct Codec<CameraTrigger>
     : MemberCodec<CameraTrigger, kCameraTriggerLayout, kCameraTriggerBaseId, &CameraTrigger::counter,
-                  &CameraTrigger::cameras, &CameraTrigger::at_once, &CameraTrigger::t_ns> {};
+                  &CameraTrigger::cameras, &CameraTrigger::at_once, &CameraTrigger::t_ns> {
+    static void read_refused(const RawSignals& raw, std::uint8_t counter, CameraTrigger& out) noexcept {
+        out.counter = counter;
+        RawReader{layout.signals, raw}.get(out.cameras);
+    }
+};
 
 using R = CameraReply;
 template <>
@@ -494,8 +517,10 @@ MessageDecoder<Message>::MessageDecoder(std::uint8_t camera) noexcept
 template <class Message>
 DecodeStatus MessageDecoder<Message>::accept(const CanFrame& frame, std::int64_t t_reference_ns,
                                              Message& out) noexcept {
-    const DecodeStatus status = set_.accept(frame);
+    const DecodeStatus status = set_.accept(frame, t_reference_ns);
     if (status == DecodeStatus::complete) Codec<Message>::read(set_.raw(), set_.counter(), t_reference_ns, out);
+    if constexpr (requires { Codec<Message>::read_refused(set_.raw(), set_.counter(), out); })
+        if (status == DecodeStatus::not_a_number) Codec<Message>::read_refused(set_.raw(), set_.counter(), out);
     return status;
 }
 

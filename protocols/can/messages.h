@@ -110,7 +110,8 @@ public:
     /// `camera`: of ledgers, whose base identifiers differ by camera.
     explicit MessageDecoder(std::uint8_t camera = 0) noexcept;
 
-    /// Writes `out` only when the status is `complete`.
+    /// Writes `out` only when `complete`; of a `not_a_number` CameraCommand or CameraTrigger, counter and
+    /// camera(s).
     [[nodiscard]] DecodeStatus accept(const CanFrame& frame, std::int64_t t_reference_ns, Message& out) noexcept;
     [[nodiscard]] std::uint64_t count(DecodeStatus status) const noexcept { return set_.count(status); }
 

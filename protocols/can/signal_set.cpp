@@ -1,5 +1,7 @@
 #include "protocols/can/signal_set.h"
 
+#include <utility>
+
 #include "protocols/can/crc.h"
 
 namespace narpa {
@@ -90,13 +92,13 @@ CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t 
     return frame;
 }
 
-DecodeStatus SetDecoder::accept(const CanFrame& frame) noexcept {
-    const DecodeStatus status = judge(frame);
+DecodeStatus SetDecoder::accept(const CanFrame& frame, std::int64_t t_ns) noexcept {
+    const DecodeStatus status = judge(frame, t_ns);
     ++counts_[static_cast<std::size_t>(status)];
     return status;
 }
 
-DecodeStatus SetDecoder::judge(const CanFrame& frame) noexcept {
+DecodeStatus SetDecoder::judge(const CanFrame& frame, std::int64_t t_ns) noexcept {
     const std::uint32_t index = frame.id - base_id_;
     const bool has_fd = layout_->fd_counter_bit != 0;
     const bool is_classic_id = index < layout_->frames.size(), is_fd_id = has_fd && index == kFdOffset;
@@ -107,13 +109,13 @@ DecodeStatus SetDecoder::judge(const CanFrame& frame) noexcept {
     if (frame.size > expected) return DecodeStatus::too_long;
     if (is_fd_id) {
         if (get_bits(frame.data, 8 * kFdCrcByte, 16) != fd_crc(frame)) return DecodeStatus::bad_checksum;
-        return take_fd(frame);
+        return take_fd(frame, t_ns);
     }
     if (frame.data[kClassicCrcByte] != classic_crc(frame)) return DecodeStatus::bad_checksum;
-    return take_classic(frame, index);
+    return take_classic(frame, index, t_ns);
 }
 
-DecodeStatus SetDecoder::take_classic(const CanFrame& frame, std::size_t index) noexcept {
+DecodeStatus SetDecoder::take_classic(const CanFrame& frame, std::size_t index, std::int64_t t_ns) noexcept {
     const std::uint8_t counter = frame.data[kClassicCounterByte];
     const std::span<const Signal> signals = layout_->signals;
     RawSignals raw{};
@@ -125,42 +127,48 @@ DecodeStatus SetDecoder::take_classic(const CanFrame& frame, std::size_t index) 
         as_whole = as_whole && raw[i] == whole_.raw[i];
     }
 
+    const bool may_be_repeat = may_repeat(counter, t_ns);
+    if (repeats_ && !may_be_repeat) drop_partial();
     const bool continues = partial_.seen != 0 && counter == partial_.counter;
-    if (!continues && has_whole_ && counter == whole_.counter && as_whole) return DecodeStatus::duplicate;
     const std::uint32_t bit = 1u << index;
     const bool seen = continues && (partial_.seen & bit) != 0;
     if (seen && as_partial) return DecodeStatus::duplicate;
     if (!continues || seen) drop_partial();
 
+    repeats_ = may_be_repeat && as_whole && (partial_.seen == 0 || repeats_);
     partial_.counter = counter;
     partial_.seen |= bit;
     for (std::size_t i = 0; i < signals.size(); ++i)
         if (signals[i].classic.frame == index) partial_.raw[i] = raw[i];
-    if (partial_.seen != (1u << layout_->frames.size()) - 1u) return DecodeStatus::partial;
+    if (partial_.seen != (1u << layout_->frames.size()) - 1u)
+        return repeats_ ? DecodeStatus::duplicate : DecodeStatus::partial;
     const Set set = partial_;
     partial_.seen = 0;
-    return conclude(set);
+    return conclude(set, t_ns);
 }
 
-DecodeStatus SetDecoder::take_fd(const CanFrame& frame) noexcept {
+DecodeStatus SetDecoder::take_fd(const CanFrame& frame, std::int64_t t_ns) noexcept {
     Set set;
     set.counter = static_cast<std::uint8_t>(get_bits(frame.data, layout_->fd_counter_bit, 8));
     for (std::size_t i = 0; i < layout_->signals.size(); ++i)
         set.raw[i] = get_signal(frame.data, layout_->signals[i], layout_->signals[i].fd);
-    if (has_whole_ && set.counter == whole_.counter && set.raw == whole_.raw) return DecodeStatus::duplicate;
-    drop_partial();
-    return conclude(set);
+    repeats_ = may_repeat(set.counter, t_ns) && set.raw == whole_.raw;
+    if (!repeats_) drop_partial();
+    return conclude(set, t_ns);
 }
 
-DecodeStatus SetDecoder::conclude(const Set& set) noexcept {
+DecodeStatus SetDecoder::conclude(const Set& set, std::int64_t t_ns) noexcept {
+    t_whole_ns_ = t_ns;
+    if (std::exchange(repeats_, false)) return DecodeStatus::duplicate;
     whole_ = set;
     has_whole_ = true;
     return verdict_(set.raw);
 }
 
 void SetDecoder::drop_partial() noexcept {
-    if (partial_.seen != 0) ++counts_[static_cast<std::size_t>(DecodeStatus::incomplete_set)];
+    if (partial_.seen != 0 && !repeats_) ++counts_[static_cast<std::size_t>(DecodeStatus::incomplete_set)];
     partial_.seen = 0;
+    repeats_ = false;
 }
 
 }  // namespace narpa

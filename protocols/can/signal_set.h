@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <span>
 #include <string_view>
@@ -14,14 +15,14 @@ namespace narpa {
 
 /// The result of decoding one frame.
 enum class DecodeStatus : std::uint8_t {
-    not_mine,        ///< another identifier, or a controller's error report
-    partial,         ///< a valid part of a set that is not complete yet
-    complete,        ///< this frame completes the set
-    too_short,       ///< fewer bytes than the message has
-    too_long,        ///< more bytes than the message has
-    wrong_kind,      ///< right identifier, but remote, 29-bit, or the wrong one of classic and FD
-    bad_checksum,    ///< CRC-8 or CRC-16 differs
-    duplicate,       ///< same counter and content as a part already seen or the last whole set
+    not_mine,      ///< another identifier, or a controller's error report
+    partial,       ///< a valid part of a set that is not complete yet
+    complete,      ///< this frame completes the set
+    too_short,     ///< fewer bytes than the message has
+    too_long,      ///< more bytes than the message has
+    wrong_kind,    ///< right identifier, but remote, 29-bit, or the wrong one of classic and FD
+    bad_checksum,  ///< CRC-8 or CRC-16 differs
+    duplicate,     ///< same counter and content as a part already seen, or as the last whole set within kRepeat_ns
     incomplete_set,  ///< counted only: an earlier set was dropped because this frame belongs to another one
     not_a_number,    ///< the set is complete, but a signal is "not available" or an unknown choice
     not_unit,        ///< the set is complete, but its quaternion's norm differs from 1 by more than 1e-3
@@ -64,9 +65,15 @@ private:
 [[nodiscard]] CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
                                  std::uint32_t base_id) noexcept;
 
+/// A set with the counter and content of the last one is a repeat of it within this time of reception, and a new
+/// one afterwards: a sender that was restarted begins with the same counter.
+inline constexpr std::int64_t kRepeat_ns = 100'000'000;
+
 /// Collects the frames of one set. A set takes effect when all its classic frames of one counter have arrived, in
 /// any order, or with its one FD frame. A frame with another counter (or other content under the same counter)
-/// drops the frames collected so far, which is counted as `incomplete_set`, and starts a new set.
+/// drops the frames collected so far, which is counted as `incomplete_set`, and starts a new set. Frames that
+/// repeat the last whole set are duplicates, but are collected too: in a new set with the old counter some may be
+/// equal.
 class SetDecoder {
 public:
     /// Checks a complete set: `complete`, `not_a_number` or `not_unit`.
@@ -75,7 +82,8 @@ public:
     SetDecoder(const SetLayout& layout, std::uint32_t base_id, Verdict verdict) noexcept
         : layout_(&layout), base_id_(base_id), verdict_(verdict) {}
 
-    [[nodiscard]] DecodeStatus accept(const CanFrame& frame) noexcept;
+    /// `t_ns`: when it was received, on any clock.
+    [[nodiscard]] DecodeStatus accept(const CanFrame& frame, std::int64_t t_ns) noexcept;
 
     /// The newest complete set; meaningful once `accept` has returned complete.
     [[nodiscard]] const RawSignals& raw() const noexcept { return whole_.raw; }
@@ -93,10 +101,14 @@ private:
         std::uint8_t counter = 0;
     };
 
-    [[nodiscard]] DecodeStatus judge(const CanFrame& frame) noexcept;
-    [[nodiscard]] DecodeStatus take_classic(const CanFrame& frame, std::size_t index) noexcept;
-    [[nodiscard]] DecodeStatus take_fd(const CanFrame& frame) noexcept;
-    [[nodiscard]] DecodeStatus conclude(const Set& set) noexcept;
+    [[nodiscard]] DecodeStatus judge(const CanFrame& frame, std::int64_t t_ns) noexcept;
+    [[nodiscard]] DecodeStatus take_classic(const CanFrame& frame, std::size_t index, std::int64_t t_ns) noexcept;
+    [[nodiscard]] DecodeStatus take_fd(const CanFrame& frame, std::int64_t t_ns) noexcept;
+    [[nodiscard]] DecodeStatus conclude(const Set& set, std::int64_t t_ns) noexcept;
+    /// A set with this counter may be a repeat of the last whole one.
+    [[nodiscard]] bool may_repeat(std::uint8_t counter, std::int64_t t_ns) const noexcept {
+        return has_whole_ && counter == whole_.counter && std::abs(t_ns - t_whole_ns_) <= kRepeat_ns;
+    }
     void drop_partial() noexcept;
 
     const SetLayout* layout_;
@@ -104,6 +116,8 @@ private:
     Verdict verdict_;
     Set partial_{}, whole_{};
     bool has_whole_ = false;
+    bool repeats_ = false;         ///< all frames of partial_ are as in whole_
+    std::int64_t t_whole_ns_ = 0;  ///< when whole_ or its last repeat was completed
     std::array<std::uint64_t, kDecodeStatusCount> counts_{};
 };
 

@@ -30,6 +30,18 @@ TEST(StopOnSignals, OneIsARequest) {
         testing::ExitedWithCode(0), "");
 }
 
+TEST(StopOnSignals, AHangUpIsARequestUnlessItIsIgnored) {
+    for (const bool ignored : {false, true})
+        EXPECT_EXIT(
+            {
+                ::signal(SIGHUP, ignored ? SIG_IGN : SIG_DFL);
+                stop_on_signals();
+                ::raise(SIGHUP);
+                ::_exit(stop_flag() ? 3 : 4);
+            },
+            testing::ExitedWithCode(ignored ? 4 : 3), "");
+}
+
 TEST(StopOnSignals, SeveralAtOnceAreOneRequest) {
     EXPECT_EXIT(
         {

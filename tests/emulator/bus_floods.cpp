@@ -243,6 +243,37 @@ TEST_F(BusFlood, ARecordedCommandMayFollowAPauseOfTheRecording) {
     EXPECT_TRUE(node.receive(4 * kLimit, moved) && !moved);
 }
 
+TEST_F(BusFlood, ABodyWhoseCommandsAreAllPastIsReported) {
+    for (const int repeats : {1, 12}) {
+        const std::string spec = "log:" + (folder_ / (std::to_string(repeats) + ".log").c_str());
+        {
+            auto bus = open_can_bus(spec, CanRole::client);
+            ASSERT_TRUE(bus);
+            (*bus)->send(pose(0));
+            (*bus)->send(pose(1, 59'000'000'000));  // of a wrong clock
+            for (int k = 2; k < 2 + repeats; ++k) (*bus)->send(pose(k));
+        }
+        RunOptions o;
+        o.bus = spec;
+        o.lockstep = true;
+        o.video = {{"nav", "none"}};
+        const auto emulator = Emulator::create(scene(small_scene()), o);
+        ASSERT_TRUE(emulator);
+        CanNode& node = *(*emulator)->can();
+        bool moved = false;
+        while (node.receive(0, moved)) {
+        }
+        EXPECT_EQ(node.counters().past, static_cast<std::uint64_t>(repeats));
+        EXPECT_EQ(node.refuses_poses(), repeats > 1);
+        ASSERT_TRUE((*emulator)->run(StopFlag{false}));
+        const std::string expected =
+            "pose commands of \"chaser\" (can_id 0x100) refused: 12 as past (not newer than its newest, for 59.100 "
+            "s), "
+            "0 as overrun (more than are kept); check the sender's clock and rate";
+        EXPECT_EQ((*emulator)->notices(), repeats > 1 ? std::vector{expected} : std::vector<std::string>{});
+    }
+}
+
 TEST_F(BusFlood, ALockstepRunMakesNoFramesForARefusedCommandAndReportsIt) {
     const std::string spec = "log:" + (folder_ / "jump.log");
     {

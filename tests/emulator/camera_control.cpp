@@ -334,6 +334,35 @@ TEST_F(CameraControlTest, CommandsThatCannotBeAreAnswered) {
                                     CameraAnswer::wrong_mode, CameraAnswer::not_controllable}));
 }
 
+TEST_F(CameraControlTest, ValuesThatNoCameraHasAreAnswered) {
+    open();
+    pose(0);
+    std::uint8_t counter = 0;
+    for (const auto& [signal, value] : std::initializer_list<std::pair<std::size_t, std::int64_t>>{
+             {6, -1}, {7, -5}, {9, 70'000}, {4, -1}, {5, -1}, {11, -1}, {1, 2}, {2, 3}, {3, -1}}) {
+        RawSignals raw{};
+        for (std::size_t i = 1; i < kCameraCommandLayout.signals.size(); ++i) raw[i] = kNotAvailable;
+        raw[signal] = value;
+        add(encode_fd(kCameraCommandLayout, raw, ++counter, kCameraCommandBaseId));
+    }
+    RawSignals trigger{};
+    trigger[0] = 0b101, trigger[1] = 2;  // at once: unknown
+    add(encode_fd(kCameraTriggerLayout, trigger, ++counter, kCameraTriggerBaseId));
+    pose(1);
+    const Traffic traffic = run(small_scene(operated()));
+    std::vector<CameraAnswer> answers;
+    for (const CameraReply& r : traffic.replies) answers.push_back(r.answer);
+    using enum CameraAnswer;
+    EXPECT_EQ(answers,
+              (std::vector{exposure_range, region_range, region_range, binning_range, gain_range, period_range,
+                           wrong_mode, wrong_mode, wrong_mode, wrong_mode, not_controllable}));
+    ASSERT_EQ(traffic.replies.size(), 11U);
+    EXPECT_EQ(traffic.replies[0].counter, 1);
+    EXPECT_EQ(traffic.replies[6].counter, 7);
+    EXPECT_TRUE(traffic.replies[9].to_trigger);
+    EXPECT_EQ(traffic.replies[10].camera, 2);
+}
+
 // --- Its schedule, without a loop -------------------------------------
 
 class CameraSchedule : public testing::Test {

@@ -29,6 +29,52 @@ private:
     std::vector<FrameStamp>& stamps_;
 };
 
+/// Is full.
+class Full final : public VideoSink {
+public:
+    bool send(std::span<const std::uint8_t>, const FrameStamp&) noexcept override { return false; }
+    void flush() noexcept override {}
+    VideoCounters counters() const noexcept override { return {}; }
+    std::string description() const override { return "full"; }
+};
+
+class UntakenFrames : public LoopTest {
+protected:
+    /// One frame to sinks that are full, and to one that is not.
+    CameraStats run(bool one_takes, FrameLedger& ledger) {
+        auto world = World::create(scene(small_scene()));
+        if (!world) return {};
+        std::vector<std::string> frames;
+        std::vector<FrameStamp> stamps;
+        std::vector<std::unique_ptr<VideoSink>> sinks;
+        sinks.push_back(std::make_unique<Full>());
+        if (one_takes) sinks.push_back(std::make_unique<Keeper>(frames, stamps));
+        sinks.push_back(std::make_unique<Full>());
+        CameraSensor feed(**world, 0, std::move(sinks));
+        feed.keep_ledgers();
+        RealTimeClock clock;
+        clock.start(kHourNs);
+        clock.end_at(feed.last_pose_ns() + 1);
+        feed.make_next(clock);
+        EXPECT_TRUE(feed.ledgers().pop(ledger));
+        return feed.stats();
+    }
+};
+
+TEST_F(UntakenFrames, AreNotHandedOver) {
+    FrameLedger ledger;
+    const CameraStats none = run(false, ledger);
+    EXPECT_EQ(ledger.delivery, Delivery::nothing);
+    EXPECT_EQ(ledger.t_hand_over_ns, 0);
+    EXPECT_EQ(none.handed_over, 0U);
+    EXPECT_EQ(none.not_taken, 1U);
+    const CameraStats one = run(true, ledger);
+    EXPECT_EQ(ledger.delivery, Delivery::frame);
+    EXPECT_NE(ledger.t_hand_over_ns, 0);
+    EXPECT_EQ(one.handed_over, 1U);
+    EXPECT_EQ(one.not_taken, 0U);
+}
+
 class LatePolicies : public LoopTest, public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {
 protected:
     /// Frames 0 to 4, of which these come late.

@@ -87,10 +87,10 @@ TEST_F(Lockstep, DropsAndCountsWhatIsWrongOnTheBus) {
         };
         const auto unchanged = [](CanFrame&) {};
         send(pose(0), unchanged);
+        send(pose(0), unchanged);                               // duplicated
         send(pose(1), [](CanFrame& f) { f.data[9] ^= 0x40; });  // corrupt
         send(pose(2), [](CanFrame& f) { f.size = 48; });        // short
         send(pose(3), unchanged);
-        send(pose(3), unchanged);                          // duplicated
         send(pose(2), unchanged);                          // from the past
         send(pose(4), [](CanFrame& f) { f.id = 0x333; });  // foreign
         send(pose(5), unchanged);
@@ -105,6 +105,15 @@ TEST_F(Lockstep, DropsAndCountsWhatIsWrongOnTheBus) {
     EXPECT_EQ(c.by_status[static_cast<std::size_t>(DecodeStatus::duplicate)], 1U);
     EXPECT_EQ(c.missed, 3U);  // 1, 2 and 4
     EXPECT_EQ(frames_, 6U);   // still every frame from 0.0 to 0.5 s
+}
+
+/// In a ledger 0 is no command.
+TEST_F(Lockstep, ACommandForTimeZeroIsKnown) {
+    run(small_scene(), record(3), 0, "zero");
+    const auto rows = read_rows(folder_ / "zero/nav.ledger.csv");
+    ASSERT_EQ(rows.size(), 3U);
+    EXPECT_EQ(rows[0].at("t_pose_ns"), "1");
+    EXPECT_EQ(rows[1].at("t_pose_ns"), "100000000");
 }
 
 TEST_F(Lockstep, EndsBeforeTheFrameAtItsDuration) {

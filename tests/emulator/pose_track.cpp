@@ -118,10 +118,27 @@ TEST(PoseTrack, RefusesToForgetWhatIsStillInUse) {
     EXPECT_EQ(track.push(command(10 * kSecond, {}), 5 * kSecond), TrackStatus::taken);  // the clock has moved on
 }
 
+TEST(PoseTrack, KeepsUpWithAThousandCommandsASecond) {
+    PoseTrack track({}, 0.5);
+    for (std::int64_t i = 0; i < 5000; ++i) {
+        const std::int64_t t_now_ns = (i - 256) * kMs;
+        ASSERT_EQ(track.push(command(i * kMs, drifting(0.001 * static_cast<double>(i))), t_now_ns),
+                  TrackStatus::taken)
+            << i;
+    }
+    const std::int64_t t_now_ns = (4999 - 256) * kMs;
+    for (std::int64_t t = t_now_ns - kSecond; t < 5 * kSecond; t += kMs / 4) {
+        const TrackedPose p = track.at(t);
+        EXPECT_EQ(p.t_pose_ns, t / kMs * kMs);
+        EXPECT_LT(norm(p.motion.T_world_body.t - drifting(static_cast<double>(t) * 1e-9).T_world_body.t), 1e-11);
+        EXPECT_FALSE(p.stale);
+    }
+}
+
 TEST(PoseTrack, ReadersNeverSeeHalfACommand) {
     // Position and velocity of every command are equal whole numbers, so a torn sample would show: a mixture of two
-    // that are 256 commands apart. A reader that was held up meets a neighbour instead, carried on for at most 0.2
-    // ms.
+    // that are kDepth commands apart. A reader that was held up meets a neighbour instead, carried on for at most
+    // 0.2 ms.
     PoseTrack track({}, 1e9);
     ASSERT_EQ(track.push(command(1, {{{}, {1, 1, 1}}, {1, 1, 1}, {}}), 1), TrackStatus::taken);
     std::atomic<bool> done{false};

@@ -43,7 +43,7 @@ TEST_F(RealTime, MakesOrCountsEveryFrameAndPacketOfItsDuration) {
     EXPECT_EQ(emulator->can()->counters().taken, 10U);
     const VideoCounters sent = camera_of(*emulator).sinks().front()->counters();
     EXPECT_EQ(sent.written + sent.ring_full + sent.failed,
-              c.handed_over);  // a disk may pause for longer than the ring lasts
+              c.handed_over + c.not_taken);  // a disk may pause for longer than the ring lasts
 }
 
 TEST_F(RealTime, AdviceStatesHowLongAFrameTakes) {
@@ -183,6 +183,7 @@ TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
     RunOptions o;
     o.duration_s = 1;
     o.video = {{"nav", fifo}};
+    o.log_folder = folder_ / "log";
     // Twice as large as a pipe, so that it stands after the first frame.
     const auto emulator = start(with_resolution(small_scene("rate_hz = 25"), "[512, 256]"), o);
     ASSERT_TRUE(emulator);
@@ -191,8 +192,22 @@ TEST_F(RealTime, AReaderThatDoesNotReadCostsNoFrameItsTime) {
     const CameraStats& c = camera_of(*emulator).stats();
     const VideoCounters sent = camera_of(*emulator).sinks().front()->counters();
     EXPECT_EQ(c.frames + c.skipped, 25U);
-    EXPECT_GT(c.handed_over, sent.written);  // the loop went on without the reader
-    EXPECT_EQ(sent.written + sent.ring_full + sent.no_reader + sent.failed, c.handed_over);
+    EXPECT_GT(c.frames, sent.written);  // the loop went on without the reader
+    EXPECT_EQ(sent.written + sent.no_reader + sent.failed, c.handed_over);
+    EXPECT_EQ(sent.ring_full, c.not_taken);
+    EXPECT_GT(c.not_taken, 0U);
+    for (const auto& row : read_rows(o.log_folder + "/nav.ledger.csv"))
+        EXPECT_EQ(row.at("delivery") == "nothing", row.at("t_hand_over_ns") == "0");
+    EXPECT_EQ(std::ranges::count(read_rows(o.log_folder + "/nav.ledger.csv"), "nothing",
+                                 [](const auto& row) { return row.at("delivery"); }),
+              static_cast<std::ptrdiff_t>(c.not_taken));
+}
+
+TEST_F(RealTime, WhatWasMissedIsNotMadeUpFor) {
+    EXPECT_EQ(next_due_ns(300, 100, 300), 400);
+    EXPECT_EQ(next_due_ns(300, 100, 399), 400);
+    EXPECT_EQ(next_due_ns(300, 100, 400), 500);
+    EXPECT_EQ(next_due_ns(300, 100, 3'350), 3'400);
 }
 
 TEST_F(RealTime, ABudgetLongerThanAPeriodIsRefused) {
@@ -217,7 +232,8 @@ TEST_F(RealTime, StopsWhenAskedAndFlushesEverything) {
     const std::string video = read_text(folder_ / "a.y4m");
     const VideoCounters sent = camera_of(*emulator).sinks().front()->counters();
     EXPECT_GE(sent.written, 1U);
-    EXPECT_EQ(sent.written + sent.ring_full + sent.failed, camera_of(*emulator).stats().handed_over);
+    const CameraStats& stats = camera_of(*emulator).stats();
+    EXPECT_EQ(sent.written + sent.ring_full + sent.failed, stats.handed_over + stats.not_taken);
     EXPECT_EQ((video.size() - video.find('\n') - 1) % (64 * 48 + 6), 0U);
     EXPECT_EQ((video.size() - video.find('\n') - 1) / (64 * 48 + 6), sent.written);
     // Nobody commands: every frame says so.

@@ -87,6 +87,24 @@ TYPED_TEST(CanCamera, ComesBackInBothForms) {
     }
 }
 
+TYPED_TEST(CanCamera, TheSameSetIsARepeatForAShortTimeOnly) {
+    RandomCamera random;
+    TypeParam sent, out;
+    random.fill(sent);
+    MessageDecoder<TypeParam> classic, fd;
+    const auto send = [&](std::int64_t t_ns) {
+        DecodeStatus status = DecodeStatus::not_mine;
+        for (const CanFrame& f : encode_classic(sent)) status = classic.accept(f, t_ns, out);
+        EXPECT_EQ(fd.accept(encode_fd(sent), t_ns, out), status);
+        return status;
+    };
+    EXPECT_EQ(send(0), DecodeStatus::complete);
+    EXPECT_EQ(send(kRepeat_ns), DecodeStatus::duplicate);
+    EXPECT_EQ(send(2 * kRepeat_ns), DecodeStatus::duplicate) << "of the repeat";
+    EXPECT_EQ(send(3 * kRepeat_ns + 1), DecodeStatus::complete) << "the first of a sender that was restarted";
+    EXPECT_EQ(classic.count(DecodeStatus::incomplete_set), 0u);
+}
+
 TYPED_TEST(CanCamera, EveryFlippedBitIsFound) {
     RandomCamera random;
     TypeParam sent, out;
@@ -102,7 +120,8 @@ TYPED_TEST(CanCamera, EveryFlippedBitIsFound) {
         }
 }
 
-/// Of a state nothing may be missing; of a command no value may be beyond its kind.
+/// Of a state nothing may be missing; of a command no choice may be unknown, and its receiver learns whom to
+/// answer.
 TEST(CanCameraValues, WhatIsMissingOrUnknownIsRefused) {
     RawSignals raw{};
     for (std::size_t i = 0; i < kCameraCommandSignals.size(); ++i) raw[i] = kNotAvailable;
@@ -110,22 +129,54 @@ TEST(CanCameraValues, WhatIsMissingOrUnknownIsRefused) {
     const auto decode = [&]<class Message>(MessageDecoder<Message>& decoder, const SetLayout& layout,
                                            std::uint32_t base) {
         Message out;
+        out.camera = 9;
         return decoder.accept(encode_fd(layout, raw, 1, base), 0, out);
     };
     MessageDecoder<CameraCommand> commands;
     EXPECT_EQ(decode(commands, kCameraCommandLayout, kCameraCommandBaseId), DecodeStatus::complete);
-    for (const auto& [signal, value] : std::initializer_list<std::pair<std::size_t, std::int64_t>>{
-             {1, 2}, {1, -1}, {2, 3}, {2, -3}, {4, -1}, {6, -5}, {7, 70'000}, {11, -1}}) {
+    for (const auto& [signal, value] :
+         std::initializer_list<std::pair<std::size_t, std::int64_t>>{{1, 2}, {1, -1}, {2, 3}, {2, -3}, {3, 2}}) {
         const std::int64_t before = std::exchange(raw[signal], value);
         EXPECT_EQ(decode(commands, kCameraCommandLayout, kCameraCommandBaseId), DecodeStatus::not_a_number)
             << kCameraCommandSignals[signal].name << " " << value;
         raw[signal] = before;
     }
+    raw[0] = 5, raw[2] = 3;
+    CameraCommand command;
+    EXPECT_EQ(commands.accept(encode_fd(kCameraCommandLayout, raw, 77, kCameraCommandBaseId), 0, command),
+              DecodeStatus::not_a_number);
+    EXPECT_EQ(command.camera, 5);
+    EXPECT_EQ(command.counter, 77);
+    MessageDecoder<CameraTrigger> triggers;
+    CameraTrigger trigger;
+    RawSignals unknown{};
+    unknown[0] = 0b101, unknown[1] = 2;
+    EXPECT_EQ(triggers.accept(encode_fd(kCameraTriggerLayout, unknown, 78, kCameraTriggerBaseId), 0, trigger),
+              DecodeStatus::not_a_number);
+    EXPECT_EQ(trigger.cameras, 0b101);
+    EXPECT_EQ(trigger.counter, 78);
     MessageDecoder<CameraState> states;
     raw = {};
     EXPECT_EQ(decode(states, kCameraStateLayout, kCameraStateBaseId), DecodeStatus::complete);
     raw[5] = kNotAvailable;
     EXPECT_EQ(decode(states, kCameraStateLayout, kCameraStateBaseId), DecodeStatus::not_a_number);
+}
+
+/// No camera accepts the value that the command then has.
+TEST(CanCameraValues, WhatNoCameraCanDoIsStillACommand) {
+    CameraCommand sent, out;
+    MessageDecoder<CameraCommand> decoder;
+    RawSignals raw{};
+    for (std::size_t i = 0; i < kCameraCommandSignals.size(); ++i) raw[i] = kNotAvailable;
+    raw[0] = 0, raw[4] = -1, raw[6] = -5, raw[7] = -5, raw[9] = 70'000, raw[11] = -1;
+    ASSERT_EQ(decoder.accept(encode_fd(kCameraCommandLayout, raw, 1, kCameraCommandBaseId), 0, out),
+              DecodeStatus::complete);
+    sent.counter = 1;
+    sent.binning = 255;
+    sent.exposure_ns = -5;
+    sent.region_x = sent.region_width = 65535;
+    sent.period_ns = -1;
+    EXPECT_EQ(out, sent);
 }
 
 }  // namespace

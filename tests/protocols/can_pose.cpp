@@ -241,6 +241,32 @@ TEST(CanPose, RestartedSenderMayUseTheLastCounterAgain) {
     EXPECT_EQ(decoder.count(PoseStatus::complete), 2u);
 }
 
+TEST(CanPose, RestartedSenderMayUseTheLastCounterInAnyOrderOfFrames) {
+    PoseDecoder decoder(kBase);
+    PoseCommand out;
+    for (const std::int64_t t_ns : {1'000, 2'000}) {  // all frames but that of the time are equal
+        const FrameSet frames = classic(command_at(t_ns, 0));
+        for (std::size_t i = 9; i-- > 0;) (void)decoder.accept(frames[i], 0, out);
+        EXPECT_EQ(out.t_valid_ns, t_ns);
+    }
+    EXPECT_EQ(decoder.count(PoseStatus::complete), 2u);
+    EXPECT_EQ(decoder.count(PoseStatus::incomplete_set), 0u);
+}
+
+TEST(CanPose, FramesOfARepeatAreNoPartOfALaterSet) {
+    PoseDecoder decoder(kBase);
+    PoseCommand out, other = command_at(2'000, 0);
+    other.motion.rate_rad_s.z += 0.5;  // in the last frame
+    const FrameSet old = classic(command_at(1'000, 0)), frames = classic(other);
+    for (const CanFrame& f : old) (void)decoder.accept(f, 0, out);
+    EXPECT_EQ(decoder.accept(old[8], 0, out), PoseStatus::duplicate);
+    for (std::size_t i = 0; i < 8; ++i)
+        EXPECT_EQ(decoder.accept(frames[i], kRepeat_ns + 1, out), PoseStatus::partial);
+    EXPECT_EQ(decoder.accept(frames[8], kRepeat_ns + 1, out), PoseStatus::complete);
+    EXPECT_NEAR(out.motion.rate_rad_s.z, other.motion.rate_rad_s.z, 1e-5);
+    EXPECT_EQ(decoder.count(PoseStatus::incomplete_set), 0u);
+}
+
 TEST(CanPose, DuplicatesAreNamed) {
     PoseDecoder decoder(kBase);
     PoseCommand out;

@@ -95,7 +95,7 @@ PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,
         source.stale |= p.stale;
         if (p.commanded && (!named || static_cast<int>(i) == rider)) {
             source.counter = p.counter;
-            source.t_pose_ns = p.t_pose_ns != 0 ? p.t_pose_ns : 1;
+            source.t_pose_ns = p.t_pose_ns;
             named = true;
         }
     }

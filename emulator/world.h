@@ -18,7 +18,7 @@ namespace narpa {
 /// The command that a placement is based on, for the ledger.
 struct PlacementSource {
     std::uint8_t counter = 0;
-    std::int64_t t_pose_ns = 0;  ///< 0: no command; of a command for time 0, 1 ns
+    std::int64_t t_pose_ns = 0;  ///< 0: no command
     bool stale = false;          ///< a commanded body had no command, or none for longer than stale_after_s
 };
 

@@ -107,15 +107,6 @@ TEST_F(Lockstep, DropsAndCountsWhatIsWrongOnTheBus) {
     EXPECT_EQ(frames_, 6U);   // still every frame from 0.0 to 0.5 s
 }
 
-/// In a ledger 0 is no command.
-TEST_F(Lockstep, ACommandForTimeZeroIsKnown) {
-    run(small_scene(), record(3), 0, "zero");
-    const auto rows = read_rows(folder_ / "zero/nav.ledger.csv");
-    ASSERT_EQ(rows.size(), 3U);
-    EXPECT_EQ(rows[0].at("t_pose_ns"), "1");
-    EXPECT_EQ(rows[1].at("t_pose_ns"), "100000000");
-}
-
 TEST_F(Lockstep, EndsBeforeTheFrameAtItsDuration) {
     RunOptions o;
     o.bus = record(21);

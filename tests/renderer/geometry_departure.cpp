@@ -144,6 +144,34 @@ TEST(LeavingAPlate, ItsInnerSideIsAsFreeAsItsOuterSide) {
     EXPECT_EQ(dark, 0);
 }
 
+/// Where vertices have normals rays leave from above the face, and perhaps from beside it: such starts are not
+/// moved, so that a surface at the end of a ray does not hide itself.
+TEST(LeavingASmoothMesh, TheEndOfARayIsWhereItWasMeasuredTo) {
+    std::mt19937_64 random(35);
+    Scene s;
+    s.materials.push_back(lambert(0.5f));
+    add_mesh(s, icosphere(0, 1, true));
+    add_mesh(s, plate(100, 100, 1), {{}, {0, 0, -3}});
+    const auto tracer = Tracer::create(s, 1);
+    ASSERT_TRUE(tracer);
+    const BodyPoses at = placed(s);
+    int above = 0, hidden = 0;
+    for (int k = 0; k < 2000; ++k) {
+        const Vec3 side = random_direction(random);
+        const Hit hit = tracer->intersect(at, {2 * side, -side}, kInfinity);
+        ASSERT_EQ(hit.body, 0);
+        const Vec3 start = at.T_world_body[0] * hit.departure_body;
+        if (dot(hit.geometric_normal, start - hit.position) < 1e-3) continue;
+        const Vec3 down = normalized(Vec3{0.3 * side.x, 0.3 * side.y, -1});
+        if (!(dot(hit.geometric_normal, down) > 0.05)) continue;
+        ++above;
+        const double range_m = (-3 - start.z) / down.z;
+        hidden += tracer->occluded(at, hit, down, range_m - 1e-5);
+    }
+    EXPECT_GT(above, 300);
+    EXPECT_EQ(hidden, 0) << "of " << above;
+}
+
 /// Sixteen paths that bounce about inside a closed body. Counts those that get out; each of them starts anew.
 struct Bounces {
     int bounces = 0, escapes = 0;

@@ -146,6 +146,27 @@ TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
     EXPECT_NEAR((norm(k) - 1) * 6.37e6, 47, 0.5);
 }
 
+TEST(GroundScene, AnObserverOnTheEllipsoidIsAboveItsSurface) {
+    const MemoryFolder folder;
+    for (const double latitude_deg : {0.0, 12.3, 45.0, -67.8, 90.0}) {
+        std::string text = kGroundScene;
+        text.replace(text.find("51.4778"), 7, fmt::format("{}", latitude_deg));
+        text.replace(text.find("height_m = 47"), 13, "");
+        const auto scene = read_scene(folder.write("s.toml", text));
+        ASSERT_TRUE(scene) << scene.error().text();
+        const auto tracer = Tracer::create(*scene, 1);
+        ASSERT_TRUE(tracer);
+        const Vec3 from = scene->cameras[0].T_mount_camera.t;
+        const Hit up = tracer->intersect(placed(*scene), {from, normalized(from)}, kInfinity);
+        EXPECT_NE(up.body, 0) << latitude_deg;
+    }
+    std::string text = kGroundScene;
+    text.replace(text.find("height_m = 47"), 13, "height_m = -5");
+    const auto below = read_scene(folder.write("s.toml", text));
+    ASSERT_FALSE(below);
+    EXPECT_NE(below.error().what.find("below the surface of `earth`"), std::string::npos);
+}
+
 /// The scene at a later time is the one of a later epoch: the orbit, the Earth, the telescope.
 TEST(GroundScene, AtALaterTimeIsTheOneOfALaterEpoch) {
     const MemoryFolder folder;

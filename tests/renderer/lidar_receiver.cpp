@@ -121,6 +121,18 @@ TEST(LidarReceiver, TiltedPlanesAreAtTheRangeOfTheAxis) {
         }
 }
 
+/// However far apart the ends of its footprint are.
+TEST(LidarReceiver, ATiltedPlaneIsOneEcho) {
+    TargetRange target({0.5});
+    target.add(1000, 85 * kPi / 180, 400);
+    for (const int sub_rays : {8, 16, 32, 64}) {
+        const LidarReceiverModel model{.beam_divergence_rad = 1e-3, .sub_rays = sub_rays, .pulse_length_m = 0.9};
+        int split = 0;
+        for (const LidarEchoes& e : target.shoot(model, 4000)) split += e.second.range_m > 0;
+        EXPECT_EQ(split, 0) << sub_rays;
+    }
+}
+
 /// Where a beam meets an edge there are two echoes, and never one in between, unless they are closer than a pulse.
 TEST(LidarReceiver, AnEdgeGivesTwoEchoesOrTheirMean) {
     // The near plate takes what is left of x = 1 cm: at 50 m and 3 mrad, 58 % of the footprint.

@@ -267,6 +267,8 @@ const BadFile kBad[] = {
      64, "got 0.05, expected more than the focal length of 0.1 m"},
     {"LensAperture", CAMERA FIELD "lens = {aperture_diameter_m = inf, focus_distance_m = 1}\n", 5, 31,
      "got inf, expected a number > 0"},
+    {"LensOfAFisheye", CAMERA "fov_diagonal_deg = 175\nlens = {aperture_diameter_m = 0.01, focus_distance_m = 9}\n",
+     5, 8, "the image reaches 87 degrees off the axis, expected at most 80 for a thin lens"},
     {"LidarModel", LIDAR "model = \"HDL-64\"\n", 3, 9, "expected one of \"VLP-16\""},
     {"LidarWithoutModel", LIDAR, 1, 1, "[[lidar]] has no \"model\""},
     {"LidarTooFast", LIDAR "model = \"VLP-16\"\nrate_hz = 25\n", 4, 11, "got 25, expected a number in [5, 20]"},

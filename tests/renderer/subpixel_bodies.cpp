@@ -7,6 +7,7 @@
 #include "renderer/camera/scene_camera.h"
 #include "renderer/film/camera_image.h"
 #include "renderer/integrator/subpixel_bodies.h"
+#include "renderer/material/texture_lookup.h"
 #include "tests/renderer/camera_support.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/oracle.h"
@@ -254,6 +255,40 @@ struct Shining {
 
 /// Half the width in pixels of a sphere at 1 km through `Shining`'s camera.
 constexpr double kWide = 0.5;
+
+TEST(TinyBody, ShowsTheSideOfItsTextureThatFacesTheCamera) {
+    Texture halves{.name = "halves", .width = 128, .height = 64, .rgb = {}, .wrap = Texture::Wrap::repeat};
+    for (int i = 0; i < 128 * 64; ++i) halves.rgb.insert(halves.rgb.end(), 3, i % 128 < 64 ? 65535 : 0);
+    build_coarser_levels(halves);
+    for (const double side : {1.0, -1.0}) {
+        Far far(1e6, 0, 0.5);
+        far.scene.textures.push_back(halves);
+        far.scene.materials[0].texture = 0;
+        add_sphere(far.scene, 5, {});
+        far.scene.bodies[0].initial.T_world_body.q = exp_rotation({0, 0, -side * 0.5 * kPi});
+        const double expected = side > 0 ? lambert_sphere(0.5, 5, far.distance, 0) : 0;
+        for (const double seen : fluxes(far, {.spp = 16}))
+            EXPECT_NEAR(seen, expected, 5e-3 * lambert_sphere(0.5, 5, far.distance, 0)) << side;
+    }
+}
+
+/// Rays through it would see air without ground.
+TEST(TinyBody, IsNoneThatHasAnAtmosphere) {
+    Far far(1e10, 1, 0.1);
+    add_sphere(far.scene, 6.371e6, {});
+    const BodyPoses at = placed(far.scene);
+    const CameraModelHandle model(far.c);
+    const auto tracer = Tracer::create(far.scene, 1);
+    ASSERT_TRUE(tracer);
+    EXPECT_TRUE(SubpixelBodies(*tracer, at, far.c, model, far.view(), nullptr, false).any());
+    far.scene.atmosphere.emplace();
+    far.scene.atmosphere->body = 0;
+    const auto with_air = Tracer::create(far.scene, 1);
+    ASSERT_TRUE(with_air);
+    const SubpixelBodies none(*with_air, at, far.c, model, far.view(), nullptr, false);
+    EXPECT_FALSE(none.any());
+    EXPECT_FALSE(none.contains(0));
+}
 
 TEST(TinyBody, CoversWhatIsBehindIt) {
     for (const int spp : {1, 4}) {

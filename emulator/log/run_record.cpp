@@ -5,15 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
 
 #include "base/write_file.h"
+#include "renderer/scene/file_bytes.h"
 
 namespace narpa {
 namespace {
@@ -61,6 +60,11 @@ Status remove_run(const std::string& folder) {
     namespace fs = std::filesystem;
     std::error_code failed;
     if (!fs::exists(file_in(folder), failed)) return Ok{};  // the files are not a run's
+    if (const auto record = read_run_record(folder); !record) {
+        Error error = record.error();
+        error.what += "; the folder's files stay, expected a new folder or that of a run";
+        return error;
+    }
     std::vector<fs::path> files{fs::path(folder) / "can.log"};
     for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
         const std::string path = at->path();
@@ -90,9 +94,12 @@ Status write_run_record(const std::string& folder, const Scene& scene) {
 }
 
 Result<RunRecord> read_run_record(const std::string& folder) {
-    std::ifstream in(file_in(folder));
-    if (!in) return Error{"is not there, expected the log folder of a run", file_in(folder)};
-    const std::string file = file_in(folder), text{std::istreambuf_iterator<char>(in), {}};
+    const std::string file = file_in(folder);
+    if (std::error_code failed; !std::filesystem::exists(file, failed))
+        return Error{"is not there, expected the log folder of a run", file};
+    const auto bytes = read_file(file);
+    if (!bytes) return bytes.error();
+    const std::string& text = *bytes;
     json document;
     try {
         document = json::parse(text);

@@ -18,7 +18,7 @@ struct RunRecord {
 };
 
 /// Removes the log of an earlier run, whose sensors may be others, from its folder. Other files stay, and so do
-/// links, which the next log writes through.
+/// links, which the next log writes through. Error: run.json is not a run's; nothing is removed.
 Status remove_run(const std::string& folder);
 /// Writes FOLDER/run.json.
 Status write_run_record(const std::string& folder, const Scene& scene);

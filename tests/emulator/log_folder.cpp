@@ -72,6 +72,18 @@ TEST_F(LogFolder, HasNoFilesOfSensorsThatTheRunLacks) {
                                                  "notes.csv", "run.json"}));
 }
 
+TEST_F(LogFolder, FilesBesideARunJsonThatIsNoRunsStay) {
+    std::filesystem::create_directory(log_);
+    std::ofstream(log_ + "/run.json") << "{\"mine\": true}\n";
+    std::ofstream(log_ + "/approach.truth.csv") << "mine\n";
+    const Files before = files();
+    const auto refused = Emulator::create(scene(small_scene()), of_both_sensors());
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().text().find("run.json:1:1: format: expected"), std::string::npos)
+        << refused.error().text();
+    EXPECT_TRUE(files() == before);
+}
+
 TEST_F(LogFolder, FilesOfAFolderThatHasNoRunStay) {
     std::filesystem::create_directory(log_);
     std::ofstream(log_ + "/approach.truth.csv") << "mine\n";

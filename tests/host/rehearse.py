@@ -136,9 +136,10 @@ attitude_wxyz = [0.0, 0.0, 0.0, 1.0]
 
 def dense():
     folder = support.work_folder()
-    _, verdict = rehearse(part_of("docking-dense", 6, folder), folder / "out")
+    _, verdict = rehearse(part_of("docking-dense", 12, folder), folder / "out")
     n = verdict["navigation"]
-    expect(n["with_frames"] >= 6, f"frames gave poses: {n['with_frames']} of {n['estimates']}")
+    # Of a whole docking 201 of 212, most of the others at its end.
+    expect(n["with_frames"] >= 11, f"frames gave poses: {n['with_frames']} of {n['estimates']}")
     expect(n["position_m"]["max"] < 0.015, f"largest error at 25 m, by features 20 mm: {n['position_m']['max']}")
     expect(n["nees"] < 14, f"covariances hold: NEES {n['nees']}")
 

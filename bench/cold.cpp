@@ -107,7 +107,7 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
     if (o.noise_known) variance = sampling_variance(view, truth, settings, d.random);
 
     SearchOptions search;
-    // What is off the truth by this part of it has the truth off by more.
+    // A guess of (1 - p) times the truth has the truth at 1 / (1 - p) = 1 + p / (1 - p) times itself.
     search.range_m = guess_m;
     search.range_part = o.range_part / (1 - o.range_part);
     search.dense.samples_per_pixel = 12, search.dense.fineness = 4;

@@ -20,7 +20,7 @@ constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
 constexpr std::int64_t kStartingPeriodNs = 500'000'000;  // of heartbeats until a lockstep run begins, wall time
-constexpr int kWaitsAlone = 10;                          // so many, for a commander that comes back
+constexpr int kWaitsAlone = 10;  // of kLockstepWaitNs, for the last commander to come back before the run ends
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
 /// Calls f on the threads on which the sensor works.

@@ -56,7 +56,7 @@ double surface_motion_m(const Vector6& pose_step, double reach_m) {
     return pose_step.tail<3>().norm() + pose_step.head<3>().norm() * reach_m;
 }
 
-/// Along some observed motion more than so much of the information of `all` is not that of `some`.
+/// Along an observed motion more than the part kMost of the information is from points that are not in `some`.
 bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& some) {
     constexpr double kMost = 0.75;
     const Observability& o = all.observability;
@@ -224,14 +224,15 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     return out;
 }
 
-/// So far the surfaces may move before edges are found anew: the rim that is searched is wider by as much.
+/// Largest motion of the surfaces for which the edges that were found stay valid: the rim that is searched is wider
+/// by as much.
 double CloudIcp::edges_hold_m() const {
     if (!(settings_.noise.footprint_rad > 0)) return kInfinity;
     return 0.05 * settings_.noise.footprint_rad * association_.nearest_m();
 }
 
-/// Points whose beams miss the model draw at nothing: a face can stop short of its edge. A search about the minimum
-/// draws them in.
+/// Beams that miss the model have no residual, so a face can stop short of its edge. Repeats the search about the
+/// minimum, so that they find a surface.
 void CloudIcp::draw_in(CloudEstimate& found) {
     for (int i = 0; i < 3; ++i) {
         if (found.used < kFewestBeams || found.explained + found.grazing + found.edges >= found.points) return;

@@ -20,8 +20,8 @@ constexpr double kMostMisfit = 10;
 /// The weakest motions are rendered so far to both sides: by so many standard deviations, but not many times the
 /// limit of observed motions, and at least by so many pixels.
 constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
-/// And count as shown by no more than so many times what the Jacobian says: answers of which more was measured had
-/// too small a covariance by it.
+/// The measured response to a motion counts at most as this many times the Jacobian's: with larger ones covariances
+/// were too small.
 constexpr double kMostShown = 1.3;
 
 }  // namespace
@@ -29,7 +29,7 @@ constexpr double kMostShown = 1.3;
 void LevelSolver::finish() {
     const PhotometricImages images = view_.images();
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
-    // What the equations say is still to go belongs to the error too.
+    // The step that remains is a part of the error.
     const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
     const Matrix6 of_noise = last.pose_covariance();
     e_.covariance_of_model = covariance_of_model(last);

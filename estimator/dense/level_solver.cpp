@@ -30,30 +30,31 @@ constexpr double kSameWay = 0.7, kLongestStride = 8;
 /// Sampling noise may increase the cost of a good step by this part.
 constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
-/// Coarse levels use so many times the samples: their pixels have more details and less noise, and are few. All
-/// steps but the finest level's last take a derivative by so many times fewer lines.
+/// Coarse levels: factor of the number of samples, as their pixels have more details and less noise, and are few.
+/// All steps but the last of the finest level: factor by which their derivative has fewer lines.
 constexpr int kCoarseSamples = 2;
 constexpr int kCoarseFineness = 2;
-/// Of the image and the derivative from which pixels of a large target are chosen: one in so many samples, and
-/// lines.
+/// The image and the derivative from which pixels of a large target are chosen: the part of the usual number of
+/// samples, and the number of lines.
 constexpr int kChoiceSamples = 4, kChoiceFineness = 1;
-/// And only pixels that together hold this part of the information.
+/// The pixels that are chosen hold this part of the information together.
 constexpr double kHeld = 0.8;
-/// Where the target covers so many: fewer take little time.
+/// Pixels are chosen where the target covers at least this many: fewer take little time.
 constexpr std::size_t kManyPixels = 10'000;
 /// The last steps. In a curved valley steps end early, and the derivative leaves about a tenth of a step.
 struct LastSteps {
-    int first_samples, samples;  ///< so many times; the most once a step is shorter than `before_sigmas`
+    int first_samples,
+        samples;  ///< factors of the number of samples: before and after a step shorter than the next
     double before_sigmas;
-    double sigmas, px;  ///< the last is shorter than that many standard deviations, or than that
+    double sigmas, px;  ///< the last step is shorter than one of these: in standard deviations, in pixels
     double serves_px;   ///< the Jacobian is reused for poses within this motion
 };
 /// Chosen pixels show fine details: samples are what limits them, and low-discrepancy ones are best in powers of
 /// two.
 constexpr LastSteps kOfAll{6, 6, 0, 1, 0.02, 0.02}, kOfChosen{4, 8, 20, 3, 0, 0.1};
 constexpr int kMostPolishes = 5;
-/// Poses within this motion, px, are in one minimum where a step leads from one to the other: no more than this
-/// part of the way is left, or so many variances. What a second step leaves is the distance between them.
+/// Two poses at most kReach_px apart count as one minimum if steps from one leave at most the part kLeft of the
+/// distance to the other, or a squared Mahalanobis distance below kLeftVariances.
 constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
 constexpr int kMeetingSteps = 2;
 constexpr int kMostShift_px = 12;
@@ -63,7 +64,8 @@ constexpr double kLeastGain = 0.05;
 /// The Jacobian is reused for poses within this motion, px.
 constexpr double kDerivativeServes_px = 0.2;
 /// Pixels are chosen when a step is shorter than this: those that hold the pose show details smaller than a pixel,
-/// from which steps lead nowhere from further off. After so many steps any that the derivative holds for will do.
+/// from which steps lead nowhere from further off. After kMostBeforeChoice steps, when one is shorter than
+/// kDerivativeServes_px.
 constexpr double kChooses_px = 0.1;
 constexpr int kMostBeforeChoice = 2;
 

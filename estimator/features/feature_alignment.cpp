@@ -27,9 +27,9 @@ constexpr double kStep_px = 6;
 constexpr double kFewestFreedom = 3;
 /// Steps of a smaller normalised square are noise: each view selects other features.
 constexpr double kSettledSquared = 9;
-/// Points move by so much in the motions to which the response is measured, RMS.
+/// RMS motion in the image by which the response is measured.
 constexpr double kMoved_px = 2;
-/// Of so many matches most are of points of the body: their response is not measured.
+/// From this number of matches on most are of points of the body, and the response is not measured.
 constexpr int kMany = 30;
 /// Matches that were nearer to a guess than this, RMS, need no second start.
 constexpr double kNear_px = 2 * kMoved_px;

@@ -10,7 +10,7 @@
 namespace narpa {
 namespace {
 
-/// Lit: above this part of what so many of the lit pixels exceed, and above so many standard deviations of noise.
+/// A pixel is lit if its signal is above 10 % of the 99th percentile and above five standard deviations of noise.
 constexpr double kLitPart = 0.1, kBrightPart = 0.01, kLitSigmas = 5;
 /// The frame's black is its own where the render shows nothing in at least this part of the pixels.
 constexpr double kEmptyPart = 0.01;

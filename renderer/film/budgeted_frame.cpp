@@ -12,10 +12,10 @@ using Of = PassCosts::Of;
 using Stage = SamplePlan::Stage;
 using Tiles = FramePasses::Tiles;
 
-/// Textures are averaged over the beam that a sample has where a pixel gets so many. Centres are of a frame of two,
-/// so that each takes a point of its own of the lens and of the Sun and shows what these blur.
+/// Textures are averaged over the beam that a sample has where a pixel gets so many. Centres are sampled as in a
+/// frame of two samples, so that each takes its own point of the lens and of the Sun and shows what these blur.
 constexpr int kCentreBeam = 2, kBeamSamples = 4;
-/// What waking the threads and a preempted one may take: so long, or this part of the budget if that is more.
+/// Time for waking the threads and for a preempted one: the larger of this and of one in kSlackPart of the budget.
 constexpr std::int64_t kLeastSlack_ns = 300'000;
 constexpr std::int64_t kSlackPart = 40;
 /// Of the time left, the part of the first pass of samples beyond those of all pixels, so that there soon is an
@@ -26,8 +26,8 @@ constexpr double kSunlightTimePart = 0.7;
 /// Of the rays left. Their number follows nearly exactly from that of the samples by Sun-only direct lighting; of
 /// paths it varies by a tenth from one pass to the next.
 constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
-/// Of the rays left, so much may be expected to go to one sample for each pixel: a part of the tiles shows how many
-/// rays that takes.
+/// Largest part of the remaining rays that one sample for each pixel may be expected to take: a part of the tiles
+/// shows how many that is.
 constexpr double kSure = 0.85;
 /// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
 constexpr std::uint64_t kPixelsOfACoarseRay = 4;

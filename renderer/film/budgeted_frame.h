@@ -19,7 +19,7 @@ public:
     /// measurement does not last.
     void doubt(Of what) noexcept;
     [[nodiscard]] bool known(Of what) const noexcept { return measurements_[index(what)] > 0; }
-    /// Of so many pixels or samples.
+    /// Wall time expected for this number of pixels or samples.
     [[nodiscard]] std::int64_t expected_ns(Of what, std::uint64_t pieces) const noexcept {
         return static_cast<std::int64_t>(ns_[index(what)] * static_cast<double>(pieces));
     }

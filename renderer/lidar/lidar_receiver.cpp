@@ -115,15 +115,15 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
     return possible;
 }
 
-/// That the medium scatters into the beam, before what its axis meets at `axis_m` (0: nothing); in units of a white
-/// surface that faces the Sun.
+/// Sunlight that the medium scatters into the beam, up to what its axis meets at `axis_m` (0: nothing); in units of
+/// a white surface that faces the Sun.
 float LidarReceiver::sunlight_in_air(const BodyPoses& at, const Ray& beam, double axis_m, double u) const noexcept {
     const double range_m = axis_m > 0 ? axis_m : kInfinity;
     return static_cast<float>(std::numbers::pi / tracer_.scene().sun->irradiance_w_m2 *
                               medium_->lidar_in_scattering(at, beam, range_m, u));
 }
 
-/// Of the receiver, over that in the dark.
+/// Noise of the receiver over its noise in the dark.
 double LidarReceiver::noise_in(double sunlight) const noexcept {
     return std::sqrt(1 + model_.sunlight_noise * sunlight);
 }
@@ -242,8 +242,8 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
     return count;
 }
 
-/// What arrives within a pulse's length of an echo is part of it. Of what comes later, the pulse's length with the
-/// most light is an echo of its own. `late`: of one beam, of which each brings an equal share; its order is lost.
+/// Light within a pulse's length of an echo is part of it. Of later light, the pulse's length with the most of it
+/// is an echo of its own. `late`: returns of one beam, of which each brings an equal share; its order is lost.
 /// Returns the number of echoes, the nearest first.
 std::size_t LidarReceiver::add_multipath(std::span<LidarReturn> late, EchoList& echoes,
                                          std::size_t n) const noexcept {

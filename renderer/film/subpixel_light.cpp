@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "renderer/camera/lens.h"
 #include "renderer/film/pixel_samples.h"
@@ -183,17 +184,16 @@ void Collector::put_into(RadianceImage& out, std::vector<float>* variance) const
 
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out,
                          std::vector<float>* variance) {
-    Collector collector(f, block);
-    bool met = false;
+    std::optional<Collector> collector;  // of few blocks
     for (std::size_t body = 0; body < f.at.T_world_body.size(); ++body) {
         const auto disc =
             f.subpixel_bodies.disc_within(static_cast<int>(body), block.x_first, block.y_first,
                                           block.x_first + block.width - 1, block.y_first + block.height - 1);
         if (!disc) continue;
-        collector.sample(*disc);
-        met = true;
+        if (!collector) collector.emplace(f, block);
+        collector->sample(*disc);
     }
-    if (met) collector.put_into(out, variance);
+    if (collector) collector->put_into(out, variance);
 }
 
 }  // namespace narpa

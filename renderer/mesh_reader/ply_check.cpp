@@ -48,16 +48,17 @@ Result<PlyHeader> read_header(const std::string& path, const std::string& text, 
     return header;
 }
 
-/// Whether the rest of the line has the element's values.
+/// Whether the next line that is not empty has the element's values.
 bool has_values(TextCursor& lines, const PlyElement& element) {
+    std::string_view value;
+    while (value.empty() && lines.next_line()) value = lines.token();
     for (const bool is_list : element.is_list) {
-        const std::string_view value = lines.token();
         if (value.empty()) return false;
-        if (!is_list) continue;
-        const std::optional<double> items = number_from(value);
+        const std::optional<double> items = is_list ? number_from(value) : 0;
         if (!items) return false;
         for (double i = 0; i < *items; ++i)
             if (lines.token().empty()) return false;
+        value = lines.token();
     }
     return true;
 }
@@ -78,7 +79,7 @@ Status check_ply(const std::string& path) {
     for (std::ptrdiff_t i = 0; i < header_lines; ++i) lines.next_line();
     for (const PlyElement& element : header->elements)
         for (double i = 0; i < element.count; ++i) {
-            if (lines.next_line() && has_values(lines, element)) continue;
+            if (has_values(lines, element)) continue;
             return lines.error({}, fmt::format("expected \"{}\" {} of {}, with the values of its properties",
                                                element.name, i + 1, element.count));
         }

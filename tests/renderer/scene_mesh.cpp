@@ -359,6 +359,7 @@ TEST(MeshFile, PlyTextHasTheValuesThatItsHeaderPromises) {
         return m ? "" : m.error().text().substr((folder / "m.ply").size());
     };
     EXPECT_EQ(error_of("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1 0\n"), "");
+    EXPECT_EQ(error_of("\n0 0 0\n1 0 0\n\n0 1 0\n3 0 1 2\r\n3 2 1 0"), "");
     EXPECT_EQ(error_of("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
               ":14:1: expected \"face\" 2 of 2, with the values of its properties");
     EXPECT_EQ(error_of("0 0 0\n1 0\n0 1 0\n3 0 1 2\n3 2 1 0\n"),

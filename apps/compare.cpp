@@ -9,6 +9,7 @@
 #include "apps/cli.h"
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
+#include "base/write_file.h"
 #include "emulator/camera_unit.h"
 #include "emulator/frame_tracker.h"
 #include "emulator/threads.h"

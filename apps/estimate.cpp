@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <random>
 
 #include "apps/cli.h"
@@ -72,13 +71,9 @@ Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, F
 }
 
 Status write_rows(const std::string& path, const std::vector<TrackedFrame>& tracked) {
-    std::ofstream file(path);
-    if (!file) return cannot_open_to_write(path);
-    file << kEstimateHeader << '\n';
-    for (const TrackedFrame& f : tracked) file << estimate_row(f);
-    file.flush();
-    if (!file) return Error{"cannot be written to the end", path, 0, 0, ErrorKind::failed};
-    return Ok{};
+    std::string rows = std::string(kEstimateHeader) + '\n';
+    for (const TrackedFrame& f : tracked) rows += estimate_row(f);
+    return write_file(path, rows);
 }
 
 Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_options) {

@@ -22,10 +22,6 @@ bool is_one_of(const std::string& file, const std::vector<std::string>& files) {
 
 }  // namespace
 
-std::string document_beside(const std::string& file) {
-    return std::filesystem::path(file).replace_extension(".json").string();
-}
-
 Status keep_inputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
     for (const std::string& output : outputs)
         if (is_one_of(output, inputs))

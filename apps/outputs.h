@@ -9,8 +9,6 @@
 
 namespace narpa::cli {
 
-/// FILE.json for FILE.png: the document that is written beside a picture or a capture.
-[[nodiscard]] std::string document_beside(const std::string& file);
 /// An Error that names the first output that is one of the inputs, by whatever path.
 [[nodiscard]] Status keep_inputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 /// The same of the files that a scene was read from, and `others`, where empty names are none.

@@ -1,8 +1,9 @@
-/// base/write_file.h - a whole file at once.
+/// base/write_file.h - a whole file at once, and the name of one beside another.
 #pragma once
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -14,6 +15,11 @@ namespace narpa {
 /// Of a file that could not be opened for writing, with the system's reason: call it before errno changes.
 [[nodiscard]] inline Error cannot_open_to_write(const std::string& path) {
     return {std::string("cannot be written: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
+}
+
+/// FILE.json for FILE.png: the document that is written beside a picture or a capture.
+[[nodiscard]] inline std::string document_beside(const std::string& file) {
+    return std::filesystem::path(file).replace_extension(".json").string();
 }
 
 /// Errors: cannot be opened (`missing`), cannot be written to the end (`failed`).

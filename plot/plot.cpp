@@ -11,7 +11,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -23,8 +22,6 @@
 
 namespace narpa {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Exit statuses of narpa-plot, and of a program that could not be started (posix_spawn(3)).
 constexpr int kMatplotlibMissing = 3, kNotStarted = 127;
@@ -64,10 +61,6 @@ int run_program(std::vector<std::string> arguments) {
     while (waitpid(child, &status, 0) < 0)
         if (errno != EINTR) return kNotStarted;
     return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
-}
-
-std::string document_beside(const std::string& picture) {
-    return fs::path(picture).replace_extension(".json").string();
 }
 
 Error failed(std::string what, const std::string& picture) {

@@ -1,9 +1,8 @@
 #include <atomic>
 #include <exception>
-#include <filesystem>
-#include <fstream>
 #include <utility>
 
+#include "base/write_file.h"
 #include "drivers/lidar/backends.h"
 
 namespace narpa {
@@ -20,16 +19,6 @@ private:
     std::atomic<std::uint64_t> sent_{0};
 };
 
-/// FILE.json of FILE.pcap.
-Status write_beside(const std::string& capture, std::string_view metadata) {
-    const std::string path = std::filesystem::path(capture).replace_extension(".json");
-    std::ofstream out(path);
-    out << metadata;
-    out.close();
-    if (!out) return Error{"the LiDAR's metadata cannot be written", path, 0, 0, ErrorKind::missing};
-    return Ok{};
-}
-
 }  // namespace
 
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
@@ -44,7 +33,7 @@ Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, cons
         if (text.ends_with(".pcap")) {
             auto sink = open_pcap_sink(text, network, epoch_unix_ns, wait_when_full);
             if (!sink || metadata.empty()) return sink;
-            const Status written = write_beside(text, metadata);
+            const Status written = write_file(document_beside(text), metadata);
             return written ? std::move(sink) : Result<std::unique_ptr<PacketSink>>(written.error());
         }
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
